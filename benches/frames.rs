@@ -1,7 +1,8 @@
 //! Frames a second of the built-in flight: as a whole, and with each effect left out.
 //!
-//! A second table is of terrains of different sizes: the same ground seen straight down, so that only what is out of sight differs. Sides are
-//! those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 10 GB and some minutes to make).
+//! A second table is of terrains of different sizes: the same ground seen straight down, so that only what is
+//! out of sight differs. Sides are those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 10 GB and
+//! some minutes to make).
 //!
 //! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
@@ -27,7 +28,8 @@ const EFFORT: Effort = Effort { burst: 8, rounds: 25, budget: Duration::from_sec
 const SMALL_PICTURE_PX: u32 = 256;
 
 fn main() -> Outcome<()> {
-    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know whether it works.
+    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know
+    // whether it works.
     let measuring = std::env::args().any(|argument| argument == "--bench");
     let effort = if measuring { EFFORT } else { Effort::TRY };
     let loaded = flight::load()?;
@@ -55,7 +57,10 @@ fn main() -> Outcome<()> {
     }
     let plan = variants[0].session.planner().plan(0)?;
     let [ideal_width, ideal_height] = plan.ideal.size_px;
-    println!("ideal     {ideal_width}x{ideal_height} px in frame 0, {} exposure nodes", plan.blur.map_or(1, |blur| blur.nodes));
+    println!(
+        "ideal     {ideal_width}x{ideal_height} px in frame 0, {} exposure nodes",
+        plan.blur.map_or(1, |blur| blur.nodes)
+    );
 
     measure(&mut variants, demo.frames, effort)?;
     print_table(&variants, "the full camera", effort);
@@ -70,8 +75,9 @@ fn main() -> Outcome<()> {
         let sequence = flight::ground::looking_down(demo, side.parse()?)?;
         println!("{side} x {side} heights: made in {:.1} s", begin.elapsed().as_secs_f64());
         // The smallest also with its picture in tiles.
-        for (engine, what) in
-            [(&engine, "heights"), (&with_tiles, "heights, the picture in tiles")].into_iter().take(2 - sizes.len().min(1))
+        for (engine, what) in [(&engine, "heights"), (&with_tiles, "heights, the picture in tiles")]
+            .into_iter()
+            .take(2 - sizes.len().min(1))
         {
             sizes.push(Variant::open(format!("{side} x {side} {what}"), engine, sequence.clone(), plain)?);
         }
@@ -83,9 +89,16 @@ fn main() -> Outcome<()> {
 
 fn print_table(variants: &[Variant<'_>], first: &str, effort: Effort) {
     println!("{}", say_rounds(variants, effort));
-    println!("| variant | ms a frame | frames/s | to {first} | processor ms a frame | to {first} | start, s |");
+    println!(
+        "| variant | ms a frame | frames/s | to {first} | processor ms a frame | to {first} | start, s |"
+    );
     println!("|---|---|---|---|---|---|---|");
     for variant in variants {
-        println!("| {} | {} | {:.2} |", variant.name, times(variant, &variants[0]).join(" | "), variant.start.as_secs_f64());
+        println!(
+            "| {} | {} | {:.2} |",
+            variant.name,
+            times(variant, &variants[0]).join(" | "),
+            variant.start.as_secs_f64()
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! The host's share of a frame, each part alone: plan, poses, files, and what precedes the first frame. No GPU, except for the one
-//! frame that is encoded.
+//! The host's share of a frame, each part alone: plan, poses, files, and what precedes the first frame. No
+//! GPU, except for the one frame that is encoded.
 //!
 //! `cargo bench --bench host`
 
@@ -62,25 +62,36 @@ fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
             planner.forget();
             planner.plan(black_box(60)).map(drop)
         };
-        group.bench_function(BenchmarkId::new("plan of a group of eight", name), |bencher| bencher.iter(plan_anew));
+        group.bench_function(BenchmarkId::new("plan of a group of eight", name), |bencher| {
+            bencher.iter(plan_anew)
+        });
         let plan = planner.plan(60)?;
-        group.bench_function(BenchmarkId::new("line_poses", name), |bencher| bencher.iter(|| line_poses(black_box(&plan), &sequence.path)));
+        group.bench_function(BenchmarkId::new("line_poses", name), |bencher| {
+            bencher.iter(|| line_poses(black_box(&plan), &sequence.path))
+        });
     }
     group.finish();
     Ok(())
 }
 
-/// What is drawn of a terrain: of the demo's in frame 60, and of ones of different sizes under the same camera.
+/// What is drawn of a terrain: of the demo's in frame 60, and of ones of different sizes under the same
+/// camera.
 fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let mut group = criterion.benchmark_group("terrain");
     let sequence = &loaded.sequence;
     let plan = Planner::new(sequence.clone(), &sequence.scenario.output.channels, MAX_SIDE_PX)?.plan(60)?;
     let focal_px = plan.ideal.focal_px.max_element();
     let mut measure = |name: &str, terrain: &Terrain, pose: &CameraPose| {
-        let detail = || TerrainDetail::new(black_box(terrain), pose, plan.tangents(), focal_px, plan.terrain_error_px);
+        let detail =
+            || TerrainDetail::new(black_box(terrain), pose, plan.tangents(), focal_px, plan.terrain_error_px);
         let lod = detail().mesh_to_draw().lod;
-        println!("{name}: {} triangles of {} chunks, within {:.3} px", lod.triangles, lod.chunks, lod.max_error_px);
-        group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| bencher.iter(|| detail().mesh_to_draw()));
+        println!(
+            "{name}: {} triangles of {} chunks, within {:.3} px",
+            lod.triangles, lod.chunks, lod.max_error_px
+        );
+        group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| {
+            bencher.iter(|| detail().mesh_to_draw())
+        });
     };
     if let Some(terrain) = &sequence.scene.terrain {
         measure("demo", terrain, &plan.key_pose);
@@ -89,7 +100,8 @@ fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
         let begun = Instant::now();
         let (name, terrain) = (format!("{side} x {side} heights"), rugged(side.parse()?)?);
         println!("{name}: made in {:.1} s", begun.elapsed().as_secs_f64());
-        // Over its middle: straight down, which sees none of the border, and as the demo's camera looks, to the horizon.
+        // Over its middle: straight down, which sees none of the border, and as the demo's camera looks, to
+        // the horizon.
         let position_ned_m = DVec3::new(0.0, 0.0, terrain.down_at(0.0, 0.0).unwrap_or_default() - 2000.0);
         let down = CameraPose { position_ned_m, ned_from_camera: DQuat::IDENTITY };
         measure(&format!("{name}, down"), &terrain, &down);
@@ -140,8 +152,12 @@ fn files(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
         ("EXR half, piz", ImageFormat::Exr, ExrCompression::Piz),
         ("PNG srgb8", ImageFormat::Png, ExrCompression::None),
     ] {
-        let output =
-            OutputSpec { channels: vec![Channel::Color], format: vec![format], exr_compression: compression, ..OutputSpec::default() };
+        let output = OutputSpec {
+            channels: vec![Channel::Color],
+            format: vec![format],
+            exr_compression: compression,
+            ..OutputSpec::default()
+        };
         let files = FrameFiles::new(folder.path(), &output, encoding);
         group.bench_function(name, |bencher| {
             bencher.iter_batched(
@@ -161,7 +177,8 @@ fn files(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
 /// Frame 60 of the demo.
 fn rendered(loaded: &Loaded) -> Outcome<RenderedFrame> {
     let engine = Engine::new(AdapterChoice::Best)?;
-    let mut session = engine.session::<Infallible>(loaded.sequence.clone(), &loaded.sequence.scenario.output.channels)?;
+    let mut session =
+        engine.session::<Infallible>(loaded.sequence.clone(), &loaded.sequence.scenario.output.channels)?;
     let mut frame = RenderedFrame::default();
     session.render::<Infallible>([60], &mut |finished| {
         frame = finished.frame;

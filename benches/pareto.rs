@@ -1,6 +1,8 @@
-//! Run time against error, the short form of `camsim bench`: four cases at 320x240, times and errors in one table.
+//! Run time against error, the short form of `camsim bench`: four cases at 320x240, times and errors in one
+//! table.
 //!
-//! `cargo bench --bench pareto`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter. The whole table is `camsim bench -o DIR`.
+//! `cargo bench --bench pareto`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter. The whole table is
+//! `camsim bench -o DIR`.
 
 #![allow(clippy::print_stdout, reason = "the table is what this program is for")]
 
@@ -10,7 +12,8 @@ use camsim::{
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know whether it works.
+    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know
+    // whether it works.
     let measuring = std::env::args().any(|argument| argument == "--bench");
     let engine = Engine::new(AdapterChoice::Best)?;
     let cases = if measuring { Vec::new() } else { vec!["plane-30".to_owned()] };

@@ -1,9 +1,11 @@
-//! What a frame of `benches/all_effects.toml` costs by size, by length of blur, by effect and by file format, each table with the paper's
-//! preset of the same frames in the same rounds; what the houses of `benches/houses.toml` add to their terrain; and what the plan takes ways of
-//! sampling to cost beside what they take.
+//! What a frame of `benches/all_effects.toml` costs by size, by length of blur, by effect and by file format,
+//! each table with the paper's preset of the same frames in the same rounds; what the houses of
+//! `benches/houses.toml` add to their terrain; and what the plan takes ways of sampling to cost beside what
+//! they take.
 //!
-//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `alike`, `passes`,
-//! `houses`, `costs`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`,
+//! `blur`, `effects`, `alike`, `passes`, `houses`, `costs`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks
+//! the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 
@@ -43,12 +45,16 @@ const FILE_ROUNDS: usize = 5;
 const FILE_FRAMES: &str = "32..64";
 
 fn main() -> Outcome<()> {
-    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know whether it works.
-    let (measuring, wanted): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|argument| argument == "--bench");
+    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know
+    // whether it works.
+    let (measuring, wanted): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|argument| argument == "--bench");
     let is_measuring = !measuring.is_empty();
     let engine = Engine::new(AdapterChoice::Best)?;
     println!("adapter   {}", engine.gpu().describe());
-    println!("frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table");
+    println!(
+        "frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table"
+    );
     let tables = [
         ("size", size as fn(&Engine, bool) -> Outcome<()>),
         ("blur", blur),
@@ -72,7 +78,11 @@ fn main() -> Outcome<()> {
 
 /// Frames of several sizes, the path over the exposure the same in pixels.
 fn size(engine: &Engine, is_measuring: bool) -> Outcome<()> {
-    let sizes: &[[u32; 2]] = if is_measuring { &[[640, 480], [320, 240], [1280, 960], [2560, 1920], [3840, 2160]] } else { &[[320, 240]] };
+    let sizes: &[[u32; 2]] = if is_measuring {
+        &[[640, 480], [320, 240], [1280, 960], [2560, 1920], [3840, 2160]]
+    } else {
+        &[[320, 240]]
+    };
     let mut variants = Vec::new();
     for &[width, height] in sizes {
         let k = f64::from(width) / 640.0;
@@ -90,7 +100,9 @@ fn size(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     let effort = effort(EFFORT_LARGE, is_measuring);
     measure(&mut variants, 96, effort)?;
     println!("{}", say_rounds(&variants, effort));
-    println!("| frame | ms a frame | frames/s | processor ms a frame | processor ns a pixel | to the first, a pixel, in the same round |");
+    println!(
+        "| frame | ms a frame | frames/s | processor ms a frame | processor ns a pixel | to the first, a pixel, in the same round |"
+    );
     println!("|---|---|---|---|---|---|");
     let pixels = |variant: &Variant<'_>| {
         let [width, height] = variant.session.planner().sequence().scenario.camera.size_px;
@@ -99,7 +111,8 @@ fn size(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     for variant in &variants {
         let [wall, rate, _, processor, _] = times(variant, &variants[0]);
         let ns = 1e6 * quartiles(&variant.processor_ms)[1] / pixels(variant);
-        let to_first = ratio(&variant.processor_ms, &variants[0].processor_ms) * pixels(&variants[0]) / pixels(variant);
+        let to_first =
+            ratio(&variant.processor_ms, &variants[0].processor_ms) * pixels(&variants[0]) / pixels(variant);
         println!("| {} | {wall} | {rate} | {processor} | {ns:.0} | {to_first:.2} |", variant.name);
     }
     Ok(())
@@ -112,12 +125,25 @@ fn blur(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     for exposure_ms in exposures_ms {
         let sequence = changed(&[("camera.shutter.exposure_ms", exposure_ms.to_string())])?;
         let path_px = median_path_px(engine, &sequence)?;
-        variants.push(Variant::open(format!("{exposure_ms} ms | {path_px:.1}"), engine, sequence, &[Channel::Color])?);
+        variants.push(Variant::open(
+            format!("{exposure_ms} ms | {path_px:.1}"),
+            engine,
+            sequence,
+            &[Channel::Color],
+        )?);
     }
     // The preset samples paths of any length as often as it is told.
     for samples in [100, 10] {
-        let sequence = changed(&[("quality.preset", "\"paper\"".into()), ("quality.blur_samples", samples.to_string())])?;
-        variants.push(Variant::open(format!("24 ms, {PRESET}, {samples} samples | "), engine, sequence, &[Channel::Color])?);
+        let sequence = changed(&[
+            ("quality.preset", "\"paper\"".into()),
+            ("quality.blur_samples", samples.to_string()),
+        ])?;
+        variants.push(Variant::open(
+            format!("24 ms, {PRESET}, {samples} samples | "),
+            engine,
+            sequence,
+            &[Channel::Color],
+        )?);
     }
     let effort = effort(EFFORT, is_measuring);
     measure(&mut variants, 96, effort)?;
@@ -145,7 +171,13 @@ fn alike(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     without_each(engine, &whole, None, "variant, all sampled alike", is_measuring)
 }
 
-fn without_each(engine: &Engine, whole: &Arc<Sequence>, preset: Option<Arc<Sequence>>, head: &str, is_measuring: bool) -> Outcome<()> {
+fn without_each(
+    engine: &Engine,
+    whole: &Arc<Sequence>,
+    preset: Option<Arc<Sequence>>,
+    head: &str,
+    is_measuring: bool,
+) -> Outcome<()> {
     let mut variants = Vec::new();
     for (name, without) in EFFECTS.into_iter().take(if is_measuring { EFFECTS.len() } else { 1 }) {
         variants.push(Variant::open(name, engine, without.of(whole)?, &[Channel::Color])?);
@@ -189,11 +221,17 @@ fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         let mut column: Vec<(String, Vec<f64>)> = Vec::new();
         session.render::<Infallible>(32..if is_measuring { 64 } else { 33 }, &mut |finished| {
             let times = &finished.times;
-            let host = [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: read", times.read_ms)];
+            let host = [
+                ("host: plan", times.plan_ms),
+                ("host: record", times.record_ms),
+                ("host: read", times.read_ms),
+            ];
             let device = times.passes.iter().map(|pass| (format!("device: {}", pass.name), pass.ms));
             let by_host = [("host: ideal", times.ideal_ms), ("host: reverse", times.reverse_ms)];
             let by_host = by_host.into_iter().filter_map(|(name, ms)| Some((name, ms?)));
-            for (name, ms) in host.into_iter().chain(by_host).map(|(name, ms)| (name.to_owned(), ms)).chain(device) {
+            for (name, ms) in
+                host.into_iter().chain(by_host).map(|(name, ms)| (name.to_owned(), ms)).chain(device)
+            {
                 match column.iter_mut().find(|(known, _)| *known == name) {
                     Some((_, all)) => all.push(ms),
                     None => column.push((name, vec![ms])),
@@ -229,7 +267,8 @@ const PITCHES_DEG: [f64; 3] = [-35.0, -50.0, -65.0];
 /// Scale of the ideal frame where terrain and houses are to be sampled alike.
 const ALIKE: f64 = 2.83;
 
-/// Terrain with 5000 houses on it beside the terrain alone: as the plan makes each of them, and both from ideal frames of one scale without rays.
+/// Terrain with 5000 houses on it beside the terrain alone: as the plan makes each of them, and both from
+/// ideal frames of one scale without rays.
 fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     println!(
         "\nbenches/houses.toml: terrain with 5000 houses beside the terrain alone; houses in view, scales and predicted errors are those of frame 40\n"
@@ -245,7 +284,9 @@ fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         ("quality.frames_per_ideal", "1".to_owned()),
     ];
     for pitch_deg in PITCHES_DEG.into_iter().take(if is_measuring { PITCHES_DEG.len() } else { 1 }) {
-        for (way, sets) in [("as planned", &[][..]), ("alike", &alike[..3]), ("alike, an ideal frame each", &alike)] {
+        for (way, sets) in
+            [("as planned", &[][..]), ("alike", &alike[..3]), ("alike, an ideal frame each", &alike)]
+        {
             let pitch = ("camera.mount.angles_deg", format!("[0.0, {pitch_deg:?}, 0.0]"));
             let with_houses = sequence_of("benches/houses.toml", &[&[pitch], sets].concat())?;
             let mut terrain = Sequence::clone(&with_houses);
@@ -257,24 +298,35 @@ fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
             let plans = [0, 1].map(|i| plan_of(&mut variants[i])).into_iter().collect::<Outcome<Vec<_>>>()?;
             let effort = effort(EFFORT_HOUSES, is_measuring);
             measure(&mut variants, 96, effort)?;
-            let both = |of: &dyn Fn(&FramePlan) -> String| plans.iter().map(of).collect::<Vec<_>>().join(", ");
+            let both =
+                |of: &dyn Fn(&FramePlan) -> String| plans.iter().map(of).collect::<Vec<_>>().join(", ");
             let scales = both(&|plan| format!("{:.2}", plan.ideal.focal_px.x / plan.camera.focal_px.x));
             let dn = both(&|plan| format!("{:.2}", predicted_dn(plan)));
             let [terrain, houses] = [0, 1].map(|i| &variants[i]);
             let pair = |of: &dyn Fn(&Variant<'_>) -> Vec<f64>| {
-                let [alone, with] = [of(terrain), of(houses)].map(|ms| (format!("{:.0}", quartiles(&ms)[1]), ms));
+                let [alone, with] =
+                    [of(terrain), of(houses)].map(|ms| (format!("{:.0}", quartiles(&ms)[1]), ms));
                 format!("{} | {} | {:.2}", alone.0, with.0, ratio(&with.1, &alone.1))
             };
-            let [processor, wall] = [pair(&|variant| variant.processor_ms.clone()), pair(&|variant| variant.ms.clone())];
-            println!("| {pitch_deg} degrees, {way} | {} | {scales} | {dn} | {processor} | {wall} |", in_view(&plans[1], houses));
+            let [processor, wall] =
+                [pair(&|variant| variant.processor_ms.clone()), pair(&|variant| variant.ms.clone())];
+            println!(
+                "| {pitch_deg} degrees, {way} | {} | {scales} | {dn} | {processor} | {wall} |",
+                in_view(&plans[1], houses)
+            );
         }
     }
-    println!("\nrounds    of {} frames, with and without in turn; medians, of ratios too", EFFORT_HOUSES.burst);
+    println!(
+        "\nrounds    of {} frames, with and without in turn; medians, of ratios too",
+        EFFORT_HOUSES.burst
+    );
     Ok(())
 }
 
-/// Cases of `camsim bench` and scenarios of this folder, and the scales, reads along a side and samples with which each is made.
-const COSTLY: [&str; 7] = ["plane-30", "terrain-100", "lens-s3", "lens-tangential", "blender-plane", "exposure-100", "all-effects"];
+/// Cases of `camsim bench` and scenarios of this folder, and the scales, reads along a side and samples with
+/// which each is made.
+const COSTLY: [&str; 7] =
+    ["plane-30", "terrain-100", "lens-s3", "lens-tangential", "blender-plane", "exposure-100", "all-effects"];
 const COSTLY_FILES: [&str; 2] = ["benches/all_effects.toml", "benches/houses.toml"];
 const COST_SCALES: [f64; 3] = [1.0, 1.6, 2.5];
 const COST_TAPS: [Auto<u32>; 4] = [Auto::Auto, Auto::Value(1), Auto::Value(2), Auto::Value(4)];
@@ -282,11 +334,16 @@ const COST_SAMPLES: [u32; 2] = [3, 16];
 /// Frames of each, one by one so that nothing overlaps; the first compiles.
 const COST_FRAMES: u64 = 4;
 
-/// What the plan takes the ideal and the reverse pass to cost beside what they take, by the clock of the device or of the host, whichever runs them: many ways of sampling, silhouettes left as they
-/// are. Only where its milliseconds come from the ratio should be near 1; anywhere ratios should be alike.
+/// What the plan takes the ideal and the reverse pass to cost beside what they take, by the clock of the
+/// device or of the host, whichever runs them: many ways of sampling, silhouettes left as they are. Only
+/// where its milliseconds come from the ratio should be near 1; anywhere ratios should be alike.
 fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     let mut sequences = Vec::new();
-    for case in cases()?.into_iter().filter(|case| COSTLY.contains(&case.name)).take(if is_measuring { COSTLY.len() } else { 1 }) {
+    for case in cases()?.into_iter().filter(|case| COSTLY.contains(&case.name)).take(if is_measuring {
+        COSTLY.len()
+    } else {
+        1
+    }) {
         sequences.push((case.name, case.sequence, 0));
     }
     for file in COSTLY_FILES.into_iter().filter(|_| is_measuring) {
@@ -300,11 +357,15 @@ fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         let (mut taken, mut foretold) = ([vec![], vec![]], [vec![], vec![]]);
         let ideals = || COST_SCALES.iter().flat_map(|scale| [1, 4].map(|samples| (*scale, samples)));
         let ways = || ideals().flat_map(|ideal| COST_TAPS.iter().map(move |taps| (ideal, *taps)));
-        for (((scale, ideal_samples), taps), samples) in samples.into_iter().flat_map(|samples| ways().map(move |way| (way, samples))) {
+        for (((scale, ideal_samples), taps), samples) in
+            samples.into_iter().flat_map(|samples| ways().map(move |way| (way, samples)))
+        {
             let mut forced = Sequence::clone(&sequence);
             let quality = &mut forced.scenario.quality;
-            (quality.frames_per_ideal, quality.silhouettes, quality.ideal_scale) = (1, Silhouettes::Plain, Auto::Value(scale));
-            (quality.ideal_samples, quality.footprint_taps, quality.blur_samples) = (Auto::Value(ideal_samples), taps, samples);
+            (quality.frames_per_ideal, quality.silhouettes, quality.ideal_scale) =
+                (1, Silhouettes::Plain, Auto::Value(scale));
+            (quality.ideal_samples, quality.footprint_taps, quality.blur_samples) =
+                (Auto::Value(ideal_samples), taps, samples);
             let Some(way) = pass_times(engine, Arc::new(forced), first)? else {
                 println!("\nthe adapter has no time stamps: no passes");
                 return Ok(());
@@ -315,7 +376,8 @@ fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
             }
         }
         let cells = [0, 1].map(|k: usize| {
-            let ([least, most], [low, middle, high]) = ([0.0, 1.0].map(|part| quantile(&taken[k], part)), quartiles(&foretold[k]));
+            let ([least, most], [low, middle, high]) =
+                ([0.0, 1.0].map(|part| quantile(&taken[k], part)), quartiles(&foretold[k]));
             format!("{least:.1} .. {most:.1} | {middle:.2} ({low:.2} .. {high:.2})")
         });
         println!("| {name} | {} | {} |", taken[0].len(), cells.join(" | "));
@@ -327,7 +389,8 @@ fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     Ok(())
 }
 
-/// Of the ideal and the reverse pass what they take and what the plan takes them to cost, milliseconds; `None` without time stamps.
+/// Of the ideal and the reverse pass what they take and what the plan takes them to cost, milliseconds;
+/// `None` without time stamps.
 fn pass_times(engine: &Engine, sequence: Arc<Sequence>, first: u64) -> Outcome<Option<[[f64; 2]; 2]>> {
     let frames = sequence.frames;
     let mut session = engine.session::<Infallible>(sequence, &[Channel::Color])?;
@@ -341,8 +404,18 @@ fn pass_times(engine: &Engine, sequence: Arc<Sequence>, first: u64) -> Outcome<O
             let plan = &finished.plan;
             price = [plan.ideal_price_ms, plan.price_ms - plan.ideal_price_ms];
             let by_host = [finished.times.ideal_ms, finished.times.reverse_ms];
-            for ((times, name), by_host) in taken.iter_mut().zip(["ideal", "reverse"]).zip(by_host).filter(|_| k > 0) {
-                times.extend(finished.times.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).chain(by_host));
+            for ((times, name), by_host) in
+                taken.iter_mut().zip(["ideal", "reverse"]).zip(by_host).filter(|_| k > 0)
+            {
+                times.extend(
+                    finished
+                        .times
+                        .passes
+                        .iter()
+                        .filter(|pass| pass.name == name)
+                        .map(|pass| pass.ms)
+                        .chain(by_host),
+                );
             }
             Ok(())
         })?;
@@ -363,13 +436,17 @@ fn plan_of(variant: &mut Variant<'_>) -> Outcome<FramePlan> {
 /// Over the picture, by all causes, 1/255 of the linear range.
 fn predicted_dn(plan: &FramePlan) -> f64 {
     let predicted = &plan.predicted;
-    predicted.resampling_dn.hypot(predicted.blur_dn).hypot(predicted.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn))
+    predicted
+        .resampling_dn
+        .hypot(predicted.blur_dn)
+        .hypot(predicted.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn))
 }
 
 fn in_view(plan: &FramePlan, variant: &Variant<'_>) -> u64 {
     let sequence = variant.session.planner().sequence();
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
-    ModelDetail::new(&sequence.scene, &SceneLevels::new(&sequence.scene), &plan.ideal_pose(), &tolerance).meshes
+    ModelDetail::new(&sequence.scene, &SceneLevels::new(&sequence.scene), &plan.ideal_pose(), &tolerance)
+        .meshes
 }
 
 /// The program itself, with and without files.
@@ -396,20 +473,31 @@ fn files(is_measuring: bool) -> Outcome<()> {
                 .arg(&out)
                 .output()?;
             let said = String::from_utf8_lossy(&run.stdout).into_owned();
-            let number_before =
-                |mark: &str| said.split(mark).next().and_then(|before| before.split_whitespace().last()?.parse::<f64>().ok());
-            let rate = number_before(" frames/s").ok_or_else(|| format!("no rate in: {said}{}", String::from_utf8_lossy(&run.stderr)))?;
+            let number_before = |mark: &str| {
+                said.split(mark)
+                    .next()
+                    .and_then(|before| before.split_whitespace().last()?.parse::<f64>().ok())
+            };
+            let rate = number_before(" frames/s")
+                .ok_or_else(|| format!("no rate in: {said}{}", String::from_utf8_lossy(&run.stderr)))?;
             rates[i].push(rate);
             peaks[i].extend(number_before(" MB at most"));
             std::fs::remove_dir_all(&out)?;
         }
     }
-    println!("\nrounds    {} of frames {FILE_FRAMES}, one program after the other; medians, quartiles in brackets\n", rates[0].len());
+    println!(
+        "\nrounds    {} of frames {FILE_FRAMES}, one program after the other; medians, quartiles in brackets\n",
+        rates[0].len()
+    );
     println!("| files | frames/s | to none, in the same round | memory at most, MB |");
     println!("|---|---|---|---|");
     for ((name, _), (rate, peak)) in kinds.iter().zip(rates.iter().zip(&peaks)) {
         let [low, median, high] = quartiles(rate);
-        println!("| {name} | {median:.1} ({low:.1} .. {high:.1}) | {:.2} | {:.0} |", ratio(rate, &rates[0]), quartiles(peak)[1]);
+        println!(
+            "| {name} | {median:.1} ({low:.1} .. {high:.1}) | {:.2} | {:.0} |",
+            ratio(rate, &rates[0]),
+            quartiles(peak)[1]
+        );
     }
     if let Some(mb) = peak_memory_mb() {
         println!("\nmemory of this program, with the sessions of the tables above: {mb:.0} MB at most");
@@ -421,7 +509,9 @@ fn files(is_measuring: bool) -> Outcome<()> {
 fn print_against(variants: &[Variant<'_>], head: &str) {
     let preset = variants.iter().find(|variant| variant.name.contains(PRESET));
     let base = if preset.is_some() { "preset" } else { "first" };
-    println!("| {head} | ms a frame | frames/s | to the first | processor ms a frame | to the first | times the {base}'s rate |");
+    println!(
+        "| {head} | ms a frame | frames/s | to the first | processor ms a frame | to the first | times the {base}'s rate |"
+    );
     println!("|---{}|---|---|---|---|---|---|", "|---".repeat(head.matches('|').count()));
     for variant in variants {
         let faster = ratio(&preset.unwrap_or(&variants[0]).ms, &variant.ms);
@@ -445,7 +535,8 @@ fn changed(sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
 }
 
 fn sequence_of(path: &str, sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
-    let sets: Vec<(String, String)> = sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    let sets: Vec<(String, String)> =
+        sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     Ok(load_sequence(&read_scenario(&in_repository(path), &sets, None)?)?.sequence)
 }
 
@@ -457,7 +548,8 @@ fn preset() -> Outcome<Arc<Sequence>> {
 const PATH_FRAMES: [u64; 4] = [40, 56, 72, 88];
 const PATH_PARTS: u8 = 12;
 
-/// Length of the path that a pixel's source takes over the exposure, in pixels of the camera: where renderings say that the source is at instants of it.
+/// Length of the path that a pixel's source takes over the exposure, in pixels of the camera: where
+/// renderings say that the source is at instants of it.
 fn median_path_px(engine: &Engine, sequence: &Arc<Sequence>) -> Outcome<f64> {
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords])?;
     let mut medians = Vec::new();

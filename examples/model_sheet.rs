@@ -1,4 +1,5 @@
-//! Every model below a folder, side by side: what it looks like, what of it is not shown, and which files are refused and why.
+//! Every model below a folder, side by side: what it looks like, what of it is not shown, and which files are
+//! refused and why.
 //!
 //! ```text
 //! cargo run --release --example model_sheet -- FOLDER [SHEET.png] [SECONDS]
@@ -79,7 +80,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>> {
     for entry in folder.read_dir().map_err(|error| format!("{}: {error}", folder.display()))? {
         let path = entry?.path();
-        let is_model = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb") || ending.eq_ignore_ascii_case("gltf"));
+        let is_model = path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("glb") || ending.eq_ignore_ascii_case("gltf"));
         if path.is_dir() {
             find(&path, files)?;
         } else if is_model {
@@ -94,12 +97,14 @@ fn portrait(engine: &Engine, model: &Model) -> Result<RenderedFrame, Box<dyn Err
     let place = |scale: f64| model.place(DVec3::ZERO, std::f64::consts::PI, scale).collect::<Vec<Mesh>>();
     let around = |meshes: &[Mesh]| meshes.iter().fold(Aabb::EMPTY, |all, mesh| all.union(&mesh.bounds()));
     let true_size = around(&place(1.0));
-    let radius_m = if true_size.is_empty() { 1.0 } else { (0.5 * (true_size.max - true_size.min).length()).max(1e-9) };
+    let radius_m =
+        if true_size.is_empty() { 1.0 } else { (0.5 * (true_size.max - true_size.min).length()).max(1e-9) };
     let meshes = place(1.0 / radius_m);
     let bounds = around(&meshes);
     let centre = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
     let size = bounds.max - bounds.min;
-    let [yaw, pitch] = if size.x < FLAT * size.y.max(size.z) { [0.0; 2] } else { YAW_PITCH_DEG.map(f64::to_radians) };
+    let [yaw, pitch] =
+        if size.x < FLAT * size.y.max(size.z) { [0.0; 2] } else { YAW_PITCH_DEG.map(f64::to_radians) };
     let ned_from_body = DQuat::from_euler(EulerRot::ZYX, yaw, pitch, 0.0);
     let state = BodyState {
         position_ned_m: centre - AWAY * (ned_from_body * DVec3::X),
@@ -111,10 +116,13 @@ fn portrait(engine: &Engine, model: &Model) -> Result<RenderedFrame, Box<dyn Err
     };
     let sequence = sequence(state, Scene { meshes, sky_linear: SKY, ..Scene::default() })?;
     let mut rendered = RenderedFrame::default();
-    engine.session::<WriteError>(sequence, &[Channel::Color])?.render::<WriteError>([0], &mut |finished| {
-        rendered = finished.frame;
-        Ok(())
-    })?;
+    engine.session::<WriteError>(sequence, &[Channel::Color])?.render::<WriteError>(
+        [0],
+        &mut |finished| {
+            rendered = finished.frame;
+            Ok(())
+        },
+    )?;
     Ok(rendered)
 }
 
@@ -142,7 +150,10 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         output: Default::default(),
     };
     (scenario.camera.size_px, scenario.camera.focal_px) = (SIZE_PX, [FOCAL_PX; 2]);
-    let path = CameraPath::new(Trajectory::uniform(-1.0, 2.0, 1.0, vec![state]).ok_or("no trajectory")?, &scenario.camera.mount)?;
+    let path = CameraPath::new(
+        Trajectory::uniform(-1.0, 2.0, 1.0, vec![state]).ok_or("no trajectory")?,
+        &scenario.camera.mount,
+    )?;
     Ok(Arc::new(Sequence {
         scenario,
         path: Arc::new(path),

@@ -5,8 +5,9 @@ fn main() -> std::process::ExitCode {
     camsim_cli::main()
 }
 
-/// Mesa's device-selection layer asks the desktop session which GPU to prefer; where there is no session it only prints an error for each
-/// adapter it opens. camsim ranks adapters itself, so the layer is switched off there.
+/// Mesa's device-selection layer asks the desktop session which GPU to prefer; where there is no session it
+/// only prints an error for each adapter it opens. camsim ranks adapters itself, so the layer is switched off
+/// there.
 #[expect(unsafe_code, reason = "the environment is changed before any thread exists")]
 fn hush_device_selection() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os("NODEVICE_SELECT").is_none() {

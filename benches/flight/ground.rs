@@ -62,6 +62,9 @@ pub fn looking_down(demo: &Sequence, side: u32) -> Outcome<Arc<Sequence>> {
     let mount = &mut sequence.scenario.camera.mount;
     mount.angles_deg = [0.0, -90.0, 0.0];
     sequence.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), mount)?);
-    sequence.scene = Arc::new(camsim::core::scene::Scene { terrain: Some(terrain), ..camsim::core::scene::Scene::clone(&sequence.scene) });
+    sequence.scene = Arc::new(camsim::core::scene::Scene {
+        terrain: Some(terrain),
+        ..camsim::core::scene::Scene::clone(&sequence.scene)
+    });
     Ok(Arc::new(sequence))
 }

@@ -1,9 +1,10 @@
 //! Variants in turn, and the table of what came out.
 //!
-//! A machine is never quite idle, so what is compared is measured in turn: each round renders the same few frames with every variant,
-//! and differences and ratios are medians over the rounds of those *in the same round*. A time a frame is that of a burst, two frames in
-//! flight, divided by its frames: plan, poses, passes and read-back are in it, files are not. On Linux the time that this program's
-//! threads had a processor stands beside it: with a software adapter that is the work itself, whatever else runs.
+//! A machine is never quite idle, so what is compared is measured in turn: each round renders the same few
+//! frames with every variant, and differences and ratios are medians over the rounds of those *in the same
+//! round*. A time a frame is that of a burst, two frames in flight, divided by its frames: plan, poses,
+//! passes and read-back are in it, files are not. On Linux the time that this program's threads had a
+//! processor stands beside it: with a software adapter that is the work itself, whatever else runs.
 
 use std::{
     convert::Infallible,
@@ -51,11 +52,23 @@ pub struct Variant<'a> {
 
 impl<'a> Variant<'a> {
     /// Opens a session and renders two frames: the first dispatch of a pipeline compiles it.
-    pub fn open(name: impl Into<String>, engine: &'a Engine, sequence: Arc<Sequence>, channels: &[Channel]) -> Outcome<Self> {
+    pub fn open(
+        name: impl Into<String>,
+        engine: &'a Engine,
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+    ) -> Outcome<Self> {
         let begin = Instant::now();
         let mut session = engine.session::<Infallible>(sequence, channels)?;
         render(&mut session, 0..2)?;
-        Ok(Self { name: name.into(), session, still: false, start: begin.elapsed(), ms: Vec::new(), processor_ms: Vec::new() })
+        Ok(Self {
+            name: name.into(),
+            session,
+            still: false,
+            start: begin.elapsed(),
+            ms: Vec::new(),
+            processor_ms: Vec::new(),
+        })
     }
 }
 
@@ -79,9 +92,14 @@ pub fn measure(variants: &mut [Variant<'_>], frames: u64, effort: Effort) -> Out
             }
             let busy = processor_ms();
             let begin = Instant::now();
-            render(&mut variant.session, (first..first + burst).map(|frame| if variant.still { first } else { frame }))?;
+            render(
+                &mut variant.session,
+                (first..first + burst).map(|frame| if variant.still { first } else { frame }),
+            )?;
             variant.ms.push(ms(begin.elapsed()) / burst as f64);
-            variant.processor_ms.extend(busy.zip(processor_ms()).map(|(before, after)| (after - before) / burst as f64));
+            variant
+                .processor_ms
+                .extend(busy.zip(processor_ms()).map(|(before, after)| (after - before) / burst as f64));
         }
     }
     Ok(())
@@ -97,8 +115,8 @@ fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> O
 /// What a variant's row says about its times.
 pub fn times(variant: &Variant<'_>, first: &Variant<'_>) -> [String; 5] {
     let rate = format!("{:.1}", 1e3 / quartiles(&variant.ms)[1]);
-    let [wall, processor] =
-        [(&variant.ms, &first.ms), (&variant.processor_ms, &first.processor_ms)].map(|(own, first)| against(own, first));
+    let [wall, processor] = [(&variant.ms, &first.ms), (&variant.processor_ms, &first.processor_ms)]
+        .map(|(own, first)| against(own, first));
     [wall.0, rate, wall.1, processor.0, processor.1]
 }
 
@@ -108,7 +126,8 @@ fn against(own: &[f64], first: &[f64]) -> (String, String) {
         return ("not known".to_owned(), String::new());
     }
     let [low, median, high] = quartiles(own);
-    let [_, difference, _] = quartiles(&own.iter().zip(first).map(|(own, first)| own - first).collect::<Vec<_>>());
+    let [_, difference, _] =
+        quartiles(&own.iter().zip(first).map(|(own, first)| own - first).collect::<Vec<_>>());
     (format!("{median:.1} ({low:.1} .. {high:.1})"), format!("{difference:+.1}"))
 }
 
@@ -119,5 +138,9 @@ pub fn ratio(own: &[f64], other: &[f64]) -> f64 {
 
 /// The line above a table.
 pub fn say_rounds(variants: &[Variant<'_>], effort: Effort) -> String {
-    format!("\nrounds    {} of {} frames, variants in turn; medians, quartiles in brackets\n", variants[0].ms.len(), effort.burst)
+    format!(
+        "\nrounds    {} of {} frames, variants in turn; medians, quartiles in brackets\n",
+        variants[0].ms.len(),
+        effort.burst
+    )
 }

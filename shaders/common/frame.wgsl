@@ -11,7 +11,8 @@ struct Frame {
     principal_px: vec2<f32>,
     // Depth buffer value = near_m / z.
     near_m: f32,
-    // Poses of a line over the exposure; 1 = no blur. With more than one, the mid-exposure pose follows the nodes.
+    // Poses of a line over the exposure; 1 = no blur. With more than one, the mid-exposure pose follows the
+    // nodes.
     nodes: u32,
     // 0: lines are rows, 1: lines are columns.
     line_axis: u32,
@@ -37,7 +38,8 @@ struct Frame {
     mono: u32,
     // The path over the exposure goes through every so many poses.
     node_stride: u32,
-    // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
+    // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees
+    // a silhouette.
     edge_scale: u32,
     edge_samples: u32,
     // Largest rotation of a step of the rk2 solver.
@@ -49,27 +51,31 @@ struct Frame {
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
     ned_from_key_z: vec4<f32>,
-    // The key camera's motion in its own axes, for the solvers that take it as constant: velocity of the optical centre; angular rate, and
-    // its length in w.
+    // The key camera's motion in its own axes, for the solvers that take it as constant: velocity of the
+    // optical centre; angular rate, and its length in w.
     key_velocity_m_s: vec4<f32>,
     key_rate_rad_s: vec4<f32>,
     // k1 k2 k3 of the lens.
     lens_radial: vec3<f32>,
     pad0: u32,
-    // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0 = clear).
+    // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0
+    // = clear).
     linear_fog: vec4<f32>,
-    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
+    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a
+    // share of the window.
     keys: u32,
     key_rows: u32,
     exposure_share: f32,
-    // Where a look-up of depth finds the sky, a surface so far away stands for it, pixels of the ideal frame (docs/ACCURACY.md, "Skylines").
+    // Where a look-up of depth finds the sky, a surface so far away stands for it, pixels of the ideal frame
+    // (docs/ACCURACY.md, "Skylines").
     sky_reach_px: f32,
-    // Of each ideal frame: the plane that look-ups of depth begin with, whose inverse planar depth is the product with (u, v, 1), 1/m.
+    // Of each ideal frame: the plane that look-ups of depth begin with, whose inverse planar depth is the
+    // product with (u, v, 1), 1/m.
     planes: array<vec4<f32>, 4>,
 }
 
 @group(0) @binding(0) var<uniform> given_frame: Frame;
 
-// What the kernels read, copied where they begin: llvmpipe reads each number of a uniform buffer lane by lane where a loop or condition stands around it
-// (docs/PERFORMANCE.md, "Numbers read once").
+// What the kernels read, copied where they begin: llvmpipe reads each number of a uniform buffer lane by lane
+// where a loop or condition stands around it (docs/PERFORMANCE.md, "Numbers read once").
 var<private> frame: Frame;

@@ -1,8 +1,9 @@
 // Counter-based noise: a pure function of (seed, frame, pixel, stream), so frames may come in any order.
 // Twin: camsim_core::noise.
 
-// Inverse normal CDF over octaves of the tail probability: what each segment of camsim_core::noise::tail_table begins with, and what it adds; one
-// row an octave. By the sampler of one texel (reverse/ideal_frame.wgsl): llvmpipe reads storage buffers lane by lane.
+// Inverse normal CDF over octaves of the tail probability: what each segment of
+// camsim_core::noise::tail_table begins with, and what it adds; one row an octave. By the sampler of one
+// texel (reverse/ideal_frame.wgsl): llvmpipe reads storage buffers lane by lane.
 @group(0) @binding(1) var noise_table: texture_2d<f32>;
 
 // Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
@@ -20,8 +21,9 @@ fn pcg4d(key: vec4<u32>) -> vec4<u32> {
     return v;
 }
 
-// Standard normal from 32 random bits: bit 31 is the sign, bits 30..8 the tail probability p = (m + 0.5) / 2^24.
-// The low 8 bits of pcg4d are patterned and stay unused. Multiply-add only: equal on every machine to rounding.
+// Standard normal from 32 random bits: bit 31 is the sign, bits 30..8 the tail probability p = (m + 0.5) /
+// 2^24. The low 8 bits of pcg4d are patterned and stay unused. Multiply-add only: equal on every machine to
+// rounding.
 fn normal_from_bits(bits: u32) -> f32 {
     let m = (bits >> 8u) & 0x7fffffu;
     // Octave k holds p in [2^-(k+2), 2^-(k+1)); its 16 segments are linear.

@@ -1,6 +1,7 @@
 // The key camera, and fog.
 struct IdealCamera {
-    // Clip-space scale and shift: clip.xy = scale * xy + shift * z, clip.z = near, clip.w = z (reversed, infinite far).
+    // Clip-space scale and shift: clip.xy = scale * xy + shift * z, clip.z = near, clip.w = z (reversed,
+    // infinite far).
     clip_scale: vec2<f32>,
     clip_shift: vec2<f32>,
     // Rows of camera_from_ned.

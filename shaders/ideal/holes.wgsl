@@ -1,5 +1,5 @@
-// Holes where a picture's alpha is below the cut-off. Each sample of a pixel looks for itself, so that a hole's border is one as a triangle's is. Twin:
-// camsim_core::scene::Mesh::shows.
+// Holes where a picture's alpha is below the cut-off. Each sample of a pixel looks for itself, so that a
+// hole's border is one as a triangle's is. Twin: camsim_core::scene::Mesh::shows.
 #import ideal/mesh_surface.wgsl
 
 // The picture at its full size, at a sample's place.

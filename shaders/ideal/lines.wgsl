@@ -1,5 +1,6 @@
-// The border of two surfaces within a fine pixel, as a straight line. Four samples know where a border is to a tenth of a pixel; all samples
-// along four pixels of a straight one know it to a hundredth or three. Twin: camsim_core::temporal::lines.
+// The border of two surfaces within a fine pixel, as a straight line. Four samples know where a border is to
+// a tenth of a pixel; all samples along four pixels of a straight one know it to a hundredth or three. Twin:
+// camsim_core::temporal::lines.
 
 // Half of the length along which samples must agree on a line, fine pixels: tried in this order.
 const LINE_REACH: array<f32, 2> = array<f32, 2>(4.0, 2.0);
@@ -25,8 +26,9 @@ fn sample_offset(i: i32) -> vec2<f32> {
     return places[i];
 }
 
-// A place about the middle of the pixel, in eighths, of which all samples' are whole and less than 64; above it whether the surface is the
-// nearer one. One word is read and written faster than three floats, and says the same exactly.
+// A place about the middle of the pixel, in eighths, of which all samples' are whole and less than 64; above
+// it whether the surface is the nearer one. One word is read and written faster than three floats, and says
+// the same exactly.
 fn packed_member(place: vec2<f32>, nearer: bool) -> u32 {
     let eighths = vec2<u32>(vec2<i32>(8.0 * place) + 64);
     return eighths.x | (eighths.y << 8u) | (u32(nearer) << 16u);
@@ -81,8 +83,8 @@ fn fitted_line(steps: u32) -> vec3<f32> {
     return line / max(length(line.xy), 1e-20);
 }
 
-// The line through a fine pixel, as [`packed_line`] has it, or 0 where there is none: one surface, more than two, or a corner.
-// Keys have their rows from `from_px` to before `to_px`.
+// The line through a fine pixel, as [`packed_line`] has it, or 0 where there is none: one surface, more than
+// two, or a corner. Keys have their rows from `from_px` to before `to_px`.
 fn edge_line(fine_pixel: vec2<i32>, from_px: vec2<i32>, to_px: vec2<i32>) -> vec2<u32> {
     var low = 1e30;
     var high = 0.0;

@@ -1,5 +1,5 @@
-// Marks the pixels of an ideal frame that, with their neighbours, show more than one surface, and lists the tiles of 8x8 pixels that have
-// any. Twin of `steps`: camsim_core::temporal::edges.
+// Marks the pixels of an ideal frame that, with their neighbours, show more than one surface, and lists the
+// tiles of 8x8 pixels that have any. Twin of `steps`: camsim_core::temporal::edges.
 #import common/dispatch.wgsl
 #import ideal/marked_tiles.wgsl
 
@@ -32,15 +32,16 @@ const EDGE_STEP: f32 = 0.01;
 // The same in a frame that is drawn finer: a wall's foot, where another picture begins, bends less.
 const FINE_EDGE_STEP: f32 = 0.003;
 
-// A workgroup takes 16x16 pixels, four tiles, and each of its threads 2x2: what workgroups, barriers and atomics cost is shared by four pixels.
-// Those pixels and the ones around them, row by row.
+// A workgroup takes 16x16 pixels, four tiles, and each of its threads 2x2: what workgroups, barriers and
+// atomics cost is shared by four pixels. Those pixels and the ones around them, row by row.
 const AROUND: u32 = 18u;
 var<workgroup> around: array<f32, 324>;
 // Of each tile: the bits of the largest depth value, and 64 bits for its pixels.
 var<workgroup> nearest: array<atomic<u32>, 4>;
 var<workgroup> bits: array<atomic<u32>, 8>;
 
-// Along one direction: a second difference beyond what a smooth surface has, or sky beside a surface. For four pixels.
+// Along one direction: a second difference beyond what a smooth surface has, or sky beside a surface. For
+// four pixels.
 fn steps(before: vec4<f32>, here: vec4<f32>, after: vec4<f32>, edge_step: f32) -> vec4<bool> {
     let high = max(before, max(here, after));
     let low = min(before, min(here, after));
@@ -66,7 +67,8 @@ fn marks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         around[i] = textureLoad(centre_depth, at, 0);
     }
     workgroupBarrier();
-    // The pixels of a thread are those in the middle of four rows of four: left and right above, left and right below.
+    // The pixels of a thread are those in the middle of four rows of four: left and right above, left and
+    // right below.
     let at = 2u * (local.y * AROUND + local.x);
     let r0 = row_around(at);
     let r1 = row_around(at + AROUND);

@@ -1,4 +1,5 @@
-// The terrain's triangles that are to be drawn with several samples a pixel: those near tiles that have marks.
+// The terrain's triangles that are to be drawn with several samples a pixel: those near tiles that have
+// marks.
 #import ideal/camera.wgsl
 #import ideal/terrain_vertex.wgsl
 

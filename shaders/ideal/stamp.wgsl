@@ -1,4 +1,5 @@
-// Writes the marks into the alpha of an ideal frame's colour, 0 where a pixel is marked: a filtered read then tells of a mark for nothing.
+// Writes the marks into the alpha of an ideal frame's colour, 0 where a pixel is marked: a filtered read then
+// tells of a mark for nothing.
 #import ideal/marked_tiles.wgsl
 
 struct MarkedTiles {

@@ -17,9 +17,10 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 // Where a pixel's triangle is, of which its middle may be outside: the `covered` slot.
 #import <slot:covered>
 
-// What reads the picture about a place, of which the middle's neighbours tell how large a pixel is: the `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
-// filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter.
-// Where the picture is: the `picture` slot, in one texture or in tiles.
+// What reads the picture about a place, of which the middle's neighbours tell how large a pixel is: the
+// `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
+// filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter. Where the
+// picture is: the `picture` slot, in one texture or in tiles.
 #import <slot:picture>
 @group(1) @binding(1) var surface_sampler: sampler;
 
@@ -37,7 +38,8 @@ fn pixel_at(uv: vec2<f32>) -> Pixel {
     let size = picture_size();
     let dx = dpdx(uv) * size;
     let dy = dpdy(uv) * size;
-    // The axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b, c]].
+    // The axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b,
+    // c]].
     let a = dx.x * dx.x + dy.x * dy.x;
     let b = dx.x * dx.y + dy.x * dy.y;
     let c = dx.y * dx.y + dy.y * dy.y;
@@ -61,16 +63,18 @@ struct Version {
 
 // Reads this far apart, texels, or less need no smaller version of the picture.
 const CLOSE_TEXELS: f32 = 0.8;
-// Variance (times 12) of the version for reads a texel apart: more than the 1 of their cell, because what a read lets through between the
-// cells comes back as another wave.
+// Variance (times 12) of the version for reads a texel apart: more than the 1 of their cell, because what a
+// read lets through between the cells comes back as another wave.
 const CELL_VARIANCE: f32 = 1.5;
 
-// For reads `cell` texels apart. A version of 2^level texels has the variance 3 (4^level - 1), one between two whole levels a mixture.
+// For reads `cell` texels apart. A version of 2^level texels has the variance 3 (4^level - 1), one between
+// two whole levels a mixture.
 fn version_for(cell: f32) -> Version {
     let close = cell <= CLOSE_TEXELS;
     let variance = select(CELL_VARIANCE * cell * cell, 0.0, close);
     let texels2 = variance / 3.0 + 1.0;
-    // Half of its exponent, rounded down, and 4 to the minus that: by bits, since logarithms cost as much as a read on llvmpipe. Not below 1.
+    // Half of its exponent, rounded down, and 4 to the minus that: by bits, since logarithms cost as much as
+    // a read on llvmpipe. Not below 1.
     let below = ((bitcast<u32>(texels2) >> 23u) - 127u) >> 1u;
     let level = f32(below) + (texels2 * bitcast<f32>((127u - 2u * below) << 23u) - 1.0) / 3.0;
     // Exactly 0 needs one version instead of two.

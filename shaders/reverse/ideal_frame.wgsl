@@ -5,8 +5,9 @@
 @group(1) @binding(9) var texel_sampler: sampler;
 @group(1) @binding(2) var ideal_depth: texture_2d<f32>;
 
-// A number of the frame that says where the kernel goes: how often a loop turns, whether there is something to do. What follows from uniforms alone makes
-// Mesa's lavapipe compile the kernel anew, for one frame after the other, half a second each time; what also depends on a texture it leaves alone.
+// A number of the frame that says where the kernel goes: how often a loop turns, whether there is something
+// to do. What follows from uniforms alone makes Mesa's lavapipe compile the kernel anew, for one frame after
+// the other, half a second each time; what also depends on a texture it leaves alone.
 fn told(count: u32) -> u32 {
     return min(count, 65536u * textureDimensions(ideal_color).x);
 }
@@ -25,7 +26,8 @@ fn inside_ideal(at_px: vec2<f32>) -> bool {
     return all(at_px >= vec2<f32>(-0.5)) && all(at_px <= vec2<f32>(frame.ideal_size_px) - 0.5);
 }
 
-// The four texels around a place: the first one, the last one, and how far the place is from the first to the last.
+// The four texels around a place: the first one, the last one, and how far the place is from the first to the
+// last.
 struct Around {
     first: vec2<i32>,
     last: vec2<i32>,
@@ -42,7 +44,8 @@ fn texels_around(at_px: vec2<f32>) -> Around {
     return Around(first, min(first + 1, origin + vec2<i32>(last)), at - base);
 }
 
-// Inverse planar depth 1/z, 1/m: bilinear in 1/z, which is exact on planes; the nearest texel where the four belong to different surfaces.
+// Inverse planar depth 1/z, 1/m: bilinear in 1/z, which is exact on planes; the nearest texel where the four
+// belong to different surfaces.
 fn inverse_depth(at_px: vec2<f32>) -> f32 {
     let around = texels_around(at_px);
     let b = around.first;
@@ -66,13 +69,15 @@ fn ideal_color_at(at_px: vec2<f32>) -> vec4<f32> {
     let size = vec2<f32>(textureDimensions(ideal_color));
     let last = vec2<f32>(frame.ideal_size_px) - 1.0;
     let at = clamp(at_px, vec2<f32>(0.0), last) + vec2<f32>(0.5, 0.5 + f32(key_row()));
-    // Times a reciprocal, which is worked out once: a division a sample is a twentieth of the kernel on llvmpipe.
+    // Times a reciprocal, which is worked out once: a division a sample is a twentieth of the kernel on
+    // llvmpipe.
     return textureSampleLevel(ideal_color, ideal_sampler, at * (1.0 / size), 0.0);
 }
 
-// A cubic spline's 4x4 texels as five bilinear reads, without the corners, whose weights are at most 0.4 % at softness 0 and 0.8 % at 0.5: columns and rows of
-// the reads, from before the place to after it, and their weights. Softness 0 is Catmull-Rom's, which does not blur as a bilinear read between
-// pixels does; 1 is the B-spline, with a variance of a third of a square pixel. Twin: camsim_core::temporal::ColorImage::spline.
+// A cubic spline's 4x4 texels as five bilinear reads, without the corners, whose weights are at most 0.4 % at
+// softness 0 and 0.8 % at 0.5: columns and rows of the reads, from before the place to after it, and their
+// weights. Softness 0 is Catmull-Rom's, which does not blur as a bilinear read between pixels does; 1 is the
+// B-spline, with a variance of a third of a square pixel. Twin: camsim_core::temporal::ColorImage::spline.
 struct Spline {
     before: vec2<f32>,
     between: vec2<f32>,

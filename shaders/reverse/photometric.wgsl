@@ -1,4 +1,5 @@
-// Vignette, light, noise, saturation on linear values (paper section 7, fig. 9). Twin: camsim_core::photometric.
+// Vignette, light, noise, saturation on linear values (paper section 7, fig. 9). Twin:
+// camsim_core::photometric.
 
 // Vignette weights at output size, after thresholds; one texel of 1.0 when there is no vignette.
 @group(1) @binding(4) var vignette: texture_2d<f32>;

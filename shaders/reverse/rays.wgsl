@@ -1,6 +1,6 @@
-// The pixels that the reverse pass has listed: those that see several surfaces get the mean of rays of their own instead of what was gathered
-// plainly; depth and coordinates are those of the surface that the pixel's own ray meets, which the host tells for solvers that look where it
-// is. Slots as in reverse.wgsl.
+// The pixels that the reverse pass has listed: those that see several surfaces get the mean of rays of their
+// own instead of what was gathered plainly; depth and coordinates are those of the surface that the pixel's
+// own ray meets, which the host tells for solvers that look where it is. Slots as in reverse.wgsl.
 #import common/frame.wgsl
 #import common/noise.wgsl
 #import reverse/ideal_frame.wgsl

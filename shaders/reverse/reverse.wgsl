@@ -1,6 +1,6 @@
-// The reverse pipeline (paper section 2): for each output pixel
-//   lens inverse (a map) -> line time and pose -> temporal inverse -> gather over the exposure -> photometric -> output.
-// Slots are filled by the pipeline key; every filling of a slot defines the same functions.
+// The reverse pipeline (paper section 2): for each output pixel lens inverse (a map) -> line time and pose ->
+// temporal inverse -> gather over the exposure -> photometric -> output. Slots are filled by the pipeline
+// key; every filling of a slot defines the same functions.
 #import common/frame.wgsl
 #import common/noise.wgsl
 #import reverse/ideal_frame.wgsl

@@ -25,14 +25,24 @@ pub struct Console<'a> {
 
 impl fmt::Debug for Console<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Console").field("quiet", &self.quiet).field("verbose", &self.verbose).finish_non_exhaustive()
+        f.debug_struct("Console")
+            .field("quiet", &self.quiet)
+            .field("verbose", &self.verbose)
+            .finish_non_exhaustive()
     }
 }
 
 impl<'a> Console<'a> {
     /// Answers to `out`, the rest to `err`.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write) -> Self {
-        Self { out: io::BufWriter::new(out), err, quiet: false, verbose: false, typed: Vec::new(), scenario: None }
+        Self {
+            out: io::BufWriter::new(out),
+            err,
+            quiet: false,
+            verbose: false,
+            typed: Vec::new(),
+            scenario: None,
+        }
     }
 
     /// What was typed, for hints that name a command.
@@ -58,14 +68,16 @@ impl<'a> Console<'a> {
         words.chain([option.as_ref()]).map(quoted).collect::<Vec<_>>().join(" ")
     }
 
-    /// Text whose commands name the scenario in place of `SCENARIO.toml`, with the options that change it where the command takes them.
+    /// Text whose commands name the scenario in place of `SCENARIO.toml`, with the options that change it
+    /// where the command takes them.
     #[must_use]
     pub fn whole(&self, text: &str) -> String {
         let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
         let path = quoted(scenario.as_os_str());
         let words = changes.iter().map(|word| quoted(word.as_ref()));
         let with_changes = std::iter::once(path.clone()).chain(words).collect::<Vec<_>>().join(" ");
-        text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}")).replace("SCENARIO.toml", &with_changes)
+        text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}"))
+            .replace("SCENARIO.toml", &with_changes)
     }
 
     /// `-q` and `-v`.
@@ -159,7 +171,11 @@ impl<'a> Console<'a> {
 pub fn quoted(word: &OsStr) -> String {
     let text = word.to_string_lossy();
     let is_plain = |c: char| c.is_alphanumeric() || "_./=:,@%+-".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    if !text.is_empty() && text.chars().all(is_plain) {
+        text.into_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }
 
 #[cfg(test)]
@@ -172,9 +188,11 @@ mod tests {
         let mut console = Console::new(&mut out, &mut err);
         let hint = "see `camsim lens SCENARIO.toml check` and `camsim explain SCENARIO.toml --frame 5`";
         assert_eq!(console.whole(hint), hint);
-        console.set_scenario(Path::new("my flights/a.toml"), vec!["--set".into(), "camera.size_px=[9, 9]".into()]);
-        let whole =
-            "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' --set 'camera.size_px=[9, 9]' --frame 5`";
+        console.set_scenario(
+            Path::new("my flights/a.toml"),
+            vec!["--set".into(), "camera.size_px=[9, 9]".into()],
+        );
+        let whole = "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' --set 'camera.size_px=[9, 9]' --frame 5`";
         assert_eq!(console.whole(hint), whole);
         console.set_typed(["target/camsim", "render", "it's.toml", "-o", "out"].map(OsString::from).to_vec());
         assert_eq!(console.command_with("--resume"), "target/camsim render 'it'\\''s.toml' -o out --resume");

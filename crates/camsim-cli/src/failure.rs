@@ -127,7 +127,9 @@ mod tests {
 
     #[test]
     fn causes_are_listed_once() {
-        let deep = anyhow::anyhow!("disk full").context("frame_000001.exr: cannot be written: disk full").context("rendering stopped");
+        let deep = anyhow::anyhow!("disk full")
+            .context("frame_000001.exr: cannot be written: disk full")
+            .context("rendering stopped");
         assert_eq!(
             Failure::failed(deep).to_string(),
             "error: rendering stopped\n  caused by: frame_000001.exr: cannot be written: disk full"
@@ -136,7 +138,9 @@ mod tests {
 
     #[test]
     fn a_reader_that_left_is_told_from_other_faults() {
-        let left = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe)).context("writing to standard output").unwrap_err();
+        let left = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe))
+            .context("writing to standard output")
+            .unwrap_err();
         assert!(Failure::failed(left).is_broken_pipe());
         assert!(!Failure::from(io::Error::from(io::ErrorKind::StorageFull)).is_broken_pipe());
     }
@@ -145,7 +149,8 @@ mod tests {
     fn adapters_have_their_own_code() {
         assert_eq!(Failure::from(GpuError::NoAdapter(String::new())).code(), NO_ADAPTER);
         assert_eq!(Failure::from(GpuError::Device("lost".into())).code(), FAILED);
-        let setting = GpuError::Setting { name: "CAMSIM_REVERSE", value: "gpu".into(), allowed: "`device` or `host`" };
+        let setting =
+            GpuError::Setting { name: "CAMSIM_REVERSE", value: "gpu".into(), allowed: "`device` or `host`" };
         assert_eq!(setting.to_string(), "CAMSIM_REVERSE=gpu: set it to `device` or `host`, or not at all");
         assert_eq!(Failure::from(setting).code(), BAD_INPUT);
     }

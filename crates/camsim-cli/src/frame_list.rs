@@ -35,7 +35,10 @@ impl fmt::Display for FrameListError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Syntax(part) => {
-                write!(f, "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas")
+                write!(
+                    f,
+                    "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"
+                )
             }
             Self::Empty(part) => write!(f, "`{part}` holds no frame: the end must be above the start"),
             Self::Outside { asked_by, frame, frames } => {
@@ -97,7 +100,11 @@ impl FrameList {
         for part in &self.0 {
             let end = part.end.unwrap_or_else(|| frames.max(part.first + 1));
             if end > frames {
-                return Err(FrameListError::Outside { asked_by: "--frames", frame: part.first.max(frames).min(end - 1), frames });
+                return Err(FrameListError::Outside {
+                    asked_by: "--frames",
+                    frame: part.first.max(frames).min(end - 1),
+                    frames,
+                });
             }
             list.extend(part.first..end);
         }
@@ -118,7 +125,8 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        let numbers =
+            text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
         match numbers {
             Some((index, count)) if (1..=count).contains(&index) => Ok(Self([index, count])),
             _ => Err("write I/N with I from 1 to N: 1/4 is the first of four shards".to_owned()),
@@ -154,7 +162,18 @@ mod tests {
 
     #[test]
     fn what_is_no_range_is_refused() {
-        for text in ["", "a", "1..b", "-1", "1...3", "..=", "1,,2", "1..=18446744073709551615", "99999999999999999999", "+3"] {
+        for text in [
+            "",
+            "a",
+            "1..b",
+            "-1",
+            "1...3",
+            "..=",
+            "1,,2",
+            "1..=18446744073709551615",
+            "99999999999999999999",
+            "+3",
+        ] {
             assert!(matches!(text.parse::<FrameList>(), Err(FrameListError::Syntax(_))), "{text}");
         }
         for text in ["3..3", "5..2", "..0"] {

@@ -72,7 +72,8 @@ const SHARE_OF_TOLERANCE: f64 = 0.25;
 /// No texture is made of the ideal frame, so nearly any size will do, and any number of pixels.
 const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 
-/// The oracle. Plans only say which ideal frame source coordinates refer to: the one that the engine would use.
+/// The oracle. Plans only say which ideal frame source coordinates refer to: the one that the engine would
+/// use.
 #[derive(Debug)]
 pub struct Rays {
     oracle: Oracle,
@@ -86,8 +87,9 @@ impl Rays {
         let scenario = &sequence.scenario;
         let mut planned = Sequence::clone(sequence);
         planned.scenario.quality.solver = Auto::Auto;
-        let planner =
-            Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX).or_bad_input()?.with_ideals_of_any_area();
+        let planner = Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX)
+            .or_bad_input()?
+            .with_ideals_of_any_area();
         let options = RenderOptions {
             channels: scenario.output.channels.clone(),
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
@@ -111,7 +113,14 @@ impl FrameSource for Rays {
             let plan = self.planner.plan(frame).or_bad_input()?;
             let options = RenderOptions { key: Some(plan.ideal_view()), ..self.options.clone() };
             let frame = self.oracle.render(frame, &options);
-            sink(Finished { frame, plan, lod: LodSelection::default(), out_of_order: 0, times: FrameTimes::default() }).or_failed()?;
+            sink(Finished {
+                frame,
+                plan,
+                lod: LodSelection::default(),
+                out_of_order: 0,
+                times: FrameTimes::default(),
+            })
+            .or_failed()?;
         }
         Ok(())
     }

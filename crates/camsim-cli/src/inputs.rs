@@ -41,7 +41,10 @@ impl Changes {
     /// As they are typed.
     fn words(&self) -> Vec<String> {
         let sets = self.sets.iter().flat_map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
-        let preset = self.preset.iter().flat_map(|preset| ["--preset".to_owned(), format!("{preset:?}").to_lowercase()]);
+        let preset = self
+            .preset
+            .iter()
+            .flat_map(|preset| ["--preset".to_owned(), format!("{preset:?}").to_lowercase()]);
         sets.chain(preset).collect()
     }
 }
@@ -86,7 +89,10 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
 }
 
 /// Loads the log and tracks it; no scene is read.
-pub fn load_flight_only(scenario: &Scenario, console: &mut Console<'_>) -> Result<(FlightLog, Tracked), Failure> {
+pub fn load_flight_only(
+    scenario: &Scenario,
+    console: &mut Console<'_>,
+) -> Result<(FlightLog, Tracked), Failure> {
     let (log, tracked) = load_flight(scenario).or_bad_input()?;
     for warning in flight_warnings(scenario, &log, &tracked) {
         console.warn(warning);

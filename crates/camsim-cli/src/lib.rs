@@ -1,8 +1,8 @@
 //! The camsim command line: arguments -> scenario -> engine -> writers.
 //!
-//! Each command is one file in `commands/` with its arguments and a `run`. Everything else is shared: [`console`] (where text goes),
-//! [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list` (`--frames`), `frame_source` (what
-//! renders), `render_run` (from there to an output folder).
+//! Each command is one file in `commands/` with its arguments and a `run`. Everything else is shared:
+//! [`console`] (where text goes), [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list`
+//! (`--frames`), `frame_source` (what renders), `render_run` (from there to an output folder).
 
 use std::{
     ffi::OsString,

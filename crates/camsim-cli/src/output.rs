@@ -21,7 +21,9 @@ pub fn write_output(
 ) -> Result<(), Failure> {
     match path {
         None => Ok(fill(console.stdout())?),
-        Some(path) => write_file(path, fill).with_context(|| format!("{}: cannot be written", path.display())).or_failed(),
+        Some(path) => write_file(path, fill)
+            .with_context(|| format!("{}: cannot be written", path.display()))
+            .or_failed(),
     }
 }
 
@@ -30,7 +32,8 @@ pub fn write_output(
 /// # Errors
 /// As [`write_output`] would fail.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
-    let tried = part_of(path).and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
+    let tried = part_of(path)
+        .and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
     tried.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
 }
 
@@ -43,7 +46,9 @@ pub fn check_folder(folder: &Path) -> Result<(), Failure> {
         .with_context(|| format!("{}: cannot be made; choose another folder with -o", folder.display()))
         .or_failed()?;
     let tried = part_of(&folder.join("camsim")).and_then(|part| touch(&part));
-    tried.with_context(|| format!("{}: cannot be written to; choose another folder with -o", folder.display())).or_failed()
+    tried
+        .with_context(|| format!("{}: cannot be written to; choose another folder with -o", folder.display()))
+        .or_failed()
 }
 
 fn touch(part: &Path) -> io::Result<()> {
@@ -84,7 +89,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.csv");
         check_output(&path).unwrap();
-        assert!(check_output(folder.path()).is_err() && check_output(&folder.path().join("none/out.csv")).is_err());
+        assert!(
+            check_output(folder.path()).is_err()
+                && check_output(&folder.path().join("none/out.csv")).is_err()
+        );
         check_folder(&folder.path().join("a/b")).unwrap();
         std::fs::write(&path, "a file").unwrap();
         assert!(check_folder(&path).is_err() && check_folder(&path.join("below")).is_err());

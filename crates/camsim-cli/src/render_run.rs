@@ -76,8 +76,8 @@ impl Outcome {
     }
 }
 
-/// Renders; `look` sees each finished frame before it is written, and can stop the run, as Ctrl-C can: frames that are written then stay, the tables are of
-/// them, and `run.json` says that it is not finished.
+/// Renders; `look` sees each finished frame before it is written, and can stop the run, as Ctrl-C can: frames
+/// that are written then stay, the tables are of them, and `run.json` says that it is not finished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
@@ -89,7 +89,12 @@ pub fn run(
     let inputs = inputs::of_scenario(scenario);
     let adapter = source.adapter();
     folder::check(job, &files, &inputs, &adapter, console)?;
-    let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
+    let mine: Vec<u64> = job
+        .frames
+        .iter()
+        .copied()
+        .filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0)))
+        .collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // What cannot be planned is refused before anything is written.
     let begin = Instant::now();
@@ -145,7 +150,10 @@ pub fn run(
     let time = begin.elapsed();
     let said: Vec<String> = if rendered.is_ok() {
         let unseen = unseen_warnings(blind, empty, todo.len()).chain(rings.warning(todo.len()));
-        unseen.chain(tolerances.iter().flat_map(Tolerances::warnings)).map(|warning| console.whole(&warning)).collect()
+        unseen
+            .chain(tolerances.iter().flat_map(Tolerances::warnings))
+            .map(|warning| console.whole(&warning))
+            .collect()
     } else {
         Vec::new()
     };
@@ -156,9 +164,17 @@ pub fn run(
     let told = finish(job, &files, &made, &manifest, source);
     if is_stopped && written.is_ok() {
         told?;
-        let done = if writes_frames { mine.iter().filter(|&&frame| files.exist(frame)).count() as u64 } else { manifest.written };
+        let done = if writes_frames {
+            mine.iter().filter(|&&frame| files.exist(frame)).count() as u64
+        } else {
+            manifest.written
+        };
         let folder = job.folder.display();
-        return Err(Failure::interrupted(anyhow!("{done} of {} frames are in {folder}; to go on: {}", mine.len(), job.go_on)));
+        return Err(Failure::interrupted(anyhow!(
+            "{done} of {} frames are in {folder}; to go on: {}",
+            mine.len(),
+            job.go_on
+        )));
     }
     rendered?;
     let bytes = written?.map_or(0, |summary| summary.bytes);
@@ -166,7 +182,8 @@ pub fn run(
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
 }
 
-/// Writes what there is to say before the first frame; of a folder of another scenario nothing stays that this one could take for its own.
+/// Writes what there is to say before the first frame; of a folder of another scenario nothing stays that
+/// this one could take for its own.
 fn prepare(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -221,7 +238,11 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 
 /// The command that renders what a folder's own scenario has beyond the frames that are there.
 pub fn go_on(folder: &Path) -> String {
-    format!("camsim render {} -o {} --resume", quoted(folder.join("run.json").as_os_str()), quoted(folder.as_os_str()))
+    format!(
+        "camsim render {} -o {} --resume",
+        quoted(folder.join("run.json").as_os_str()),
+        quoted(folder.as_os_str())
+    )
 }
 
 fn threads() -> usize {

@@ -59,7 +59,8 @@ impl TimesTable {
         }
     }
 
-    /// Median and largest of each part, and in how many frames there was one: what is kept from frame to frame is not done again.
+    /// Median and largest of each part, and in how many frames there was one: what is kept from frame to
+    /// frame is not done again.
     #[must_use]
     pub fn text(&mut self) -> String {
         let mut text = format!("{:<24}{:>10}{:>10}{:>10}\n", "ms a frame", "median", "largest", "frames");

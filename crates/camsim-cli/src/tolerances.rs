@@ -22,10 +22,11 @@ struct Broken {
 }
 
 impl Tolerances {
-    /// `None` where the user asks for methods whatever their error: those of the paper; and for the oracle, which has no plan.
+    /// `None` where the user asks for methods whatever their error: those of the paper; and for the oracle,
+    /// which has no plan.
     pub fn new(quality: &QualitySpec) -> Option<Self> {
-        let is_asked_for =
-            quality.preset == Preset::Paper || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle));
+        let is_asked_for = quality.preset == Preset::Paper
+            || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle));
         let broken = |key, unit, tolerance| Broken { key, unit, tolerance, frames: 0, worst: None };
         (!is_asked_for).then(|| Self {
             px: broken("quality.max_error_px", " px", quality.max_error_px),
@@ -139,7 +140,9 @@ mod tests {
     fn rings_are_told_of_the_frame_with_most() {
         let mut rings = Rings::default();
         assert_eq!(rings.warning(0), None);
-        [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)].into_iter().for_each(|(frame, count)| rings.add(frame, count));
+        [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)]
+            .into_iter()
+            .for_each(|(frame, count)| rings.add(frame, count));
         let said = rings.warning(5).unwrap();
         assert!(
             said.starts_with("in 4 of 5 frames blended triangles cover each other in rings, so that up to 7, in frame 5, are mixed before"),
@@ -160,7 +163,9 @@ mod tests {
     fn methods_asked_for_by_name_are_not_judged() {
         let of = |solver| Tolerances::new(&QualitySpec { solver, ..QualitySpec::default() }).is_some();
         assert!(of(Auto::Auto) && of(Auto::Value(Solver::Reproject)));
-        assert!(![Solver::Linear, Solver::Rk2, Solver::Oracle].into_iter().any(|solver| of(Auto::Value(solver))));
+        assert!(
+            ![Solver::Linear, Solver::Rk2, Solver::Oracle].into_iter().any(|solver| of(Auto::Value(solver)))
+        );
         assert!(Tolerances::new(&QualitySpec { preset: Preset::Paper, ..QualitySpec::default() }).is_none());
     }
 }

@@ -20,8 +20,15 @@ const BETWEEN: char = '\u{1f}';
 fn runs_as_the_program() {
     let Ok(args) = std::env::var(ARGS) else { return };
     let (mut out, mut err) = (std::io::stdout(), std::io::stderr());
-    let code = camsim_cli::run(std::iter::once("camsim").chain(args.split(BETWEEN)).map(OsString::from), &mut out, &mut err);
-    #[allow(clippy::disallowed_methods, reason = "the exit code is what is tested, and nothing is left to be dropped")]
+    let code = camsim_cli::run(
+        std::iter::once("camsim").chain(args.split(BETWEEN)).map(OsString::from),
+        &mut out,
+        &mut err,
+    );
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "the exit code is what is tested, and nothing is left to be dropped"
+    )]
     std::process::exit(i32::from(code));
 }
 
@@ -31,7 +38,10 @@ fn spawn(folder: &Path, args: &[&str]) -> Child {
 
 fn program(folder: &Path, args: &[&str]) -> Command {
     let mut program = Command::new(std::env::current_exe().unwrap());
-    program.args(["--exact", "runs_as_the_program", "--nocapture"]).env(ARGS, args.join(&BETWEEN.to_string())).current_dir(folder);
+    program
+        .args(["--exact", "runs_as_the_program", "--nocapture"])
+        .env(ARGS, args.join(&BETWEEN.to_string()))
+        .current_dir(folder);
     program.stdout(Stdio::piped()).stderr(Stdio::piped());
     program
 }
@@ -62,13 +72,23 @@ const SMALL: [&str; 10] = [
 ];
 
 fn pattern() -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml").canonicalize().unwrap().to_str().unwrap().to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../assets/pattern.toml")
+        .canonicalize()
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .to_owned()
 }
 
 /// Renders the pattern, small, into a folder.
 fn render(base: &Path, out: &str, more: &[&str]) -> (i32, String) {
     let pattern = pattern();
-    camsim(base, &[&["render", &pattern, "-o", out, "--outputs", "color,coords,depth,rows"][..], &SMALL, more].concat())
+    camsim(
+        base,
+        &[&["render", &pattern, "-o", out, "--outputs", "color,coords,depth,rows"][..], &SMALL, more]
+            .concat(),
+    )
 }
 
 fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -90,7 +110,15 @@ fn frames(folder: &Path) -> Vec<BTreeMap<String, String>> {
     let text = fs::read_to_string(folder.join("frames.csv")).unwrap();
     let mut lines = text.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-    lines.map(|line| columns.iter().zip(line.split(',')).map(|(column, cell)| ((*column).to_owned(), cell.to_owned())).collect()).collect()
+    lines
+        .map(|line| {
+            columns
+                .iter()
+                .zip(line.split(','))
+                .map(|(column, cell)| ((*column).to_owned(), cell.to_owned()))
+                .collect()
+        })
+        .collect()
 }
 
 fn numbers(folder: &Path) -> Vec<u64> {
@@ -102,13 +130,17 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
     let base = tempfile::tempdir().unwrap();
     let at = |name: &str| base.path().join(name);
     camsim_io::builtin::unpack(&at("made/demo/scene")).unwrap();
-    let more = [&SMALL[..], &["--frames", "0..3", "--outputs", "color,coords,rows", "--format", "exr,png"]].concat();
-    let (code, err) = camsim(&at("made"), &[&["render", "demo/scene/demo.toml", "-o", "demo"][..], &more].concat());
+    let more =
+        [&SMALL[..], &["--frames", "0..3", "--outputs", "color,coords,rows", "--format", "exr,png"]].concat();
+    let (code, err) =
+        camsim(&at("made"), &[&["render", "demo/scene/demo.toml", "-o", "demo"][..], &more].concat());
     assert_eq!(code, 0, "{err}");
     let made = files_below(&at("made/demo"));
     let run = String::from_utf8(made[Path::new("run.json")].clone()).unwrap();
     assert!(
-        run.contains("\"log\": \"scene/demo_flight.csv\"") && run.contains("\"scene/demo_dem.tif\": ") && !run.contains("../"),
+        run.contains("\"log\": \"scene/demo_flight.csv\"")
+            && run.contains("\"scene/demo_dem.tif\": ")
+            && !run.contains("../"),
         "{run}"
     );
     assert!(!run.contains(base.path().to_str().unwrap()), "{run}");
@@ -121,7 +153,8 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
     fs::rename(at("made/demo"), at("far/away/copy")).unwrap();
     fs::remove_dir_all(at("made")).unwrap();
     let frames = ["--frames", "0..3"];
-    let (code, err) = camsim(&at("work"), &[&["render", "../far/away/copy/run.json", "-o", "again"][..], &frames].concat());
+    let (code, err) =
+        camsim(&at("work"), &[&["render", "../far/away/copy/run.json", "-o", "again"][..], &frames].concat());
     assert_eq!(code, 0, "{err}");
     let again = files_below(&at("work/again"));
     for (name, bytes) in made.iter().filter(|(name, _)| !name.starts_with("scene")) {
@@ -132,12 +165,15 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
     }
     assert_eq!(again[Path::new("inputs/vignette.png")], made[Path::new("scene/vignette.png")]);
     // Into itself all is as it was, to the byte; and what is there is taken for done.
-    let (code, err) = camsim(&at("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
+    let (code, err) =
+        camsim(&at("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
     assert_eq!(code, 0, "{err}");
     assert!(files_below(&at("far/away/copy")) == made);
-    let (code, err) = camsim(&at("far/away/copy"), &["render", "run.json", "-o", ".", "--frames", "0..4", "--resume"]);
+    let (code, err) =
+        camsim(&at("far/away/copy"), &["render", "run.json", "-o", ".", "--frames", "0..4", "--resume"]);
     assert_eq!(code, 0, "{err}");
-    let run: serde_json::Value = serde_json::from_slice(&fs::read(at("far/away/copy/run.json")).unwrap()).unwrap();
+    let run: serde_json::Value =
+        serde_json::from_slice(&fs::read(at("far/away/copy/run.json")).unwrap()).unwrap();
     assert_eq!((run["written"].as_u64(), run["skipped"].as_u64()), (Some(1), Some(3)));
 
     // The camera of either folder by itself.
@@ -172,7 +208,18 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
     // Two at once.
     let pattern = pattern();
     let shard = |shard: &str| {
-        let args = ["render", &pattern, "-o", "shards", "--outputs", "color,coords,depth,rows", "--frames", "2..8", "--shard", shard];
+        let args = [
+            "render",
+            &pattern,
+            "-o",
+            "shards",
+            "--outputs",
+            "color,coords,depth,rows",
+            "--frames",
+            "2..8",
+            "--shard",
+            shard,
+        ];
         spawn(base.path(), &[&args[..], &SMALL].concat())
     };
     for child in ["1/3", "2/3", "3/3"].map(shard) {
@@ -184,23 +231,38 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
     fs::remove_file(at("parts/color/frame_000003.exr")).unwrap();
     done("parts", &["--frames", "7", "--resume"]);
     let rows = frames(&at("parts"));
-    assert!(rows[1]["frame"] == "3" && rows[1]["color_exr"].is_empty() && rows[1]["depth"] == "depth/frame_000003.exr", "{rows:?}");
+    assert!(
+        rows[1]["frame"] == "3"
+            && rows[1]["color_exr"].is_empty()
+            && rows[1]["depth"] == "depth/frame_000003.exr",
+        "{rows:?}"
+    );
     fs::remove_file(at("parts/frames.csv")).unwrap();
     done("parts", &["--frames", "2..8", "--resume"]);
     assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
     // Another channel of the same frames stands beside.
-    let channel =
-        camsim(base.path(), &[&["render", &pattern, "-o", "parts", "--outputs", "valid", "--frames", "2..4"][..], &SMALL].concat());
+    let channel = camsim(
+        base.path(),
+        &[&["render", &pattern, "-o", "parts", "--outputs", "valid", "--frames", "2..4"][..], &SMALL]
+            .concat(),
+    );
     assert_eq!(channel.0, 0, "{}", channel.1);
     let rows = frames(&at("parts"));
-    assert!(rows.len() == 6 && rows[0]["valid"] == "valid/frame_000002.png" && rows[0]["coords"] == "coords/frame_000002.exr", "{rows:?}");
+    assert!(
+        rows.len() == 6
+            && rows[0]["valid"] == "valid/frame_000002.png"
+            && rows[0]["coords"] == "coords/frame_000002.exr",
+        "{rows:?}"
+    );
     assert!(rows[5]["valid"].is_empty(), "{rows:?}");
 
     // Another scenario between these frames is refused before anything is touched ...
     let before = files_below(&at("whole"));
     let (code, err) = render(base.path(), "whole", &["--frames", "2..4", "--set", "seed=99"]);
     assert!(
-        code == 2 && err.contains("seed was 12, now 99") && err.contains("20 files of frames, color/frame_000004.exr the first"),
+        code == 2
+            && err.contains("seed was 12, now 99")
+            && err.contains("20 files of frames, color/frame_000004.exr the first"),
         "{err}"
     );
     assert!(files_below(&at("whole")) == before);
@@ -227,13 +289,18 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
     let out = base.path().join("my out");
     let pattern = pattern();
     // Enough work for a signal to come in between.
-    let args =
-        [&["render", &pattern, "-o", "my out", "--outputs", "color,rows"][..], &SMALL, &["--set", "camera.size_px=[64, 48]"]].concat();
+    let args = [
+        &["render", &pattern, "-o", "my out", "--outputs", "color,rows"][..],
+        &SMALL,
+        &["--set", "camera.size_px=[64, 48]"],
+    ]
+    .concat();
     let child = spawn(base.path(), &args);
     let begin = Instant::now();
     let count = || {
-        fs::read_dir(out.join("rows"))
-            .map_or(0, |files| files.flatten().filter(|file| !file.file_name().to_string_lossy().starts_with('.')).count())
+        fs::read_dir(out.join("rows")).map_or(0, |files| {
+            files.flatten().filter(|file| !file.file_name().to_string_lossy().starts_with('.')).count()
+        })
     };
     while count() < 2 {
         assert!(begin.elapsed() < Duration::from_secs(120), "no frame came");
@@ -247,11 +314,26 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
     assert!(err.contains("stopping after the frames that are under way"), "{err}");
     let told = err.lines().find(|line| line.starts_with("stopped: ")).unwrap_or_else(|| panic!("{err}"));
     let done = count();
-    assert!(done < 60 && told.starts_with(&format!("stopped: {done} of 60 frames are in my out; to go on: camsim render ")), "{told}");
-    assert!(told.contains(" -o 'my out' ") && told.contains("--set 'camera.size_px=[64, 48]'") && told.ends_with(" --resume"), "{told}");
+    assert!(
+        done < 60
+            && told.starts_with(&format!(
+                "stopped: {done} of 60 frames are in my out; to go on: camsim render "
+            )),
+        "{told}"
+    );
+    assert!(
+        told.contains(" -o 'my out' ")
+            && told.contains("--set 'camera.size_px=[64, 48]'")
+            && told.ends_with(" --resume"),
+        "{told}"
+    );
     // What is written is listed, all of it and nothing else.
     assert_eq!(numbers(&out), (0..done as u64).collect::<Vec<_>>());
-    assert!(frames(&out).iter().all(|row| out.join(&row["color_exr"]).is_file() && out.join(&row["rows"]).is_file()));
+    assert!(
+        frames(&out)
+            .iter()
+            .all(|row| out.join(&row["color_exr"]).is_file() && out.join(&row["rows"]).is_file())
+    );
     let run: serde_json::Value = serde_json::from_slice(&fs::read(out.join("run.json")).unwrap()).unwrap();
     assert_eq!((run["finished"].as_bool(), run["written"].as_u64()), (Some(false), Some(done as u64)));
     assert!(files_below(&out).keys().all(|name| !name.to_string_lossy().contains(".tmp")));
@@ -265,8 +347,12 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
 fn an_adapter_that_is_not_there_gets_a_list_of_those_that_are() {
     let base = tempfile::tempdir().unwrap();
     let there = camsim_gpu::context::adapters(camsim_gpu::AdapterChoice::Best);
-    let (code, err) = end(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
-    assert!(code == 3 && err.contains("no adapter has `no such thing` in its name (CAMSIM_ADAPTER): there is "), "{err}");
+    let (code, err) =
+        end(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
+    assert!(
+        code == 3 && err.contains("no adapter has `no such thing` in its name (CAMSIM_ADAPTER): there is "),
+        "{err}"
+    );
     // Of this process's own choice, which may be narrower.
     assert!(there.iter().all(|adapter| err.contains(&adapter.to_string())) && !there.is_empty(), "{err}");
 }

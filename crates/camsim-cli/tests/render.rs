@@ -27,11 +27,25 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     let temporary = tempfile::tempdir().unwrap();
     let (whole, parts) = (temporary.path().join("whole"), temporary.path().join("parts"));
     let render = |folder: &Path, more: &[&str]| {
-        let common =
-            ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,rows", "--format", "exr,png"];
+        let common = [
+            "render",
+            scenario.to_str().unwrap(),
+            "-o",
+            folder.to_str().unwrap(),
+            "--outputs",
+            "color,rows",
+            "--format",
+            "exr,png",
+        ];
         // A small camera: the order of frames is what matters here.
-        let small =
-            ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
+        let small = [
+            "--set",
+            "camera.size_px=[96, 72]",
+            "--set",
+            "camera.focal_px=[63, 63]",
+            "--set",
+            "camera.principal_point_px=[47.5, 35.5]",
+        ];
         camsim(&[&common[..], &small, &["--set", "camera.photometric.noise_sigma=0.01"], more].concat())
     };
     let (code, out, err) = render(&whole, &["--frames", "2..6"]);
@@ -44,7 +58,11 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     let (code, out, err) = render(&parts, &["--frames", "2..6", "--resume"]);
     assert!(code == 0 && out.starts_with("1 frames (3 were there already)"), "{out}{err}");
     for frame in 2..6 {
-        for file in [format!("color/frame_{frame:06}.exr"), format!("color/frame_{frame:06}.png"), format!("rows/frame_{frame:06}.csv")] {
+        for file in [
+            format!("color/frame_{frame:06}.exr"),
+            format!("color/frame_{frame:06}.png"),
+            format!("rows/frame_{frame:06}.csv"),
+        ] {
             assert_eq!(bytes(&whole, &file), bytes(&parts, &file), "{file}");
         }
     }
@@ -73,9 +91,24 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     }
     let (scenario, folder) = (temporary.path().join("pattern.toml"), temporary.path().join("out"));
     let render = |more: &[&str]| {
-        let common = ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--backend", "reference", "--outputs", "rows"];
-        let small =
-            ["--set", "camera.size_px=[24, 18]", "--set", "camera.focal_px=[16, 16]", "--set", "camera.principal_point_px=[11.5, 8.5]"];
+        let common = [
+            "render",
+            scenario.to_str().unwrap(),
+            "-o",
+            folder.to_str().unwrap(),
+            "--backend",
+            "reference",
+            "--outputs",
+            "rows",
+        ];
+        let small = [
+            "--set",
+            "camera.size_px=[24, 18]",
+            "--set",
+            "camera.focal_px=[16, 16]",
+            "--set",
+            "camera.principal_point_px=[11.5, 8.5]",
+        ];
         camsim(&[&common[..], &small, more].concat())
     };
     let (code, _, err) = render(&["--frames", "2"]);
@@ -88,8 +121,17 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     fs::write(&log, rows.replace('1', "2")).unwrap();
     let (before, kept) = (bytes(&folder, "frames.csv"), bytes(&folder, "run.json"));
     let (code, _, err) = render(&["--frames", "2..5", "--resume"]);
-    assert!(code == 2 && err.contains("when a file had something else in it") && err.contains("../demo_flight.csv was "), "{err}");
-    assert_eq!((bytes(&folder, "frames.csv"), bytes(&folder, "run.json")), (before, kept), "nothing is touched");
+    assert!(
+        code == 2
+            && err.contains("when a file had something else in it")
+            && err.contains("../demo_flight.csv was "),
+        "{err}"
+    );
+    assert_eq!(
+        (bytes(&folder, "frames.csv"), bytes(&folder, "run.json")),
+        (before, kept),
+        "nothing is touched"
+    );
     fs::write(&log, rows).unwrap();
     let (code, _, err) = render(&["--frames", "2..5", "--resume"]);
     assert!(code == 0 && !err.contains("another adapter"), "{err}");
@@ -99,7 +141,10 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     let adapter = run_json(&folder)["adapter"].as_str().unwrap().to_owned();
     fs::write(folder.join("run.json"), manifest.replace(&adapter, "a card")).unwrap();
     let (code, _, err) = render(&["--frames", "2..6", "--resume"]);
-    assert!(code == 0 && err.contains(&format!("run.json was made by another adapter than {adapter}")), "{err}");
+    assert!(
+        code == 0 && err.contains(&format!("run.json was made by another adapter than {adapter}")),
+        "{err}"
+    );
 }
 
 #[test]
@@ -108,13 +153,31 @@ fn timing_runs_write_no_frame() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path().join("timing");
-    let (code, out, err) =
-        camsim(&["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0,3", "--format", "none"]);
+    let (code, out, err) = camsim(&[
+        "render",
+        scenario.to_str().unwrap(),
+        "-o",
+        folder.to_str().unwrap(),
+        "--frames",
+        "0,3",
+        "--format",
+        "none",
+    ]);
     assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
     assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
     // What was asked for by name is said in a quiet run too.
-    let quiet =
-        ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0", "--format", "none", "--times", "-q"];
+    let quiet = [
+        "render",
+        scenario.to_str().unwrap(),
+        "-o",
+        folder.to_str().unwrap(),
+        "--frames",
+        "0",
+        "--format",
+        "none",
+        "--times",
+        "-q",
+    ];
     let (code, out, err) = camsim(&quiet);
     assert!(
         code == 0
@@ -142,7 +205,11 @@ fn the_reference_renders_without_an_adapter() {
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&again.stdout);
-        assert!(again.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&again.stderr));
+        assert!(
+            again.status.success() && said.contains("1 passed"),
+            "{said}{}",
+            String::from_utf8_lossy(&again.stderr)
+        );
         return;
     }
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
@@ -150,9 +217,22 @@ fn the_reference_renders_without_an_adapter() {
     let folder = |name: &str| temporary.path().join(name);
     let (whole, parts) = (folder("whole"), folder("parts"));
     let render = |folder: &Path, more: &[&str]| {
-        let common = ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,depth,coords,rows"];
-        let small =
-            ["--set", "camera.size_px=[48, 36]", "--set", "camera.focal_px=[32, 32]", "--set", "camera.principal_point_px=[23.5, 17.5]"];
+        let common = [
+            "render",
+            scenario.to_str().unwrap(),
+            "-o",
+            folder.to_str().unwrap(),
+            "--outputs",
+            "color,depth,coords,rows",
+        ];
+        let small = [
+            "--set",
+            "camera.size_px=[48, 36]",
+            "--set",
+            "camera.focal_px=[32, 32]",
+            "--set",
+            "camera.principal_point_px=[23.5, 17.5]",
+        ];
         camsim(&[&common[..], &small, more].concat())
     };
     let (code, _, err) = render(&folder("engine"), &["--frames", "2"]);
@@ -161,7 +241,8 @@ fn the_reference_renders_without_an_adapter() {
     let (code, out, err) = render(&whole, &["--frames", "2..5", "--backend", "reference"]);
     assert!(code == 0 && out.starts_with("3 frames in"), "{out}{err}");
     for shard in ["2/2", "1/2"] {
-        let (code, out, err) = render(&parts, &["--frames", "2..5", "--shard", shard, "--set", "quality.solver=oracle"]);
+        let (code, out, err) =
+            render(&parts, &["--frames", "2..5", "--shard", shard, "--set", "quality.solver=oracle"]);
         assert!(code == 0, "{out}{err}");
     }
     fs::remove_file(parts.join("depth/frame_000003.exr")).unwrap();
@@ -174,7 +255,10 @@ fn the_reference_renders_without_an_adapter() {
         }
     }
     let run = run_json(&whole);
-    assert!(run["adapter"].as_str().is_some_and(|adapter| adapter.starts_with("reference (f64 rays, ")), "{run}");
+    assert!(
+        run["adapter"].as_str().is_some_and(|adapter| adapter.starts_with("reference (f64 rays, ")),
+        "{run}"
+    );
     assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
 
     // What names methods of its own would get the oracle's picture instead.
@@ -186,7 +270,8 @@ fn the_reference_renders_without_an_adapter() {
         (vec!["--set", "quality.iterations=3"], "quality.iterations: counts the depth look-ups"),
     ] {
         let refused = folder("refused");
-        let (code, _, err) = render(&refused, &[&["--frames", "2", "--backend", "reference"], &more[..]].concat());
+        let (code, _, err) =
+            render(&refused, &[&["--frames", "2", "--backend", "reference"], &more[..]].concat());
         assert!(code == 2 && err.contains(wanted) && !refused.exists(), "{more:?}: {code} {err}");
     }
     let (code, _, err) = render(&folder("refused"), &["--preset", "paper", "--set", "quality.solver=oracle"]);
@@ -198,8 +283,14 @@ fn the_reference_renders_without_an_adapter() {
 fn the_measured_error_stands_beside_the_predicted_one() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let verify = |more: &[&str]| {
-        let small =
-            ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
+        let small = [
+            "--set",
+            "camera.size_px=[96, 72]",
+            "--set",
+            "camera.focal_px=[63, 63]",
+            "--set",
+            "camera.principal_point_px=[47.5, 35.5]",
+        ];
         camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "3,20"][..], &small, more].concat())
     };
     let (code, out, err) = verify(&["--json"]);
@@ -210,15 +301,24 @@ fn the_measured_error_stands_beside_the_predicted_one() {
         let (measured, predicted) = (&frame["measured"]["smooth"], &frame["predicted"]);
         let p99_px = measured["p99_px"].as_f64().unwrap();
         assert!(measured["pixels"].as_u64().unwrap() > 1000 && p99_px > 0.0, "{frame}");
-        assert!(p99_px <= predicted["total_px"].as_f64().unwrap() && frame["as_predicted"] == true, "{frame}");
+        assert!(
+            p99_px <= predicted["total_px"].as_f64().unwrap() && frame["as_predicted"] == true,
+            "{frame}"
+        );
         assert!(frame["measured"]["falsely_valid"] == 0 && frame["measured"]["missing"] == 0, "{frame}");
     }
     // Straight steps at constant velocity in a turn: beyond the tolerance, and the exit code says so.
     let (code, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=0.002"]);
-    assert!(code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"), "{out}{err}");
+    assert!(
+        code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"),
+        "{out}{err}"
+    );
     // More than any adapter holds.
     let (code, _, err) = verify(&["--set", "camera.size_px=[20000, 20000]"]);
-    assert!(code == 2 && err.contains("400000000 pixels") && err.contains("make camera.size_px smaller"), "{err}");
+    assert!(
+        code == 2 && err.contains("400000000 pixels") && err.contains("make camera.size_px smaller"),
+        "{err}"
+    );
 }
 
 /// `verify` of the pattern, which is a plane, at 96x72.
@@ -237,11 +337,18 @@ fn a_picture_beyond_its_tolerance_fails_and_what_nobody_foretold_is_named() {
     let strict = ["--set", "quality.max_error_dn=0.01"];
     let (code, out, err) = verify(&strict);
     assert!(code == 1 && out.contains("quality.max_error_dn = 0.01 is BROKEN as predicted"), "{out}{err}");
-    assert!(err.contains("quality.max_error_dn = 0.01 is broken in frame 3") && !out.contains("not in that prediction"), "{out}{err}");
+    assert!(
+        err.contains("quality.max_error_dn = 0.01 is broken in frame 3")
+            && !out.contains("not in that prediction"),
+        "{out}{err}"
+    );
     let (code, out, _) = verify(&[&strict[..], &["--json"]].concat());
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     let frame = &report["frames"][0];
-    assert!(code == 1 && report["kept"] == false && frame["kept"] == true && frame["picture"]["kept"] == false, "{out}");
+    assert!(
+        code == 1 && report["kept"] == false && frame["kept"] == true && frame["picture"]["kept"] == false,
+        "{out}"
+    );
     // Sources may be anywhere, and the prediction for the picture knows what that costs.
     let (_, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=100"]);
     assert!(out.contains("is BROKEN as predicted") && !out.contains("not in that prediction"), "{out}{err}");
@@ -258,8 +365,15 @@ fn two_fields_far_apart_do_not_hide_an_error() {
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     let frame = &report["frames"][0];
     assert!(code == 1 && report["kept"] == false && err.contains("is broken in frame 3"), "{out}{err}");
-    assert!(frame["measured"]["smooth"]["pixels"].as_u64().unwrap() > 6000 && frame["measured"]["judged_by"] == "smooth", "{frame}");
-    assert!(frame["measured"]["smooth"]["p99_px"].as_f64().unwrap() > 1.0 && frame["level_of_detail"].is_null(), "{frame}");
+    assert!(
+        frame["measured"]["smooth"]["pixels"].as_u64().unwrap() > 6000
+            && frame["measured"]["judged_by"] == "smooth",
+        "{frame}"
+    );
+    assert!(
+        frame["measured"]["smooth"]["p99_px"].as_f64().unwrap() > 1.0 && frame["level_of_detail"].is_null(),
+        "{frame}"
+    );
 }
 
 #[test]
@@ -267,16 +381,33 @@ fn two_fields_far_apart_do_not_hide_an_error() {
 fn an_empty_picture_is_neither_kept_nor_silent() {
     // The paper's frustum is symmetric about the optical axis, which these pictures lie beside.
     let pinhole = ["--set", "camera.lens.model=pinhole", "--set", "camera.lens.coefficients=[]"];
-    let beside = [&pinhole[..], &["--set", "camera.principal_point_px=[200, 150]", "--preset", "paper"]].concat();
+    let beside =
+        [&pinhole[..], &["--set", "camera.principal_point_px=[200, 150]", "--preset", "paper"]].concat();
     let (code, out, err) = verify_small(&beside);
-    assert!(code == 1 && out.contains("6912") && out.contains("BROKEN as predicted: too many pixels"), "{out}{err}");
+    assert!(
+        code == 1 && out.contains("6912") && out.contains("BROKEN as predicted: too many pixels"),
+        "{out}{err}"
+    );
     assert!(err.contains("the ideal frame: 100.0 % of the pixels"), "{err}");
     let folder = tempfile::tempdir().unwrap();
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let render = |more: &[&str]| {
-        let args = ["render", scenario.to_str().unwrap(), "-o", folder.path().to_str().unwrap(), "--format", "none"];
+        let args =
+            ["render", scenario.to_str().unwrap(), "-o", folder.path().to_str().unwrap(), "--format", "none"];
         let (code, _, err) = camsim(
-            &[&args[..], &["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--frames", "3..5"], more].concat(),
+            &[
+                &args[..],
+                &[
+                    "--set",
+                    "camera.size_px=[96, 72]",
+                    "--set",
+                    "camera.focal_px=[63, 63]",
+                    "--frames",
+                    "3..5",
+                ],
+                more,
+            ]
+            .concat(),
         );
         assert_eq!(code, 0, "{err}");
         err
@@ -291,21 +422,43 @@ fn tolerances_that_the_plans_break_are_said_once_and_kept() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let render = |more: &[&str]| {
-        let args = ["render", scenario.to_str().unwrap(), "-o", folder.path().to_str().unwrap(), "--format", "none", "--frames", "3..5"];
+        let args = [
+            "render",
+            scenario.to_str().unwrap(),
+            "-o",
+            folder.path().to_str().unwrap(),
+            "--format",
+            "none",
+            "--frames",
+            "3..5",
+        ];
         let small = ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]"];
-        let (code, out, err) = camsim(&[&args[..], &small, &["--set", "camera.principal_point_px=[47.5, 35.5]"], more].concat());
+        let (code, out, err) =
+            camsim(&[&args[..], &small, &["--set", "camera.principal_point_px=[47.5, 35.5]"], more].concat());
         assert_eq!(code, 0, "{out}{err}");
         (err, run_json(folder.path())["warnings"].to_string())
     };
     let strict = ["--set", "quality.max_error_px=1e-7", "--set", "quality.max_error_dn=1e-3"];
     for said in <[String; 2]>::from(render(&strict)) {
         for key in ["quality.max_error_px = 0.0000001", "quality.max_error_dn = 0.001"] {
-            assert_eq!(said.matches(&format!("2 of 2 frames do not keep {key}: in the worst, frame ")).count(), 1, "{said}");
+            assert_eq!(
+                said.matches(&format!("2 of 2 frames do not keep {key}: in the worst, frame ")).count(),
+                1,
+                "{said}"
+            );
         }
-        assert!(said.contains(&format!("`camsim explain {} --set ", scenario.display())) && said.contains(" --frame "), "{said}");
+        assert!(
+            said.contains(&format!("`camsim explain {} --set ", scenario.display()))
+                && said.contains(" --frame "),
+            "{said}"
+        );
     }
     let lax = ["--set", "quality.max_error_dn=20"];
-    for more in [&lax[..], &[&strict[..], &["--preset", "paper"]].concat(), &[&strict[..], &["--set", "quality.solver=linear"]].concat()] {
+    for more in [
+        &lax[..],
+        &[&strict[..], &["--preset", "paper"]].concat(),
+        &[&strict[..], &["--set", "quality.solver=linear"]].concat(),
+    ] {
         for said in <[String; 2]>::from(render(more)) {
             assert!(!said.contains("do not keep"), "{more:?}: {said}");
         }
@@ -322,7 +475,8 @@ fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
     };
     // Coarse terrain leaves the source coordinates as they are, and is said beside them.
     let off_px = |[terrain_px, dn]: [&str; 2]| {
-        let asked = [format!("quality.max_terrain_error_px={terrain_px}"), format!("quality.max_error_dn={dn}")];
+        let asked =
+            [format!("quality.max_terrain_error_px={terrain_px}"), format!("quality.max_error_dn={dn}")];
         let (_, out, err) = verify(&["--json", "--set", &asked[0], "--set", &asked[1]]);
         let report: serde_json::Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{out}{err}"));
         let detail = &report["frames"][0]["level_of_detail"];
@@ -335,5 +489,8 @@ fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
     let [tight, loose] = [["20", "1"], ["20", "2"]].map(off_px);
     assert!(tight < 0.5 * loose && loose < 0.5 * coarse, "{tight} {loose} {coarse}");
     let (code, out, err) = verify(&[]);
-    assert!(code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")), "{out}{err}");
+    assert!(
+        code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")),
+        "{out}{err}"
+    );
 }

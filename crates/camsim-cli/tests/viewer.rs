@@ -9,7 +9,18 @@ use std::{ffi::OsString, path::Path};
 fn the_window_shows_the_codes_of_the_files_that_render_writes() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let folder = tempfile::tempdir().unwrap();
-    let words = ["camsim", "render", scenario.to_str().unwrap(), "--frames", "7..8", "--outputs", "color", "--format", "png", "-o"];
+    let words = [
+        "camsim",
+        "render",
+        scenario.to_str().unwrap(),
+        "--frames",
+        "7..8",
+        "--outputs",
+        "color",
+        "--format",
+        "png",
+        "-o",
+    ];
     let args = words.iter().map(OsString::from).chain([folder.path().as_os_str().to_owned()]);
     let (mut out, mut err) = (Vec::new(), Vec::new());
     let code = camsim_cli::run(args, &mut out, &mut err);
@@ -18,7 +29,8 @@ fn the_window_shows_the_codes_of_the_files_that_render_writes() {
 
     let shown = camsim_viewer::still(&scenario, 7).unwrap();
     assert_eq!(shown.size_px, [written.width() as usize, written.height() as usize]);
-    let differing = shown.rgba.iter().zip(written.as_raw()).filter(|(shown, written)| shown != written).count();
+    let differing =
+        shown.rgba.iter().zip(written.as_raw()).filter(|(shown, written)| shown != written).count();
     assert_eq!((differing, shown.rgba.len()), (0, written.as_raw().len()), "codes that differ, of all");
     assert!(shown.rgba.chunks(4).any(|pixel| pixel != &shown.rgba[..4]), "a picture of something");
 }

@@ -1,7 +1,7 @@
 //! Camera intrinsics: pixel <-> ideal ray, the zoom table, and the check of a calibration.
 //!
-//! Pixels as in OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the top-left pixel, a centred principal point is
-//! `((W - 1)/2, (H - 1)/2)`.
+//! Pixels as in OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the top-left pixel, a
+//! centred principal point is `((W - 1)/2, (H - 1)/2)`.
 
 use glam::DVec2;
 
@@ -16,7 +16,8 @@ pub use check::LensCheck;
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
-/// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing error.
+/// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing
+/// error.
 pub(crate) const MAX_SIZE_PX: u32 = 32_768;
 
 /// What can be wrong with a camera.
@@ -26,7 +27,9 @@ pub enum CameraError {
     #[error("camera.size_px is [{0}, {1}]: both must be 1 to {MAX_SIZE_PX}")]
     Size(u32, u32),
     /// Zero, negative or non-finite focal length.
-    #[error("{key} is [{x}, {y}]: both must be positive finite pixels (a mirrored axis is not a camera; flip the image instead)")]
+    #[error(
+        "{key} is [{x}, {y}]: both must be positive finite pixels (a mirrored axis is not a camera; flip the image instead)"
+    )]
     Focal {
         /// Key in the file.
         key: String,
@@ -95,10 +98,17 @@ impl CameraModel {
 
     /// From `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
-        Self::new(spec.size_px, spec.focal_px, spec.principal_point_px, spec.lens.model, &spec.lens.coefficients)
+        Self::new(
+            spec.size_px,
+            spec.focal_px,
+            spec.principal_point_px,
+            spec.lens.model,
+            &spec.lens.coefficients,
+        )
     }
 
-    /// From `[camera]` at one zoom value: its zoom table where it has one, else as [`CameraModel::from_spec`].
+    /// From `[camera]` at one zoom value: its zoom table where it has one, else as
+    /// [`CameraModel::from_spec`].
     pub fn at_zoom(spec: &CameraSpec, zoom: f64) -> Result<Self, CameraError> {
         match ZoomTable::from_spec(spec)? {
             Some(table) => table.at(zoom),
@@ -124,18 +134,26 @@ impl CameraModel {
         let centre = [0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0)];
         let [cx, cy] = principal_point_px.unwrap_or(centre);
         if !(cx.is_finite() && cy.is_finite()) {
-            return Err(CameraError::PrincipalPoint { key: format!("{key}.principal_point_px"), x: cx, y: cy });
+            return Err(CameraError::PrincipalPoint {
+                key: format!("{key}.principal_point_px"),
+                x: cx,
+                y: cy,
+            });
         }
         let focal_px = DVec2::new(fx, fy);
         let principal_point_px = DVec2::new(cx, cy);
         // The start table of the inverse is spread over just what the image shows.
-        let reach =
-            image_corners(size_px).into_iter().map(|corner| ((corner - principal_point_px) / focal_px).length()).fold(0.0, f64::max);
-        let lens = Lens::with_reach(model, coefficients, reach).map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
+        let reach = image_corners(size_px)
+            .into_iter()
+            .map(|corner| ((corner - principal_point_px) / focal_px).length())
+            .fold(0.0, f64::max);
+        let lens = Lens::with_reach(model, coefficients, reach)
+            .map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
         Ok(Self { size_px, focal_px, principal_point_px, lens })
     }
 
-    /// Where the ideal ray `(u, v, 1)` is imaged, pixels. The bare formula: also beyond the fold, where [`Lens::contains`] is false.
+    /// Where the ideal ray `(u, v, 1)` is imaged, pixels. The bare formula: also beyond the fold, where
+    /// [`Lens::contains`] is false.
     pub fn project(&self, ideal: DVec2) -> DVec2 {
         self.pixel_from_distorted(self.lens.distort(ideal))
     }

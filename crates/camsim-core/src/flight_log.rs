@@ -1,15 +1,20 @@
-//! The flight log: rows of time, position and attitude, cleaned and brought to one local north-east-down frame.
+//! The flight log: rows of time, position and attitude, cleaned and brought to one local north-east-down
+//! frame.
 //!
-//! [`RawRow`]s come from a reader (camsim-io) as the file states them; [`FlightLog::from_raw`] cleans them and counts every repair in a
-//! [`CleaningReport`]. Nothing is repaired silently. The steps, in order:
+//! [`RawRow`]s come from a reader (camsim-io) as the file states them; [`FlightLog::from_raw`] cleans them
+//! and counts every repair in a [`CleaningReport`]. Nothing is repaired silently. The steps, in order:
 //!
 //! 1. rows without a usable time or position are dropped; unusable attitudes are marked as missing;
-//! 2. rows are sorted stably by time; zeros that stand for a missing fix or height are left out (`null_rows`);
-//! 3. heights change datum, positions become local NED, angles become rotations or (where turns count) stay angles;
+//! 2. rows are sorted stably by time; zeros that stand for a missing fix or height are left out
+//!    (`null_rows`);
+//! 3. heights change datum, positions become local NED, angles become rotations or (where turns count) stay
+//!    angles;
 //! 4. position spikes are dropped, attitude glitches are marked as missing (`outliers`);
 //! 5. rows less than 1 ms apart are averaged into one;
-//! 6. missing attitudes are interpolated between their neighbours, or all are computed from the track (`track_attitude`);
-//! 7. time is scaled, gaps are counted, rows with more than 90 degrees of turn between them get rows in between.
+//! 6. missing attitudes are interpolated between their neighbours, or all are computed from the track
+//!    (`track_attitude`);
+//! 7. time is scaled, gaps are counted, rows with more than 90 degrees of turn between them get rows in
+//!    between.
 
 use glam::{DQuat, DVec3};
 
@@ -73,7 +78,8 @@ pub struct LogRow {
     pub ned_from_body: DQuat,
 }
 
-/// Change of vertical datum while a log is read. If log and terrain share a datum, none is needed: that is the caller's decision.
+/// Change of vertical datum while a log is read. If log and terrain share a datum, none is needed: that is
+/// the caller's decision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeightConversion {
     /// Heights stay as they are.
@@ -92,8 +98,9 @@ pub struct LogOptions {
     pub angles: AngleKind,
     /// Where attitude comes from.
     pub attitude: AttitudeSource,
-    /// Origin of the local frame: `None` is the first good row of a geodetic log, after `height`. A given origin is in the datum
-    /// *after* `height`. For a log in local coordinates it says where on earth (0, 0, 0) is.
+    /// Origin of the local frame: `None` is the first good row of a geodetic log, after `height`. A given
+    /// origin is in the datum *after* `height`. For a log in local coordinates it says where on earth (0, 0,
+    /// 0) is.
     pub origin: Option<Geodetic>,
     /// Change of vertical datum of geodetic rows.
     pub height: HeightConversion,
@@ -103,7 +110,13 @@ pub struct LogOptions {
 
 impl Default for LogOptions {
     fn default() -> Self {
-        Self { angles: AngleKind::Auto, attitude: AttitudeSource::Log, origin: None, height: HeightConversion::None, speed: 1.0 }
+        Self {
+            angles: AngleKind::Auto,
+            attitude: AttitudeSource::Log,
+            origin: None,
+            height: HeightConversion::None,
+            speed: 1.0,
+        }
     }
 }
 
@@ -112,7 +125,9 @@ impl LogOptions {
     pub fn from_spec(spec: &FlightSpec, height: HeightConversion) -> Self {
         let origin = match spec.origin {
             Origin::First => None,
-            Origin::Geodetic([lat_deg, lon_deg, height_m]) => Some(Geodetic::from_deg(lat_deg, lon_deg, height_m)),
+            Origin::Geodetic([lat_deg, lon_deg, height_m]) => {
+                Some(Geodetic::from_deg(lat_deg, lon_deg, height_m))
+            }
         };
         Self { angles: spec.angles, attitude: spec.attitude, origin, height, speed: spec.speed }
     }

@@ -4,7 +4,8 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::pose::CameraPose;
 
-/// Time, pose and velocity of one line of the readout (a row, or a column for sideways readout) at its mid-exposure.
+/// Time, pose and velocity of one line of the readout (a row, or a column for sideways readout) at its
+/// mid-exposure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowRecord {
     /// Line number from 0.
@@ -22,7 +23,8 @@ pub struct RowRecord {
 /// Floats per pixel of [`RenderedFrame::coords`].
 pub const COORDS_CHANNELS: usize = 8;
 
-/// Where a ray (u, v) of a camera goes: what `coords` has in place of a point where the ray meets nothing. NED, of length 1.
+/// Where a ray (u, v) of a camera goes: what `coords` has in place of a point where the ray meets nothing.
+/// NED, of length 1.
 #[must_use]
 pub fn sky_direction_ned(pose: &CameraPose, uv: DVec2) -> DVec3 {
     pose.ned_from_camera * uv.extend(1.0).normalize()
@@ -41,8 +43,9 @@ pub struct RenderedFrame {
     pub color_rgba: Vec<f32>,
     /// Planar depth in the row's own camera, metres, 0 = nothing there.
     pub depth_m: Option<Vec<f32>>,
-    /// Per pixel: ideal ray u, v; source x, y in the ideal frame (pixels); Delta t (s); the ray's point n, e, d at mid-exposure (m), or of the sky,
-    /// whose depth is 0, its direction: a vector of length 1. All 0 where there is no ray.
+    /// Per pixel: ideal ray u, v; source x, y in the ideal frame (pixels); Delta t (s); the ray's point n, e,
+    /// d at mid-exposure (m), or of the sky, whose depth is 0, its direction: a vector of length 1. All 0
+    /// where there is no ray.
     pub coords: Option<Vec<[f32; COORDS_CHANNELS]>>,
     /// One record a line of the readout.
     pub rows: Vec<RowRecord>,

@@ -1,9 +1,11 @@
 //! WGS-84 geodesy: geodetic <-> earth-centred (ECEF) <-> local north-east-down, exact in f64.
 //!
-//! The local frame is the plane tangent to the ellipsoid at the origin's latitude and longitude, through the origin's height:
-//! flat-earth shortcuts would be off by 0.07 m over a 1 km flight and by metres over a long one.
+//! The local frame is the plane tangent to the ellipsoid at the origin's latitude and longitude, through the
+//! origin's height: flat-earth shortcuts would be off by 0.07 m over a 1 km flight and by metres over a long
+//! one.
 //!
-//! An ECEF coordinate near the surface has a spacing of 9.3e-10 m in f64; that is the accuracy of everything here.
+//! An ECEF coordinate near the surface has a spacing of 9.3e-10 m in f64; that is the accuracy of everything
+//! here.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -45,7 +47,8 @@ impl Geodetic {
         self.lon_rad.to_degrees()
     }
 
-    /// Whether all three are finite, latitude is within +-90 degrees, longitude within +-360 degrees and height within 1e8 m.
+    /// Whether all three are finite, latitude is within +-90 degrees, longitude within +-360 degrees and
+    /// height within 1e8 m.
     pub fn is_valid(self) -> bool {
         // Written so that NaN fails.
         self.lat_rad.abs() <= std::f64::consts::FRAC_PI_2 + 1e-12
@@ -53,7 +56,8 @@ impl Geodetic {
             && self.height_m.abs() <= 1e8
     }
 
-    /// Earth-centred, earth-fixed coordinates in metres: x towards (0, 0), y towards 90 E, z towards the north pole.
+    /// Earth-centred, earth-fixed coordinates in metres: x towards (0, 0), y towards 90 E, z towards the
+    /// north pole.
     ///
     /// `N = a / sqrt(1 - e2 sin^2 lat)`, `x = (N + h) cos lat cos lon`, `z = (N (1 - e2) + h) sin lat`.
     pub fn to_ecef(self) -> DVec3 {
@@ -61,15 +65,20 @@ impl Geodetic {
         let (sin_lon, cos_lon) = self.lon_rad.sin_cos();
         let normal_m = WGS84_A_M / (1.0 - WGS84_E2 * sin_lat * sin_lat).sqrt();
         let from_axis_m = (normal_m + self.height_m) * cos_lat;
-        DVec3::new(from_axis_m * cos_lon, from_axis_m * sin_lon, (normal_m * (1.0 - WGS84_E2) + self.height_m) * sin_lat)
+        DVec3::new(
+            from_axis_m * cos_lon,
+            from_axis_m * sin_lon,
+            (normal_m * (1.0 - WGS84_E2) + self.height_m) * sin_lat,
+        )
     }
 
     /// Inverse of [`Self::to_ecef`].
     ///
-    /// Bowring's iteration on the reduced latitude beta (Bowring 1976, Survey Review 23:323-327), run to convergence:
-    /// `tan lat = (z + e'^2 b sin^3 beta) / (p - e2 a cos^3 beta)`, `tan beta = (1 - f) tan lat`. Height is
-    /// `p cos lat + z sin lat - a sqrt(1 - e2 sin^2 lat)`, which is well conditioned at the poles and on the equator alike.
-    /// Valid further than 43 km from the earth's centre (inside the evolute the answer is not unique); finite everywhere.
+    /// Bowring's iteration on the reduced latitude beta (Bowring 1976, Survey Review 23:323-327), run to
+    /// convergence: `tan lat = (z + e'^2 b sin^3 beta) / (p - e2 a cos^3 beta)`, `tan beta = (1 - f) tan
+    /// lat`. Height is `p cos lat + z sin lat - a sqrt(1 - e2 sin^2 lat)`, which is well conditioned at the
+    /// poles and on the equator alike. Valid further than 43 km from the earth's centre (inside the evolute
+    /// the answer is not unique); finite everywhere.
     pub fn from_ecef(ecef_m: DVec3) -> Self {
         let semi_minor_m = WGS84_A_M * (1.0 - WGS84_F);
         let second_e2 = WGS84_E2 / (1.0 - WGS84_E2);
@@ -79,7 +88,8 @@ impl Geodetic {
         // Two rounds reach 1e-12 rad from -10 km to 1000 km; the rest costs nothing because the loop stops.
         for _ in 0..10 {
             let (sin_r, cos_r) = reduced.sin_cos();
-            let next_lat = (ecef_m.z + second_e2 * semi_minor_m * sin_r.powi(3)).atan2(from_axis_m - WGS84_E2 * WGS84_A_M * cos_r.powi(3));
+            let next_lat = (ecef_m.z + second_e2 * semi_minor_m * sin_r.powi(3))
+                .atan2(from_axis_m - WGS84_E2 * WGS84_A_M * cos_r.powi(3));
             let done = (next_lat - lat_rad).abs() < 1e-16;
             lat_rad = next_lat;
             reduced = ((1.0 - WGS84_F) * lat_rad.sin()).atan2(lat_rad.cos());
@@ -88,13 +98,16 @@ impl Geodetic {
             }
         }
         let (sin_lat, cos_lat) = lat_rad.sin_cos();
-        let height_m = from_axis_m * cos_lat + ecef_m.z * sin_lat - WGS84_A_M * (1.0 - WGS84_E2 * sin_lat * sin_lat).sqrt();
+        let height_m = from_axis_m * cos_lat + ecef_m.z * sin_lat
+            - WGS84_A_M * (1.0 - WGS84_E2 * sin_lat * sin_lat).sqrt();
         Self { lat_rad, lon_rad: ecef_m.y.atan2(ecef_m.x), height_m }
     }
 
-    /// Rotation that takes north-east-down coordinates of the tangent frame here to ECEF axes: Rz(lon) Ry(-pi/2 - lat).
+    /// Rotation that takes north-east-down coordinates of the tangent frame here to ECEF axes: Rz(lon)
+    /// Ry(-pi/2 - lat).
     pub fn ecef_from_ned_rotation(self) -> DQuat {
-        DQuat::from_rotation_z(self.lon_rad) * DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2 - self.lat_rad)
+        DQuat::from_rotation_z(self.lon_rad)
+            * DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2 - self.lat_rad)
     }
 }
 
@@ -114,7 +127,11 @@ impl LocalFrame {
         let north = DVec3::new(-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat);
         let east = DVec3::new(-sin_lon, cos_lon, 0.0);
         let down = DVec3::new(-cos_lat * cos_lon, -cos_lat * sin_lon, -sin_lat);
-        Self { origin, origin_ecef_m: origin.to_ecef(), ned_from_ecef_axes: DMat3::from_cols(north, east, down).transpose() }
+        Self {
+            origin,
+            origin_ecef_m: origin.to_ecef(),
+            ned_from_ecef_axes: DMat3::from_cols(north, east, down).transpose(),
+        }
     }
 
     /// Where (0, 0, 0) is.
@@ -144,8 +161,8 @@ impl LocalFrame {
 
     /// Rotation that takes the tangent NED frame at `at` to this frame's axes.
     ///
-    /// An attitude in a log is relative to the tangent frame at the aircraft; this brings it to the origin's. It turns by about
-    /// 0.9 degrees per 100 km, and by the meridian convergence about the vertical.
+    /// An attitude in a log is relative to the tangent frame at the aircraft; this brings it to the origin's.
+    /// It turns by about 0.9 degrees per 100 km, and by the meridian convergence about the vertical.
     pub fn ned_from_local(&self, at: Geodetic) -> DQuat {
         (self.origin.ecef_from_ned_rotation().inverse() * at.ecef_from_ned_rotation()).normalize()
     }

@@ -1,11 +1,13 @@
-//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and back on the principal branch or not at all.
+//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and back on the principal
+//! branch or not at all.
 //!
-//! A lens is regular in a star-shaped domain about its axis, [`Lens::fold_radius`] being the border: there the Jacobian's determinant,
-//! its trace, or the model's denominator reaches zero for the first time along a ray. Beyond the fold the formula goes on, but what it
-//! yields are mirror images that no real lens shows, so the inverse answers `None` for a point whose only pre-images lie there.
+//! A lens is regular in a star-shaped domain about its axis, [`Lens::fold_radius`] being the border: there
+//! the Jacobian's determinant, its trace, or the model's denominator reaches zero for the first time along a
+//! ray. Beyond the fold the formula goes on, but what it yields are mirror images that no real lens shows, so
+//! the inverse answers `None` for a point whose only pre-images lie there.
 //!
-//! Adding a model is one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain, start table), one WGSL file
-//! of the same name, and one line in each `match` below.
+//! Adding a model is one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain,
+//! start table), one WGSL file of the same name, and one line in each `match` below.
 
 use glam::{DMat2, DVec2};
 
@@ -24,14 +26,17 @@ pub use kannala_brandt::KannalaBrandt;
 pub use pinhole::Pinhole;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
 
-/// Distorted radius (units of the focal length) that the start table of [`Lens::new`] covers; see [`Lens::with_reach`].
+/// Distorted radius (units of the focal length) that the start table of [`Lens::new`] covers; see
+/// [`Lens::with_reach`].
 const DEFAULT_REACH: f64 = 2.0;
 
 /// What can be wrong with lens coefficients.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LensError {
     /// More coefficients than the model has.
-    #[error("lens.coefficients: model \"{model}\" takes at most {max} coefficients ({names}), but {got} are given: {fix}")]
+    #[error(
+        "lens.coefficients: model \"{model}\" takes at most {max} coefficients ({names}), but {got} are given: {fix}"
+    )]
     TooManyCoefficients {
         /// The model's name in files.
         model: &'static str,
@@ -45,7 +50,9 @@ pub enum LensError {
         fix: &'static str,
     },
     /// NaN or infinite.
-    #[error("lens.coefficients[{index}] is {value}: every coefficient must be a finite number (use 0 for an unused one)")]
+    #[error(
+        "lens.coefficients[{index}] is {value}: every coefficient must be a finite number (use 0 for an unused one)"
+    )]
     NotFinite {
         /// Position from 0.
         index: usize,
@@ -53,7 +60,9 @@ pub enum LensError {
         value: f64,
     },
     /// A reach that is not a positive finite number.
-    #[error("the lens must reach a positive finite distorted radius, not {0}: check focal_px, principal_point_px and size_px")]
+    #[error(
+        "the lens must reach a positive finite distorted radius, not {0}: check focal_px, principal_point_px and size_px"
+    )]
     Reach(f64),
 }
 
@@ -69,14 +78,15 @@ pub enum Lens {
 }
 
 impl Lens {
-    /// A lens from its model and coefficients: `k1 k2 p1 p2 k3 k4 k5 k6` (Brown-Conrady), `k1 k2 k3 k4` (Kannala-Brandt), none (pinhole);
-    /// trailing zeros may be left out.
+    /// A lens from its model and coefficients: `k1 k2 p1 p2 k3 k4 k5 k6` (Brown-Conrady), `k1 k2 k3 k4`
+    /// (Kannala-Brandt), none (pinhole); trailing zeros may be left out.
     pub fn new(model: LensModel, coefficients: &[f64]) -> Result<Self, LensError> {
         Self::with_reach(model, coefficients, DEFAULT_REACH)
     }
 
-    /// As [`Lens::new`], with the start table of the inverse spread over distorted radii `0..=reach` (units of the focal length) where the
-    /// lens does not fold before. Points farther out are still solved, from a poorer start.
+    /// As [`Lens::new`], with the start table of the inverse spread over distorted radii `0..=reach` (units
+    /// of the focal length) where the lens does not fold before. Points farther out are still solved, from a
+    /// poorer start.
     pub fn with_reach(model: LensModel, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
         if !(reach.is_finite() && reach > 0.0) {
             return Err(LensError::Reach(reach));
@@ -86,7 +96,12 @@ impl Lens {
         }
         Ok(match model {
             LensModel::Pinhole => {
-                padded::<0>(coefficients, "pinhole", "none", "leave them out, or set lens.model to the model they belong to")?;
+                padded::<0>(
+                    coefficients,
+                    "pinhole",
+                    "none",
+                    "leave them out, or set lens.model to the model they belong to",
+                )?;
                 Self::Pinhole(Pinhole)
             }
             LensModel::BrownConrady => {
@@ -95,7 +110,12 @@ impl Lens {
                 Self::BrownConrady(Box::new(BrownConrady::new(k, reach)))
             }
             LensModel::KannalaBrandt => {
-                let k = padded(coefficients, "kannala-brandt", "k1 k2 k3 k4", "leave the others out, or set model = \"brown-conrady\"")?;
+                let k = padded(
+                    coefficients,
+                    "kannala-brandt",
+                    "k1 k2 k3 k4",
+                    "leave the others out, or set model = \"brown-conrady\"",
+                )?;
                 Self::KannalaBrandt(Box::new(KannalaBrandt::new(k, reach)))
             }
         })
@@ -128,7 +148,8 @@ impl Lens {
         }
     }
 
-    /// Forward: ideal to distorted. The bare formula, also beyond the fold; ask [`Lens::contains`] whether the point can be seen.
+    /// Forward: ideal to distorted. The bare formula, also beyond the fold; ask [`Lens::contains`] whether
+    /// the point can be seen.
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         match self {
             Self::Pinhole(lens) => lens.distort(ideal),
@@ -146,8 +167,8 @@ impl Lens {
         }
     }
 
-    /// Inverse on the principal branch: the ideal point inside the fold that is imaged at `distorted`, or `None` if there is none
-    /// (also for NaN and infinities).
+    /// Inverse on the principal branch: the ideal point inside the fold that is imaged at `distorted`, or
+    /// `None` if there is none (also for NaN and infinities).
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         match self {
             Self::Pinhole(lens) => lens.undistort(distorted),
@@ -183,12 +204,14 @@ impl Lens {
         }
     }
 
-    /// Ideal radius of the border of the principal branch in direction `phi` (radians from +u towards +v); infinite for a pinhole.
+    /// Ideal radius of the border of the principal branch in direction `phi` (radians from +u towards +v);
+    /// infinite for a pinhole.
     pub fn fold_radius(&self, phi_rad: f64) -> f64 {
         self.fold_curve().map_or(f64::INFINITY, |fold| fold.radius(phi_rad))
     }
 
-    /// Whether an ideal point lies on the principal branch, that is, whether `undistort(distort(ideal))` is `ideal`.
+    /// Whether an ideal point lies on the principal branch, that is, whether `undistort(distort(ideal))` is
+    /// `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
         ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
     }
@@ -204,7 +227,15 @@ fn padded<const N: usize>(
     let mut all = [0.0; N];
     match all.get_mut(..coefficients.len()) {
         Some(head) => head.copy_from_slice(coefficients),
-        None => return Err(LensError::TooManyCoefficients { model, max: N, names, got: coefficients.len(), fix }),
+        None => {
+            return Err(LensError::TooManyCoefficients {
+                model,
+                max: N,
+                names,
+                got: coefficients.len(),
+                fix,
+            });
+        }
     }
     Ok(all)
 }

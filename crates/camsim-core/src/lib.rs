@@ -1,8 +1,7 @@
 //! The mathematics of camsim, in f64, without GPU and without file formats.
 //!
-//! Modules stand in the order of the data flow:
-//! scenario -> log -> tracker -> trajectory -> camera -> shutter -> frame plan -> ideal frame -> lens inverse -> temporal inverse
-//! -> gather -> photometric -> metrics.
+//! Modules stand in the order of the data flow: scenario -> log -> tracker -> trajectory -> camera -> shutter
+//! -> frame plan -> ideal frame -> lens inverse -> temporal inverse -> gather -> photometric -> metrics.
 //!
 //! # Conventions
 //!

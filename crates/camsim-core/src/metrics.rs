@@ -1,8 +1,9 @@
 //! How much two pictures differ.
 //!
-//! RMSE and the largest difference are over all samples of all colour channels, with values as stored (a peak of 1 is white).
-//! SSIM is that of Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error visibility to structural similarity",
-//! IEEE TIP 13(4), 2004: Gaussian window of 11 x 11 with sigma 1.5, K1 = 0.01, K2 = 0.03, L = 1, windows wholly inside the picture.
+//! RMSE and the largest difference are over all samples of all colour channels, with values as stored (a peak
+//! of 1 is white). SSIM is that of Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error
+//! visibility to structural similarity", IEEE TIP 13(4), 2004: Gaussian window of 11 x 11 with sigma 1.5, K1
+//! = 0.01, K2 = 0.03, L = 1, windows wholly inside the picture.
 
 use thiserror::Error;
 
@@ -63,7 +64,8 @@ pub struct Comparison {
     pub ssim: Option<f64>,
     /// Share of pixels of which any sample differs at all (alpha too), 0..=1.
     pub differing: f64,
-    /// Pixels that hold a NaN or an infinity in either picture; they are left out of `rmse`, `max` and `ssim` unless bitwise equal.
+    /// Pixels that hold a NaN or an infinity in either picture; they are left out of `rmse`, `max` and `ssim`
+    /// unless bitwise equal.
     pub non_finite: u64,
     /// Pixels compared.
     pub pixels: u64,
@@ -77,7 +79,8 @@ impl Comparison {
         -20.0 * self.rmse.log10()
     }
 
-    /// All pictures of a set as one: pooled RMSE, share and counts, largest maximum, mean SSIM by picture. `None` for an empty set.
+    /// All pictures of a set as one: pooled RMSE, share and counts, largest maximum, mean SSIM by picture.
+    /// `None` for an empty set.
     pub fn pooled(set: &[Self]) -> Option<Self> {
         let pixels: u64 = set.iter().map(|c| c.pixels).sum();
         let samples: u64 = set.iter().map(|c| c.samples).sum();
@@ -113,11 +116,17 @@ pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricE
     for view in [a, b] {
         let needed = view.size_px[0] as usize * view.size_px[1] as usize * view.channels;
         if needed == 0 || view.samples.len() != needed {
-            return Err(MetricError::Samples { size_px: view.size_px, channels: view.channels, needed, found: view.samples.len() });
+            return Err(MetricError::Samples {
+                size_px: view.size_px,
+                channels: view.channels,
+                needed,
+                found: view.samples.len(),
+            });
         }
     }
 
-    let (mut squares, mut max, mut samples, mut differing, mut non_finite) = (0.0_f64, 0.0_f64, 0_u64, 0_u64, 0_u64);
+    let (mut squares, mut max, mut samples, mut differing, mut non_finite) =
+        (0.0_f64, 0.0_f64, 0_u64, 0_u64, 0_u64);
     let mut usable = Vec::with_capacity(a.samples.len() / a.channels);
     for (pixel_a, pixel_b) in a.samples.chunks_exact(a.channels).zip(b.samples.chunks_exact(b.channels)) {
         let same = |(x, y): (&f32, &f32)| x == y || x.to_bits() == y.to_bits();
@@ -156,7 +165,11 @@ fn luminance(view: ImageView<'_>, usable: &[bool]) -> Vec<f64> {
         [first, ..] => f64::from(*first),
         [] => 0.0,
     };
-    view.samples.chunks_exact(view.channels).zip(usable).map(|(pixel, &ok)| if ok { value(pixel) } else { 0.0 }).collect()
+    view.samples
+        .chunks_exact(view.channels)
+        .zip(usable)
+        .map(|(pixel, &ok)| if ok { value(pixel) } else { 0.0 })
+        .collect()
 }
 
 const WINDOW: usize = 11;
@@ -187,10 +200,12 @@ fn ssim(a: &[f64], b: &[f64], size_px: [u32; 2]) -> Option<f64> {
 /// Separable Gaussian over windows wholly inside: the result is `WINDOW - 1` narrower and lower.
 fn blur(values: &[f64], width: usize) -> Vec<f64> {
     let half = (WINDOW / 2) as f64;
-    let mut kernel: [f64; WINDOW] = std::array::from_fn(|i| (-(i as f64 - half).powi(2) / (2.0 * SIGMA_PX * SIGMA_PX)).exp());
+    let mut kernel: [f64; WINDOW] =
+        std::array::from_fn(|i| (-(i as f64 - half).powi(2) / (2.0 * SIGMA_PX * SIGMA_PX)).exp());
     let total: f64 = kernel.iter().sum();
     kernel.iter_mut().for_each(|k| *k /= total);
-    let weigh = |taps: &mut dyn Iterator<Item = f64>| taps.zip(&kernel).map(|(value, k)| value * k).sum::<f64>();
+    let weigh =
+        |taps: &mut dyn Iterator<Item = f64>| taps.zip(&kernel).map(|(value, k)| value * k).sum::<f64>();
 
     let narrow = width + 1 - WINDOW;
     let rows: Vec<f64> = values
@@ -291,9 +306,18 @@ mod tests {
     fn pictures_that_do_not_fit_are_refused() {
         let a = vec![0.0_f32; 6];
         assert!(matches!(compare(view([3, 2], 1, &a), view([2, 3], 1, &a)), Err(MetricError::Size { .. })));
-        assert!(matches!(compare(view([3, 2], 1, &a), view([3, 2], 3, &a)), Err(MetricError::Channels { .. })));
-        assert!(matches!(compare(view([3, 3], 1, &a), view([3, 3], 1, &a)), Err(MetricError::Samples { .. })));
-        assert!(matches!(compare(view([0, 0], 1, &[]), view([0, 0], 1, &[])), Err(MetricError::Samples { .. })));
+        assert!(matches!(
+            compare(view([3, 2], 1, &a), view([3, 2], 3, &a)),
+            Err(MetricError::Channels { .. })
+        ));
+        assert!(matches!(
+            compare(view([3, 3], 1, &a), view([3, 3], 1, &a)),
+            Err(MetricError::Samples { .. })
+        ));
+        assert!(matches!(
+            compare(view([0, 0], 1, &[]), view([0, 0], 1, &[])),
+            Err(MetricError::Samples { .. })
+        ));
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! Mount: the camera on the platform, its lever arm and its vibration (paper eqs. 3-5 without their approximations).
+//! Mount: the camera on the platform, its lever arm and its vibration (paper eqs. 3-5 without their
+//! approximations).
 //!
-//! With the body at position x and attitude R, body rate w, mount M (constant), vibration rotation V(t) = Exp(theta(t)) and displacement d(t):
+//! With the body at position x and attitude R, body rate w, mount M (constant), vibration rotation V(t) =
+//! Exp(theta(t)) and displacement d(t):
 //!
 //! ```text
 //! ned_from_camera = R V(t) M                 optical centre = x + R (lever + d(t))
@@ -8,10 +10,11 @@
 //! rate in camera  = (V M)^T (w + J(theta) theta'),  J the left Jacobian of Exp
 //! ```
 //!
-//! M takes optical camera axes to body axes: at angles (0, 0, 0) the camera's z is the nose, its x the right wing, its y the belly; roll, pitch
-//! and yaw then turn it as they turn a body (ZYX). Pitch -90 deg looks straight down with the top of the image towards the nose.
-//! The vibration is composed before the mount, so its axes are the body's, whichever way the camera looks: theta has the sums of
-//! `amplitude sin(2 pi hz t + phase)` of the roll, pitch and yaw entries as components and turns the camera about its optical centre.
+//! M takes optical camera axes to body axes: at angles (0, 0, 0) the camera's z is the nose, its x the right
+//! wing, its y the belly; roll, pitch and yaw then turn it as they turn a body (ZYX). Pitch -90 deg looks
+//! straight down with the top of the image towards the nose. The vibration is composed before the mount, so
+//! its axes are the body's, whichever way the camera looks: theta has the sums of `amplitude sin(2 pi hz t +
+//! phase)` of the roll, pitch and yaw entries as components and turns the camera about its optical centre.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -34,7 +37,9 @@ pub enum MountError {
         key: &'static str,
     },
     /// The amplitude given is of the wrong kind for the axis.
-    #[error("camera.mount.vibration entry {entry} (counted from 1): axis {axis:?} takes `{wanted}`, not `{given}`")]
+    #[error(
+        "camera.mount.vibration entry {entry} (counted from 1): axis {axis:?} takes `{wanted}`, not `{given}`"
+    )]
     WrongAmplitude {
         /// Counted from 1.
         entry: usize,
@@ -46,7 +51,9 @@ pub enum MountError {
         given: &'static str,
     },
     /// Negative, NaN or infinite frequency, amplitude or phase.
-    #[error("camera.mount.vibration entry {entry} (counted from 1): amplitude and phase must be finite, hz finite and not negative")]
+    #[error(
+        "camera.mount.vibration entry {entry} (counted from 1): amplitude and phase must be finite, hz finite and not negative"
+    )]
     BadVibration {
         /// Counted from 1.
         entry: usize,
@@ -94,7 +101,11 @@ impl CameraPath {
         for (i, entry) in spec.vibration.iter().enumerate() {
             let (axis, turns) = body_axis(entry.axis);
             let amplitude = amplitude(entry, i + 1, turns)?;
-            let sinusoid = Sinusoid { component: axis * amplitude, rate_rad_s: TAU * entry.hz, phase_rad: entry.phase_deg.to_radians() };
+            let sinusoid = Sinusoid {
+                component: axis * amplitude,
+                rate_rad_s: TAU * entry.hz,
+                phase_rad: entry.phase_deg.to_radians(),
+            };
             if turns { &mut rotations } else { &mut translations }.push(sinusoid);
         }
         Ok(Self {
@@ -106,7 +117,8 @@ impl CameraPath {
         })
     }
 
-    /// First and last instant that the log covers, seconds. Outside, the platform coasts and the mount goes on vibrating.
+    /// First and last instant that the log covers, seconds. Outside, the platform coasts and the mount goes
+    /// on vibrating.
     pub fn span_s(&self) -> (f64, f64) {
         self.trajectory.span_s()
     }
@@ -123,7 +135,9 @@ impl CameraPath {
     /// Velocity of the optical centre in NED at `t_s`, m/s.
     pub fn velocity_ned(&self, t_s: f64) -> DVec3 {
         let (body, offset) = self.at(t_s);
-        body.velocity_ned_m_s + body.ned_from_body * (body.rate_body_rad_s.cross(offset.lever_body_m) + offset.lever_rate_body_m_s)
+        body.velocity_ned_m_s
+            + body.ned_from_body
+                * (body.rate_body_rad_s.cross(offset.lever_body_m) + offset.lever_rate_body_m_s)
     }
 
     /// Angular rate of the camera relative to NED at `t_s`, in optical camera axes, rad/s.
@@ -134,7 +148,11 @@ impl CameraPath {
 
     /// Highest frequency of any vibration with an amplitude, hertz; 0 for a rigid mount.
     pub fn highest_vibration_hz(&self) -> f64 {
-        self.rotations.iter().chain(&self.translations).filter(|s| s.component != DVec3::ZERO).fold(0.0, |hz, s| hz.max(s.rate_rad_s / TAU))
+        self.rotations
+            .iter()
+            .chain(&self.translations)
+            .filter(|s| s.component != DVec3::ZERO)
+            .fold(0.0, |hz, s| hz.max(s.rate_rad_s / TAU))
     }
 
     /// Bound on the vibration's angle at any time, radians; 0 for a rigid mount.
@@ -157,7 +175,8 @@ impl CameraPath {
             lever_rate_body_m_s: DVec3::ZERO,
             rate_body_rad_s: DVec3::ZERO,
         };
-        // A sine has no value at an infinite instant; the trajectory stands still there, and so does the mount.
+        // A sine has no value at an infinite instant; the trajectory stands still there, and so does the
+        // mount.
         if t_s.is_finite() {
             if !self.rotations.is_empty() {
                 let (angle_rad, angle_rate_rad_s) = sum(&self.rotations, t_s);
@@ -272,13 +291,22 @@ mod tests {
         ] {
             let path = CameraPath::new(level(yaw_deg), &mount(angles_deg)).unwrap();
             for (direction, expected) in directions(&path).into_iter().zip(expected) {
-                assert!((direction - expected).length() < 1e-15, "yaw {yaw_deg}, mount {angles_deg:?}: {direction}");
+                assert!(
+                    (direction - expected).length() < 1e-15,
+                    "yaw {yaw_deg}, mount {angles_deg:?}: {direction}"
+                );
             }
         }
     }
 
     fn shaken() -> CameraPath {
-        let entry = |axis, amplitude_deg, amplitude_m, hz, phase_deg| VibrationSpec { axis, amplitude_deg, amplitude_m, hz, phase_deg };
+        let entry = |axis, amplitude_deg, amplitude_m, hz, phase_deg| VibrationSpec {
+            axis,
+            amplitude_deg,
+            amplitude_m,
+            hz,
+            phase_deg,
+        };
         let spec = MountSpec {
             angles_deg: [3.0, -60.0, 20.0],
             offset_m: [1.5, -0.2, 0.4],
@@ -291,7 +319,8 @@ mod tests {
             ],
         };
         let attitude = so3::exp(DVec3::new(0.3, -0.2, 2.0));
-        CameraPath::new(body(DVec3::new(12.0, 3.0, -1.0), attitude, DVec3::new(0.5, -0.3, 0.8)), &spec).unwrap()
+        CameraPath::new(body(DVec3::new(12.0, 3.0, -1.0), attitude, DVec3::new(0.5, -0.3, 0.8)), &spec)
+            .unwrap()
     }
 
     #[test]
@@ -303,7 +332,8 @@ mod tests {
             let (before, after) = (path.pose(t_s - h), path.pose(t_s + h));
             let velocity = (after.position_ned_m - before.position_ned_m) / (2.0 * h);
             let rate = so3::log(before.ned_from_camera.inverse() * after.ned_from_camera) / (2.0 * h);
-            // Rounding: 1e-13 m over 2 us. Third derivative of 0.2 deg at 100 Hz: h^2/6 * 9e5 rad/s^3 = 1.5e-7 rad/s.
+            // Rounding: 1e-13 m over 2 us. Third derivative of 0.2 deg at 100 Hz: h^2/6 * 9e5 rad/s^3 =
+            // 1.5e-7 rad/s.
             assert!((velocity - path.velocity_ned(t_s)).length() < 1e-6);
             assert!((rate - path.rate_camera(t_s)).length() < 5e-7);
         }
@@ -312,9 +342,14 @@ mod tests {
     #[test]
     fn lever_arm_is_exact() {
         let spec = MountSpec { offset_m: [2.0, 0.0, 0.0], ..MountSpec::default() };
-        let path = CameraPath::new(body(DVec3::ZERO, DQuat::IDENTITY, DVec3::new(0.0, 0.0, 1.0)), &spec).unwrap();
+        let path =
+            CameraPath::new(body(DVec3::ZERO, DQuat::IDENTITY, DVec3::new(0.0, 0.0, 1.0)), &spec).unwrap();
         let (sin, cos) = 1.0f64.sin_cos();
-        assert!((path.pose(1.0).position_ned_m - DVec3::new(100.0 + 2.0 * cos, 200.0 + 2.0 * sin, -300.0)).length() < 1e-12);
+        assert!(
+            (path.pose(1.0).position_ned_m - DVec3::new(100.0 + 2.0 * cos, 200.0 + 2.0 * sin, -300.0))
+                .length()
+                < 1e-12
+        );
         assert!((path.velocity_ned(1.0) - DVec3::new(-2.0 * sin, 2.0 * cos, 0.0)).length() < 1e-12);
         // A level camera that looks along the nose yaws about its own downward y.
         assert!((path.rate_camera(1.0) - DVec3::Y).length() < 1e-15);
@@ -327,12 +362,18 @@ mod tests {
         assert!((path.peak_vibration_rad().to_degrees() - (0.04f64 + 25.0 + 1.0).sqrt()).abs() < 1e-9);
         assert!((path.peak_vibration_m() - (1e-4f64 + 4e-6).sqrt()).abs() < 1e-12);
         let rigid = CameraPath::new(level(0.0), &MountSpec::default()).unwrap();
-        assert_eq!((rigid.highest_vibration_hz(), rigid.peak_vibration_rad(), rigid.peak_vibration_m()), (0.0, 0.0, 0.0));
+        assert_eq!(
+            (rigid.highest_vibration_hz(), rigid.peak_vibration_rad(), rigid.peak_vibration_m()),
+            (0.0, 0.0, 0.0)
+        );
     }
 
     #[test]
     fn refuses_faults_and_survives_any_time() {
-        assert_eq!(CameraPath::new(level(0.0), &mount([f64::NAN, 0.0, 0.0])).unwrap_err(), MountError::NotFinite { key: "angles_deg" });
+        assert_eq!(
+            CameraPath::new(level(0.0), &mount([f64::NAN, 0.0, 0.0])).unwrap_err(),
+            MountError::NotFinite { key: "angles_deg" }
+        );
         let vibration = |axis, amplitude_deg, amplitude_m, hz| MountSpec {
             vibration: vec![VibrationSpec { axis, amplitude_deg, amplitude_m, hz, phase_deg: 0.0 }],
             ..MountSpec::default()

@@ -1,4 +1,5 @@
-//! Counter-based noise: a pure function of (seed, frame, pixel, stream), independent of order, machine and resume.
+//! Counter-based noise: a pure function of (seed, frame, pixel, stream), independent of order, machine and
+//! resume.
 //!
 //! Twin of `shaders/common/noise.wgsl`; integer hash and multiply-add only, so both agree to rounding.
 
@@ -9,14 +10,17 @@ pub const SEGMENTS: usize = 16;
 /// Stream of the sensor's additive Gaussian noise.
 pub const NOISE_STREAM: u32 = 1;
 
-/// Seed of a camera's noise: `seed` itself without a name; with one, so that cameras of one run do not share their noise,
-/// `splitmix64(seed ^ fnv1a64(name))`: the 64-bit FNV-1a hash of the name's UTF-8 bytes, and the finaliser of SplitMix64.
+/// Seed of a camera's noise: `seed` itself without a name; with one, so that cameras of one run do not share
+/// their noise, `splitmix64(seed ^ fnv1a64(name))`: the 64-bit FNV-1a hash of the name's UTF-8 bytes, and the
+/// finaliser of SplitMix64.
 #[must_use]
 pub fn camera_seed(seed: u64, name: &str) -> u64 {
     if name.is_empty() {
         return seed;
     }
-    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
     let z = (seed ^ hash).wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -47,7 +51,8 @@ pub fn pcg4d(key: [u32; 4]) -> [u32; 4] {
     [x, y, z, w]
 }
 
-/// Quantiles `z(p)` of the upper tail of the standard normal at `p = 2^-(k+2) (1 + s/16)`, index `17 k + s`, `s = 0..=16`.
+/// Quantiles `z(p)` of the upper tail of the standard normal at `p = 2^-(k+2) (1 + s/16)`, index `17 k + s`,
+/// `s = 0..=16`.
 #[must_use]
 pub fn tail_table() -> Vec<f32> {
     let at = |octave: usize, segment: usize| {
@@ -57,15 +62,18 @@ pub fn tail_table() -> Vec<f32> {
     (0..OCTAVES).flat_map(|octave| (0..=SEGMENTS).map(move |segment| at(octave, segment))).collect()
 }
 
-/// [`tail_table`] as a shader reads it: what each segment begins with and what it adds, index `16 k + s`, `s = 0..16`.
+/// [`tail_table`] as a shader reads it: what each segment begins with and what it adds, index `16 k + s`, `s
+/// = 0..16`.
 #[must_use]
 pub fn tail_segments() -> Vec<[f32; 2]> {
     let table = tail_table();
-    let of_octave = |octave: &[f32]| octave.windows(2).map(|ends| [ends[0], ends[1] - ends[0]]).collect::<Vec<_>>();
+    let of_octave =
+        |octave: &[f32]| octave.windows(2).map(|ends| [ends[0], ends[1] - ends[0]]).collect::<Vec<_>>();
     table.chunks_exact(SEGMENTS + 1).flat_map(of_octave).collect()
 }
 
-/// Standard normal from 32 random bits by interpolating [`tail_table`]; bit 31 is the sign, bits 30..8 the tail probability.
+/// Standard normal from 32 random bits by interpolating [`tail_table`]; bit 31 is the sign, bits 30..8 the
+/// tail probability.
 ///
 /// Reaches about 5.5 sigma.
 #[must_use]
@@ -83,11 +91,17 @@ pub fn normal_from_bits(bits: u32, table: &[f32]) -> f32 {
 /// Four independent standard normals of a pixel.
 #[must_use]
 pub fn normal4(pixel: [u32; 2], frame: u32, seed: u64, stream: u32, table: &[f32]) -> [f32; 4] {
-    let key = [pixel[0] | (pixel[1] << 16), frame, seed as u32, (seed >> 32) as u32 ^ stream.wrapping_mul(0x9e37_79b9)];
+    let key = [
+        pixel[0] | (pixel[1] << 16),
+        frame,
+        seed as u32,
+        (seed >> 32) as u32 ^ stream.wrapping_mul(0x9e37_79b9),
+    ];
     pcg4d(key).map(|bits| normal_from_bits(bits, table))
 }
 
-/// `z` with `1 - Phi(z) = p` for `0 < p <= 0.5`: Newton on an erfc continued fraction or series, to f64 rounding.
+/// `z` with `1 - Phi(z) = p` for `0 < p <= 0.5`: Newton on an erfc continued fraction or series, to f64
+/// rounding.
 fn upper_quantile(p: f64) -> f64 {
     if p >= 0.5 {
         return 0.0;
@@ -130,9 +144,12 @@ mod tests {
 
     #[test]
     fn quantiles_agree_with_published_values() {
-        for (p, z) in
-            [(0.25, 0.674_489_750_196_082), (0.025, 1.959_963_984_540_054), (1e-3, 3.090_232_306_167_813), (1e-6, 4.753_424_308_822_899)]
-        {
+        for (p, z) in [
+            (0.25, 0.674_489_750_196_082),
+            (0.025, 1.959_963_984_540_054),
+            (1e-3, 3.090_232_306_167_813),
+            (1e-6, 4.753_424_308_822_899),
+        ] {
             assert!((upper_quantile(p) - z).abs() < 1e-9, "{p}: {}", upper_quantile(p));
         }
     }
@@ -144,7 +161,8 @@ mod tests {
         for (i, seed) in seeds.iter().enumerate() {
             assert!(*seed != 12 && !seeds[..i].contains(seed), "{seeds:?}");
         }
-        // FNV-1a of "a" is af63dc4c8601ec8c (its authors' table), and SplitMix64 begins with e220a8397b1dcdaf from state 0 (Vigna's program).
+        // FNV-1a of "a" is af63dc4c8601ec8c (its authors' table), and SplitMix64 begins with e220a8397b1dcdaf
+        // from state 0 (Vigna's program).
         assert_eq!(camera_seed(0xaf63_dc4c_8601_ec8c, "a"), 0xe220_a839_7b1d_cdaf);
         // Unlike seeds stay unlike under one name.
         assert_ne!(camera_seed(12, "left"), camera_seed(13, "left"));
@@ -176,7 +194,10 @@ mod tests {
         let moment = sums.map(|s| s / f64::from(n));
         // Five standard errors of each estimate at n = 1e6.
         assert!(
-            moment[0].abs() < 5e-3 && (moment[1] - 1.0).abs() < 7.1e-3 && moment[2].abs() < 0.02 && (moment[3] - 3.0).abs() < 0.05,
+            moment[0].abs() < 5e-3
+                && (moment[1] - 1.0).abs() < 7.1e-3
+                && moment[2].abs() < 0.02
+                && (moment[3] - 3.0).abs() < 0.05,
             "{moment:?}"
         );
         assert!((f64::from(beyond_3) / f64::from(n) - 0.002_7).abs() < 2.6e-4, "{beyond_3}");
@@ -185,12 +206,19 @@ mod tests {
     #[test]
     fn neighbours_frames_and_seeds_are_uncorrelated() {
         let table = tail_table();
-        let at = |x: u32, y: u32, frame: u32, seed: u64| f64::from(normal4([x, y], frame, seed, NOISE_STREAM, &table)[0]);
+        let at = |x: u32, y: u32, frame: u32, seed: u64| {
+            f64::from(normal4([x, y], frame, seed, NOISE_STREAM, &table)[0])
+        };
         let mut sums = [0.0; 4];
         for y in 0..300 {
             for x in 0..300 {
                 let z = at(x, y, 7, 12);
-                for (sum, other) in sums.iter_mut().zip([at(x + 1, y, 7, 12), at(x, y + 1, 7, 12), at(x, y, 8, 12), at(x, y, 7, 13)]) {
+                for (sum, other) in sums.iter_mut().zip([
+                    at(x + 1, y, 7, 12),
+                    at(x, y + 1, 7, 12),
+                    at(x, y, 8, 12),
+                    at(x, y, 7, 13),
+                ]) {
                     *sum += z * other;
                 }
             }
@@ -224,18 +252,21 @@ mod tests {
         }
     }
 
-    /// Largest power of a plane of bits at any frequency but 0, in its mean power: exponentially distributed for true noise.
+    /// Largest power of a plane of bits at any frequency but 0, in its mean power: exponentially distributed
+    /// for true noise.
     fn strongest_wave(bit: impl Fn(u32, u32) -> bool) -> f64 {
         const SIDE: usize = 64;
-        let mut rows: Vec<Vec<[f64; 2]>> =
-            (0..SIDE as u32).map(|y| (0..SIDE as u32).map(|x| [if bit(x, y) { 1.0 } else { -1.0 }, 0.0]).collect()).collect();
+        let mut rows: Vec<Vec<[f64; 2]>> = (0..SIDE as u32)
+            .map(|y| (0..SIDE as u32).map(|x| [if bit(x, y) { 1.0 } else { -1.0 }, 0.0]).collect())
+            .collect();
         rows.iter_mut().for_each(|row| fourier(row));
         let mut strongest = 0.0_f64;
         for x in 0..SIDE {
             let mut column: Vec<[f64; 2]> = rows.iter().map(|row| row[x]).collect();
             fourier(&mut column);
             for ([re, im], y) in column.into_iter().zip(0..) {
-                // Where the plane's wave is its own mirror image all its power is in one number: half as much on average counts the same.
+                // Where the plane's wave is its own mirror image all its power is in one number: half as much
+                // on average counts the same.
                 let real = x % (SIDE / 2) == 0 && y % (SIDE / 2) == 0;
                 let power = (re * re + im * im) / (SIDE * SIDE) as f64;
                 if (x, y) != (0, 0) {
@@ -248,7 +279,8 @@ mod tests {
 
     #[test]
     fn no_bit_plane_that_is_used_has_a_pattern() {
-        // 96 planes of 4096 frequencies: the strongest of them is above 27 once in a million times (4e5 exp(-27) = 7e-7).
+        // 96 planes of 4096 frequencies: the strongest of them is above 27 once in a million times (4e5
+        // exp(-27) = 7e-7).
         const LIMIT: f64 = 27.0;
         let wave = |lane: usize, bit: u32| {
             let key = |x: u32, y: u32| [x | (y << 16), 7, 12, NOISE_STREAM.wrapping_mul(0x9e37_79b9)];

@@ -1,4 +1,5 @@
-//! Vignette, light, noise, saturation: paper section 7 and fig. 9, on linear values. Twin of `shaders/reverse/photometric.wgsl`.
+//! Vignette, light, noise, saturation: paper section 7 and fig. 9, on linear values. Twin of
+//! `shaders/reverse/photometric.wgsl`.
 
 use crate::{
     noise::{NOISE_STREAM, normal4},
@@ -19,11 +20,13 @@ pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
     }
 }
 
-/// Vignette weights at output size: the map resampled bilinearly (pixel centres, edges held), then the thresholds.
+/// Vignette weights at output size: the map resampled bilinearly (pixel centres, edges held), then the
+/// thresholds.
 #[must_use]
 pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]) -> Vec<f32> {
     let axis = |out: u32, out_size: u32, in_size: u32| {
-        let at = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5).clamp(0.0, f64::from(in_size - 1));
+        let at = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5)
+            .clamp(0.0, f64::from(in_size - 1));
         let low = at.floor() as u32;
         (low, (low + 1).min(in_size - 1), (at - at.floor()) as f32)
     };
@@ -61,7 +64,8 @@ pub fn photometric(
     let mono = is_mono(spec.output);
     let luma = 0.212_6 * color[0] + 0.715_2 * color[1] + 0.072_2 * color[2];
     let gain = weight * spec.light as f32;
-    let noise = if spec.noise_sigma > 0.0 { normal4(pixel, frame, seed, NOISE_STREAM, table) } else { [0.0; 4] };
+    let noise =
+        if spec.noise_sigma > 0.0 { normal4(pixel, frame, seed, NOISE_STREAM, table) } else { [0.0; 4] };
     std::array::from_fn(|channel| {
         let value = if mono { luma } else { color[channel] };
         let n = if mono { noise[0] } else { noise[channel] };
@@ -94,7 +98,11 @@ mod tests {
 
     #[test]
     fn mono_output_has_one_noise_for_all_channels() {
-        let spec = PhotometricSpec { output: OutputEncoding::Luma8, noise_sigma: 0.05, ..PhotometricSpec::default() };
+        let spec = PhotometricSpec {
+            output: OutputEncoding::Luma8,
+            noise_sigma: 0.05,
+            ..PhotometricSpec::default()
+        };
         let value = photometric(&spec, [0.5, 0.4, 0.3], 1.0, [3, 4], 0, 1, &crate::noise::tail_table());
         assert!(value[0] == value[1] && value[1] == value[2]);
     }

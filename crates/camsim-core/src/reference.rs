@@ -1,9 +1,11 @@
-//! The oracle: every ray cast in f64 at its own instant from the trajectory into the scene. Slow, exact, and independent.
+//! The oracle: every ray cast in f64 at its own instant from the trajectory into the scene. Slow, exact, and
+//! independent.
 //!
-//! It shares with the renderer and its twins the scenario, the trajectory (with the mount) and the lens's forward model, and nothing else:
-//! line times ([`clock`]), lens inverse ([`eye`]), zoom, ray casting ([`ray`], [`ground`], [`meshes`]), colour ([`paint`]) and integration
-//! ([`render`]) are its own. The seeded photometric stage is the renderer's, since a seed has no other meaning than its noise.
-//! What its measurements count apart as a silhouette is defined once, for them and for the plan's prediction.
+//! It shares with the renderer and its twins the scenario, the trajectory (with the mount) and the lens's
+//! forward model, and nothing else: line times ([`clock`]), lens inverse ([`eye`]), zoom, ray casting
+//! ([`ray`], [`ground`], [`meshes`]), colour ([`paint`]) and integration ([`render`]) are its own. The seeded
+//! photometric stage is the renderer's, since a seed has no other meaning than its noise. What its
+//! measurements count apart as a silhouette is defined once, for them and for the plan's prediction.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -33,7 +35,10 @@ use clock::Clock;
 use eye::Eye;
 use ground::Ground;
 pub use holes::{Holes, holes};
-pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, MOST_VOID_SHARE, coord_errors, image_errors, silhouettes};
+pub use measure::{
+    CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, MOST_VOID_SHARE, coord_errors, image_errors,
+    silhouettes,
+};
 use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;
@@ -170,20 +175,24 @@ impl Oracle {
         let stamp_s = self.clock.stamp_s(frame);
         let eye = match &self.fixed {
             Some(eye) => FrameEye::Fixed(eye),
-            None => self.zoomed_eye(zoom_at(&self.sequence.zoom_track, stamp_s)).map_or(FrameEye::Blind, FrameEye::Zoomed),
+            None => self
+                .zoomed_eye(zoom_at(&self.sequence.zoom_track, stamp_s))
+                .map_or(FrameEye::Blind, FrameEye::Zoomed),
         };
         FrameView { oracle: self, stamp_s, eye }
     }
 
-    /// The place `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase `phase` in [-0.5, 0.5]; the whole pixel has the
-    /// time of its line. `None` where the lens has no ideal ray. For many looks into a frame of a zoom lens, [`Oracle::view`] is faster.
+    /// The place `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase `phase` in
+    /// [-0.5, 0.5]; the whole pixel has the time of its line. `None` where the lens has no ideal ray. For
+    /// many looks into a frame of a zoom lens, [`Oracle::view`] is faster.
     #[must_use]
     pub fn look(&self, frame: u64, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<Look> {
         self.view(frame).look(pixel, offset_px, phase)
     }
 
-    /// First surface along `origin + t direction`, t > 0, of what is mixed with what is behind it that from its cut-off on; [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in the
-    /// camera. Surfaces are met from both sides. `None` also for numbers that are not finite.
+    /// First surface along `origin + t direction`, t > 0, of what is mixed with what is behind it that from
+    /// its cut-off on; [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in the camera.
+    /// Surfaces are met from both sides. `None` also for numbers that are not finite.
     #[must_use]
     pub fn cast(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
         let ray = Ray::new(origin_ned_m, direction_ned)?;
@@ -194,18 +203,20 @@ impl Oracle {
 
     fn on_ground(&self, ray: &Ray) -> Option<Hit> {
         let terrain = self.sequence.scene.terrain.as_ref();
-        terrain.zip(self.ground.as_ref()).and_then(|(terrain, ground)| ground.first(terrain, ray, f64::INFINITY))
+        terrain
+            .zip(self.ground.as_ref())
+            .and_then(|(terrain, ground)| ground.first(terrain, ray, f64::INFINITY))
     }
 
-    /// Linear light that a ray brings from the one surface that it is said to meet, with fog by slant range: where nothing is mixed, that is
-    /// all. [`Oracle::light`] knows of layers.
+    /// Linear light that a ray brings from the one surface that it is said to meet, with fog by slant range:
+    /// where nothing is mixed, that is all. [`Oracle::light`] knows of layers.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
         self.paint.color(hit, uv.extend(1.0).length())
     }
 
-    /// Linear light that the ray `uv` of a camera brings: of what lets none through, and of every layer before it, each at its own place and
-    /// mixed by its alpha with what is behind it.
+    /// Linear light that the ray `uv` of a camera brings: of what lets none through, and of every layer
+    /// before it, each at its own place and mixed by its alpha with what is behind it.
     #[must_use]
     pub fn light(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
         let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
@@ -213,7 +224,9 @@ impl Oracle {
         if !self.blends {
             return self.paint.color(self.cast(pose.position_ned_m, direction).as_ref(), range_per_depth);
         }
-        let Some(ray) = Ray::new(pose.position_ned_m, direction) else { return self.paint.color(None, range_per_depth) };
+        let Some(ray) = Ray::new(pose.position_ned_m, direction) else {
+            return self.paint.color(None, range_per_depth);
+        };
         let on_ground = self.on_ground(&ray);
         let limit = on_ground.map_or(f64::INFINITY, |hit| hit.depth_m);
         let solid = self.meshes.first_solid(&ray, limit).or(on_ground);
@@ -236,7 +249,8 @@ impl Oracle {
     }
 
     fn zoomed_eye(&self, zoom: f64) -> Option<Arc<Eye>> {
-        // Not held while it is made: that is done in parallel, and a thread that waits for its parts may take up work that asks for an eye itself.
+        // Not held while it is made: that is done in parallel, and a thread that waits for its parts may take
+        // up work that asks for an eye itself.
         let kept = || self.zoomed.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, eye)) = kept().iter().find(|(bits, _)| *bits == zoom.to_bits()) {
             return Some(eye.clone());
@@ -283,15 +297,23 @@ impl FrameView<'_> {
     }
 }
 
-fn eye(camera: &CameraSpec, focal_px: [f64; 2], principal_px: [f64; 2], coefficients: &[f64]) -> Result<Eye, CameraError> {
-    let lens = Lens::new(camera.lens.model, coefficients).map_err(|source| CameraError::Lens { key: "camera".to_owned(), source })?;
+fn eye(
+    camera: &CameraSpec,
+    focal_px: [f64; 2],
+    principal_px: [f64; 2],
+    coefficients: &[f64],
+) -> Result<Eye, CameraError> {
+    let lens = Lens::new(camera.lens.model, coefficients)
+        .map_err(|source| CameraError::Lens { key: "camera".to_owned(), source })?;
     Ok(Eye::new(camera.size_px, focal_px, principal_px, lens))
 }
 
 /// Every number of a calibration linear in the zoom value between two entries of the table, held outside.
 fn eye_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<Eye, CameraError> {
     let table = &camera.zoom;
-    let (Some(first), Some(last)) = (table.first(), table.last()) else { return Err(CameraError::ZoomValue(zoom)) };
+    let (Some(first), Some(last)) = (table.first(), table.last()) else {
+        return Err(CameraError::ZoomValue(zoom));
+    };
     let pair = table.windows(2).find(|pair| pair[0].at <= zoom && zoom < pair[1].at);
     let (low, high, share) = match pair {
         Some([low, high]) => (low, high, (zoom - low.at) / (high.at - low.at)),
@@ -301,10 +323,13 @@ fn eye_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<Eye, CameraError> {
     let mix = |a: f64, b: f64| a * (1.0 - share) + b * share;
     let mix2 = |a: [f64; 2], b: [f64; 2]| [mix(a[0], b[0]), mix(a[1], b[1])];
     let centre = centre_px(camera);
-    let principal_px = mix2(low.principal_point_px.unwrap_or(centre), high.principal_point_px.unwrap_or(centre));
+    let principal_px =
+        mix2(low.principal_point_px.unwrap_or(centre), high.principal_point_px.unwrap_or(centre));
     let count = low.coefficients.len().max(high.coefficients.len());
     let coefficient = |of: &[f64], i: usize| of.get(i).copied().unwrap_or(0.0);
-    let coefficients: Vec<f64> = (0..count).map(|i| mix(coefficient(&low.coefficients, i), coefficient(&high.coefficients, i))).collect();
+    let coefficients: Vec<f64> = (0..count)
+        .map(|i| mix(coefficient(&low.coefficients, i), coefficient(&high.coefficients, i)))
+        .collect();
     eye(camera, mix2(low.focal_px, high.focal_px), principal_px, &coefficients)
 }
 
@@ -319,5 +344,7 @@ fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
         return first.1;
     }
     let between = track.windows(2).find(|rows| rows[0].0 <= t_s && t_s < rows[1].0);
-    between.map_or(last.1, |rows| rows[0].1 + (rows[1].1 - rows[0].1) * ((t_s - rows[0].0) / (rows[1].0 - rows[0].0)))
+    between.map_or(last.1, |rows| {
+        rows[0].1 + (rows[1].1 - rows[0].1) * ((t_s - rows[0].0) / (rows[1].0 - rows[0].0))
+    })
 }

@@ -1,7 +1,8 @@
 //! The scenario: one plain struct that TOML, `--set`, the command line and the viewer all edit.
 //!
-//! Every key has a default except `flight.log` and the scene. Angles are degrees only where the key says `_deg`,
-//! lengths are metres, times seconds or `_ms`. Paths are as written in the file until the loader resolves them.
+//! Every key has a default except `flight.log` and the scene. Angles are degrees only where the key says
+//! `_deg`, lengths are metres, times seconds or `_ms`. Paths are as written in the file until the loader
+//! resolves them.
 
 use std::path::PathBuf;
 
@@ -14,15 +15,16 @@ mod validate;
 
 pub use auto::{Auto, FieldOr};
 pub use camera::{
-    Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout, ShutterSpec, VibrationSpec,
-    ZoomSpec,
+    Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout,
+    ShutterSpec, VibrationSpec, ZoomSpec,
 };
 pub use scene::{
-    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, PatternCentre, PatternSpec, SceneSpec,
-    TerrainSpec,
+    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
+    PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
 pub use validate::{
-    MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera,
+    MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
+    validate, validate_camera,
 };
 
 /// Everything that one run depends on.
@@ -194,7 +196,8 @@ pub struct TrackerSpec {
     pub rate_hz: f64,
     /// Speed limit; `auto` is 1.2 times the 99.9th percentile of the log's own speed.
     pub max_speed_m_s: Auto<f64>,
-    /// Acceleration limit; `auto` is 1.5 times the 99.9th percentile of the smoothed log's own, and at least the paper's 19.6; with the paper's preset it is that.
+    /// Acceleration limit; `auto` is 1.5 times the 99.9th percentile of the smoothed log's own, and at least
+    /// the paper's 19.6; with the paper's preset it is that.
     pub max_acceleration_m_s2: Auto<f64>,
     /// Angular rate limit; `auto` as for speed.
     pub max_angular_rate_deg_s: Auto<f64>,
@@ -215,7 +218,8 @@ impl Scenario {
         if self.quality.preset == Preset::Paper {
             let or_paper = |limit: Auto<f64>, paper: f64| Auto::Value(limit.value().unwrap_or(paper));
             tracker.max_acceleration_m_s2 = or_paper(tracker.max_acceleration_m_s2, PAPER_ACCELERATION_M_S2);
-            tracker.max_angular_acceleration_deg_s2 = or_paper(tracker.max_angular_acceleration_deg_s2, PAPER_ANGULAR_ACCELERATION_DEG_S2);
+            tracker.max_angular_acceleration_deg_s2 =
+                or_paper(tracker.max_angular_acceleration_deg_s2, PAPER_ANGULAR_ACCELERATION_DEG_S2);
         }
         tracker
     }
@@ -257,21 +261,25 @@ pub struct QualitySpec {
     pub preset: Preset,
     /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
     pub max_error_px: f64,
-    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place, the terrain's level of detail and at silhouettes.
+    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place, the
+    /// terrain's level of detail and at silhouettes.
     pub max_error_dn: f64,
-    /// Bound on what the terrain's level of detail moves, pixels of the picture; what that costs counts in `max_error_dn`.
+    /// Bound on what the terrain's level of detail moves, pixels of the picture; what that costs counts in
+    /// `max_error_dn`.
     pub max_terrain_error_px: f64,
     /// Temporal solver.
     pub solver: Auto<Solver>,
     /// Depth look-ups of `reproject`, at most [`MAX_ITERATIONS`].
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure. At most [`MAX_BLUR_SAMPLES`].
+    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure. At most
+    /// [`MAX_BLUR_SAMPLES`].
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel, at most [`MAX_FOOTPRINT_TAPS`].
     pub footprint_taps: Auto<u32>,
     /// Pixels of the ideal frame for each of the camera's, along a side.
     pub ideal_scale: Auto<f64>,
-    /// Samples of each pixel of the ideal frame, 1 or 4: with several, borders are known to a part of a pixel.
+    /// Samples of each pixel of the ideal frame, 1 or 4: with several, borders are known to a part of a
+    /// pixel.
     pub ideal_samples: Auto<u32>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
@@ -314,9 +322,9 @@ pub enum Preset {
     /// The cheapest methods that keep the tolerances.
     #[default]
     Default,
-    /// The paper's own methods and approximations, as a base to measure against; [`crate::plan::paper`] lists them. It fixes the solver
-    /// (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the samples of an exposure (100), and the tolerances choose
-    /// nothing but the terrain's level of detail.
+    /// The paper's own methods and approximations, as a base to measure against; [`crate::plan::paper`] lists
+    /// them. It fixes the solver (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the
+    /// samples of an exposure (100), and the tolerances choose nothing but the terrain's level of detail.
     Paper,
 }
 
@@ -329,7 +337,8 @@ pub enum Silhouettes {
     Auto,
     /// As everywhere: from pixels of the ideal frame, each of which shows one surface.
     Plain,
-    /// By rays of their own, over the pixel's area and exposure, through ideal frames that keep several samples a pixel.
+    /// By rays of their own, over the pixel's area and exposure, through ideal frames that keep several
+    /// samples a pixel.
     Rays,
 }
 
@@ -390,12 +399,15 @@ pub enum Stamps {
 }
 
 impl OutputSpec {
-    /// What written stamps show at path time 0, nanoseconds: there the log's clock shows `log_epoch_ns`, and the window begins at `start_s` of path time.
+    /// What written stamps show at path time 0, nanoseconds: there the log's clock shows `log_epoch_ns`, and
+    /// the window begins at `start_s` of path time.
     #[must_use]
     pub fn stamp_epoch_ns(&self, log_epoch_ns: i64, start_s: f64) -> i64 {
         match self.stamps {
             Stamps::Log => log_epoch_ns,
-            Stamps::Zero => i64::try_from(self.epoch_ns).unwrap_or(i64::MAX).saturating_sub((start_s * 1e9).round() as i64),
+            Stamps::Zero => i64::try_from(self.epoch_ns)
+                .unwrap_or(i64::MAX)
+                .saturating_sub((start_s * 1e9).round() as i64),
         }
     }
 }

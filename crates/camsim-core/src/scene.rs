@@ -1,7 +1,7 @@
 //! The scene as plain data: terrain, meshes, pictures, sky, fog. No GPU and no file format in here.
 //!
-//! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so that the renderer can form
-//! camera-relative coordinates without cancellation.
+//! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so
+//! that the renderer can form camera-relative coordinates without cancellation.
 
 use crate::pose::CameraPose;
 
@@ -27,8 +27,8 @@ pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
 pub use surface_filter::{SurfaceFilter, SurfaceReads};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, DrawnCell, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid,
-    TerrainHit, TerrainMesh, TerrainVertex, VERTEX_BITS,
+    Aabb, CHUNK_CELLS, DrawnCell, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk,
+    TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainVertex, VERTEX_BITS,
 };
 pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
 
@@ -43,7 +43,8 @@ pub struct Scene {
     pub sky_linear: [f32; 3],
     /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
     pub fog_visibility_m: Option<f64>,
-    /// Light on meshes whose shapes have normals; the ground has it in its picture ([`Terrain::light_up`]). Without, colours are as they are.
+    /// Light on meshes whose shapes have normals; the ground has it in its picture ([`Terrain::light_up`]).
+    /// Without, colours are as they are.
     pub light: Option<Light>,
 }
 
@@ -54,7 +55,8 @@ impl Scene {
         self.meshes.iter().any(|mesh| mesh.material.blends)
     }
 
-    /// Whether all borders are those of triangles: no surface is mixed with what is behind it or has holes by its picture.
+    /// Whether all borders are those of triangles: no surface is mixed with what is behind it or has holes by
+    /// its picture.
     #[must_use]
     pub fn has_borders_of_triangles(&self) -> bool {
         self.meshes.iter().all(|mesh| !mesh.material.blends && mesh.material.cutoff.is_none())

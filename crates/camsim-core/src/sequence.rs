@@ -9,7 +9,8 @@ use crate::{mount::CameraPath, scenario::Scenario, scene::Scene};
 pub struct Sequence {
     /// The resolved scenario.
     pub scenario: Scenario,
-    /// Camera pose at any instant; its time is seconds since the first good row of the log (after `flight.speed`).
+    /// Camera pose at any instant; its time is seconds since the first good row of the log (after
+    /// `flight.speed`).
     pub path: Arc<CameraPath>,
     /// What written stamps show at path time 0, nanoseconds: the log's clock, or that of `output.stamps`.
     pub epoch_ns: i64,

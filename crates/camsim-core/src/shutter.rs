@@ -1,11 +1,13 @@
-//! When each line of the image is exposed: delay, rolling shutter, exposure, interlacing (the paper's section 6).
+//! When each line of the image is exposed: delay, rolling shutter, exposure, interlacing (the paper's section
+//! 6).
 //!
 //! Everything is relative to the frame's stamp and to the **mid-exposure** of a line:
 //!
 //! `dt = -delay + ((line + 0.5)/N - 0.5) t_r - (t_i if the row belongs to the earlier field)`
 //!
-//! so that the middle of the image has exactly `-delay`. `line` counts rows from the top or columns from the left; the two reverse
-//! readout directions count from the other end. Fields are always rows, whatever the readout direction.
+//! so that the middle of the image has exactly `-delay`. `line` counts rows from the top or columns from the
+//! left; the two reverse readout directions count from the other end. Fields are always rows, whatever the
+//! readout direction.
 
 use crate::scenario::{FieldOr, Parity, Readout, ShutterSpec};
 
@@ -35,7 +37,8 @@ pub enum ShutterError {
 pub enum LinesAxis {
     /// Lines are rows: a pixel's time depends on its y alone.
     Rows,
-    /// Lines are columns: a pixel's time depends on its x, and on the parity of its y where fields are interlaced.
+    /// Lines are columns: a pixel's time depends on its x, and on the parity of its y where fields are
+    /// interlaced.
     Columns,
 }
 
@@ -66,11 +69,23 @@ impl Shutter {
         };
         Ok(Self {
             size_px,
-            delay_s: seconds("delay_ms", spec.delay_ms, "; it says how much older than its stamp the image is")?,
-            readout_s: seconds("readout_ms", spec.readout_ms, "; for a reverse readout set camera.shutter.readout")?,
+            delay_s: seconds(
+                "delay_ms",
+                spec.delay_ms,
+                "; it says how much older than its stamp the image is",
+            )?,
+            readout_s: seconds(
+                "readout_ms",
+                spec.readout_ms,
+                "; for a reverse readout set camera.shutter.readout",
+            )?,
             direction: spec.readout,
             exposure_s: seconds("exposure_ms", spec.exposure_ms, "")?,
-            interlace_s: seconds("interlace_ms", interlace_ms, "; to exchange the fields set camera.shutter.first_field")?,
+            interlace_s: seconds(
+                "interlace_ms",
+                interlace_ms,
+                "; to exchange the fields set camera.shutter.first_field",
+            )?,
             first_field: spec.first_field,
         })
     }
@@ -91,8 +106,8 @@ impl Shutter {
         }
     }
 
-    /// Mid-exposure of a line relative to the stamp, seconds. Rows include their field's lag; columns are those of the later field
-    /// (see [`Shutter::dt_pixel_s`]).
+    /// Mid-exposure of a line relative to the stamp, seconds. Rows include their field's lag; columns are
+    /// those of the later field (see [`Shutter::dt_pixel_s`]).
     pub fn dt_line_s(&self, line: u32) -> f64 {
         let dt_s = self.dt_readout_s(line);
         match self.lines_axis() {
@@ -110,7 +125,8 @@ impl Shutter {
         self.dt_readout_s(line) - self.field_lag_s(y)
     }
 
-    /// By how much a row is earlier than the readout alone says: the interlacing lag for rows of the first field, else 0.
+    /// By how much a row is earlier than the readout alone says: the interlacing lag for rows of the first
+    /// field, else 0.
     pub fn field_lag_s(&self, row: u32) -> f64 {
         let parity = if row.is_multiple_of(2) { Parity::Even } else { Parity::Odd };
         if parity == self.first_field { self.interlace_s } else { 0.0 }
@@ -119,7 +135,8 @@ impl Shutter {
     /// Earliest begin and latest end of exposure of any pixel, relative to the stamp.
     pub fn window_s(&self) -> (f64, f64) {
         let last = self.lines() - 1;
-        // With one row only one field exists; with more, both do. For rows, the extreme lines of each field are among the outer two.
+        // With one row only one field exists; with more, both do. For rows, the extreme lines of each field
+        // are among the outer two.
         let rows = self.size_px[1];
         let mids = [0, 1.min(last), last.saturating_sub(1), last].into_iter().flat_map(|line| {
             let ys = match self.lines_axis() {
@@ -128,7 +145,8 @@ impl Shutter {
             };
             ys.map(|y| self.dt_readout_s(line) - self.field_lag_s(y))
         });
-        let (min, max) = mids.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), dt_s| (min.min(dt_s), max.max(dt_s)));
+        let (min, max) =
+            mids.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), dt_s| (min.min(dt_s), max.max(dt_s)));
         (min - 0.5 * self.exposure_s, max + 0.5 * self.exposure_s)
     }
 
@@ -197,7 +215,10 @@ mod tests {
         for y in 0..height {
             for x in 0..width {
                 let dt_s = shutter.dt_pixel_s(x, y);
-                window = (window.0.min(dt_s - 0.5 * shutter.exposure_s()), window.1.max(dt_s + 0.5 * shutter.exposure_s()));
+                window = (
+                    window.0.min(dt_s - 0.5 * shutter.exposure_s()),
+                    window.1.max(dt_s + 0.5 * shutter.exposure_s()),
+                );
             }
         }
         window
@@ -243,22 +264,33 @@ mod tests {
             let lag_s = plain.dt_line_s(row) - shutter.dt_line_s(row);
             assert!((lag_s - if row % 2 == 0 { 0.02 } else { 0.0 }).abs() < 1e-15);
         }
-        let odd = Shutter::from_spec(&ShutterSpec { first_field: Parity::Odd, ..interlaced.clone() }, 25.0, [4, 6]).unwrap();
+        let odd =
+            Shutter::from_spec(&ShutterSpec { first_field: Parity::Odd, ..interlaced.clone() }, 25.0, [4, 6])
+                .unwrap();
         assert_eq!(odd.dt_line_s(0), plain.dt_line_s(0));
         assert!((odd.dt_line_s(1) - plain.dt_line_s(1) + 0.02).abs() < 1e-15);
         // Sideways readout: still rows.
-        let sideways = Shutter::from_spec(&ShutterSpec { readout: Readout::LeftToRight, ..interlaced }, 25.0, [4, 6]).unwrap();
+        let sideways =
+            Shutter::from_spec(&ShutterSpec { readout: Readout::LeftToRight, ..interlaced }, 25.0, [4, 6])
+                .unwrap();
         assert!((sideways.dt_pixel_s(1, 1) - sideways.dt_pixel_s(1, 2) - 0.02).abs() < 1e-15);
         assert_eq!(sideways.dt_pixel_s(1, 1), sideways.dt_line_s(1));
     }
 
     #[test]
     fn the_window_is_that_of_all_pixels() {
-        for readout in [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft] {
+        for readout in
+            [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft]
+        {
             for first_field in [Parity::Even, Parity::Odd] {
                 for interlace_ms in [0.0, 1.0, 20.0, 100.0] {
                     for size in [[1, 1], [1, 2], [2, 1], [5, 3], [4, 6]] {
-                        let spec = ShutterSpec { readout, first_field, interlace_ms: FieldOr::Ms(interlace_ms), ..spec() };
+                        let spec = ShutterSpec {
+                            readout,
+                            first_field,
+                            interlace_ms: FieldOr::Ms(interlace_ms),
+                            ..spec()
+                        };
                         let shutter = Shutter::from_spec(&spec, 30.0, size).unwrap();
                         assert_eq!(shutter.window_s(), window_by_pixels(&shutter, size), "{spec:?} {size:?}");
                     }

@@ -1,7 +1,7 @@
 //! Temporal inverse and gather: output ray + instant -> where to look in the ideal frame (paper section 6).
 //!
-//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`; the paper's own models are in
-//! [`displacement`] and [`paper`].
+//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`; the
+//! paper's own models are in [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -26,7 +26,8 @@ pub use stages::{NodeDepths, PathStage};
 /// Most ideal frames of one output frame.
 pub const MAX_KEYS: u32 = 4;
 
-/// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
+/// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as
+/// needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealGeometry {
     /// Width, height.
@@ -62,7 +63,9 @@ impl IdealGeometry {
     /// Whether a position lies on the frame's pixels.
     #[must_use]
     pub fn contains(&self, at_px: DVec2) -> bool {
-        at_px.cmpge(DVec2::splat(-0.5)).all() && at_px.x <= f64::from(self.size_px[0]) - 0.5 && at_px.y <= f64::from(self.size_px[1]) - 0.5
+        at_px.cmpge(DVec2::splat(-0.5)).all()
+            && at_px.x <= f64::from(self.size_px[0]) - 0.5
+            && at_px.y <= f64::from(self.size_px[1]) - 0.5
     }
 }
 
@@ -76,7 +79,8 @@ pub struct InverseDepthImage<'a> {
 }
 
 impl InverseDepthImage<'_> {
-    /// Bilinear in 1/z (exact on planes); the nearest texel where the four around belong to different surfaces.
+    /// Bilinear in 1/z (exact on planes); the nearest texel where the four around belong to different
+    /// surfaces.
     #[must_use]
     pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
@@ -108,13 +112,15 @@ impl InverseDepthImage<'_> {
     /// Largest less smallest of the four texels around a position.
     #[must_use]
     pub fn spread(&self, at_px: DVec2) -> f64 {
-        let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].map(|half| self.nearest(at_px + DVec2::from_array(half)));
+        let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
+            .map(|half| self.nearest(at_px + DVec2::from_array(half)));
         let [a, b, c, d] = corners;
         a.max(b).max(c).max(d) - a.min(b).min(c).min(d)
     }
 }
 
-/// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the way right and down.
+/// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the
+/// way right and down.
 #[must_use]
 pub fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
     let low = d00.min(d10).min(d01).min(d11);
@@ -133,7 +139,8 @@ pub fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
     }
 }
 
-/// How far from a surface pixels of the sky go with it, pixels of the camera: as far as reads reach, and what the surface may be beside where it is first looked for.
+/// How far from a surface pixels of the sky go with it, pixels of the camera: as far as reads reach, and what
+/// the surface may be beside where it is first looked for.
 pub const SKY_REACH_PX: f64 = 2.0;
 
 /// Where a surface is looked for around a place that shows the sky.
@@ -158,21 +165,27 @@ pub struct KeyView<'a> {
     pub ideal: &'a IdealGeometry,
     /// Its depth.
     pub depth: &'a InverseDepthImage<'a>,
-    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m (the plan's `SeenPlane`). 0: infinitely far.
+    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m (the
+    /// plan's `SeenPlane`). 0: infinitely far.
     pub plane: DVec3,
     /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0: the plan's `sky_reach_px`.
     pub sky_reach_px: f64,
 }
 
 impl KeyView<'_> {
-    /// Inverse depth of the surface that the last look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
-    /// anywhere, and a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two as it should.
+    /// Inverse depth of the surface that the last look-up finds, 1/m. Where it finds the sky, that of the
+    /// nearest surface of those within reach: the sky is of one colour, so that it may be read anywhere, and
+    /// a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two
+    /// as it should.
     fn surface_at(&self, at_px: DVec2) -> f64 {
         let found = self.depth.inverse_depth(at_px);
         if found > 0.0 {
             return found;
         }
-        SKY_DIRECTIONS.iter().map(|direction| self.depth.nearest(at_px + self.sky_reach_px * *direction)).fold(0.0, f64::max)
+        SKY_DIRECTIONS
+            .iter()
+            .map(|direction| self.depth.nearest(at_px + self.sky_reach_px * *direction))
+            .fold(0.0, f64::max)
     }
 }
 
@@ -185,16 +198,24 @@ pub struct Source {
     pub inverse_depth: f64,
 }
 
-/// Exact relative pose, depth by fixed-point iteration; `None` behind the key camera or outside the ideal frame.
+/// Exact relative pose, depth by fixed-point iteration; `None` behind the key camera or outside the ideal
+/// frame.
 ///
-/// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key frame's inverse depth w_key
-/// there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the error by `(parallax px) |grad w| / w`, beginning with that of the plane.
+/// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key
+/// frame's inverse depth w_key there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the
+/// error by `(parallax px) |grad w| / w`, beginning with that of the plane.
 #[must_use]
-pub fn reproject(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, key: &KeyView<'_>) -> Option<Source> {
+pub fn reproject(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    iterations: u32,
+    key: &KeyView<'_>,
+) -> Option<Source> {
     source_at(uv, key_from_line, settle(uv, key_from_line, None, iterations, key).on_line, key.ideal)
 }
 
-/// Sources at the nodes of an exposure, whose poses relative to the key are `nodes`, in order of time; `mid` is that of mid-exposure.
+/// Sources at the nodes of an exposure, whose poses relative to the key are `nodes`, in order of time; `mid`
+/// is that of mid-exposure.
 #[must_use]
 pub fn reproject_nodes(
     uv: DVec2,
@@ -239,15 +260,22 @@ pub fn through_three([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
     move |share| begin + share * (slope + share * bend)
 }
 
-/// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of [`reproject`].
+/// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of
+/// [`reproject`].
 #[must_use]
-pub fn reproject_with(uv: DVec2, key_from_line: (DMat3, DVec3), found: f64, ideal: &IdealGeometry) -> Option<Source> {
+pub fn reproject_with(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    found: f64,
+    ideal: &IdealGeometry,
+) -> Option<Source> {
     let (rotation, shift) = key_from_line;
     let w = depth_on_line(rotation * uv.extend(1.0), shift, found).unwrap_or(0.0);
     source_at(uv, key_from_line, w, ideal)
 }
 
-/// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's ray.
+/// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's
+/// ray.
 #[derive(Clone, Copy)]
 struct Settled {
     in_key: f64,
@@ -255,7 +283,13 @@ struct Settled {
 }
 
 /// `guess`: what the key frame is taken to have there at first, 1/m; `None` begins with the plane.
-fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), guess: Option<f64>, iterations: u32, key: &KeyView<'_>) -> Settled {
+fn settle(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    guess: Option<f64>,
+    iterations: u32,
+    key: &KeyView<'_>,
+) -> Settled {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
     let on_line = match guess {
@@ -266,7 +300,8 @@ fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), guess: Option<f64>, iteratio
     for look in 1..=iterations {
         let at_px = key.ideal.px_from_point(direction + settled.on_line * shift);
         let in_key = if look < iterations { key.depth.inverse_depth(at_px) } else { key.surface_at(at_px) };
-        settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
+        settled =
+            Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
     }
     settled
 }
@@ -279,8 +314,8 @@ fn source_at(uv: DVec2, key_from_line: (DMat3, DVec3), w: f64, ideal: &IdealGeom
     (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
 }
 
-/// The inverse depth of a plane on the line's ray, 1/m: `n . z (R d + w t) = 1` gives `w = n . R d / (1 - n . t)`. 0 beyond its horizon and where the line's camera
-/// is not before it.
+/// The inverse depth of a plane on the line's ray, 1/m: `n . z (R d + w t) = 1` gives `w = n . R d / (1 - n .
+/// t)`. 0 beyond its horizon and where the line's camera is not before it.
 pub fn plane_on_line(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
     let before = 1.0 - plane.dot(shift);
     if before > 1e-3 { plane.dot(direction).max(0.0) / before } else { 0.0 }
@@ -292,7 +327,8 @@ fn depth_on_line(direction: DVec3, shift: DVec3, found: f64) -> Option<f64> {
     (scale > 1e-3).then(|| found * direction.z / scale)
 }
 
-/// Samples for a stretch of path: `min(a L, L + 16)`, at least `at_least`, at most `cap` (NUMERICS section 3: a = 2 keeps white texture below 1/255).
+/// Samples for a stretch of path: `min(a L, L + 16)`, at least `at_least`, at most `cap` (NUMERICS section 3:
+/// a = 2 keeps white texture below 1/255).
 #[must_use]
 pub fn samples_for(length_px: f64, samples_per_px: f64, at_least: u32, cap: u32) -> u32 {
     ((samples_per_px * length_px).min(length_px + 16.0).ceil() as u32).clamp(at_least, cap.max(at_least))
@@ -325,10 +361,10 @@ impl ColorImage<'_> {
         top.lerp(bottom, t.y)
     }
 
-    /// By a cubic spline, edges held: between pixels a bilinear read blurs. Softness 0 is Catmull and Rom's spline, which hardly does; 1 is
-    /// the B-spline, with a variance of a third of a square pixel an axis; between them weights and variance are mixed. Without the
-    /// four corners of its 4x4 pixels (at most 0.4 % each at softness 0, 0.8 % at 0.5). May leave the range of its pixels by a tenth
-    /// of their contrast.
+    /// By a cubic spline, edges held: between pixels a bilinear read blurs. Softness 0 is Catmull and Rom's
+    /// spline, which hardly does; 1 is the B-spline, with a variance of a third of a square pixel an axis;
+    /// between them weights and variance are mixed. Without the four corners of its 4x4 pixels (at most 0.4 %
+    /// each at softness 0, 0.8 % at 0.5). May leave the range of its pixels by a tenth of their contrast.
     #[must_use]
     pub fn spline(&self, at_px: DVec2, softness: DVec2) -> DVec3 {
         let base = at_px.floor();
@@ -352,22 +388,34 @@ impl ColorImage<'_> {
         sum / reads.iter().map(|read| read.0).sum::<f64>()
     }
 
-    /// Mean over a rectangle around a place, pixels being squares of one colour; edges held. Its sides along x and y, pixels, are 1 and more: with sides of 1 this is the bilinear read.
+    /// Mean over a rectangle around a place, pixels being squares of one colour; edges held. Its sides along
+    /// x and y, pixels, are 1 and more: with sides of 1 this is the bilinear read.
     #[must_use]
     pub fn over_area(&self, at_px: DVec2, sides_px: DVec2) -> DVec3 {
         let first = (at_px - 0.5 * (sides_px + 1.0)).floor() + 1.0;
         // Of a pixel so far away the part that is within, of all of the rectangle.
-        let weight = |k: usize, px: f64| (0.5 * (sides_px[k] + 1.0) - (px - at_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k];
+        let weight = |k: usize, px: f64| {
+            (0.5 * (sides_px[k] + 1.0) - (px - at_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k]
+        };
         let count = [0, 1].map(|k: usize| (sides_px[k] + 1.0).ceil() as u32);
-        let pixels = (0..count[1]).flat_map(|y| (0..count[0]).map(move |x| first + DVec2::new(f64::from(x), f64::from(y))));
+        let pixels = (0..count[1])
+            .flat_map(|y| (0..count[0]).map(move |x| first + DVec2::new(f64::from(x), f64::from(y))));
         pixels.map(|px| weight(0, px.x) * weight(1, px.y) * self.sample(px)).sum()
     }
 }
 
-/// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each polynomial of the path has its
-/// samples uniformly in time, in the middles of equal parts, and at most `cap` of them.
+/// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each
+/// polynomial of the path has its samples uniformly in time, in the middles of equal parts, and at most `cap`
+/// of them.
 #[must_use]
-pub fn gather(nodes_px: &[DVec2], path: PathStage, area: &Footprint, color: &ColorImage<'_>, samples_per_px: f64, cap: u32) -> DVec3 {
+pub fn gather(
+    nodes_px: &[DVec2],
+    path: PathStage,
+    area: &Footprint,
+    color: &ColorImage<'_>,
+    samples_per_px: f64,
+    cap: u32,
+) -> DVec3 {
     let taps = area.taps[0] * area.taps[1];
     if nodes_px.len() < 2 {
         let at = nodes_px.first().copied().unwrap_or_default();
@@ -419,7 +467,11 @@ mod tests {
 
     #[test]
     fn reprojection_over_a_plane_is_its_homography() {
-        let ideal = IdealGeometry { size_px: [200, 150], focal_px: DVec2::splat(150.0), principal_px: DVec2::new(99.5, 74.5) };
+        let ideal = IdealGeometry {
+            size_px: [200, 150],
+            focal_px: DVec2::splat(150.0),
+            principal_px: DVec2::new(99.5, 74.5),
+        };
         let normal = DVec3::new(0.002, -0.003, 0.02);
         let values = plane_image(&ideal, normal);
         let depth = InverseDepthImage { size_px: ideal.size_px, values: &values };
@@ -434,14 +486,21 @@ mod tests {
             let far = key(DVec3::ZERO);
             let found = reproject(uv, (rotation, shift), 12, &far).expect("in view");
             // f32 depth: 6e-8 relative times about 8 px of parallax.
-            assert!((found.at_px - exact).length() < 2e-6 && (found.inverse_depth * z - 1.0).abs() < 1e-6, "{found:?} {exact}");
+            assert!(
+                (found.at_px - exact).length() < 2e-6 && (found.inverse_depth * z - 1.0).abs() < 1e-6,
+                "{found:?} {exact}"
+            );
             let two = reproject(uv, (rotation, shift), 2, &far).expect("in view");
             assert!((two.at_px - exact).length() < 0.2, "two look-ups: {}", (two.at_px - exact).length());
             // Begun with the plane there is nothing to look for.
             let none = reproject(uv, (rotation, shift), 0, &key(normal)).expect("in view");
             assert!((none.at_px - exact).length() < 1e-10, "no look-up: {}", (none.at_px - exact).length());
             let one = reproject(uv, (rotation, shift), 1, &key(1.1 * normal)).expect("in view");
-            assert!((one.at_px - exact).length() < 0.05, "a plane that is off by a tenth: {}", (one.at_px - exact).length());
+            assert!(
+                (one.at_px - exact).length() < 0.05,
+                "a plane that is off by a tenth: {}",
+                (one.at_px - exact).length()
+            );
         }
     }
 
@@ -456,7 +515,11 @@ mod tests {
     #[test]
     fn a_mean_over_an_area_is_that_of_the_pixels_in_it() {
         let size_px = [12, 9];
-        let value = |x: i64, y: i64| f64::from((pcg4d([x.clamp(0, 11) as u32, y.clamp(0, 8) as u32, 5, 6])[0] >> 8) as f32 / 16_777_216.0);
+        let value = |x: i64, y: i64| {
+            f64::from(
+                (pcg4d([x.clamp(0, 11) as u32, y.clamp(0, 8) as u32, 5, 6])[0] >> 8) as f32 / 16_777_216.0,
+            )
+        };
         let rgba: Vec<f32> = (0..108).flat_map(|i| [value(i % 12, i / 12) as f32, 0.5, 0.25, 1.0]).collect();
         let color = ColorImage { size_px, rgba: &rgba };
         for (at_px, sides_px) in [
@@ -470,10 +533,15 @@ mod tests {
                 let [begin, end] = [-0.5, 0.5].map(|half| at_px[k] + half * sides_px[k]);
                 ((px as f64 + 0.5).min(end) - (px as f64 - 0.5).max(begin)).max(0.0) / sides_px[k]
             };
-            let exact: f64 =
-                (-20..40).flat_map(|y| (-20..40).map(move |x| (x, y))).map(|(x, y)| part(0, x) * part(1, y) * value(x, y)).sum();
+            let exact: f64 = (-20..40)
+                .flat_map(|y| (-20..40).map(move |x| (x, y)))
+                .map(|(x, y)| part(0, x) * part(1, y) * value(x, y))
+                .sum();
             let found = color.over_area(at_px, sides_px);
-            assert!((found - DVec3::new(exact, 0.5, 0.25)).abs().max_element() < 1e-7, "{at_px} {sides_px}: {found} {exact}");
+            assert!(
+                (found - DVec3::new(exact, 0.5, 0.25)).abs().max_element() < 1e-7,
+                "{at_px} {sides_px}: {found} {exact}"
+            );
             let one = color.over_area(at_px, DVec2::ONE);
             assert!(one.distance(color.sample(at_px)) < 1e-12, "{at_px}: {one}");
         }
@@ -482,9 +550,14 @@ mod tests {
     #[test]
     fn the_spline_meets_its_pixels_and_beats_bilinear_on_a_wave() {
         let wave = |x: f64, y: f64| 0.5 + 0.25 * (1.3 * x).sin() + 0.2 * (1.1 * y + 0.4).sin();
-        let rgba: Vec<f32> = (0..32 * 32).flat_map(|i| [wave(f64::from(i % 32), f64::from(i / 32)) as f32, 0.5, 0.0, 1.0]).collect();
+        let rgba: Vec<f32> = (0..32 * 32)
+            .flat_map(|i| [wave(f64::from(i % 32), f64::from(i / 32)) as f32, 0.5, 0.0, 1.0])
+            .collect();
         let color = ColorImage { size_px: [32, 32], rgba: &rgba };
-        assert!(color.spline(DVec2::new(7.0, 9.0), DVec2::ZERO).distance(color.sample(DVec2::new(7.0, 9.0))) < 1e-12);
+        assert!(
+            color.spline(DVec2::new(7.0, 9.0), DVec2::ZERO).distance(color.sample(DVec2::new(7.0, 9.0)))
+                < 1e-12
+        );
         let (mut spline, mut bilinear) = (0.0, 0.0);
         for k in 0..200 {
             let at = DVec2::new(8.0 + 0.077 * f64::from(k), 20.0 - 0.053 * f64::from(k));
@@ -505,7 +578,8 @@ mod tests {
         assert_eq!(area.taps, [3, 1]);
         let nodes = [DVec2::new(10.0, 3.0), DVec2::new(20.0, 3.0), DVec2::new(40.0, 3.0)];
         let mean = gather(&nodes, PathStage::Straight, &area, &color, 2.0, 256);
-        // Equal time on both segments: (15 + 30) / 2. The cyclic taps leave at most half a tap of bias over the sample count.
+        // Equal time on both segments: (15 + 30) / 2. The cyclic taps leave at most half a tap of bias over
+        // the sample count.
         assert!((mean.x - 22.5).abs() < 0.05 && (mean.y - 1.0).abs() < 1e-12, "{mean}");
     }
 }

@@ -72,7 +72,8 @@ pub enum Limit {
 
 impl Limit {
     /// All of them, in the order of [`ResolvedLimits`].
-    pub const ALL: [Self; 4] = [Self::MaxSpeed, Self::MaxAcceleration, Self::MaxAngularRate, Self::MaxAngularAcceleration];
+    pub const ALL: [Self; 4] =
+        [Self::MaxSpeed, Self::MaxAcceleration, Self::MaxAngularRate, Self::MaxAngularAcceleration];
 
     /// The key below `[tracker]`.
     #[must_use]
@@ -154,13 +155,15 @@ impl Tracked {
         .collect()
     }
 
-    /// One sentence where the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`] (RMS): the truth is the motion, not the log.
+    /// One sentence where the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`]
+    /// (RMS): the truth is the motion, not the log.
     #[must_use]
     pub fn distance_warning(&self, rows: &[LogRow]) -> Option<String> {
         let (start_s, end_s) = self.trajectory.span_s();
         let rate_hz = self.rate_hz.min(MOST_COMPARED / (end_s - start_s).max(1e-9));
         let TrackReport { rms, max_error, .. } = TrackReport::measure(&self.trajectory, rows, rate_hz)?;
-        let [off_m, most_m] = [rms, max_error].map(|of| DVec3::new(of.north_m, of.east_m, of.down_m).length());
+        let [off_m, most_m] =
+            [rms, max_error].map(|of| DVec3::new(of.north_m, of.east_m, of.down_m).length());
         (off_m > FAR_M || rms.attitude_deg > FAR_DEG).then(|| {
             format!(
                 "the tracked motion, which frames and truth follow, is {off_m:.2} m and {:.2} deg RMS from the log (at most {most_m:.1} m, {:.1} deg): see `track --report`, or set tracker.kind = \"spline\" or raise the limits",
@@ -206,7 +209,9 @@ pub enum TrackerError {
         value: f64,
     },
     /// Two rows are so close in time that the velocity between them is beyond f64.
-    #[error("rows of the flight log are so close in time that the velocity between them is not finite; merge rows of nearly equal time")]
+    #[error(
+        "rows of the flight log are so close in time that the velocity between them is not finite; merge rows of nearly equal time"
+    )]
     Overflow,
     /// The log is too long for the control rate.
     #[error(
@@ -243,14 +248,20 @@ pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerErro
         TrackerKind::Hold | TrackerKind::Linear => {
             let limits = resolve_limits(rows, spec, [0.0; 2]);
             let still = |_: &LogRow, _: &LogRow| (DVec3::ZERO, DVec3::ZERO);
-            let trajectory = if spec.kind == TrackerKind::Hold { piecewise(rows, still) } else { piecewise(rows, constant_velocity) };
+            let trajectory = if spec.kind == TrackerKind::Hold {
+                piecewise(rows, still)
+            } else {
+                piecewise(rows, constant_velocity)
+            };
             given(trajectory, limits, Saturation::default(), Vec::new())
         }
         TrackerKind::Sqrt | TrackerKind::Spline => {
             let (reference, limits) = reference(rows, spec)?;
             let plant::Followed { states, saturation, mut holds } = plant::follow(&reference, &limits);
             let (start_s, end_s) = (rows[0].t_s, rows[rows.len() - 1].t_s);
-            holds.iter_mut().for_each(|hold| (hold.from_s, hold.to_s) = (start_s + hold.from_s, start_s + hold.to_s));
+            holds
+                .iter_mut()
+                .for_each(|hold| (hold.from_s, hold.to_s) = (start_s + hold.from_s, start_s + hold.to_s));
             given(Trajectory::uniform(start_s, reference.step_s, end_s, states), limits, saturation, holds)
         }
     }
@@ -324,7 +335,8 @@ const LEAST_SPEED_M_S: f64 = 1.0;
 /// ... and 10 deg/s.
 const LEAST_RATE_RAD_S: f64 = 0.174_532_925_199_432_95;
 
-/// `auto` accelerations are this factor times the smoothed log's own: more than speeds need, for what is cut there is a lag that lasts.
+/// `auto` accelerations are this factor times the smoothed log's own: more than speeds need, for what is cut
+/// there is a lag that lasts.
 const ACCELERATION_FACTOR: f64 = 1.5;
 
 /// `accelerations`: those of the smoothed log at [`AUTO_RANK`], m/s^2 and rad/s^2.
@@ -343,7 +355,10 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
         }
     }
     ResolvedLimits {
-        max_speed_m_s: spec.max_speed_m_s.value().unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(LEAST_SPEED_M_S)),
+        max_speed_m_s: spec
+            .max_speed_m_s
+            .value()
+            .unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(LEAST_SPEED_M_S)),
         max_acceleration_m_s2: spec
             .max_acceleration_m_s2
             .value()
@@ -352,10 +367,10 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
             .max_angular_rate_deg_s
             .value()
             .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(LEAST_RATE_RAD_S), f64::to_radians),
-        max_angular_acceleration_rad_s2: spec
-            .max_angular_acceleration_deg_s2
-            .value()
-            .map_or_else(|| (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()), f64::to_radians),
+        max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.value().map_or_else(
+            || (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()),
+            f64::to_radians,
+        ),
     }
 }
 
@@ -373,7 +388,8 @@ fn at_rank(mut values: Vec<f64>, rank: f64) -> f64 {
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// One segment a row; `velocities` gives velocity and body rate from a row and the next one. The last row continues as the one before.
+/// One segment a row; `velocities` gives velocity and body rate from a row and the next one. The last row
+/// continues as the one before.
 fn piecewise(rows: &[LogRow], velocities: impl Fn(&LogRow, &LogRow) -> (DVec3, DVec3)) -> Option<Trajectory> {
     let mut motion = (DVec3::ZERO, DVec3::ZERO);
     let knots = rows.iter().enumerate().map(|(i, row)| {

@@ -1,15 +1,15 @@
 //! Trajectory: pose, velocity and acceleration of the platform at any instant, in closed form.
 //!
-//! Between two knots the platform is a double integrator with constant acceleration `a` and constant body angular acceleration
-//! `alpha`, so that with tau = t - t_k
+//! Between two knots the platform is a double integrator with constant acceleration `a` and constant body
+//! angular acceleration `alpha`, so that with tau = t - t_k
 //!
 //! ```text
 //! x(t) = x_k + v_k tau + a tau^2/2          v(t) = v_k + a tau
 //! R(t) = R_k Exp(w_k tau + alpha tau^2/2 + tau^3/12 w_k x alpha)          w(t) = w_k + alpha tau
 //! ```
 //!
-//! The cubic term is the second Magnus term. The error of R over one segment is of order `tau^5 |w|^2 |alpha|`:
-//! 1e-13 rad at 120 deg/s and 200 Hz, 1e-8 rad at 400 deg/s and 20 000 deg/s^2.
+//! The cubic term is the second Magnus term. The error of R over one segment is of order `tau^5 |w|^2
+//! |alpha|`: 1e-13 rad at 120 deg/s and 200 Hz, 1e-8 rad at 400 deg/s and 20 000 deg/s^2.
 
 use glam::DVec3;
 
@@ -44,14 +44,20 @@ pub struct Trajectory {
 impl Trajectory {
     /// Segments of equal length `step_s`, the first beginning at `start_s`; the last one ends at `end_s`.
     ///
-    /// `None` if there is no knot, a number is not finite, or `end_s` is not within the segments or at most one step after them.
+    /// `None` if there is no knot, a number is not finite, or `end_s` is not within the segments or at most
+    /// one step after them.
     pub fn uniform(start_s: f64, step_s: f64, end_s: f64, knots: Vec<BodyState>) -> Option<Self> {
         let beyond_s = start_s + step_s * (knots.len() as f64 + 1e-6);
-        let ordered = step_s > 0.0 && step_s.is_finite() && start_s.is_finite() && end_s >= start_s && end_s <= beyond_s;
+        let ordered = step_s > 0.0
+            && step_s.is_finite()
+            && start_s.is_finite()
+            && end_s >= start_s
+            && end_s <= beyond_s;
         Self::build(Clock::Uniform { step_s }, start_s, end_s, ordered, knots)
     }
 
-    /// Segments that begin at `times_s` (strictly increasing, one a knot); the last one ends at `end_s`, not before it begins.
+    /// Segments that begin at `times_s` (strictly increasing, one a knot); the last one ends at `end_s`, not
+    /// before it begins.
     ///
     /// `None` if there is no knot, a number is not finite, or the times are not as said.
     pub fn listed(times_s: Vec<f64>, end_s: f64, knots: Vec<BodyState>) -> Option<Self> {
@@ -100,8 +106,8 @@ impl Trajectory {
 
     /// Motion state at `t_s`, at O(1) cost for control ticks and O(log n) for rows of a log.
     ///
-    /// Outside [`Self::span_s`] the platform coasts: velocity and body rate stay as they are at the end, for at most 1e9 s.
-    /// NaN gives the beginning.
+    /// Outside [`Self::span_s`] the platform coasts: velocity and body rate stay as they are at the end, for
+    /// at most 1e9 s. NaN gives the beginning.
     pub fn state(&self, t_s: f64) -> BodyState {
         if t_s >= self.end_s {
             return advance(&self.last, (t_s - self.end_s).min(LONGEST_COAST_S));
@@ -123,18 +129,23 @@ impl Trajectory {
         match &self.clock {
             // Saturating cast: the quotient is not negative; rounding at a knot only moves a continuous seam.
             Clock::Uniform { step_s } => (((t_s - self.start_s) / step_s) as usize).min(last),
-            Clock::Listed(times_s) => times_s.partition_point(|knot| *knot <= t_s).saturating_sub(1).min(last),
+            Clock::Listed(times_s) => {
+                times_s.partition_point(|knot| *knot <= t_s).saturating_sub(1).min(last)
+            }
         }
     }
 }
 
-/// The state `tau_s` after `from`, which may be negative, under the accelerations of `from` (formulas in the module's text).
+/// The state `tau_s` after `from`, which may be negative, under the accelerations of `from` (formulas in the
+/// module's text).
 pub fn advance(from: &BodyState, tau_s: f64) -> BodyState {
     let (rate, alpha) = (from.rate_body_rad_s, from.angular_acceleration_body_rad_s2);
     let half2 = 0.5 * tau_s * tau_s;
     let magnus = rate.cross(alpha) * (tau_s * half2 / 6.0);
     BodyState {
-        position_ned_m: from.position_ned_m + from.velocity_ned_m_s * tau_s + from.acceleration_ned_m_s2 * half2,
+        position_ned_m: from.position_ned_m
+            + from.velocity_ned_m_s * tau_s
+            + from.acceleration_ned_m_s2 * half2,
         velocity_ned_m_s: from.velocity_ned_m_s + from.acceleration_ned_m_s2 * tau_s,
         ned_from_body: from.ned_from_body * so3::exp(rate * tau_s + alpha * half2 + magnus),
         rate_body_rad_s: rate + alpha * tau_s,
@@ -188,7 +199,8 @@ mod tests {
 
     #[test]
     fn segment_agrees_with_fine_integration() {
-        // 2000 midpoint-exponential steps within one 5 ms tick: their own error is of order (5e-3)^3 / 2000^2.
+        // 2000 midpoint-exponential steps within one 5 ms tick: their own error is of order (5e-3)^3 /
+        // 2000^2.
         let (start, tau_s, steps) = (still(), 5e-3, 2000);
         let h = tau_s / f64::from(steps);
         let (mut x, mut v, mut q) = (start.position_ned_m, start.velocity_ned_m_s, start.ned_from_body);
@@ -225,7 +237,8 @@ mod tests {
         let h = 1e-4;
         for k in 0..40 {
             let t_s = trajectory.knot_s(k) + 0.0043;
-            let (before, at, after) = (trajectory.state(t_s - h), trajectory.state(t_s), trajectory.state(t_s + h));
+            let (before, at, after) =
+                (trajectory.state(t_s - h), trajectory.state(t_s), trajectory.state(t_s + h));
             let velocity = (after.position_ned_m - before.position_ned_m) / (2.0 * h);
             let rate = so3::log(before.ned_from_body.inverse() * after.ned_from_body) / (2.0 * h);
             // Rounding of positions (1e-14 m / 2e-4 s); for the rate also h^2 |w x alpha| / 6.
@@ -265,7 +278,16 @@ mod tests {
             })
             .collect();
         let trajectory = Trajectory::listed(times.clone(), 4.0, knots.clone()).unwrap();
-        for (t_s, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.999, 0.0), (1.0, 1.0), (1.0001, 2.0), (3.99, 2.0), (4.0, 3.0), (9.0, 3.0)] {
+        for (t_s, expected) in [
+            (-1.0, 0.0),
+            (0.0, 0.0),
+            (0.999, 0.0),
+            (1.0, 1.0),
+            (1.0001, 2.0),
+            (3.99, 2.0),
+            (4.0, 3.0),
+            (9.0, 3.0),
+        ] {
             assert_eq!(trajectory.state(t_s).position_ned_m.x, expected, "{t_s}");
         }
         assert!(Trajectory::listed(vec![], 0.0, vec![]).is_none());

@@ -1,5 +1,6 @@
-//! Fold and validity of every calibration set by a scan that shares nothing with the library's inverse: the formulas are written out
-//! again, derivatives are finite differences, and a pixel's pre-images are counted by the winding number of the border's image.
+//! Fold and validity of every calibration set by a scan that shares nothing with the library's inverse: the
+//! formulas are written out again, derivatives are finite differences, and a pixel's pre-images are counted
+//! by the winding number of the border's image.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{PI, TAU};
@@ -11,7 +12,8 @@ use rayon::prelude::*;
 
 const RAYS: usize = 360;
 const STEPS: usize = 1500;
-/// A chord of the border's image is at most this far from the curve itself (360 rays, 1000 px): pixels nearer are not judged.
+/// A chord of the border's image is at most this far from the curve itself (360 rays, 1000 px): pixels nearer
+/// are not judged.
 const UNJUDGED_PX: f64 = 0.1;
 
 struct Set {
@@ -26,10 +28,13 @@ fn sets() -> Vec<Set> {
     let set = |line: &'static str| {
         let cells: Vec<&str> = line.split(',').collect();
         let number = |i: usize| cells[i].parse::<f64>().unwrap();
-        let model = if cells[1] == "brown-conrady" { LensModel::BrownConrady } else { LensModel::KannalaBrandt };
+        let model =
+            if cells[1] == "brown-conrady" { LensModel::BrownConrady } else { LensModel::KannalaBrandt };
         let mut k: Vec<f64> = cells[8].split_whitespace().map(|k| k.parse().unwrap()).collect();
         let size_px = [number(2) as u32, number(3) as u32];
-        let camera = CameraModel::new(size_px, [number(4), number(5)], Some([number(6), number(7)]), model, &k).unwrap();
+        let camera =
+            CameraModel::new(size_px, [number(4), number(5)], Some([number(6), number(7)]), model, &k)
+                .unwrap();
         k.resize(8, 0.0);
         Set { name: cells[0], model, k, camera }
     };
@@ -60,7 +65,10 @@ impl Set {
     fn determinant(&self, p: DVec2) -> f64 {
         let h = 1e-6 * (1.0 + p.length());
         let (e, n) = (DVec2::new(h, 0.0), DVec2::new(0.0, h));
-        let (a, b) = ((self.forward(p + e) - self.forward(p - e)) / (2.0 * h), (self.forward(p + n) - self.forward(p - n)) / (2.0 * h));
+        let (a, b) = (
+            (self.forward(p + e) - self.forward(p - e)) / (2.0 * h),
+            (self.forward(p + n) - self.forward(p - n)) / (2.0 * h),
+        );
         a.perp_dot(b)
     }
 
@@ -68,7 +76,9 @@ impl Set {
     fn fold_radius(&self, phi: f64) -> f64 {
         let ray = DVec2::from_angle(phi);
         let radius = |step: usize| (step as f64 / STEPS as f64 * 89.0 * PI / 180.0).tan();
-        let Some(first) = (1..=STEPS).find(|step| self.determinant(ray * radius(*step)) <= 0.0) else { return radius(STEPS) };
+        let Some(first) = (1..=STEPS).find(|step| self.determinant(ray * radius(*step)) <= 0.0) else {
+            return radius(STEPS);
+        };
         let (mut good, mut bad) = (radius(first - 1), radius(first));
         for _ in 0..40 {
             let middle = 0.5 * (good + bad);
@@ -106,14 +116,20 @@ fn judge(set: &Set) -> usize {
         let phi = ray as f64 * TAU / RAYS as f64;
         let error = (camera.lens.fold_radius(phi) / radius - 1.0).abs();
         // Finite differences of step 1e-6 next to a pole or a flat fold are worth 1e-4.
-        assert!(error < 1e-4, "{name}, ray {ray}: fold at {}, the scan says {radius}", camera.lens.fold_radius(phi));
+        assert!(
+            error < 1e-4,
+            "{name}, ray {ray}: fold at {}, the scan says {radius}",
+            camera.lens.fold_radius(phi)
+        );
     }
-    // A thousandth inside: at a fold that moves the image by a millionth, and it keeps clear of what a pole does to rounding.
+    // A thousandth inside: at a fold that moves the image by a millionth, and it keeps clear of what a pole
+    // does to rounding.
     let border: Vec<DVec2> = fold
         .iter()
         .enumerate()
         .map(|(ray, radius)| {
-            let image = set.forward(DVec2::from_angle(ray as f64 * TAU / RAYS as f64) * (radius * (1.0 - 1e-3)));
+            let image =
+                set.forward(DVec2::from_angle(ray as f64 * TAU / RAYS as f64) * (radius * (1.0 - 1e-3)));
             image * camera.focal_px + camera.principal_point_px
         })
         .collect();
@@ -121,18 +137,26 @@ fn judge(set: &Set) -> usize {
     for row in 0..32 {
         for column in 0..32 {
             let share = DVec2::new(f64::from(column), f64::from(row)) / 31.0;
-            let pixel = share * DVec2::new(f64::from(camera.size_px[0] - 1), f64::from(camera.size_px[1] - 1));
+            let pixel =
+                share * DVec2::new(f64::from(camera.size_px[0] - 1), f64::from(camera.size_px[1] - 1));
             let answer = camera.unproject(pixel);
             if let Some(ideal) = answer {
                 let image = set.forward(ideal) * camera.focal_px + camera.principal_point_px;
                 assert!((image - pixel).length() < 1e-4, "{name} {pixel}: {ideal} is imaged at {image}");
                 let ray = ideal.y.atan2(ideal.x).rem_euclid(TAU) / TAU * RAYS as f64;
                 let (here, next) = (fold[ray as usize % RAYS], fold[(ray as usize + 1) % RAYS]);
-                assert!(ideal.length() < 1.0001 * here.max(next), "{name} {pixel}: {ideal} lies beyond the fold");
+                assert!(
+                    ideal.length() < 1.0001 * here.max(next),
+                    "{name} {pixel}: {ideal} lies beyond the fold"
+                );
             }
             let (turns, distance) = winding(&border, pixel);
             if distance > UNJUDGED_PX {
-                assert_eq!(answer.is_some(), turns > 0, "{name} {pixel}: {turns} pre-images, {distance} px from the border: {answer:?}");
+                assert_eq!(
+                    answer.is_some(),
+                    turns > 0,
+                    "{name} {pixel}: {turns} pre-images, {distance} px from the border: {answer:?}"
+                );
                 judged += 1;
             }
         }

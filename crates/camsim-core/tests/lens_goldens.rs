@@ -1,4 +1,5 @@
-//! The lens models against figures of OpenCV (forward) and of a brute-force search (inverse): scripts/goldens/lens_opencv.py.
+//! The lens models against figures of OpenCV (forward) and of a brute-force search (inverse):
+//! scripts/goldens/lens_opencv.py.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashMap;
@@ -58,7 +59,10 @@ fn inverse_agrees_with_a_brute_force_search() {
             (true, Some(ideal)) => {
                 let expected = DVec2::new(cells[2].unwrap(), cells[3].unwrap());
                 let error = (ideal - expected).length() / expected.length_squared().max(1.0);
-                assert!(error < INVERSE_TOLERANCE, "{name} at {distorted}: {ideal}, the search found {expected}");
+                assert!(
+                    error < INVERSE_TOLERANCE,
+                    "{name} at {distorted}: {ideal}, the search found {expected}"
+                );
                 found += 1;
             }
             (false, None) => refused += 1,

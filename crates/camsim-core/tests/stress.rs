@@ -1,5 +1,5 @@
-//! Adversarial cases of gather and temporal inverse, f64 twins against integrals and rays in closed form. The table of figures is in
-//! docs/accuracy/stress.md.
+//! Adversarial cases of gather and temporal inverse, f64 twins against integrals and rays in closed form. The
+//! table of figures is in docs/accuracy/stress.md.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,10 @@ use camsim_core::{
     camera::CameraModel,
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
-    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyView, displacement::Twist, gather, reproject},
+    temporal::{
+        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyView, displacement::Twist,
+        gather, reproject,
+    },
 };
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -20,18 +23,24 @@ fn checker(size_px: [u32; 2]) -> Vec<f32> {
     (0..size_px[0] * size_px[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect()
 }
 
-const POINT: Footprint = Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], kernel: Kernel::Spline(DVec2::ZERO) };
+const POINT: Footprint =
+    Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], kernel: Kernel::Spline(DVec2::ZERO) };
 
-/// Difference, in 1/255, between camsim's samples and 8000 along the same straight path: RMS and largest over places and directions.
+/// Difference, in 1/255, between camsim's samples and 8000 along the same straight path: RMS and largest over
+/// places and directions.
 fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
     let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
     for direction in 0..12 {
         let half = DVec2::from_angle(f64::from(direction) * 0.53) * (0.5 * length_px);
         for place in 0..40 {
-            let centre = DVec2::new(128.0, 128.0) + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
-            let found = gather(&[centre - half, centre + half], PathStage::Straight, &POINT, color, 2.0, 1024).x;
-            let exact =
-                (0..8000).map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0), DVec2::ZERO).x).sum::<f64>() / 8e3;
+            let centre = DVec2::new(128.0, 128.0)
+                + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
+            let found =
+                gather(&[centre - half, centre + half], PathStage::Straight, &POINT, color, 2.0, 1024).x;
+            let exact = (0..8000)
+                .map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0), DVec2::ZERO).x)
+                .sum::<f64>()
+                / 8e3;
             let error = 255.0 * (found - exact).abs();
             square += error * error;
             worst = worst.max(error);
@@ -74,7 +83,12 @@ fn level(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, f32) + Syn
     };
     let looks: Vec<(f64, f32)> = (0..size_px[0] * size_px[1])
         .into_par_iter()
-        .map(|i| look((DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0])) - geometry.principal_px) / geometry.focal_px))
+        .map(|i| {
+            look(
+                (DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0])) - geometry.principal_px)
+                    / geometry.focal_px,
+            )
+        })
         .collect();
     IdealFrame {
         geometry,
@@ -99,7 +113,8 @@ fn a_path_longer_than_the_picture() {
         // Mean of the wave over 3 units of u.
         let expected = 0.5 + 0.4 * (9.0 * u).sin() * 13.5_f64.sin() / 13.5;
         let found = f64::from(rendered.color_rgba[4 * (10 * 60 + x) as usize]);
-        // Bilinear reading of a wave with a period of 35 px loses (2 pi / 35)^2 / 12 of its height: 3e-3 of 0.03.
+        // Bilinear reading of a wave with a period of 35 px loses (2 pi / 35)^2 / 12 of its height: 3e-3 of
+        // 0.03.
         assert!((found - expected).abs() < 3e-4, "{x}: {found} {expected}");
     }
     // ... and nowhere, without panic, in one of its own size.
@@ -108,7 +123,8 @@ fn a_path_longer_than_the_picture() {
     assert!(rendered.color_rgba.iter().all(|v| *v == 0.0));
 }
 
-/// Boxes on level ground 100 m below a camera that looks straight down: in camera axes, x right, y down, z away.
+/// Boxes on level ground 100 m below a camera that looks straight down: in camera axes, x right, y down, z
+/// away.
 struct Town;
 
 impl Town {
@@ -143,7 +159,12 @@ impl Town {
 #[test]
 fn a_second_of_rolling_shutter_over_buildings() {
     let readout = ShutterSpec { readout_ms: 1000.0, ..ShutterSpec::default() };
-    let spec = CameraSpec { size_px: [240, 180], focal_px: [180.0, 180.0], shutter: readout.clone(), ..CameraSpec::default() };
+    let spec = CameraSpec {
+        size_px: [240, 180],
+        focal_px: [180.0, 180.0],
+        shutter: readout.clone(),
+        ..CameraSpec::default()
+    };
     let ideal = level([400, 300], 180.0, |uv| (1.0 / Town::cast(DVec3::ZERO, uv.extend(1.0)), 0.5));
     let twist = Twist { velocity_m_s: DVec3::new(20.0, 4.0, 0.0), rate_rad_s: DVec3::new(0.0, 0.0, 0.05) };
     let motion = Motion::Twist(twist);
@@ -151,8 +172,10 @@ fn a_second_of_rolling_shutter_over_buildings() {
     let shutter = Shutter::from_spec(&readout, 30.0, spec.size_px).unwrap();
     let depth = InverseDepthImage { size_px: ideal.geometry.size_px, values: &ideal.inverse_depth };
     let key = KeyView { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO, sky_reach_px: 0.0 };
-    let pipelines = [Solver::Linear, Solver::Rk2, Solver::Reproject]
-        .map(|solver| Pipeline::new(&spec, &ideal, &motion, &Settings { solver: Some(solver), ..Settings::default() }).unwrap());
+    let pipelines = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| {
+        Pipeline::new(&spec, &ideal, &motion, &Settings { solver: Some(solver), ..Settings::default() })
+            .unwrap()
+    });
     let mut errors: [Vec<f64>; 4] = Default::default();
     let mut hidden = 0;
     for (x, y) in (0..180).flat_map(|y| (0..240).map(move |x| (x, y))) {
@@ -174,16 +197,25 @@ fn a_second_of_rolling_shutter_over_buildings() {
         errors.sort_by(f64::total_cmp);
         let over = errors.iter().filter(|e| **e > 1.0).count() as f64 / errors.len() as f64;
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        (rms, errors[errors.len() / 2], errors[errors.len() * 95 / 100], errors[errors.len() * 99 / 100], over)
+        (
+            rms,
+            errors[errors.len() / 2],
+            errors[errors.len() * 95 / 100],
+            errors[errors.len() * 99 / 100],
+            over,
+        )
     });
-    for (name, (rms, p50, p95, p99, over)) in [("linear", linear), ("rk2", rk2), ("two look-ups", two_looks), ("apply", own)] {
+    for (name, (rms, p50, p95, p99, over)) in
+        [("linear", linear), ("rk2", rk2), ("two look-ups", two_looks), ("apply", own)]
+    {
         eprintln!(
             "1 s over buildings, {name}: rms {rms:.3}, p50 {p50:.1e}, p95 {p95:.1e}, p99 {p99:.3} px, {:.2} % over 1 px ({hidden} hidden)",
             100.0 * over
         );
     }
     assert!(hidden > 500, "{hidden}");
-    // A texel's edge is up to half a texel from the building's, so a ray in a hundred may take the neighbour's surface.
+    // A texel's edge is up to half a texel from the building's, so a ray in a hundred may take the
+    // neighbour's surface.
     assert!(own.2 < 0.05 && own.4 < 0.015, "{own:?}");
     assert!(rk2.4 > 5.0 * own.4 && two_looks.4 > 1.5 * own.4, "{rk2:?} {two_looks:?}");
 }

@@ -41,7 +41,9 @@ pub enum GpuError {
         allowed: &'static str,
     },
     /// The device stopped working.
-    #[error("the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out")]
+    #[error(
+        "the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out"
+    )]
     Device(String),
     /// A picture or table does not fit the adapter.
     #[error("{what} needs {needed}, but the adapter's {limit_name} is {limit}: {fix}")]
@@ -65,7 +67,8 @@ pub enum AdapterChoice {
     /// `CAMSIM_ADAPTER` (part of a name) if set, else discrete before integrated before software.
     #[default]
     Best,
-    /// `CAMSIM_ADAPTER` if set, else a software adapter: tests use it, so that figures compare between machines unless a GPU is asked for.
+    /// `CAMSIM_ADAPTER` if set, else a software adapter: tests use it, so that figures compare between
+    /// machines unless a GPU is asked for.
     Software,
 }
 
@@ -102,8 +105,8 @@ impl fmt::Display for AdapterSummary {
     }
 }
 
-/// Pixels that a thread takes on a software adapter: reading a line's poses costs llvmpipe up to two fifths of the kernel, and there are few processors
-/// to be kept busy (docs/PERFORMANCE.md).
+/// Pixels that a thread takes on a software adapter: reading a line's poses costs llvmpipe up to two fifths
+/// of the kernel, and there are few processors to be kept busy (docs/PERFORMANCE.md).
 const SOFTWARE_PIXELS: u32 = 16;
 
 /// Device, queue, and what they run on.
@@ -127,17 +130,23 @@ pub struct GpuContext {
     pub(crate) ideal_on_host: bool,
 }
 
-/// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
+/// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr
+/// on headless machines.
 ///
-/// One for all engines, and never dropped: with the last instance the loader unloads the driver, and NVIDIA's has left something to be done at the end of every
-/// thread that called it. A thread that ends after that crashes.
+/// One for all engines, and never dropped: with the last instance the loader unloads the driver, and NVIDIA's
+/// has left something to be done at the end of every thread that called it. A thread that ends after that
+/// crashes.
 ///
-/// Arguments of indirect calls come from camsim's own shaders, which bound them; wgpu's check of each would be a pass of its own, and a buffer
-/// made for it.
+/// Arguments of indirect calls come from camsim's own shaders, which bound them; wgpu's check of each would
+/// be a pass of its own, and a buffer made for it.
 static INSTANCE: LazyLock<wgpu::Instance> = LazyLock::new(|| {
     let from_env = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     let flags = from_env.flags.difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
-    wgpu::Instance::new(wgpu::InstanceDescriptor { backends: from_env.backends & wgpu::Backends::PRIMARY, flags, ..from_env })
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: from_env.backends & wgpu::Backends::PRIMARY,
+        flags,
+        ..from_env
+    })
 });
 
 /// All adapters of this machine, the one that would be used first.
@@ -149,7 +158,10 @@ pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
 /// Nothing to run on, or nothing of the name that is wanted.
 fn none_found(choice: AdapterChoice) -> GpuError {
     let Ok(wanted) = std::env::var("CAMSIM_ADAPTER") else { return GpuError::NoAdapter(String::new()) };
-    let there: Vec<String> = named(choice, None).iter().map(|adapter| AdapterSummary::of(&adapter.get_info()).to_string()).collect();
+    let there: Vec<String> = named(choice, None)
+        .iter()
+        .map(|adapter| AdapterSummary::of(&adapter.get_info()).to_string())
+        .collect();
     if there.is_empty() {
         return GpuError::NoAdapter(format!(" with CAMSIM_ADAPTER={wanted}"));
     }
@@ -172,37 +184,49 @@ fn named(choice: AdapterChoice, wanted: Option<String>) -> Vec<wgpu::Adapter> {
     let mut found = pollster::block_on(INSTANCE.enumerate_adapters(wgpu::Backends::PRIMARY));
     found.retain(|adapter| {
         let info = adapter.get_info();
-        let of_kind = choice == AdapterChoice::Best || wanted.is_some() || info.device_type == wgpu::DeviceType::Cpu;
+        let of_kind =
+            choice == AdapterChoice::Best || wanted.is_some() || info.device_type == wgpu::DeviceType::Cpu;
         let named = wanted.as_ref().is_none_or(|name| info.name.to_lowercase().contains(name));
-        of_kind && named && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+        of_kind
+            && named
+            && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
     });
     found.sort_by_key(|adapter| rank(&adapter.get_info()));
     found
 }
 
-/// Where the reverse pipeline runs: as `CAMSIM_REVERSE` says, or else on the host if the device is the host's processor, that has the vectors for it, and no other shaders are to be
-/// tried.
+/// Where the reverse pipeline runs: as `CAMSIM_REVERSE` says, or else on the host if the device is the host's
+/// processor, that has the vectors for it, and no other shaders are to be tried.
 fn reverse_on(is_software: bool) -> Result<ReverseOn, GpuError> {
     match std::env::var_os("CAMSIM_REVERSE") {
-        None if is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none() => Ok(ReverseOn::Best),
+        None if is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none() => {
+            Ok(ReverseOn::Best)
+        }
         None => Ok(ReverseOn::Device),
         Some(place) if place == "device" => Ok(ReverseOn::Device),
         Some(place) if place == "host" => Ok(ReverseOn::Host),
-        Some(place) => {
-            Err(GpuError::Setting { name: "CAMSIM_REVERSE", value: place.to_string_lossy().into(), allowed: "`device` or `host`" })
-        }
+        Some(place) => Err(GpuError::Setting {
+            name: "CAMSIM_REVERSE",
+            value: place.to_string_lossy().into(),
+            allowed: "`device` or `host`",
+        }),
     }
 }
 
-/// Whether the host draws the ideal frames that it makes output frames from: as `CAMSIM_IDEAL` says, or else beside a software adapter, unless other shaders are to be tried.
+/// Whether the host draws the ideal frames that it makes output frames from: as `CAMSIM_IDEAL` says, or else
+/// beside a software adapter, unless other shaders are to be tried.
 fn ideal_on_host(is_software: bool, reverse_on: ReverseOn) -> Result<bool, GpuError> {
     match std::env::var_os("CAMSIM_IDEAL") {
-        None => Ok(is_software && reverse_on != ReverseOn::Device && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
+        None => Ok(is_software
+            && reverse_on != ReverseOn::Device
+            && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
         Some(place) if place == "device" => Ok(false),
         Some(place) if place == "host" => Ok(true),
-        Some(place) => {
-            Err(GpuError::Setting { name: "CAMSIM_IDEAL", value: place.to_string_lossy().into(), allowed: "`device` or `host`" })
-        }
+        Some(place) => Err(GpuError::Setting {
+            name: "CAMSIM_IDEAL",
+            value: place.to_string_lossy().into(),
+            allowed: "`device` or `host`",
+        }),
     }
 }
 
@@ -210,7 +234,8 @@ impl GpuContext {
     /// Opens the chosen adapter.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses, [`GpuError::Setting`] if `CAMSIM_REVERSE` or `CAMSIM_IDEAL` says neither place.
+    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses,
+    /// [`GpuError::Setting`] if `CAMSIM_REVERSE` or `CAMSIM_IDEAL` says neither place.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut candidates = ranked(choice);
         if candidates.is_empty() {
@@ -228,14 +253,25 @@ impl GpuContext {
             memory_hints: wgpu::MemoryHints::Performance,
             trace: wgpu::Trace::Off,
         });
-        let (device, queue) =
-            pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
+        let (device, queue) = pollster::block_on(request).map_err(|error| GpuError::NoDevice {
+            adapter: summary.name.clone(),
+            reason: error.to_string(),
+        })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let pixels_a_thread = if is_software { SOFTWARE_PIXELS } else { 1 };
         let reverse_on = reverse_on(is_software)?;
         let ideal_on_host = ideal_on_host(is_software, reverse_on)?;
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, reverse_on, ideal_on_host })
+        Ok(Self {
+            device,
+            queue,
+            adapter: summary,
+            is_software,
+            max_picture_px,
+            pixels_a_thread,
+            reverse_on,
+            ideal_on_host,
+        })
     }
 
     /// What renders, for people: the adapter, and that the host has a part in it where it has.
@@ -283,6 +319,12 @@ impl GpuContext {
         if bytes <= limit {
             return Ok(());
         }
-        Err(GpuError::TooLarge { what: what.into(), needed: bytes, limit_name: "max_storage_buffer_binding_size (bytes)", limit, fix })
+        Err(GpuError::TooLarge {
+            what: what.into(),
+            needed: bytes,
+            limit_name: "max_storage_buffer_binding_size (bytes)",
+            limit,
+            fix,
+        })
     }
 }

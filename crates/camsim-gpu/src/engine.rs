@@ -73,7 +73,8 @@ impl Engine {
             }
         };
         let for_errors = fault.clone();
-        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&for_errors, error.to_string())));
+        gpu.device
+            .on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&for_errors, error.to_string())));
         let for_loss = fault.clone();
         gpu.device.set_device_lost_callback(move |reason, text| {
             if reason != wgpu::DeviceLostReason::Destroyed {
@@ -89,13 +90,15 @@ impl Engine {
         &self.gpu
     }
 
-    /// Holds pictures of larger sides in tiles, as if textures ended there: for tests, and where the device's memory is short.
+    /// Holds pictures of larger sides in tiles, as if textures ended there: for tests, and where the device's
+    /// memory is short.
     pub fn limit_pictures(&mut self, max_side_px: u32) {
         self.gpu.max_picture_px = max_side_px.min(self.gpu.max_side_px());
     }
 
-    /// How many pixels of a line each thread takes, for frames of sessions to come: many for a software adapter (the default there), one for a GPU,
-    /// which wants threads; 1 to 4096. Pictures are the same, byte for byte.
+    /// How many pixels of a line each thread takes, for frames of sessions to come: many for a software
+    /// adapter (the default there), one for a GPU, which wants threads; 1 to 4096. Pictures are the same,
+    /// byte for byte.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
         // A line has no more of them; products with a workgroup's side stay far from overflow.
         self.gpu.pixels_a_thread = pixels.clamp(1, 4096);
@@ -106,8 +109,9 @@ impl Engine {
         self.gpu.reverse_on = place;
     }
 
-    /// Whether the host draws the ideal frames of the output frames that it makes, for sessions to come, where it can draw the scene. Pictures differ by rounding, and where that decides which surface
-    /// a pixel shows.
+    /// Whether the host draws the ideal frames of the output frames that it makes, for sessions to come,
+    /// where it can draw the scene. Pictures differ by rounding, and where that decides which surface a pixel
+    /// shows.
     pub fn set_ideal_on_host(&mut self, is_on_host: bool) {
         self.gpu.ideal_on_host = is_on_host;
     }
@@ -132,7 +136,8 @@ impl Engine {
         self.check_output(&planner)?;
         let mut buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let preset = sequence.scenario.quality.preset;
-        let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some(), sequence.scene.fog_visibility_m)?;
+        let ideal_pass =
+            IdealPass::new(gpu, preset, buffers.tiles().is_some(), sequence.scene.fog_visibility_m)?;
         let on_host = gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence, &buffers));
         if !on_host.as_ref().is_some_and(OnHost::draws) {
             buffers.bring_pictures(gpu, &sequence.scene);
@@ -212,13 +217,14 @@ impl Session<'_> {
         &self.planner
     }
 
-    /// Picks the instant of the exposure, in [-0.5, 0.5], at which `coords` reports source coordinates (0 = mid-exposure): what the blur
-    /// stage samples can so be checked from outside.
+    /// Picks the instant of the exposure, in [-0.5, 0.5], at which `coords` reports source coordinates (0 =
+    /// mid-exposure): what the blur stage samples can so be checked from outside.
     pub fn set_coords_phase(&mut self, phase: f32) {
         self.coords_phase = phase;
     }
 
-    /// From now on measures how long each pass takes on the device; `false` where the adapter has no time stamps.
+    /// From now on measures how long each pass takes on the device; `false` where the adapter has no time
+    /// stamps.
     pub fn time_passes(&mut self) -> bool {
         for slot in &mut self.slots {
             slot.clock = PassClock::new(&self.engine.gpu);
@@ -226,15 +232,15 @@ impl Session<'_> {
         self.slots.iter().all(|slot| slot.clock.is_some())
     }
 
-    /// Forgets what was planned and drawn last, so that the next frame takes as long as if no other had been like it. No picture changes: for
-    /// benchmarks, which render the same frames over and over.
+    /// Forgets what was planned and drawn last, so that the next frame takes as long as if no other had been
+    /// like it. No picture changes: for benchmarks, which render the same frames over and over.
     pub fn forget(&mut self) {
         self.drawn = None;
         self.planner.forget();
     }
 
-    /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next, and
-    /// other threads plan those that follow; `frames` is read ahead of them.
+    /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the
+    /// device works on the next, and other threads plan those that follow; `frames` is read ahead of them.
     ///
     /// # Errors
     /// The first fault of planning, device or sink; frames before it have been handed over.
@@ -243,7 +249,8 @@ impl Session<'_> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let preparer = Preparer::new(self.planner.clone(), self.buffers.tiles().map(|tiles| tiles.ground.clone()));
+        let preparer =
+            Preparer::new(self.planner.clone(), self.buffers.tiles().map(|tiles| tiles.ground.clone()));
         let mut frames = frames.into_iter();
         let first: Vec<u64> = frames.by_ref().take(2).collect();
         let is_single = first.len() < 2;
@@ -264,9 +271,13 @@ impl Session<'_> {
                 };
                 let is_last = next.is_none();
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
-                    && let Err(fault) = self.finish(done).map_err(RenderError::Gpu).and_then(|frame| sink(frame).map_err(RenderError::Sink))
+                    && let Err(fault) = self
+                        .finish(done)
+                        .map_err(RenderError::Gpu)
+                        .and_then(|frame| sink(frame).map_err(RenderError::Sink))
                 {
-                    // Nobody wants the frame that is in flight, but its buffers can only be used again after it; a second fault is not told.
+                    // Nobody wants the frame that is in flight, but its buffers can only be used again after
+                    // it; a second fault is not told.
                     let _ = in_flight.map(|unwanted| self.finish(unwanted));
                     return Err(fault);
                 }
@@ -300,10 +311,12 @@ impl Session<'_> {
         self.slots[slot].recall(on_host.is_none());
         self.on_host.iter_mut().for_each(OnHost::recall);
         self.engine.check()?;
-        let (lod, out_of_order) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
+        let (lod, out_of_order) =
+            self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
         let ideal_ms = self.drawn.as_mut().and_then(|drawn| drawn.ideal_ms.take());
         let record_ms = record_ms - ideal_ms.unwrap_or_default();
-        let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, ideal_ms, submit_ms, ..FrameTimes::default() };
+        let times =
+            FrameTimes { plan_ms: prepared.plan_ms, record_ms, ideal_ms, submit_ms, ..FrameTimes::default() };
         let on_host = on_host.map(|frame| (frame, prepared.lines));
         Ok(InFlight { slot, plan: prepared.plan, submission, lod, out_of_order, on_host, times })
     }
@@ -332,14 +345,20 @@ impl Session<'_> {
 
     /// What the host makes the output frame from, where it makes frames like this.
     fn bring_to_host(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan) -> Option<HostFrame> {
-        let on_host = self.on_host.as_mut().filter(|on_host| on_host.makes(plan, self.engine.gpu.reverse_on))?;
+        let on_host =
+            self.on_host.as_mut().filter(|on_host| on_host.makes(plan, self.engine.gpu.reverse_on))?;
         let drawn = self.drawn.as_mut()?;
         let gpu = &self.engine.gpu;
         on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));
         let target = drawn.target.map(|target| &self.targets[target].ideal);
-        let copy = drawn.copy.or_else(|| target.map(|target| on_host.copy_ideal(gpu, recorder, target, &plan.ideal)));
+        let copy = drawn
+            .copy
+            .or_else(|| target.map(|target| on_host.copy_ideal(gpu, recorder, target, &plan.ideal)));
         drawn.copy = copy;
-        Some(HostFrame { copy: copy?, uniforms: frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase) })
+        Some(HostFrame {
+            copy: copy?,
+            uniforms: frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase),
+        })
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
@@ -353,7 +372,9 @@ impl Session<'_> {
         let mut warm = None;
         if let (Some(table), Some(zoom)) = (self.planner.zoom_table(), plan.zoom) {
             let entry = table.nearest(zoom);
-            if let (false, Ok(camera)) = (self.zoom_maps.contains_key(&entry), table.at(table.entries()[entry].at)) {
+            if let (false, Ok(camera)) =
+                (self.zoom_maps.contains_key(&entry), table.at(table.entries()[entry].at))
+            {
                 let mut map = LensMap::new(&gpu.device, camera.size_px);
                 pass.encode(&gpu.device, recorder, &camera, &mut map, None);
                 self.zoom_maps.insert(entry, map);
@@ -369,7 +390,12 @@ impl Session<'_> {
     }
 
     /// Pass 3: the output frame.
-    fn reverse(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), ComposeError> {
+    fn reverse(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        prepared: &Prepared,
+        slot: usize,
+    ) -> Result<(), ComposeError> {
         let gpu = &self.engine.gpu;
         let plan = &prepared.plan;
         let uniforms = frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase);
@@ -381,14 +407,21 @@ impl Session<'_> {
         }
         recorder.write(&buffers.frame, 0, bytemuck::bytes_of(&uniforms));
         recorder.write(&buffers.poses, 0, bytes);
-        let Some(target) = self.drawn.as_ref().and_then(|drawn| drawn.target).map(|target| &mut self.targets[target]) else {
+        let Some(target) =
+            self.drawn.as_ref().and_then(|drawn| drawn.target).map(|target| &mut self.targets[target])
+        else {
             return Ok(());
         };
-        let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| &map.view) } else { None };
+        let lens_map = if plan.ray == RayStage::LensMap {
+            self.lens_map.as_ref().map(|(_, map)| &map.view)
+        } else {
+            None
+        };
         let lists = (plan.edges != EdgeStage::None).then(|| {
-            let lists = self
-                .lists
-                .get_or_insert_with(|| ["camsim.candidates", "camsim.listed"].map(|label| list_buffer(gpu, label, plan.camera.size_px)));
+            let lists = self.lists.get_or_insert_with(|| {
+                ["camsim.candidates", "camsim.listed"]
+                    .map(|label| list_buffer(gpu, label, plan.camera.size_px))
+            });
             lists.iter().for_each(|list| recorder.write(list, 0, bytemuck::cast_slice(&EMPTY_LIST)));
             &*lists
         });

@@ -1,4 +1,5 @@
-//! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
+//! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section
+//! 4).
 
 use std::{collections::HashMap, ops::Range};
 
@@ -47,7 +48,8 @@ use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, 
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Colour format of the paper preset's ideal frame: the device encodes on writing; the gather reads what is stored ([`STORED_VIEW`]).
+/// Colour format of the paper preset's ideal frame: the device encodes on writing; the gather reads what is
+/// stored ([`STORED_VIEW`]).
 pub const STORED_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 /// How the paper preset's gather sees it.
 pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -79,8 +81,8 @@ pub struct IdealTarget {
 }
 
 impl IdealTarget {
-    /// Allocated size for the ideal frames of a plan: one below the other. Rounded up, so that a few allocations serve all frames;
-    /// depends on the frame alone.
+    /// Allocated size for the ideal frames of a plan: one below the other. Rounded up, so that a few
+    /// allocations serve all frames; depends on the frame alone.
     #[must_use]
     pub fn size_for(plan: &FramePlan, max_side_px: u32) -> [u32; 2] {
         let width = plan.ideal.size_px[0].next_multiple_of(SIZE_QUANTUM_PX);
@@ -106,15 +108,29 @@ impl IdealTarget {
     pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], plan: &FramePlan) -> Self {
         let fine = scale_of(plan.edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
         let sampled = (plan.samples_a_pixel > 1).then(|| SampledTarget::new(gpu, allocated_px));
-        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC;
         let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(plan.preset), 1, usage);
         let depth = texture(gpu, "camsim.ideal.depth", allocated_px, DEPTH_FORMAT, 1, usage);
         let format = (color.format() == STORED_FORMAT).then_some(STORED_VIEW);
-        // Not every usage of the texture is legal for a view of another format, and the gather needs one only.
+        // Not every usage of the texture is legal for a view of another format, and the gather needs one
+        // only.
         let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
-        let gathered_color = color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
+        let gathered_color =
+            color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
         let (drawn_color, drawn_depth, gathered_depth) = (whole(&color), whole(&depth), whole(&depth));
-        Self { allocated_px, color, depth, fine, sampled, drawn_color, drawn_depth, gathered_color, gathered_depth }
+        Self {
+            allocated_px,
+            color,
+            depth,
+            fine,
+            sampled,
+            drawn_color,
+            drawn_depth,
+            gathered_color,
+            gathered_depth,
+        }
     }
 }
 
@@ -176,7 +192,8 @@ pub struct IdealSlot {
 }
 
 impl IdealSlot {
-    /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their number.
+    /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their
+    /// number.
     pub(crate) fn near_marks(&self) -> Option<&wgpu::Buffer> {
         self.terrain.as_ref().map(|terrain| &terrain.kept.arguments)
     }
@@ -187,25 +204,35 @@ impl IdealPass {
     ///
     /// # Errors
     /// Faults of the shader files.
-    pub fn new(gpu: &GpuContext, preset: Preset, has_tiles: bool, fog_visibility_m: Option<f64>) -> Result<Self, ComposeError> {
+    pub fn new(
+        gpu: &GpuContext,
+        preset: Preset,
+        has_tiles: bool,
+        fog_visibility_m: Option<f64>,
+    ) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
         let every = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
-        let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, every, wgpu::BufferBindingType::Uniform)]);
+        let camera_layout =
+            layout("camsim.ideal.camera", &[buffer_entry(0, every, wgpu::BufferBindingType::Uniform)]);
         let vertices = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
         let [texture, sampler] = texture_entries(wgpu::TextureViewDimension::D2);
         let [tiles, _] = texture_entries(wgpu::TextureViewDimension::D2Array);
         let pulled = buffer_entry(2, vertices, storage);
         let terrain_layout = match has_tiles {
-            true => layout("camsim.ideal.terrain", &[tiles, sampler, pulled, buffer_entry(3, wgpu::ShaderStages::FRAGMENT, storage)]),
+            true => layout(
+                "camsim.ideal.terrain",
+                &[tiles, sampler, pulled, buffer_entry(3, wgpu::ShaderStages::FRAGMENT, storage)],
+            ),
             false => layout("camsim.ideal.terrain", &[texture, sampler, pulled]),
         };
         let material = buffer_entry(2, wgpu::ShaderStages::FRAGMENT, wgpu::BufferBindingType::Uniform);
         let mesh_layout = layout("camsim.ideal.mesh", &[texture, sampler, material]);
-        let placement_layout = layout("camsim.ideal.placements", &[buffer_entry(0, wgpu::ShaderStages::VERTEX, storage)]);
+        let placement_layout =
+            layout("camsim.ideal.placements", &[buffer_entry(0, wgpu::ShaderStages::VERTEX, storage)]);
         Ok(Self {
             silhouettes: None,
             middle_depth: None,
@@ -232,11 +259,16 @@ impl IdealPass {
                 mapped_at_creation: false,
             })
         };
-        let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
+        let camera =
+            create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
         let placement_bytes = (buffers.placed.len() * size_of::<MeshPlacement>()) as u64;
         let placements = create("camsim.ideal.placements", placement_bytes, wgpu::BufferUsages::STORAGE);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("camsim.ideal"),
+                layout,
+                entries,
+            })
         };
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
@@ -254,10 +286,20 @@ impl IdealPass {
         let mesh_groups = mesh_groups.collect();
         let layers = buffers.batches.iter().any(|batch| batch.kind.blends).then(|| Ordered::new(gpu));
         let placement_group = group(&self.placement_layout, &[entry(0, placements.as_entire_binding())]);
-        IdealSlot { camera, terrain, placements, camera_group, placement_group, mesh_groups, drawn: Vec::new(), layers }
+        IdealSlot {
+            camera,
+            terrain,
+            placements,
+            camera_group,
+            placement_group,
+            mesh_groups,
+            drawn: Vec::new(),
+            layers,
+        }
     }
 
-    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns how many blended triangles are out of order.
+    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own
+    /// triangles of it; returns how many blended triangles are out of order.
     ///
     /// # Errors
     /// Faults of the shader files; [`GpuError::TooLarge`] for triangles that no buffer holds.
@@ -273,12 +315,19 @@ impl IdealPass {
         tolerance: &LevelTolerance,
         target: &IdealTarget,
     ) -> Result<u32, RenderErrorBase> {
-        let plain = if target.sampled.is_some() { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::Plain(plan.surface_reads) };
+        let plain = if target.sampled.is_some() {
+            SurfaceKey::Fine(plan.surface_reads)
+        } else {
+            SurfaceKey::Plain(plan.surface_reads)
+        };
         if target.sampled.is_some() && self.middle_depth.is_none() {
             self.middle_depth = Some(MiddleDepthPass::new(gpu)?);
         }
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
-        let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
+        let fine =
+            colored.map(
+                |colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth },
+            );
         for key in [Some(plain), fine].into_iter().flatten() {
             if !self.pipelines.contains_key(&key) {
                 self.pipelines.insert(key, self.surface_pipelines(gpu, key, &buffers.batches)?);
@@ -292,9 +341,15 @@ impl IdealPass {
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = base_ned_m(&key.pose);
-            recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
+            recorder.write(
+                &slot.camera,
+                0,
+                bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)),
+            );
             let mut indices = 0;
-            if let (Some(terrain), Some(on_device), Some(mesh)) = (&mut slot.terrain, &buffers.terrain, meshes.get(k)) {
+            if let (Some(terrain), Some(on_device), Some(mesh)) =
+                (&mut slot.terrain, &buffers.terrain, meshes.get(k))
+            {
                 indices = place_terrain(gpu, recorder, terrain, mesh)?;
                 terrain.bind(gpu, recorder, &self.terrain_layout, on_device, &buffers.sampler);
             }
@@ -326,13 +381,24 @@ impl IdealPass {
             let SilhouettePasses { marks, near_marks } = passes;
             if !thin {
                 marks.mark(gpu, recorder, plan, target, fine, false);
-                near_marks.encode(gpu, recorder, plan, target.allocated_px[0].div_ceil(TILE_PX), slots, &index_counts, fine);
+                near_marks.encode(
+                    gpu,
+                    recorder,
+                    plan,
+                    target.allocated_px[0].div_ceil(TILE_PX),
+                    slots,
+                    &index_counts,
+                    fine,
+                );
             }
             let color = fine.color_view.as_ref().map(|view| color_attachment(view, scene));
-            let mut pass = recorder.render_pass("ideal_fine", color, Some(depth_attachment(&fine.depth_view)));
-            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, |k| match (thin, index_counts[k]) {
-                (false, 1..) => Triangles::Kept,
-                (_, count) => Triangles::All(count),
+            let mut pass =
+                recorder.render_pass("ideal_fine", color, Some(depth_attachment(&fine.depth_view)));
+            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, |k| {
+                match (thin, index_counts[k]) {
+                    (false, 1..) => Triangles::Kept,
+                    (_, count) => Triangles::All(count),
+                }
             });
             drop(pass);
             if thin {
@@ -373,7 +439,8 @@ impl IdealPass {
     }
 }
 
-/// What surfaces stand relative to when seen from a camera: in whole metres, so that sums with whole chunk centres are exact.
+/// What surfaces stand relative to when seen from a camera: in whole metres, so that sums with whole chunk
+/// centres are exact.
 pub(crate) fn base_ned_m(pose: &CameraPose) -> DVec3 {
     pose.position_ned_m.round()
 }
@@ -385,7 +452,10 @@ fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::Ren
         view,
         depth_slice: None,
         resolve_target: None,
-        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
+        ops: wgpu::Operations {
+            load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+            store: wgpu::StoreOp::Store,
+        },
     }
 }
 
@@ -398,7 +468,8 @@ fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAtt
     }
 }
 
-/// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.
+/// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into
+/// the shift.
 fn ideal_camera(plan: &FramePlan, pose: &CameraPose, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
     let ideal = &plan.ideal;
     let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
@@ -422,7 +493,11 @@ fn ideal_camera(plan: &FramePlan, pose: &CameraPose, base_ned_m: DVec3, scene: &
     }
 }
 
-fn buffer_entry(binding: u32, visibility: wgpu::ShaderStages, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
+fn buffer_entry(
+    binding: u32,
+    visibility: wgpu::ShaderStages,
+    ty: wgpu::BufferBindingType,
+) -> wgpu::BindGroupLayoutEntry {
     let ty = wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
 }

@@ -124,7 +124,8 @@ pub struct MeshMaterial {
     pub sun_sky: [f32; 4],
 }
 
-/// Where a mesh stands from a key: rows of a turn, each followed by the origin's place. Mirror of `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
+/// Where a mesh stands from a key: rows of a turn, each followed by the origin's place. Mirror of
+/// `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshPlacement {
@@ -162,7 +163,9 @@ mod tests {
 
     #[test]
     fn structs_are_laid_out_as_in_the_shaders() {
-        let parse = |text: String| naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+        let parse = |text: String| {
+            naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)))
+        };
         let key = *reverse::PipelineKey::all().last().unwrap();
         let module = parse(shaders::compose(reverse::SHADER, &key.slots()).unwrap());
         assert_mirror!(
@@ -215,7 +218,11 @@ mod tests {
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
         let module = parse(
-            shaders::compose("ideal/terrain.wgsl", &crate::ideal::ground_slots(camsim_plan::SurfaceReads::Grid, true, true)).unwrap(),
+            shaders::compose(
+                "ideal/terrain.wgsl",
+                &crate::ideal::ground_slots(camsim_plan::SurfaceReads::Grid, true, true),
+            )
+            .unwrap(),
         );
         assert_mirror!(
             &module,
@@ -240,6 +247,11 @@ mod tests {
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);
         let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
-        assert_mirror!(&module, "KeyLayout", KeyLayout, [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]);
+        assert_mirror!(
+            &module,
+            "KeyLayout",
+            KeyLayout,
+            [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]
+        );
     }
 }

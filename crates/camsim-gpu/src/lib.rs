@@ -1,8 +1,9 @@
 //! The ideal render and the reverse pipeline on wgpu.
 //!
-//! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) -> layout (mirrors of shader
-//! structs) -> scene upload -> staging and recorder (a frame's writes and commands) -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back).
-//! The engine executes [`camsim_plan::FramePlan`]s and decides nothing itself.
+//! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) ->
+//! layout (mirrors of shader structs) -> scene upload -> staging and recorder (a frame's writes and commands)
+//! -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back). The engine executes
+//! [`camsim_plan::FramePlan`]s and decides nothing itself.
 
 #![warn(missing_docs)]
 

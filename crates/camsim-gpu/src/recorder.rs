@@ -1,12 +1,13 @@
-//! Commands of a frame as they are recorded, what the host writes for them, and how long each pass takes on the device by its own clock.
+//! Commands of a frame as they are recorded, what the host writes for them, and how long each pass takes on
+//! the device by its own clock.
 
 use crate::{
     context::{GpuContext, GpuError},
     staging::Staging,
 };
 
-/// Passes of a frame: lens map and the map it starts from, ideal frame, marks, triangles near them, samples, stamp, borders, reverse, rays; and
-/// some to spare.
+/// Passes of a frame: lens map and the map it starts from, ideal frame, marks, triangles near them, samples,
+/// stamp, borders, reverse, rays; and some to spare.
 const MAX_PASSES: u32 = 12;
 const STAMPS_BYTES: u64 = 16 * MAX_PASSES as u64;
 
@@ -34,7 +35,12 @@ impl PassClock {
     pub fn new(gpu: &GpuContext) -> Option<Self> {
         let buffer = |usage| {
             let label = Some("camsim.stamps");
-            gpu.device.create_buffer(&wgpu::BufferDescriptor { label, size: STAMPS_BYTES, usage, mapped_at_creation: false })
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label,
+                size: STAMPS_BYTES,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| Self {
             queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -66,7 +72,11 @@ impl PassClock {
     pub(crate) fn passes(&self, gpu: &GpuContext, stamps: &[u64]) -> Vec<PassTime> {
         let ms_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
         let ms = |stamp: &[u64]| stamp[1].saturating_sub(stamp[0]) as f64 * ms_per_tick;
-        self.names.iter().zip(stamps.chunks_exact(2)).map(|(name, stamp)| PassTime { name, ms: ms(stamp) }).collect()
+        self.names
+            .iter()
+            .zip(stamps.chunks_exact(2))
+            .map(|(name, stamp)| PassTime { name, ms: ms(stamp) })
+            .collect()
     }
 }
 
@@ -81,19 +91,25 @@ pub struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins a frame; its passes are timed where there is a clock. What is written for it goes through `staging`, which no other frame
-    /// may use before this one has been waited for.
+    /// Begins a frame; its passes are timed where there is a clock. What is written for it goes through
+    /// `staging`, which no other frame may use before this one has been waited for.
     #[must_use]
-    pub fn new(device: &'a wgpu::Device, mut clock: Option<&'a mut PassClock>, staging: &'a mut Staging) -> Self {
+    pub fn new(
+        device: &'a wgpu::Device,
+        mut clock: Option<&'a mut PassClock>,
+        staging: &'a mut Staging,
+    ) -> Self {
         if let Some(clock) = &mut clock {
             clock.names.clear();
         }
         staging.begin();
-        let encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") });
+        let encoder =
+            device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") });
         Self { device, encoder, clock, staging, fault: None }
     }
 
-    /// Writes to a buffer, after all that has been recorded so far and before what follows. A fault shows in [`Recorder::finish`].
+    /// Writes to a buffer, after all that has been recorded so far and before what follows. A fault shows in
+    /// [`Recorder::finish`].
     pub fn write(&mut self, to: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
         if self.fault.is_none() {
             self.fault = self.staging.write(self.device, &mut self.encoder, to, offset, bytes).err();

@@ -1,7 +1,8 @@
-//! The reverse pipeline: output pixel -> lens inverse (map) -> temporal inverse -> gather -> photometric -> output buffer.
+//! The reverse pipeline: output pixel -> lens inverse (map) -> temporal inverse -> gather -> photometric ->
+//! output buffer.
 //!
-//! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text. [`PipelineKey::all`] lists
-//! every legal composition.
+//! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text.
+//! [`PipelineKey::all`] lists every legal composition.
 
 use std::collections::{HashMap, hash_map::Entry};
 
@@ -60,15 +61,16 @@ pub struct ReverseBindings<'a> {
     pub out_color: &'a wgpu::Buffer,
     /// Depth and coordinates, when the key writes them.
     pub out_truth: Option<&'a wgpu::Buffer>,
-    /// Lists of pixels, when the key lists any: of the picture's kernel, and what stays of it. Each has [`list_size`] bytes, the first four words of
-    /// them [`EMPTY_LIST`].
+    /// Lists of pixels, when the key lists any: of the picture's kernel, and what stays of it. Each has
+    /// [`list_size`] bytes, the first four words of them [`EMPTY_LIST`].
     pub lists: Option<&'a [wgpu::Buffer; 2]>,
 }
 
 /// Head of the list of pixels before a frame: arguments of an empty dispatch, and no pixel.
 pub const EMPTY_LIST: [u32; 4] = [0, 1, 1, 0];
 
-/// Bytes for a list of all pixels of a picture. A shader's structure is a multiple of its alignment long: the head and one pixel take 32.
+/// Bytes for a list of all pixels of a picture. A shader's structure is a multiple of its alignment long: the
+/// head and one pixel take 32.
 #[must_use]
 pub fn list_size(size_px: [u32; 2]) -> u64 {
     let words = EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]);
@@ -78,8 +80,9 @@ pub fn list_size(size_px: [u32; 2]) -> u64 {
 /// That of the `vec3<u32>` in a list's head.
 const LIST_ALIGNMENT: u64 = 16;
 
-/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and those of its silhouettes, made when a key is first
-/// used. They go with the target, and when a buffer of the frame's is replaced.
+/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and those of its
+/// silhouettes, made when a key is first used. They go with the target, and when a buffer of the frame's is
+/// replaced.
 #[derive(Debug, Default)]
 pub struct ReverseGroups(HashMap<PipelineKey, [Groups; 3]>);
 
@@ -99,7 +102,8 @@ struct Variant {
     groups: [Option<wgpu::BindGroupLayout>; 4],
 }
 
-/// The kernels of a frame: the picture's, and where there may be silhouettes that of its list and that of their rays.
+/// The kernels of a frame: the picture's, and where there may be silhouettes that of its list and that of
+/// their rays.
 #[derive(Debug)]
 struct Kernels {
     picture: Variant,
@@ -168,7 +172,8 @@ impl ReversePass {
         };
         let [of_picture, of_silhouettes @ ..] = groups.0.entry(key).or_insert_with(|| {
             let bind = |variant: &Variant| variant.bind(gpu, &self.samplers, bindings);
-            let [candidates, rays] = kernels.silhouettes.as_ref().map(|of| of.each_ref().map(bind)).unwrap_or_default();
+            let [candidates, rays] =
+                kernels.silhouettes.as_ref().map(|of| of.each_ref().map(bind)).unwrap_or_default();
             [bind(&kernels.picture), candidates, rays]
         });
         let mut pass = recorder.compute_pass("reverse");
@@ -177,7 +182,9 @@ impl ReversePass {
         pass.dispatch_workgroups(across, down, 1);
         drop(pass);
         if let (Some(variants), Some(lists)) = (&kernels.silhouettes, bindings.lists) {
-            for (((variant, groups), list), name) in variants.iter().zip(of_silhouettes).zip(lists).zip(["candidates", "rays"]) {
+            for (((variant, groups), list), name) in
+                variants.iter().zip(of_silhouettes).zip(lists).zip(["candidates", "rays"])
+            {
                 let mut pass = recorder.compute_pass(name);
                 variant.set(&mut pass, groups);
                 pass.dispatch_workgroups_indirect(list, 0);
@@ -203,11 +210,20 @@ fn workgroups(plan: &FramePlan, pixels_a_thread: u32) -> [u32; 2] {
 }
 
 impl Variant {
-    fn new(gpu: &GpuContext, key: PipelineKey, file: &str, entry_point: &str, lists: Lists) -> Result<Self, ComposeError> {
+    fn new(
+        gpu: &GpuContext,
+        key: PipelineKey,
+        file: &str,
+        entry_point: &str,
+        lists: Lists,
+    ) -> Result<Self, ComposeError> {
         let module = shaders::module(&gpu.device, "camsim.reverse", file, &key.slots())?;
         let groups = layouts(key, lists).map(|entries| {
             (!entries.is_empty()).then(|| {
-                gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.reverse"), entries: &entries })
+                gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                    label: Some("camsim.reverse"),
+                    entries: &entries,
+                })
             })
         });
         let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -237,7 +253,12 @@ impl Variant {
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, [sampler, nearest]: &[wgpu::Sampler; 2], b: &ReverseBindings<'_>) -> Groups {
+    fn bind(
+        &self,
+        gpu: &GpuContext,
+        [sampler, nearest]: &[wgpu::Sampler; 2],
+        b: &ReverseBindings<'_>,
+    ) -> Groups {
         let view = |view| wgpu::BindingResource::TextureView(view);
         let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
             vec![(0, b.frame.as_entire_binding()), (1, view(b.noise_table))],
@@ -252,14 +273,18 @@ impl Variant {
             Vec::new(),
             vec![(0, b.out_color.as_entire_binding())],
         ];
-        let fine = b.fine.map(|fine| (fine.color_view.as_ref(), &fine.depth_view, whole(&fine.lines), &fine.within_reach));
+        let fine = b
+            .fine
+            .map(|fine| (fine.color_view.as_ref(), &fine.depth_view, whole(&fine.lines), &fine.within_reach));
         if let Some((color, depth, lines, within_reach)) = &fine {
             resources[1].extend(color.map(|color| (5, view(color))));
             resources[1].extend([(6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
-        if let Some([candidates, listed]) = b.lists.map(|lists| lists.each_ref().map(wgpu::Buffer::as_entire_binding)) {
+        if let Some([candidates, listed]) =
+            b.lists.map(|lists| lists.each_ref().map(wgpu::Buffer::as_entire_binding))
+        {
             match self.lists {
                 Lists::Fills => resources[3].push((2, candidates)),
                 Lists::Thins => resources[3].extend([(2, listed), (3, candidates)]),
@@ -269,8 +294,15 @@ impl Variant {
         let mut groups = [const { None }; 4];
         for (i, resources) in resources.into_iter().enumerate() {
             groups[i] = self.groups[i].as_ref().map(|layout| {
-                let entries: Vec<_> = resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-                gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.reverse"), layout, entries: &entries })
+                let entries: Vec<_> = resources
+                    .into_iter()
+                    .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+                    .collect();
+                gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("camsim.reverse"),
+                    layout,
+                    entries: &entries,
+                })
             });
         }
         groups
@@ -278,11 +310,19 @@ impl Variant {
 }
 
 fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
-    let texture =
-        |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
+    let texture = |sample_type| wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
     let numbers = || texture(wgpu::TextureSampleType::Float { filterable: false });
     let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, numbers())];
     let mut ideal = vec![
@@ -294,9 +334,15 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
         entry(9, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)),
     ];
     if key.edges != EdgeKind::None {
-        let samples =
-            |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: true };
-        ideal.extend((key.edges == EdgeKind::Samples).then(|| entry(5, samples(wgpu::TextureSampleType::Float { filterable: false }))));
+        let samples = |sample_type| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: true,
+        };
+        ideal.extend(
+            (key.edges == EdgeKind::Samples)
+                .then(|| entry(5, samples(wgpu::TextureSampleType::Float { filterable: false }))),
+        );
         ideal.extend([
             entry(6, samples(wgpu::TextureSampleType::Depth)),
             entry(7, texture(wgpu::TextureSampleType::Uint)),
@@ -318,7 +364,8 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
     [frame, ideal, lens, out]
 }
 
-/// Uniforms of a frame. `coords_phase` in [-0.5, 0.5] picks the instant of the exposure at which source coordinates are reported.
+/// Uniforms of a frame. `coords_phase` in [-0.5, 0.5] picks the instant of the exposure at which source
+/// coordinates are reported.
 #[must_use]
 pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
     let photometric = &scenario.camera.photometric;
@@ -327,7 +374,9 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
     let lens = |i: usize| plan.camera.lens.coefficients().get(i).map_or(0.0, |&k| k as f32);
-    let linear_fog = plan.linear_fog.map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
+    let linear_fog = plan
+        .linear_fog
+        .map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
     let mut planes = [[0.0; 4]; MAX_KEYS as usize];
     for (plane, key) in planes.iter_mut().zip(&plan.keys) {
         *plane = plan.plane.seen_from(&key.pose).as_vec3().extend(0.0).to_array();
@@ -374,7 +423,8 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         edge_samples,
         keys: plan.keys.len() as u32,
         key_rows: key_rows(&plan.ideal),
-        exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
+        exposure_share: (plan.shutter.exposure_s()
+            / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
@@ -382,7 +432,12 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         sky_reach_px: plan.sky_reach_px as f32,
         planes,
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
-        key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),
+        key_rate_rad_s: plan
+            .key_twist
+            .rate_rad_s
+            .extend(plan.key_twist.rate_rad_s.length())
+            .as_vec4()
+            .to_array(),
         ..FrameUniforms::default()
     }
 }

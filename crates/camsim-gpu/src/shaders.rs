@@ -1,8 +1,9 @@
-//! WGSL composition: `#import path` includes a file once; `#import <slot:name>` is filled by the pipeline key.
+//! WGSL composition: `#import path` includes a file once; `#import <slot:name>` is filled by the pipeline
+//! key.
 //!
-//! About a hundred lines of plain text joining keep every file readable by WGSL tools, need no build step, and leave naga's version
-//! alone; naga_oil's module system would rename every symbol for no gain at this size.
-//! `CAMSIM_SHADER_DIR` reads the files from a folder instead of the embedded copies, for development.
+//! About a hundred lines of plain text joining keep every file readable by WGSL tools, need no build step,
+//! and leave naga's version alone; naga_oil's module system would rename every symbol for no gain at this
+//! size. `CAMSIM_SHADER_DIR` reads the files from a folder instead of the embedded copies, for development.
 
 use std::borrow::Cow;
 
@@ -199,10 +200,19 @@ fn read(file: &str) -> Result<Cow<'static, str>, ComposeError> {
 /// A shader module from a composed file.
 ///
 /// # Errors
-/// As [`compose`]. WGSL faults surface as validation errors of the device; a test validates every variant beforehand.
-pub fn module(device: &wgpu::Device, label: &str, file: &str, slots: &[Slot]) -> Result<wgpu::ShaderModule, ComposeError> {
+/// As [`compose`]. WGSL faults surface as validation errors of the device; a test validates every variant
+/// beforehand.
+pub fn module(
+    device: &wgpu::Device,
+    label: &str,
+    file: &str,
+    slots: &[Slot],
+) -> Result<wgpu::ShaderModule, ComposeError> {
     let source = compose(file, slots)?;
-    Ok(device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) }))
+    Ok(device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    }))
 }
 
 #[cfg(test)]
@@ -225,7 +235,10 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders");
         let mut found = Vec::new();
         files_below(&root, &mut found);
-        let mut names: Vec<String> = found.iter().map(|p| p.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/")).collect();
+        let mut names: Vec<String> = found
+            .iter()
+            .map(|p| p.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/"))
+            .collect();
         names.sort();
         assert_eq!(names, FILES.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>());
     }
@@ -233,6 +246,8 @@ mod tests {
     #[test]
     fn faults_are_named() {
         assert!(matches!(compose("no/such.wgsl", &[]), Err(ComposeError::Missing(_))));
-        assert!(matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "keys"));
+        assert!(
+            matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "keys")
+        );
     }
 }

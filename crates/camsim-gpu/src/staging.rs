@@ -1,5 +1,5 @@
-//! What the host writes for a frame: memory that the frame's commands copy from, used again by a later frame. `Queue::write_buffer` makes
-//! a buffer for each call.
+//! What the host writes for a frame: memory that the frame's commands copy from, used again by a later frame.
+//! `Queue::write_buffer` makes a buffer for each call.
 
 use crate::context::GpuError;
 
@@ -34,7 +34,8 @@ impl Staging {
         self.used = 0;
     }
 
-    /// Takes `bytes` and records their way to `to`, `offset` bytes from its start. Length and offset are multiples of 4.
+    /// Takes `bytes` and records their way to `to`, `offset` bytes from its start. Length and offset are
+    /// multiples of 4.
     pub(crate) fn write(
         &mut self,
         device: &wgpu::Device,
@@ -66,7 +67,8 @@ impl Staging {
         self.on_host.unmap();
     }
 
-    /// To be called after: asks for the memory back. It is there once the frame has been waited for; a failure shows at the next write.
+    /// To be called after: asks for the memory back. It is there once the frame has been waited for; a
+    /// failure shows at the next write.
     pub(crate) fn recall(&mut self) {
         self.on_host.map_async(wgpu::MapMode::Write, .., |_| {});
     }

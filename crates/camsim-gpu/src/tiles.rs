@@ -1,5 +1,5 @@
-//! Tiles of a picture that is larger than a texture: those that a frame may read are brought to the device before it, in place of those that have not
-//! been needed for longest.
+//! Tiles of a picture that is larger than a texture: those that a frame may read are brought to the device
+//! before it, in place of those that have not been needed for longest.
 
 use std::sync::Arc;
 
@@ -17,8 +17,8 @@ const TILES_A_LAYER: u32 = TILES_A_SIDE * TILES_A_SIDE;
 /// Versions that the table on the device has room for: a side of 2^32 texels.
 const MOST_LEVELS: usize = 32;
 
-/// The tiles on the device. There is room for the neediest frame so far, its number of layers rounded up to a power of two: at most twice
-/// of what that frame needs and 16 MiB.
+/// The tiles on the device. There is room for the neediest frame so far, its number of layers rounded up to a
+/// power of two: at most twice of what that frame needs and 16 MiB.
 #[derive(Debug)]
 pub struct TilePool {
     /// Which tiles a frame needs.
@@ -49,7 +49,16 @@ impl TilePool {
         let ground = Arc::new(GroundTiles::new(terrain));
         let source = TileSource::new(&terrain.texture, form, terrain.beyond);
         let place_of = vec![None; source.grid.count as usize];
-        Self { ground, source, layers: None, place_of, at_place: Vec::new(), frames: 0, changes: [0; 2], table: Vec::new() }
+        Self {
+            ground,
+            source,
+            layers: None,
+            place_of,
+            at_place: Vec::new(),
+            frames: 0,
+            changes: [0; 2],
+            table: Vec::new(),
+        }
     }
 
     /// The layers, once a frame needed some.
@@ -73,7 +82,8 @@ impl TilePool {
         (self.place_of.iter().flatten().count(), self.at_place.len() as u64 * tile_bytes(self.source.form()))
     }
 
-    /// Makes sure that a frame finds its tiles. Frames that have been submitted have read theirs before these are written.
+    /// Makes sure that a frame finds its tiles. Frames that have been submitted have read theirs before these
+    /// are written.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] for a frame that needs more than a texture can hold.
@@ -85,11 +95,13 @@ impl TilePool {
                 self.at_place[place as usize] = Some((tile, self.frames));
             }
         }
-        let absent: Vec<u32> = tiles.iter().copied().filter(|&tile| self.place_of[tile as usize].is_none()).collect();
+        let absent: Vec<u32> =
+            tiles.iter().copied().filter(|&tile| self.place_of[tile as usize].is_none()).collect();
         if absent.is_empty() && !is_new {
             return Ok(());
         }
-        let mut places: Vec<u32> = (0..self.at_place.len() as u32).filter(|&place| !self.is_needed(place)).collect();
+        let mut places: Vec<u32> =
+            (0..self.at_place.len() as u32).filter(|&place| !self.is_needed(place)).collect();
         // Empty ones come before those that were needed long ago.
         places.sort_by_key(|&place| self.at_place[place as usize].map_or(0, |(_, frame)| frame));
         for (tile, place) in absent.into_iter().zip(places) {
@@ -144,8 +156,10 @@ impl TilePool {
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
-        let view = texture
-            .create_view(&wgpu::TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
         self.layers = Some(Layers { texture, view });
         Ok(true)
     }
@@ -158,7 +172,12 @@ impl TilePool {
             z: place / TILES_A_LAYER,
         };
         gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo { texture: &layers.texture, mip_level: 0, origin, aspect: wgpu::TextureAspect::All },
+            wgpu::TexelCopyTextureInfo {
+                texture: &layers.texture,
+                mip_level: 0,
+                origin,
+                aspect: wgpu::TextureAspect::All,
+            },
             &self.source.texels(tile),
             wgpu::TexelCopyBufferLayout {
                 offset: 0,

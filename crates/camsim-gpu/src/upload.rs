@@ -3,8 +3,8 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::scene::{
-    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole,
-    levels::level_stretch,
+    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm,
+    Texture, Wrap, is_whole, levels::level_stretch,
 };
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
@@ -122,7 +122,9 @@ impl SceneBuffers {
         let sampler = create_sampler(gpu, [Wrap::Clamp; 2], false);
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
         let (batches, order) = upload_meshes(gpu, scene);
-        batches.iter().try_for_each(|batch| check_picture(gpu, &batch.look.texture, "the picture of a mesh or pattern"))?;
+        batches.iter().try_for_each(|batch| {
+            check_picture(gpu, &batch.look.texture, "the picture of a mesh or pattern")
+        })?;
         let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
         let place = |mesh: &Mesh| {
             let &Mesh { origin_ned_m, ned_from_shape, .. } = mesh;
@@ -133,16 +135,22 @@ impl SceneBuffers {
         Ok(Self { terrain, batches, pictures: Vec::new(), placed, bounds, sampler })
     }
 
-    /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the device needs none. What several share is uploaded once.
+    /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the
+    /// device needs none. What several share is uploaded once.
     pub fn bring_pictures(&mut self, gpu: &GpuContext, scene: &Scene) {
-        if let (Some(terrain), Some(TerrainBuffers { picture: GroundPicture::Whole(picture) })) = (&scene.terrain, &mut self.terrain) {
+        if let (Some(terrain), Some(TerrainBuffers { picture: GroundPicture::Whole(picture) })) =
+            (&scene.terrain, &mut self.terrain)
+        {
             picture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture, terrain.beyond));
         }
         if self.pictures.len() < self.batches.len() {
             let mut known: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
             let picture = |batch: &MeshBatch| {
                 let texture = &batch.look.texture;
-                known.entry(Arc::as_ptr(texture)).or_insert_with(|| upload_texture(gpu, texture, None)).clone()
+                known
+                    .entry(Arc::as_ptr(texture))
+                    .or_insert_with(|| upload_texture(gpu, texture, None))
+                    .clone()
             };
             self.pictures = self.batches.iter().map(picture).collect();
         }
@@ -217,7 +225,13 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> (Vec<MeshBatch>, Vec<usize>
     (batches, order)
 }
 
-fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc<ShapeLevels>, members: Range<u32>) -> MeshBatch {
+fn upload_batch(
+    gpu: &GpuContext,
+    mesh: &Mesh,
+    light: Option<Light>,
+    levels: Arc<ShapeLevels>,
+    members: Range<u32>,
+) -> MeshBatch {
     let (shape, material) = (&mesh.shape, &mesh.material);
     let light = light.filter(|_| shape.has_normals());
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
@@ -228,11 +242,17 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc
         ranges.push(first..indices.len() as u32);
     }
     let [r, g, b] = material.emissive;
-    let sun_sky = light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
+    let sun_sky =
+        light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
     let uniform = MeshMaterial { emissive_cutoff: [r, g, b, material.cutoff.unwrap_or(0.0)], sun_sky };
     let buffer = |label, contents: &[u8], usage| {
         let size = contents.len() as u64;
-        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: true,
+        });
         // On a device that is lost there is nothing to write to; it says so itself.
         if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
             range.copy_from_slice(contents);
@@ -243,7 +263,9 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc
     MeshBatch {
         vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
         indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
-        normals: light.map(|_| buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)),
+        normals: light.map(|_| {
+            buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)
+        }),
         ranges,
         levels,
         shape: shape.clone(),
@@ -251,7 +273,12 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc
         light,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
-        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some(), lit: light.is_some(), blends: material.blends },
+        kind: MeshKind {
+            one_sided: material.one_sided,
+            holes: material.cutoff.is_some(),
+            lit: light.is_some(),
+            blends: material.blends,
+        },
         members,
     }
 }
@@ -284,7 +311,8 @@ fn check_picture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), 
 fn upload_texture(gpu: &GpuContext, texture: &Texture, border: Option<[u8; 4]>) -> wgpu::TextureView {
     let [width, height] = texture.size_px;
     let form = match (texture.encoding, texture.size_px) {
-        // Every device has the exact light of these bytes, and there are no smaller versions: a half would only round.
+        // Every device has the exact light of these bytes, and there are no smaller versions: a half would
+        // only round.
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
         _ => TexelForm::Light,
     };

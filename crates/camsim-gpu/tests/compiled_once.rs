@@ -1,5 +1,6 @@
-//! No kernel is compiled twice: a driver that compiles one anew for each value of a number in its uniforms (lavapipe does, for numbers that decide where the
-//! kernel goes) takes half a second each time and keeps the code of all of them. Alone in its process: it counts that process' code.
+//! No kernel is compiled twice: a driver that compiles one anew for each value of a number in its uniforms
+//! (lavapipe does, for numbers that decide where the kernel goes) takes half a second each time and keeps the
+//! code of all of them. Alone in its process: it counts that process' code.
 
 mod common;
 
@@ -37,8 +38,10 @@ fn no_kernel_is_compiled_anew_for_other_numbers() {
         scenario.camera.size_px = [64, 48];
         scenario.camera.focal_px = [52.0, 52.0];
         scenario.camera.mount = MountSpec { angles_deg: [0.0, -60.0, 0.0], ..MountSpec::default() };
-        scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
-        scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+        scenario.camera.shutter =
+            ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
+        scenario.camera.lens =
+            LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
         let sequence = sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO), city(2));
         let mut session = engine.session::<Infallible>(sequence, channels).expect("session");
         let mut render_at = |phases: &[f32]| {

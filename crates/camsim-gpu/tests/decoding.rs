@@ -11,7 +11,8 @@ use camsim_core::{
 use common::{engine, render, scenario, sequence, steady};
 use glam::DVec3;
 
-/// Half floats: 2^-12 of 1 for the picture on the device, 2^-11 for the ideal frame, which devices may cut off; less of less.
+/// Half floats: 2^-12 of 1 for the picture on the device, 2^-11 for the ideal frame, which devices may cut
+/// off; less of less.
 const MOST: f64 = 7.4e-4;
 
 /// All byte values, 16 by 16 sharp texels, on a level square with a side of 60 m.
@@ -39,7 +40,8 @@ fn every_byte_is_the_light_that_it_stands_for() {
     // Seen from 100 m the square is 150 pixels wide, a texel 9.4. North is up.
     let mut worst = (0.0, 0);
     for byte in 0..256_usize {
-        let [x, y] = [byte % 16, byte / 16].map(|texel| (79.5 + 150.0 / 16.0 * (texel as f64 - 7.5)).round() as usize);
+        let [x, y] =
+            [byte % 16, byte / 16].map(|texel| (79.5 + 150.0 / 16.0 * (texel as f64 - 7.5)).round() as usize);
         let stored = byte as f64 / 255.0;
         let light = if stored <= 0.040_45 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) };
         let off = (f64::from(picture[4 * (160 * y + x)]) - light).abs();

@@ -36,7 +36,9 @@ type Case = (&'static str, f64, Scene, fn(&mut Scenario));
 
 /// Steep hills with a roof over them.
 fn hills() -> Scene {
-    let heights: Vec<f64> = (0..129 * 129).map(|i| 30.0 * (f64::from(i % 129) * 0.4).sin() * (f64::from(i / 129) * 0.3).cos()).collect();
+    let heights: Vec<f64> = (0..129 * 129)
+        .map(|i| 30.0 * (f64::from(i % 129) * 0.4).sin() * (f64::from(i / 129) * 0.3).cos())
+        .collect();
     let texture = Arc::new(Texture::uniform([120, 130, 90, 255], Encoding::Srgb));
     let terrain = Terrain::from_heights(129, 129, 8.0, &heights, Some(texture)).expect("heights");
     Scene { terrain: Some(terrain), meshes: vec![roof(60.0, 25.0)], ..Scene::default() }
@@ -53,7 +55,9 @@ fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
     let engine = engine();
     let cases: [Case; 6] = [
         ("roof", -90.0, black_ground_and_roof(), |_| {}),
-        ("roof, rays at silhouettes", -90.0, black_ground_and_roof(), |s| s.quality.silhouettes = Silhouettes::Rays),
+        ("roof, rays at silhouettes", -90.0, black_ground_and_roof(), |s| {
+            s.quality.silhouettes = Silhouettes::Rays
+        }),
         ("hills from above", -90.0, hills(), |_| {}),
         ("hills and the skyline", -20.0, hills(), |_| {}),
         ("interlaced", -40.0, hills(), |s| s.camera.shutter.interlace_ms = FieldOr::Field),
@@ -62,7 +66,11 @@ fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
     for (name, pitch_deg, scene, change) in cases {
         let mut scenario = camera(pitch_deg);
         change(&mut scenario);
-        let sequence = sequence(scenario, steady(120.0, 0.0, DVec3::new(10.0, 40.0, 0.0), DVec3::new(0.2, -0.3, 0.5)), scene);
+        let sequence = sequence(
+            scenario,
+            steady(120.0, 0.0, DVec3::new(10.0, 40.0, 0.0), DVec3::new(0.2, -0.3, 0.5)),
+            scene,
+        );
         let done = render(&engine, &sequence, &[Channel::Depth, Channel::Coords], 0);
         let errors = errors(&sequence, &done);
         eprintln!("{name}: {errors:?}");
@@ -75,7 +83,8 @@ fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn depths_between_two_surfaces_are_found() {
-    let sequence = sequence(camera(-90.0), steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
+    let sequence =
+        sequence(camera(-90.0), steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
     let mut done = render(&engine(), &sequence, &[Channel::Depth], 0);
     let depths = done.frame.depth_m.clone().expect("depth");
     let step = |i: usize| (depths[i] - depths[i + 1]).abs() > 0.2 * depths[i];
@@ -86,7 +95,11 @@ fn depths_between_two_surfaces_are_found() {
         depth_m[i] = 0.5 * (depths[i] + depths[i + 1]);
     }
     let found = errors(&sequence, &done);
-    assert_eq!((found.depth_faults, found.depth_beyond), (beside.len() as u64, beside.len() as u64), "{found:?}");
+    assert_eq!(
+        (found.depth_faults, found.depth_beyond),
+        (beside.len() as u64, beside.len() as u64),
+        "{found:?}"
+    );
     assert!(!found.kept() && found.depth_max > 0.05, "{found:?}");
     // A surface that is there, but not within reach of the pixel, is as wrong.
     let mut far = render(&engine(), &sequence, &[Channel::Depth], 0);
@@ -94,7 +107,8 @@ fn depths_between_two_surfaces_are_found() {
     assert_eq!(errors(&sequence, &far).depth_faults, 1);
 }
 
-/// A low flight between houses and trees, with a delay, a fisheye and a mount that shakes: `tests/data/field/low-town`, whose models are not part of the repository.
+/// A low flight between houses and trees, with a delay, a fisheye and a mount that shakes:
+/// `tests/data/field/low-town`, whose models are not part of the repository.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_town_from_between_its_houses() {
@@ -108,7 +122,11 @@ fn a_town_from_between_its_houses() {
         let done = render(&engine(), &sequence, &[Channel::Depth, Channel::Coords], frame);
         let errors = errors(&sequence, &done);
         eprintln!("frame {frame}: {errors:?}");
-        // What is left, fewer than one pixel in 20 000, are cracks of the models and slivers, which a ray beside the pixel's centre misses.
-        assert!(errors.kept() && errors.depth_beyond * 20_000 < errors.pixels && errors.pixels == 120_000, "frame {frame}: {errors:?}");
+        // What is left, fewer than one pixel in 20 000, are cracks of the models and slivers, which a ray
+        // beside the pixel's centre misses.
+        assert!(
+            errors.kept() && errors.depth_beyond * 20_000 < errors.pixels && errors.pixels == 120_000,
+            "frame {frame}: {errors:?}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The predicted error from place to place: its largest is the plan's, and pixels are off by no more than the places around them say.
+//! The predicted error from place to place: its largest is the plan's, and pixels are off by no more than the
+//! places around them say.
 
 mod common;
 
@@ -24,18 +25,25 @@ fn hills() -> Scene {
     let height = |i: u32| {
         let (x, y) = (f64::from(i % SIDE), f64::from(i / SIDE));
         let [noise, ..] = pcg4d([i, 7, 3, 1]);
-        60.0 * (0.05 * x).sin() * (0.04 * y).cos() + 12.0 * (0.31 * x + 0.2 * y).sin() + 3.0 * (f64::from(noise >> 8) / 1.6e7 - 0.5)
+        60.0 * (0.05 * x).sin() * (0.04 * y).cos()
+            + 12.0 * (0.31 * x + 0.2 * y).sin()
+            + 3.0 * (f64::from(noise >> 8) / 1.6e7 - 0.5)
     };
     let heights: Vec<f64> = (0..SIDE * SIDE).map(height).collect();
-    Scene { terrain: Some(Terrain::from_heights(SIDE, SIDE, 16.0, &heights, None).expect("a terrain")), ..Scene::default() }
+    Scene {
+        terrain: Some(Terrain::from_heights(SIDE, SIDE, 16.0, &heights, None).expect("a terrain")),
+        ..Scene::default()
+    }
 }
 
 fn camera() -> Scenario {
     let mut scenario = scenario();
     let camera = &mut scenario.camera;
     (camera.size_px, camera.focal_px) = ([320, 240], [154.0, 154.0]);
-    camera.lens =
-        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63] };
+    camera.lens = LensSpec {
+        model: LensModel::BrownConrady,
+        coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63],
+    };
     camera.mount.angles_deg = [3.0, -75.0, 0.0];
     camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 8.0, ..ShutterSpec::default() };
     scenario
@@ -81,9 +89,17 @@ fn the_largest_of_all_places_is_what_the_plan_says() {
         let (plan, map) = mapped(&flown(scenario, scene), 3);
         let (largest_px, total_px) = (map.largest_px(), plan.predicted.total_px);
         let off = (largest_px - total_px).abs() / total_px;
-        eprintln!("{name}: {:?}, {} keys, {largest_px:.6e} px of {total_px:.6e}", plan.temporal, plan.keys.len());
+        eprintln!(
+            "{name}: {:?}, {} keys, {largest_px:.6e} px of {total_px:.6e}",
+            plan.temporal,
+            plan.keys.len()
+        );
         assert!(off < 1e-9, "{name}: {largest_px} px, the plan {total_px}");
-        assert!(map.places.len() >= plan.predicted.probes as usize && map.known().count() > 100, "{name}: {}", map.known().count());
+        assert!(
+            map.places.len() >= plan.predicted.probes as usize && map.known().count() > 100,
+            "{name}: {}",
+            map.known().count()
+        );
         kinds[match plan.temporal {
             TemporalStage::Linear | TemporalStage::Rk2 => 0,
             _ if plan.keys.len() > 1 => 1,
@@ -100,23 +116,42 @@ fn frames_of_one_ideal_frame_have_their_own_maps() {
     scenario.camera.lens.coefficients = vec![-0.2, 0.05, 0.001, -0.002];
     scenario.camera.mount.angles_deg = [0.0, -60.0, 0.0];
     // So that no frame is cheap by the twist of its own instant.
-    scenario.camera.mount.vibration =
-        vec![VibrationSpec { axis: Axis::Roll, amplitude_deg: 0.05, amplitude_m: 0.0, hz: 40.0, phase_deg: 0.0 }];
+    scenario.camera.mount.vibration = vec![VibrationSpec {
+        axis: Axis::Roll,
+        amplitude_deg: 0.05,
+        amplitude_m: 0.0,
+        hz: 40.0,
+        phase_deg: 0.0,
+    }];
     scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
     scenario.quality.frames_per_ideal = 8;
-    let sequence = sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, -1.0), DVec3::new(0.1, -0.05, 0.2)), pattern(800.0));
-    let shared: Vec<_> = (0..12).map(|frame| mapped(&sequence, frame)).filter(|(plan, _)| plan.shared_by.is_some()).collect();
+    let sequence = sequence(
+        scenario,
+        steady(80.0, 0.0, DVec3::new(9.0, 2.0, -1.0), DVec3::new(0.1, -0.05, 0.2)),
+        pattern(800.0),
+    );
+    let shared: Vec<_> =
+        (0..12).map(|frame| mapped(&sequence, frame)).filter(|(plan, _)| plan.shared_by.is_some()).collect();
     assert!(!shared.is_empty(), "no frame shares");
     for (plan, _) in &shared {
-        // Each is run dry at places of its own, and those that are solved in the same way answer for all of these.
-        let is_alike = |other: &FramePlan| other.shared_by == plan.shared_by && other.temporal == plan.temporal && other.blur == plan.blur;
+        // Each is run dry at places of its own, and those that are solved in the same way answer for all of
+        // these.
+        let is_alike = |other: &FramePlan| {
+            other.shared_by == plan.shared_by && other.temporal == plan.temporal && other.blur == plan.blur
+        };
         let alike = shared.iter().filter(|(other, _)| is_alike(other));
-        let (largest_px, total_px) = (alike.map(|(_, map)| map.largest_px()).fold(0.0, f64::max), plan.predicted.total_px);
-        assert!((largest_px - total_px).abs() < 1e-9 * total_px, "frame {}: {largest_px} px, the plan {total_px}", plan.frame);
+        let (largest_px, total_px) =
+            (alike.map(|(_, map)| map.largest_px()).fold(0.0, f64::max), plan.predicted.total_px);
+        assert!(
+            (largest_px - total_px).abs() < 1e-9 * total_px,
+            "frame {}: {largest_px} px, the plan {total_px}",
+            plan.frame
+        );
     }
 }
 
-/// What is worked out once for all places is worked out in parallel: places that wait for it may not keep its parts from being done.
+/// What is worked out once for all places is worked out in parallel: places that wait for it may not keep its
+/// parts from being done.
 #[test]
 fn as_many_threads_as_there_are_leave_each_other_free() {
     let (done, is_done) = std::sync::mpsc::channel();
@@ -144,7 +179,8 @@ fn pixels_are_off_by_no_more_than_the_places_around_them_say() {
         scenario.quality.frames_per_ideal = 1;
         let sequence = flown(scenario, scene);
         let done = render(&engine, &sequence, &[Channel::Color, Channel::Coords], 0);
-        let planner = Planner::new(sequence.clone(), &[Channel::Color, Channel::Coords], 16_384).expect("a planner");
+        let planner =
+            Planner::new(sequence.clone(), &[Channel::Color, Channel::Coords], 16_384).expect("a planner");
         let map = planner.error_map(&done.plan).expect("a map");
         let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
         let view = oracle.view(0);
@@ -159,7 +195,9 @@ fn pixels_are_off_by_no_more_than_the_places_around_them_say() {
                 apart += 1;
                 continue;
             };
-            let [.., at_x, at_y] = coords[(pixel[1] * 320 + pixel[0]) as usize][..4] else { panic!("four numbers") };
+            let [.., at_x, at_y] = coords[(pixel[1] * 320 + pixel[0]) as usize][..4] else {
+                panic!("four numbers")
+            };
             let off_px = DVec2::new(f64::from(at_x), f64::from(at_y)).distance(key.source_px(&look));
             // Single precision of coordinates of some hundred pixels says nothing below this.
             within += u32::from(off_px <= around_px.max(3e-5));

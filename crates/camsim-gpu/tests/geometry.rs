@@ -1,14 +1,16 @@
-//! The `coords` that the production shader wrote, against closed-form f64 homographies of a plane, per line and exposure sample.
+//! The `coords` that the production shader wrote, against closed-form f64 homographies of a plane, per line
+//! and exposure sample.
 //!
-//! The reference shares trajectory, shutter timing and the lens's inverse in f64 with the program; the temporal inverse it replaces by
-//! intersecting each ray with the plane at the ray's own instant.
+//! The reference shares trajectory, shutter timing and the lens's inverse in f64 with the program; the
+//! temporal inverse it replaces by intersecting each ray with the plane at the ray's own instant.
 
 mod common;
 
 use camsim_core::{
     mount::CameraPath,
     scenario::{
-        Auto, Axis, CameraSpec, Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec, Solver, VibrationSpec,
+        Auto, Axis, CameraSpec, Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario,
+        ShutterSpec, Solver, VibrationSpec,
     },
     scene::Wrap,
     trajectory::Trajectory,
@@ -20,7 +22,8 @@ use glam::{DVec2, DVec3};
 /// Ground width of the pattern, metres.
 const WIDTH_M: f64 = 6000.0;
 
-/// Where the ray of pixel (x, y) at exposure phase `phase` meets the ground, seen from the key camera; `None` off the pattern.
+/// Where the ray of pixel (x, y) at exposure phase `phase` meets the ground, seen from the key camera; `None`
+/// off the pattern.
 fn closed_form(plan: &FramePlan, path: &CameraPath, [x, y]: [u32; 2], phase: f64) -> Option<DVec2> {
     let uv = plan.camera.unproject(DVec2::new(f64::from(x), f64::from(y)))?;
     let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + phase * plan.shutter.exposure_s();
@@ -40,11 +43,12 @@ fn closed_form(plan: &FramePlan, path: &CameraPath, [x, y]: [u32; 2], phase: f64
     Some(plan.ideal.px_from_point(in_key))
 }
 
-/// Parallax between surfaces that needs no rays of its own, as in the shaders, pixels: at a skyline a pixel may be off by that.
+/// Parallax between surfaces that needs no rays of its own, as in the shaders, pixels: at a skyline a pixel
+/// may be off by that.
 const GAP_PX: f64 = 0.1;
 
-/// RMS and largest source error over all pixels and five exposure phases, and the number of pixels compared. A pixel that sees the sky at one
-/// end of its exposure is held against [`GAP_PX`] alone.
+/// RMS and largest source error over all pixels and five exposure phases, and the number of pixels compared.
+/// A pixel that sees the sky at one end of its exposure is held against [`GAP_PX`] alone.
 fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
     let engine = engine();
     let sequence = sequence(scenario, trajectory, pattern(WIDTH_M));
@@ -56,14 +60,20 @@ fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
         for y in 0..height {
             for x in 0..width {
                 let i = (y * width + x) as usize;
-                let Some(exact) = closed_form(&done.plan, &sequence.path, [x, y], f64::from(phase)) else { continue };
+                let Some(exact) = closed_form(&done.plan, &sequence.path, [x, y], f64::from(phase)) else {
+                    continue;
+                };
                 if done.frame.color_rgba[4 * i + 3] == 0.0 {
                     panic!("pixel ({x}, {y}) has a source at {exact} but came out invalid");
                 }
                 let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
                 let error = found.distance(exact);
                 let exposed = done.plan.shutter.exposure_s() > 0.0;
-                if exposed && [-0.5, 0.5].iter().any(|&end| closed_form(&done.plan, &sequence.path, [x, y], end).is_none()) {
+                if exposed
+                    && [-0.5, 0.5]
+                        .iter()
+                        .any(|&end| closed_form(&done.plan, &sequence.path, [x, y], end).is_none())
+                {
                     assert!(error < GAP_PX, "({x}, {y}) at the skyline: {error:.2e} px");
                     continue;
                 }
@@ -76,7 +86,8 @@ fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
     ((sum / f64::from(count.max(1))).sqrt(), worst, count)
 }
 
-/// Planar depth in the camera of the pixel's own line against the ground's, relative: 99th percentile, and the number of pixels.
+/// Planar depth in the camera of the pixel's own line against the ground's, relative: 99th percentile, and
+/// the number of pixels.
 fn depth_error(scenario: Scenario, trajectory: Trajectory) -> (f64, usize, TemporalStage) {
     let sequence = sequence(scenario, trajectory, pattern(WIDTH_M));
     let done = render_at_phase(&engine(), &sequence, &[Channel::Depth], 0, 0.0);
@@ -87,7 +98,8 @@ fn depth_error(scenario: Scenario, trajectory: Trajectory) -> (f64, usize, Tempo
             let pixel = [i % width, i / width];
             closed_form(&done.plan, &sequence.path, pixel, 0.0)?;
             let uv = done.plan.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
-            let pose = sequence.path.pose(done.plan.stamp_s + done.plan.shutter.dt_pixel_s(pixel[0], pixel[1]));
+            let pose =
+                sequence.path.pose(done.plan.stamp_s + done.plan.shutter.dt_pixel_s(pixel[0], pixel[1]));
             let exact_m = -pose.position_ned_m.z / (pose.ned_from_camera * uv.extend(1.0)).z;
             Some((f64::from(found[i as usize]) / exact_m - 1.0).abs())
         })
@@ -153,7 +165,13 @@ fn lever_arm_and_vibration() {
     let change = |camera: &mut CameraSpec| {
         camera.mount.offset_m = [1.5, -0.4, 0.8];
         camera.mount.vibration = vec![
-            VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.2, amplitude_m: 0.0, hz: 97.0, phase_deg: 40.0 },
+            VibrationSpec {
+                axis: Axis::Pitch,
+                amplitude_deg: 0.2,
+                amplitude_m: 0.0,
+                hz: 97.0,
+                phase_deg: 40.0,
+            },
             VibrationSpec { axis: Axis::Z, amplitude_deg: 0.0, amplitude_m: 0.02, hz: 60.0, phase_deg: 0.0 },
         ];
     };
@@ -186,7 +204,8 @@ fn a_picture_repeats_where_its_mesh_says_so() {
     scenario.camera.focal_px = [100.0, 100.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
     let unlike = |wrap: Wrap| {
-        // Four copies of the picture over 400 m, one each 100 m: a period is 50 px from 200 m above ground. The middle is a seam.
+        // Four copies of the picture over 400 m, one each 100 m: a period is 50 px from 200 m above ground.
+        // The middle is a seam.
         let mut scene = pattern(400.0);
         scene.meshes[0].material.wrap = [wrap; 2];
         for vertex in &mut std::sync::Arc::make_mut(&mut scene.meshes[0].shape).vertices {
@@ -202,12 +221,15 @@ fn a_picture_repeats_where_its_mesh_says_so() {
     assert!(unlike(Wrap::Clamp) > 0.1, "{}", unlike(Wrap::Clamp));
 }
 
-/// Where one look-up is enough for the picture, the depth that it was found with is that of a neighbour up to a line's displacement away.
+/// Where one look-up is enough for the picture, the depth that it was found with is that of a neighbour up to
+/// a line's displacement away.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn depth_is_that_of_the_lines_own_camera() {
     let scene = |solver: Auto<Solver>| {
-        let mut scenario = with(ShutterSpec { readout_ms: 90.0, ..ShutterSpec::default() }, |camera| camera.mount.angles_deg[1] = -50.0);
+        let mut scenario = with(ShutterSpec { readout_ms: 90.0, ..ShutterSpec::default() }, |camera| {
+            camera.mount.angles_deg[1] = -50.0
+        });
         scenario.quality.solver = solver;
         scenario.quality.max_error_px = 0.05;
         // Two steps would do what one is asked to show.
@@ -216,11 +238,15 @@ fn depth_is_that_of_the_lines_own_camera() {
         }
         depth_error(scenario, steady(300.0, 0.0, DVec3::new(60.0, 10.0, 20.0), 0.3 * TURN))
     };
-    // The ground's depth changes by 1 / f a pixel or more: a source off by the tolerance of 0.05 px of 250 makes 2e-4. The paper's models keep a
-    // constant twist and drop what is of second order in it: (0.09 s * 0.3 rad/s)^2 / 2 = 4e-4.
-    for (solver, limit) in
-        [(Auto::Value(Solver::Reproject), 2e-4), (Auto::Auto, 4e-4), (Auto::Value(Solver::Linear), 4e-4), (Auto::Value(Solver::Rk2), 4e-4)]
-    {
+    // The ground's depth changes by 1 / f a pixel or more: a source off by the tolerance of 0.05 px of 250
+    // makes 2e-4. The paper's models keep a constant twist and drop what is of second order in it: (0.09 s *
+    // 0.3 rad/s)^2 / 2 = 4e-4.
+    for (solver, limit) in [
+        (Auto::Value(Solver::Reproject), 2e-4),
+        (Auto::Auto, 4e-4),
+        (Auto::Value(Solver::Linear), 4e-4),
+        (Auto::Value(Solver::Rk2), 4e-4),
+    ] {
         let (p99, count, stage) = scene(solver);
         eprintln!("{solver:?}, {stage:?}: depth off by {p99:.1e} at the 99th percentile of {count} pixels");
         assert!(count > 60_000 && p99 < limit, "{solver:?}: {p99:.1e} of {count}");

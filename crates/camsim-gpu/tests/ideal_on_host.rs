@@ -32,7 +32,12 @@ fn engines() -> [Engine; 2] {
     })
 }
 
-fn frame(engine: &Engine, sequence: &Arc<Sequence>, frame_number: u64, channels: &[Channel]) -> (Finished, IdealImages) {
+fn frame(
+    engine: &Engine,
+    sequence: &Arc<Sequence>,
+    frame_number: u64,
+    channels: &[Channel],
+) -> (Finished, IdealImages) {
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     let mut found = None;
     let mut keep = |finished: Finished| {
@@ -43,8 +48,9 @@ fn frame(engine: &Engine, sequence: &Arc<Sequence>, frame_number: u64, channels:
     (found.expect("a frame"), session.read_ideal().expect("readable").expect("drawn"))
 }
 
-/// Share of the pixels that one frame shows otherwise than the other, by more than 8/255 or another surface: where rounding decides at borders of triangles. And what the others' colours are apart,
-/// RMS, 1/255, and their inverse depths, RMS, relative.
+/// Share of the pixels that one frame shows otherwise than the other, by more than 8/255 or another surface:
+/// where rounding decides at borders of triangles. And what the others' colours are apart, RMS, 1/255, and
+/// their inverse depths, RMS, relative.
 #[derive(Debug)]
 struct Apart {
     otherwise: f64,
@@ -58,7 +64,9 @@ fn apart(host: &IdealImages, device: &IdealImages) -> Apart {
     let [width, height] = host.0.size_px.map(|side| side as usize);
     assert_eq!((pixels, host.1.len()), (width * height, 4 * width * height));
     let (mut otherwise, mut squares, mut of_depths) = (0, 0.0, 0.0);
-    for ((host_rgba, device_rgba), (&a, &b)) in host.1.chunks_exact(4).zip(device.1.chunks_exact(4)).zip(host.2.iter().zip(&device.2)) {
+    for ((host_rgba, device_rgba), (&a, &b)) in
+        host.1.chunks_exact(4).zip(device.1.chunks_exact(4)).zip(host.2.iter().zip(&device.2))
+    {
         assert_eq!(host_rgba[3], device_rgba[3], "no marks");
         let dn = [0, 1, 2].map(|k| 255.0 * f64::from(host_rgba[k] - device_rgba[k]));
         let depths = f64::from(a - b).abs() / f64::from(a.max(b)).max(1e-12);
@@ -103,7 +111,11 @@ fn ball(n: u32) -> Shape {
         for column in 0..=2 * n {
             let (position_m, share) = (at(row, column), row as f32 / n as f32);
             let uv = [column as f32 / n as f32, 2.0 * share];
-            shape.vertices.push(MeshVertex { position_m, uv, tint: [1.0 - 0.5 * share, 0.4 + 0.6 * share, 0.7, 1.0] });
+            shape.vertices.push(MeshVertex {
+                position_m,
+                uv,
+                tint: [1.0 - 0.5 * share, 0.4 + 0.6 * share, 0.7, 1.0],
+            });
             shape.normals.push(position_m);
         }
     }
@@ -117,8 +129,9 @@ fn ball(n: u32) -> Shape {
 }
 
 fn stripes() -> Arc<Texture> {
-    let rgba8 =
-        (0..64 * 64_u32).flat_map(|i| [(128.0 + 100.0 * f64::from(i % 64).mul_add(0.4, 0.1).sin()) as u8, (3 * (i / 64)) as u8, 90, 255]);
+    let rgba8 = (0..64 * 64_u32).flat_map(|i| {
+        [(128.0 + 100.0 * f64::from(i % 64).mul_add(0.4, 0.1).sin()) as u8, (3 * (i / 64)) as u8, 90, 255]
+    });
     Arc::new(Texture { size_px: [64, 64], rgba8: rgba8.collect(), encoding: Encoding::Srgb })
 }
 
@@ -129,8 +142,16 @@ fn balls(count: u32, light: Option<Light>, change: impl Fn(&mut Mesh)) -> Scene 
     scene.light = light;
     for k in 0..count {
         let vary = |m: f64| (12.9898 * m * f64::from(k + 1)).sin();
-        let turn = DMat3::from_quat(DQuat::from_rotation_y(3.0 * vary(1.1)) * DQuat::from_rotation_z(3.0 * vary(1.3)));
-        let mut mesh = Mesh::new(Vec::new(), Vec::new(), texture.clone(), 60.0 * DVec3::new(vary(1.7), vary(1.9), 0.0), Wrap::Repeat);
+        let turn = DMat3::from_quat(
+            DQuat::from_rotation_y(3.0 * vary(1.1)) * DQuat::from_rotation_z(3.0 * vary(1.3)),
+        );
+        let mut mesh = Mesh::new(
+            Vec::new(),
+            Vec::new(),
+            texture.clone(),
+            60.0 * DVec3::new(vary(1.7), vary(1.9), 0.0),
+            Wrap::Repeat,
+        );
         mesh.shape = shape.clone();
         mesh.ned_from_shape = turn * DMat3::from_diagonal(DVec3::new(3.0, 4.0 + vary(2.3), 6.0));
         change(&mut mesh);
@@ -139,12 +160,18 @@ fn balls(count: u32, light: Option<Light>, change: impl Fn(&mut Mesh)) -> Scene 
     scene
 }
 
-/// Of [`pattern`] of a width: how far inverse depth is from the ray's, relative, RMS, and colour from the mean over the pixel, RMS, 1/255.
+/// Of [`pattern`] of a width: how far inverse depth is from the ray's, relative, RMS, and colour from the
+/// mean over the pixel, RMS, 1/255.
 fn from_exact(images: &IdealImages, plan: &FramePlan, width_m: f64) -> [f64; 2] {
     const WITHIN: i32 = 8;
     let (ideal, pose) = (&images.0, &plan.keys[0].pose);
     let ray = |x: f64, y: f64| {
-        pose.ned_from_camera * DVec3::new((x - ideal.principal_px.x) / ideal.focal_px.x, (y - ideal.principal_px.y) / ideal.focal_px.y, 1.0)
+        pose.ned_from_camera
+            * DVec3::new(
+                (x - ideal.principal_px.x) / ideal.focal_px.x,
+                (y - ideal.principal_px.y) / ideal.focal_px.y,
+                1.0,
+            )
     };
     let color = |at: DVec3| {
         let [x, y] = [0.5 + at.y / width_m, 0.5 - at.x / width_m].map(|share| 512.0 * share - 0.5);
@@ -163,34 +190,60 @@ fn from_exact(images: &IdealImages, plan: &FramePlan, width_m: f64) -> [f64; 2] 
         depths = [depths[0] + (f64::from(inverse) / exact - 1.0).powi(2), depths[1] + 1.0];
         let share = |k: i32| (f64::from(k) + 0.5) / f64::from(WITHIN) - 0.5;
         let rays = (0..WITHIN * WITHIN).map(|k| ray(x + share(k % WITHIN), y + share(k / WITHIN)));
-        let seen = rays.map(|ray| color(pose.position_ned_m - ray * (pose.position_ned_m.z / ray.z)).filter(|_| ray.z > 0.0));
-        let Some(mean) = seen.sum::<Option<DVec3>>().map(|sum| sum / f64::from(WITHIN * WITHIN)) else { continue };
+        let seen = rays.map(|ray| {
+            color(pose.position_ned_m - ray * (pose.position_ned_m.z / ray.z)).filter(|_| ray.z > 0.0)
+        });
+        let Some(mean) = seen.sum::<Option<DVec3>>().map(|sum| sum / f64::from(WITHIN * WITHIN)) else {
+            continue;
+        };
         let found = DVec3::from_array([0, 1, 2].map(|k| 255.0 * f64::from(images.1[4 * i + k])));
         colors = [colors[0] + (found - mean).length_squared(), colors[1] + 3.0];
     }
     [depths, colors].map(|[squares, count]| (squares / count).sqrt())
 }
 
-fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, frame_number: u64, width_m: Option<f64>) -> FramePlan {
-    let [(by_host, host), (by_device, device)] = engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &[Channel::Color]));
-    assert!(by_host.times.ideal_ms.is_some() && by_device.times.ideal_ms.is_none(), "{name}: each where it should be: {:?}", by_host.plan);
+fn assert_same(
+    name: &str,
+    engines: &[Engine; 2],
+    sequence: &Arc<Sequence>,
+    frame_number: u64,
+    width_m: Option<f64>,
+) -> FramePlan {
+    let [(by_host, host), (by_device, device)] =
+        engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &[Channel::Color]));
+    assert!(
+        by_host.times.ideal_ms.is_some() && by_device.times.ideal_ms.is_none(),
+        "{name}: each where it should be: {:?}",
+        by_host.plan
+    );
     let seen = device.2.iter().filter(|&&inverse| inverse > 0.0).count() as f64 / device.2.len() as f64;
     let found = apart(&host, &device);
     eprintln!("{name}: {:?}, {found:?}, {:.0} % no sky", by_host.plan.surface_reads, 100.0 * seen);
     assert!(seen > 0.3, "{name}: something to be seen");
     match width_m {
-        // Among boxes 5e-5 and 0.12/255 were found, half of them what half floats are cut off to there; depth is floats' rounding, and the grid's for thin triangles, 1.8e-6 at most.
-        // Circuits have the depth of the corners that they moved: by 1/512 px each way, of a surface at a slant that has another depth a few hundred pixels on.
+        // Among boxes 5e-5 and 0.12/255 were found, half of them what half floats are cut off to there; depth
+        // is floats' rounding, and the grid's for thin triangles, 1.8e-6 at most. Circuits have the depth of
+        // the corners that they moved: by 1/512 px each way, of a surface at a slant that has another depth a
+        // few hundred pixels on.
         None => {
             let most_depth = if is_software(&engines[1]) { 3e-6 } else { 1e-5 };
-            assert!(found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < most_depth, "{name}: {found:?}");
+            assert!(
+                found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < most_depth,
+                "{name}: {found:?}"
+            );
         }
         Some(width_m) => {
-            let [of_host, of_device] = [&host, &device].map(|images| from_exact(images, &by_host.plan, width_m));
+            let [of_host, of_device] =
+                [&host, &device].map(|images| from_exact(images, &by_host.plan, width_m));
             eprintln!("  from exact: host {of_host:?}, device {of_device:?}");
             assert!(of_host[0] < 2e-6, "{name}: inverse depth {:.1e}", of_host[0]);
             // Nearer by 2 % at least with the driver that this was written beside; others may be as near.
-            assert!(of_host[1] < 1.02 * of_device[1], "{name}: {:.3}/255, {:.3} by the device", of_host[1], of_device[1]);
+            assert!(
+                of_host[1] < 1.02 * of_device[1],
+                "{name}: {:.3}/255, {:.3} by the device",
+                of_host[1],
+                of_device[1]
+            );
         }
     }
     assert_eq!(by_host.lod, by_device.lod, "{name}");
@@ -224,7 +277,13 @@ fn the_host_draws_what_the_device_draws() {
         ("coarse", with(-60.0, &scale(1.0)), 120.0, 400.0),
         ("fine", with(-60.0, &scale(3.1)), 120.0, 400.0),
     ] {
-        plans.push(assert_same(name, &engines, &from_height(scenario, height_m, pattern(width_m)), 2, Some(width_m)));
+        plans.push(assert_same(
+            name,
+            &engines,
+            &from_height(scenario, height_m, pattern(width_m)),
+            2,
+            Some(width_m),
+        ));
     }
     for (name, sequence) in [
         ("boxes", from_height(camera(-50.0), 90.0, city(6))),
@@ -232,10 +291,16 @@ fn the_host_draws_what_the_device_draws() {
         ("fog", from_height(camera(-10.0), 60.0, fog(city(8)))),
         ("tints", from_height(camera(-50.0), 70.0, balls(60, None, |_| ()))),
         ("light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |_| ()))),
-        ("inner sides in light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |mesh| mesh.ned_from_shape *= -1.0))),
+        (
+            "inner sides in light",
+            from_height(camera(-50.0), 70.0, balls(60, Some(light), |mesh| mesh.ned_from_shape *= -1.0)),
+        ),
         // More than are drawn at once.
         ("a million triangles", from_height(with(-50.0, &finest), 70.0, balls(2000, Some(light), |_| ()))),
-        ("one side", from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true))),
+        (
+            "one side",
+            from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true)),
+        ),
         (
             "one colour, light of its own",
             from_height(
@@ -275,17 +340,26 @@ fn the_host_draws_what_the_device_draws() {
     assert!(SurfaceReads::ALL.iter().all(|kind| reads.contains(kind)), "all ways to read: {reads:?}");
 }
 
-/// What frames of four samples a pixel have in common on the host and on the device: share of the pixels that are apart by more than 16/255, and RMS of all, 1/255.
+/// What frames of four samples a pixel have in common on the host and on the device: share of the pixels that
+/// are apart by more than 16/255, and RMS of all, 1/255.
 fn samples_apart(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, frame_number: u64) -> [f64; 2] {
-    let [(by_host, host), (by_device, device)] = engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &[Channel::Color]));
-    assert!(by_host.times.ideal_ms.is_some() && by_device.times.ideal_ms.is_none(), "{name}: each where it should be");
+    let [(by_host, host), (by_device, device)] =
+        engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &[Channel::Color]));
+    assert!(
+        by_host.times.ideal_ms.is_some() && by_device.times.ideal_ms.is_none(),
+        "{name}: each where it should be"
+    );
     assert_eq!((by_host.plan.samples_a_pixel, host.0), (4, device.0), "{name}");
     let dn: Vec<f64> = host.1.iter().zip(&device.1).map(|(a, b)| 255.0 * f64::from(a - b)).collect();
     let rms_dn = (dn.iter().map(|dn| dn * dn).sum::<f64>() / (0.75 * dn.len() as f64)).sqrt();
     let otherwise = dn.chunks_exact(4).filter(|pixel| pixel.iter().any(|dn| dn.abs() > 16.0)).count();
     let depths = host.2.iter().zip(&device.2).filter(|&(&a, &b)| (a - b).abs() > 1e-3 * a.max(b)).count();
     let pixels = host.2.len() as f64;
-    eprintln!("{name}: {rms_dn:.3}/255, {:.1e} otherwise, {:.1e} at another depth", otherwise as f64 / pixels, depths as f64 / pixels);
+    eprintln!(
+        "{name}: {rms_dn:.3}/255, {:.1e} otherwise, {:.1e} at another depth",
+        otherwise as f64 / pixels,
+        depths as f64 / pixels
+    );
     [otherwise.max(depths) as f64 / pixels, rms_dn]
 }
 
@@ -307,17 +381,22 @@ fn samples_of_the_host_are_those_of_the_device() {
         ("boxes", from_height(camera(-50.0), 90.0, city(6))),
         ("among boxes", from_height(camera(-10.0), 9.0, city(6))),
         ("light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |_| ()))),
-        ("one side", from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true))),
+        (
+            "one side",
+            from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true)),
+        ),
         // More than are drawn at once.
         ("a million triangles", from_height(finest(camera(-50.0)), 70.0, balls(2000, Some(light), |_| ()))),
     ] {
         let [otherwise, rms_dn] = samples_apart(name, &engines, &sequence, 2);
-        // Up to 2.2e-4 and 0.26/255 were found: the device shades each triangle of a surface, and other drivers choose other sides at borders.
+        // Up to 2.2e-4 and 0.26/255 were found: the device shades each triangle of a surface, and other
+        // drivers choose other sides at borders.
         assert!(otherwise < 2e-3 && rms_dn < 0.4, "{name}: {otherwise:.1e}, {rms_dn:.3}/255");
     }
     for (file, frames) in [("benches/all_effects.toml", [52, 98]), ("benches/houses.toml", [8, 40])] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file);
-        let sets = [("quality.silhouettes", "\"plain\""), ("quality.ideal_samples", "4")].map(|(key, value)| (key.into(), value.into()));
+        let sets = [("quality.silhouettes", "\"plain\""), ("quality.ideal_samples", "4")]
+            .map(|(key, value)| (key.into(), value.into()));
         let loaded = load_sequence(&read_scenario(&path, &sets, None).expect("scenario")).expect("sequence");
         for number in frames {
             let [otherwise, rms_dn] = samples_apart(file, &engines, &loaded.sequence, number);

@@ -1,4 +1,5 @@
-//! Surfaces that are mixed with what is behind them: the device and the oracle against closed forms, and against each other.
+//! Surfaces that are mixed with what is behind them: the device and the oracle against closed forms, and
+//! against each other.
 
 mod common;
 
@@ -25,10 +26,14 @@ const HEIGHT_M: f64 = 100.0;
 /// A level square with a side of 40 m that looks up, so high above the ground.
 fn level(color: DVec3, alpha: f32, height_m: f64) -> Mesh {
     let [r, g, b] = color.as_vec3().to_array();
-    let corner = |n: f32, e: f32| MeshVertex { tint: [r, g, b, alpha], ..MeshVertex::new([20.0 * n, 20.0 * e, 0.0], [e, -n]) };
+    let corner = |n: f32, e: f32| MeshVertex {
+        tint: [r, g, b, alpha],
+        ..MeshVertex::new([20.0 * n, 20.0 * e, 0.0], [e, -n])
+    };
     let vertices = vec![corner(1.0, -1.0), corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
     let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-    let mut mesh = Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(0.0, 0.0, -height_m), Wrap::Repeat);
+    let mut mesh =
+        Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(0.0, 0.0, -height_m), Wrap::Repeat);
     Arc::make_mut(&mut mesh.shape).normals = vec![[0.0, 0.0, -1.0]; 4];
     mesh
 }
@@ -68,7 +73,8 @@ struct Pictures {
 fn pictures(sequence: &Arc<Sequence>) -> Pictures {
     let channels = [Channel::Color, Channel::Depth];
     let done = render(&engine(), sequence, &channels, 0);
-    let options = RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
+    let options =
+        RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
     let truth = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
     let depths_m = [done.frame.depth_m, truth.depth_m].map(|depth| depth.expect("depth"));
     Pictures { colors: [done.frame.color_rgba, truth.color_rgba], depths_m, plan: done.plan }
@@ -89,8 +95,12 @@ impl Pictures {
     fn expect_in_the_middle(&self, name: &str, expected: DVec3, depth_m: f64) {
         for (k, who) in ["device", "oracle"].into_iter().enumerate() {
             let (at, picture) = (60 * 160 + 80, &self.colors[k]);
-            let found = DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(picture[4 * at + channel])));
-            assert!((found - expected).abs().max_element() < 1e-3, "{name}, {who}: {found} instead of {expected}");
+            let found =
+                DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(picture[4 * at + channel])));
+            assert!(
+                (found - expected).abs().max_element() < 1e-3,
+                "{name}, {who}: {found} instead of {expected}"
+            );
             let depth = f64::from(self.depths_m[k][at]);
             assert!((depth - depth_m).abs() < 1e-3, "{name}, {who}: {depth} m instead of {depth_m}");
         }
@@ -100,9 +110,11 @@ impl Pictures {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn two_panes_over_a_wall_have_their_closed_form_from_both_sides() {
-    for (heights, alphas, depth_m) in
-        [([20.0, 40.0], [0.3, 0.6], 60.0), ([40.0, 20.0], [0.3, 0.6], 80.0), ([40.0, 20.0], [0.25, 0.4], 100.0)]
-    {
+    for (heights, alphas, depth_m) in [
+        ([20.0, 40.0], [0.3, 0.6], 60.0),
+        ([40.0, 20.0], [0.3, 0.6], 80.0),
+        ([40.0, 20.0], [0.25, 0.4], 100.0),
+    ] {
         let panes = [pane(RED, alphas[0], heights[0]), pane(BLUE, alphas[1], heights[1])];
         let [a, b] = [(RED, f64::from(alphas[0])), (BLUE, f64::from(alphas[1]))];
         let (front, behind) = if heights[0] > heights[1] { (a, b) } else { (b, a) };
@@ -146,7 +158,8 @@ fn the_papers_frames_mix_too() {
     let found = render(&engine(), &sequence, &[Channel::Color], 0).frame.color_rgba;
     let at = 4 * (60 * 160 + 80);
     let found = DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(found[at + channel])));
-    // Stored with 8 bits of sRGB, whose widest step is 0.009 of light, once for the wall and once for the pane.
+    // Stored with 8 bits of sRGB, whose widest step is 0.009 of light, once for the wall and once for the
+    // pane.
     assert!((found - over(RED, 0.3, WALL)).abs().max_element() < 9e-3, "{found}");
 }
 
@@ -156,7 +169,13 @@ fn disc() -> Texture {
     let rgba8 = (0..side * side).flat_map(|i| {
         let [x, y] = [i % side, i / side].map(|k| (f64::from(k) + 0.5) / f64::from(side));
         let far = ((x - 0.4).powi(2) + (y - 0.55).powi(2)).sqrt();
-        [60.0 + 150.0 * x, 200.0 - 140.0 * y, 90.0 + 80.0 * (6.0 * x).sin(), 255.0 * (1.5 - 3.0 * far).clamp(0.0, 1.0)].map(|v| v as u8)
+        [
+            60.0 + 150.0 * x,
+            200.0 - 140.0 * y,
+            90.0 + 80.0 * (6.0 * x).sin(),
+            255.0 * (1.5 - 3.0 * far).clamp(0.0, 1.0),
+        ]
+        .map(|v| v as u8)
     });
     Texture { size_px: [side, side], rgba8: rgba8.collect(), encoding: Encoding::Linear }
 }
@@ -173,10 +192,15 @@ fn pictures_tints_and_holes_are_mixed_as_the_oracle_does() {
     let ground = || pattern(400.0).meshes;
     let mut tinted = pane(DVec3::ONE, 1.0, 30.0);
     let corners = [[1.0, 0.2, 0.1, 0.2], [0.1, 1.0, 0.3, 0.9], [0.2, 0.1, 1.0, 0.4], [0.5, 0.5, 0.5, 0.0]];
-    Arc::make_mut(&mut tinted.shape).vertices.iter_mut().zip(corners).for_each(|(vertex, tint)| vertex.tint = tint);
+    Arc::make_mut(&mut tinted.shape)
+        .vertices
+        .iter_mut()
+        .zip(corners)
+        .for_each(|(vertex, tint)| vertex.tint = tint);
     let mut holed = textured(45.0);
     holed.material.cutoff = Some(0.5);
-    let small = Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(0.2, 0.2, 1.0)), ..mixed(textured(60.0)) };
+    let small =
+        Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(0.2, 0.2, 1.0)), ..mixed(textured(60.0)) };
     let sharp = {
         let mut mesh = mixed(textured(20.0));
         mesh.material.nearest = true;
@@ -208,7 +232,8 @@ fn many_copies_of_all_sizes_are_drawn_from_behind() {
         let size = 0.1 * 12_f64.powf(part(k, 0.618_034) + 0.5);
         let mut copy = Mesh {
             ned_from_shape: tilt * DMat3::from_diagonal(DVec3::new(size, size, 1.0)),
-            origin_ned_m: tilt * DVec3::new(50.0 * part(k, 0.754_878), 60.0 * part(k, 0.569_84), -0.7 * f64::from(k) + 10.0),
+            origin_ned_m: tilt
+                * DVec3::new(50.0 * part(k, 0.754_878), 60.0 * part(k, 0.569_84), -0.7 * f64::from(k) + 10.0),
             ..one.clone()
         };
         if k % 3 > 0 {
@@ -230,11 +255,14 @@ fn many_copies_of_all_sizes_are_drawn_from_behind() {
 fn what_one_depth_costs_is_foretold() {
     let mut checkered = pane(RED, 0.45, 30.0);
     checkered.ned_from_shape = DMat3::from_diagonal(DVec3::new(4.0, 4.0, 1.0));
-    let rgba8 = (0..32 * 32).flat_map(|i| [255, 255, 255, if (i % 32 / 8 + i / 32 / 8) % 2 == 0 { 40 } else { 255 }]);
-    checkered.material.texture = Arc::new(Texture { size_px: [32, 32], rgba8: rgba8.collect(), encoding: Encoding::Linear });
+    let rgba8 =
+        (0..32 * 32).flat_map(|i| [255, 255, 255, if (i % 32 / 8 + i / 32 / 8) % 2 == 0 { 40 } else { 255 }]);
+    checkered.material.texture =
+        Arc::new(Texture { size_px: [32, 32], rgba8: rgba8.collect(), encoding: Encoding::Linear });
     let mut errors = Vec::new();
     for (speed_m_s, keys) in [(0.0, Auto::Auto), (60.0, Auto::Value(1)), (60.0, Auto::Auto)] {
-        let scene = Scene { meshes: [pattern(400.0).meshes, vec![checkered.clone()]].concat(), ..Scene::default() };
+        let scene =
+            Scene { meshes: [pattern(400.0).meshes, vec![checkered.clone()]].concat(), ..Scene::default() };
         let mut sequence = seen_from_above(scene, DVec3::new(0.0, speed_m_s, 0.0));
         Arc::make_mut(&mut sequence).scenario.quality.key_frames = keys;
         let found = pictures(&sequence);
@@ -247,7 +275,11 @@ fn what_one_depth_costs_is_foretold() {
             predicted.layers
         );
         assert!(measured_dn < 1.5 * predicted.picture_dn(), "{measured_dn} of {}", predicted.picture_dn());
-        errors.push((measured_dn, predicted.layers.expect("a pane").error_dn, predicted.levels_in_the_way.clone()));
+        errors.push((
+            measured_dn,
+            predicted.layers.expect("a pane").error_dn,
+            predicted.levels_in_the_way.clone(),
+        ));
     }
     assert!(errors[0].1 < 1e-6 && errors[1].1 > 1.0 && errors[1].0 > 0.5 * errors[1].1, "{errors:?}");
     // More ideal frames, each for fewer lines.
@@ -262,9 +294,13 @@ fn a_test_model_of_blending_is_as_the_oracle_sees_it() {
         eprintln!("CAMSIM_DATA is not set: models of other people are not read");
         return;
     };
-    let file = std::path::PathBuf::from(data).join("gltf/AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb");
+    let file =
+        std::path::PathBuf::from(data).join("gltf/AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb");
     let model = read_gltf(&file, GltfOptions::default()).expect("a model");
-    assert_eq!(model.notes, ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are left out"]);
+    assert_eq!(
+        model.notes,
+        ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are left out"]
+    );
     let ahead = DMat3::from_rotation_y(-std::f64::consts::FRAC_PI_2);
     let mut meshes: Vec<Mesh> = model.place(DVec3::ZERO, std::f64::consts::PI, 10.0).collect();
     // Lying on its back below the camera.

@@ -37,7 +37,8 @@ impl Gpu {
                 pollster::block_on(instance.request_adapter(&options)).ok()
             })
             .expect("no GPU adapter: install Mesa's lavapipe (mesa-vulkan-drivers)");
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
         let pass = LensInversePass::new(&device);
         Self { device, queue, pass }
     }
@@ -59,7 +60,11 @@ impl Gpu {
             map_on_device.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: None },
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row_bytes),
+                    rows_per_image: None,
+                },
             },
             map_on_device.texture.size(),
         );
@@ -75,7 +80,8 @@ impl Gpu {
     }
 }
 
-/// The committed calibration sets, shrunk to at most `max_edge` pixels (focal length with it: same rays, fewer of them).
+/// The committed calibration sets, shrunk to at most `max_edge` pixels (focal length with it: same rays,
+/// fewer of them).
 fn sets(max_edge: f64) -> Vec<(String, CameraModel)> {
     let text = include_str!("../../../tests/data/lens_sets.csv");
     let set = |line: &str| {
@@ -83,10 +89,18 @@ fn sets(max_edge: f64) -> Vec<(String, CameraModel)> {
         let number = |i: usize| cells[i].parse::<f64>().unwrap();
         let shrink = (max_edge / number(2).max(number(3))).min(1.0);
         let size_px = [(number(2) * shrink) as u32, (number(3) * shrink) as u32];
-        let model = if cells[1] == "brown-conrady" { LensModel::BrownConrady } else { LensModel::KannalaBrandt };
+        let model =
+            if cells[1] == "brown-conrady" { LensModel::BrownConrady } else { LensModel::KannalaBrandt };
         let coefficients: Vec<f64> = cells[8].split_whitespace().map(|k| k.parse().unwrap()).collect();
         let centre = [number(6) * shrink, number(7) * shrink];
-        let camera = CameraModel::new(size_px, [number(4) * shrink, number(5) * shrink], Some(centre), model, &coefficients).unwrap();
+        let camera = CameraModel::new(
+            size_px,
+            [number(4) * shrink, number(5) * shrink],
+            Some(centre),
+            model,
+            &coefficients,
+        )
+        .unwrap();
         (cells[0].to_owned(), camera)
     };
     text.lines().skip(1).map(set).collect()
@@ -113,8 +127,8 @@ fn distance(border: &[DVec2], pixel: DVec2) -> f64 {
     border.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
 }
 
-/// How far a GPU answer is off, in pixels: along the ideal plane for a lens of moderate field, on the image for a fisheye, whose ideal
-/// plane stretches without bound.
+/// How far a GPU answer is off, in pixels: along the ideal plane for a lens of moderate field, on the image
+/// for a fisheye, whose ideal plane stretches without bound.
 fn error_px(camera: &CameraModel, expected: DVec2, got: DVec2) -> f64 {
     match camera.lens {
         Lens::KannalaBrandt(_) => (camera.project(got) - camera.project(expected)).length(),
@@ -128,12 +142,16 @@ fn compare(name: &str, camera: &CameraModel, map: &[[f32; 2]]) -> (f64, f64, f64
     assert_eq!(expected.len(), map.len());
     let border = border_px(camera);
     let judge = |(i, (cpu, gpu)): (usize, (&[f32; 2], &[f32; 2]))| {
-        let pixel = DVec2::new((i % camera.size_px[0] as usize) as f64, (i / camera.size_px[0] as usize) as f64);
+        let pixel =
+            DVec2::new((i % camera.size_px[0] as usize) as f64, (i / camera.size_px[0] as usize) as f64);
         let (cpu_valid, gpu_valid) = (cpu[0] < INVALID_UV, gpu[0] < INVALID_UV);
         assert_eq!(gpu[0] < INVALID_UV, gpu[1] < INVALID_UV, "{name} {pixel}: half a mark");
         if cpu_valid != gpu_valid {
             let distance = distance(&border, pixel);
-            assert!(distance < BORDER_PX, "{name} {pixel}: CPU valid {cpu_valid}, GPU {gpu_valid}, {distance} px from the border");
+            assert!(
+                distance < BORDER_PX,
+                "{name} {pixel}: CPU valid {cpu_valid}, GPU {gpu_valid}, {distance} px from the border"
+            );
         }
         if !cpu_valid || !gpu_valid {
             return (0.0, 0.0, usize::from(!cpu_valid));
@@ -145,9 +163,13 @@ fn compare(name: &str, camera: &CameraModel, map: &[[f32; 2]]) -> (f64, f64, f64
         }
         // A lens that all but folds magnifies rounding as a fold does.
         let jacobian = camera.lens.jacobian(ideal);
-        let smallest_stretch = jacobian.determinant() / jacobian.x_axis.length().max(jacobian.y_axis.length());
+        let smallest_stretch =
+            jacobian.determinant() / jacobian.x_axis.length().max(jacobian.y_axis.length());
         let distance = distance(&border, pixel);
-        assert!(distance < 1.0 || smallest_stretch < 0.05, "{name} {pixel}: off by {error} px, {distance} px from the border");
+        assert!(
+            distance < 1.0 || smallest_stretch < 0.05,
+            "{name} {pixel}: off by {error} px, {distance} px from the border"
+        );
         let limit = if distance < BORDER_PX { MAX_ERROR_AT_BORDER_PX } else { MAX_ERROR_NEAR_FOLD_PX };
         assert!(error < limit, "{name} {pixel}: off by {error} px, {distance} px from the border");
         (0.0, error, 0)
@@ -188,10 +210,18 @@ fn a_warm_start_finds_the_same_map() {
 #[test]
 fn large_images_keep_the_tolerance() {
     let gpu = Gpu::new();
-    let k = [-0.04734574598470396, 0.00875629525446153, 0.002032062604630639, -0.0007921675594001833, -0.06874708730325006];
+    let k = [
+        -0.04734574598470396,
+        0.00875629525446153,
+        0.002032062604630639,
+        -0.0007921675594001833,
+        -0.06874708730325006,
+    ];
     // A strip of a 45 Mpx camera: the precision of pixel coordinates is what is tested.
     let focal = [8141.664930616623; 2];
-    let camera = CameraModel::new([8192, 24], focal, Some([4088.206985074835, -2700.37]), LensModel::BrownConrady, &k).unwrap();
+    let camera =
+        CameraModel::new([8192, 24], focal, Some([4088.206985074835, -2700.37]), LensModel::BrownConrady, &k)
+            .unwrap();
     let (worst, ..) = compare("strip", &camera, &gpu.map(&camera, None).0);
     eprintln!("8192 px: {worst:.1e} px");
 }
@@ -218,13 +248,15 @@ fn random_lenses_agree_too() {
     };
     let (mut judged, mut invalid) = (0, 0.0);
     for i in 0..120 {
-        let mut k: Vec<f64> = [0.6, 0.4, 0.02, 0.02, 0.2].into_iter().map(|bound| random(-bound, bound)).collect();
+        let mut k: Vec<f64> =
+            [0.6, 0.4, 0.02, 0.02, 0.2].into_iter().map(|bound| random(-bound, bound)).collect();
         if i % 3 == 0 {
             k.extend([0.4, 0.2, 0.05].into_iter().map(|bound| random(-bound, bound)));
         }
         let focal = random(70.0, 200.0);
         let centre = [random(60.0, 100.0), random(40.0, 80.0)];
-        let camera = CameraModel::new([160, 120], [focal; 2], Some(centre), LensModel::BrownConrady, &k).unwrap();
+        let camera =
+            CameraModel::new([160, 120], [focal; 2], Some(centre), LensModel::BrownConrady, &k).unwrap();
         // Where a pixel has two ideal rays on the principal branch, either is an answer.
         if camera.check().bijective {
             invalid += compare(&format!("{k:?} f {focal}"), &camera, &gpu.map(&camera, None).0).2;

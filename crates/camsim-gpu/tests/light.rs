@@ -55,7 +55,8 @@ fn in_light(meshes: Vec<Mesh>, light: Option<Light>) -> Arc<Sequence> {
 fn pictures(sequence: &Arc<Sequence>) -> [Vec<f32>; 2] {
     let channels = [Channel::Color];
     let done = render(&engine(), sequence, &channels, 0).frame.color_rgba;
-    let options = RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
+    let options =
+        RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
     [done, Oracle::new(sequence.clone()).expect("an oracle").render(0, &options).color_rgba]
 }
 
@@ -69,8 +70,12 @@ fn expect_in_the_middle(name: &str, mesh: Mesh, light: Option<Light>, expected: 
     let both = pictures(&in_light(vec![mesh], light));
     for (who, picture) in ["device", "oracle"].into_iter().zip(&both) {
         let at = 4 * (60 * 160 + 80);
-        let found = DVec3::new(f64::from(picture[at]), f64::from(picture[at + 1]), f64::from(picture[at + 2]));
-        assert!((found - expected).abs().max_element() < 5e-4, "{name}, {who}: {found} instead of {expected}");
+        let found =
+            DVec3::new(f64::from(picture[at]), f64::from(picture[at + 1]), f64::from(picture[at + 2]));
+        assert!(
+            (found - expected).abs().max_element() < 5e-4,
+            "{name}, {who}: {found} instead of {expected}"
+        );
     }
 }
 
@@ -86,21 +91,32 @@ fn planes_have_the_colour_of_their_closed_form() {
     // One shape, several turns: each has its own light.
     for (a, b) in [(0.4, 0.5), (2.0, 0.5), (-1.3, 0.7)] {
         let matrix = turn(a, b);
-        expect_in_the_middle("turned", placed(&level, matrix * 1.3), Some(sun()), albedo * of_face(matrix * up));
+        expect_in_the_middle(
+            "turned",
+            placed(&level, matrix * 1.3),
+            Some(sun()),
+            albedo * of_face(matrix * up),
+        );
     }
     // From behind: the side that is seen counts.
     let behind = turn(0.4, std::f64::consts::PI + 0.5);
     let outward = behind * up;
     assert!(outward.z > 0.0);
     expect_in_the_middle("behind", placed(&level, behind), Some(sun()), albedo * of_face(-outward));
-    // A shape that is tilted in its own axes, 30 m higher in the north, mirrored and stretched. Its triangles are turned back.
+    // A shape that is tilted in its own axes, 30 m higher in the north, mirrored and stretched. Its triangles
+    // are turned back.
     let mut tilted = level.clone();
     let shape = Arc::make_mut(&mut tilted.shape);
     shape.vertices.iter_mut().for_each(|vertex| vertex.position_m[2] = -0.5 * vertex.position_m[0]);
     let own = DVec3::new(-0.5, 0.0, -1.0).normalize();
     shape.normals = vec![own.as_vec3().to_array(); 4];
     let stretched = placed(&tilted, DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0)));
-    expect_in_the_middle("stretched", stretched, Some(sun()), albedo * of_face(DVec3::new(-1.5, 0.0, -1.0).normalize()));
+    expect_in_the_middle(
+        "stretched",
+        stretched,
+        Some(sun()),
+        albedo * of_face(DVec3::new(-1.5, 0.0, -1.0).normalize()),
+    );
     Arc::make_mut(&mut tilted.shape).indices = vec![0, 2, 1, 0, 3, 2];
     let mirrored = placed(&tilted, turn(0.3, 0.0) * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)));
     let expected = turn(0.3, 0.0) * DVec3::new(0.5, 0.0, -1.0).normalize();
@@ -119,12 +135,13 @@ fn tints_holes_and_light_of_its_own_go_with_light() {
     mesh.material.cutoff = Some(0.5);
     let shape = Arc::make_mut(&mut mesh.shape);
     shape.vertices.iter_mut().for_each(|vertex| vertex.tint = [0.5, 1.0, 0.25, 1.0]);
-    // Normals that go apart: the middle is on the diagonal between the first corner and the third, and the pixel's centre half a pixel (0.25 m)
-    // south and east of it.
+    // Normals that go apart: the middle is on the diagonal between the first corner and the third, and the
+    // pixel's centre half a pixel (0.25 m) south and east of it.
     shape.normals = [[0.6, 0.0, -0.8], [0.0, 0.0, -1.0], [0.0, 0.6, -0.8], [0.0, 0.0, -1.0]].to_vec();
     let tint = DVec3::new(0.5, 1.0, 0.25);
     let expected =
-        albedo * tint * of_face(DVec3::new(0.6, 0.0, -0.8).lerp(DVec3::new(0.0, 0.6, -0.8), 30.25 / 60.0)) + DVec3::new(0.1, 0.05, 0.0);
+        albedo * tint * of_face(DVec3::new(0.6, 0.0, -0.8).lerp(DVec3::new(0.0, 0.6, -0.8), 30.25 / 60.0))
+            + DVec3::new(0.1, 0.05, 0.0);
     expect_in_the_middle("all", mesh.clone(), Some(sun()), expected);
     let both = pictures(&in_light(vec![mesh.clone()], Some(sun())));
     assert!(psnr_db(&both) > 55.0, "{}", psnr_db(&both));
@@ -139,14 +156,22 @@ fn tints_holes_and_light_of_its_own_go_with_light() {
 /// A sphere with smooth normals.
 fn ball(n: u32) -> Shape {
     let at = |i: u32, j: u32| {
-        let (around, down) = (std::f64::consts::TAU * f64::from(i) / f64::from(n), std::f64::consts::PI * f64::from(j) / f64::from(n));
+        let (around, down) = (
+            std::f64::consts::TAU * f64::from(i) / f64::from(n),
+            std::f64::consts::PI * f64::from(j) / f64::from(n),
+        );
         DVec3::new(down.sin() * around.cos(), down.sin() * around.sin(), -down.cos()).as_vec3().to_array()
     };
     let corners: Vec<[f32; 3]> = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
     let index = |i: u32, j: u32| j * (n + 1) + i;
-    let cell = |i: u32, j: u32| [index(i, j), index(i + 1, j + 1), index(i + 1, j), index(i, j), index(i, j + 1), index(i + 1, j + 1)];
+    let cell = |i: u32, j: u32| {
+        [index(i, j), index(i + 1, j + 1), index(i + 1, j), index(i, j), index(i, j + 1), index(i + 1, j + 1)]
+    };
     Shape {
-        vertices: corners.iter().map(|corner| MeshVertex::new(corner.map(|part| 5.0 * part), [0.0; 2])).collect(),
+        vertices: corners
+            .iter()
+            .map(|corner| MeshVertex::new(corner.map(|part| 5.0 * part), [0.0; 2]))
+            .collect(),
         indices: (0..n).flat_map(|j| (0..n).flat_map(move |i| cell(i, j))).collect(),
         normals: corners,
     }
@@ -177,7 +202,8 @@ fn many_turned_copies_are_as_near_to_the_oracle_as_without_light() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_slope_has_the_colour_of_its_closed_form() {
     // 40 % up to the north, 30 % up to the east, seen with few triangles and many.
-    let heights: Vec<f64> = (0..81 * 81).map(|k| 2.0 * (-0.4 * f64::from(k / 81) + 0.3 * f64::from(k % 81)) + 8.0).collect();
+    let heights: Vec<f64> =
+        (0..81 * 81).map(|k| 2.0 * (-0.4 * f64::from(k / 81) + 0.3 * f64::from(k % 81)) + 8.0).collect();
     let mut terrain = Terrain::from_heights(81, 81, 2.0, &heights, Some(paint())).expect("a terrain");
     terrain.light_up(&sun());
     let sequence = seen_from_above(Scene { terrain: Some(terrain), light: Some(sun()), ..Scene::default() });
@@ -186,7 +212,10 @@ fn a_slope_has_the_colour_of_its_closed_form() {
     for (who, picture) in ["device", "oracle"].into_iter().zip(pictures(&sequence)) {
         for pixel in picture.chunks_exact(4).step_by(37) {
             let found = DVec3::new(f64::from(pixel[0]), f64::from(pixel[1]), f64::from(pixel[2]));
-            assert!((found - expected).abs().max_element() < 0.5 / 255.0 + 5e-4, "{who}: {found} instead of {expected}");
+            assert!(
+                (found - expected).abs().max_element() < 0.5 / 255.0 + 5e-4,
+                "{who}: {found} instead of {expected}"
+            );
         }
     }
 }

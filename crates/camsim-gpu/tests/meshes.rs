@@ -15,7 +15,8 @@ use glam::{DMat3, DVec3};
 /// From 100 m above: 0.5 m a pixel, north up.
 const HEIGHT_M: f64 = 100.0;
 
-/// A level square with a side of 40 m, its texture twice across and down; it turns anticlockwise as seen from above.
+/// A level square with a side of 40 m, its texture twice across and down; it turns anticlockwise as seen from
+/// above.
 fn square(texture: Texture) -> Mesh {
     let corner = |n: f32, e: f32| MeshVertex::new([20.0 * n, 20.0 * e, 0.0], [e, -n]);
     let vertices = vec![corner(1.0, -1.0), corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
@@ -34,7 +35,13 @@ fn with_alpha(side: u32) -> Texture {
     let rgba8 = (0..side * side).flat_map(|i| {
         let [x, y] = [i % side, i / side].map(|k| (f64::from(k) + 0.5) / f64::from(side));
         let far = ((x - 0.4).powi(2) + (y - 0.55).powi(2)).sqrt();
-        [60.0 + 150.0 * x, 200.0 - 140.0 * y, 90.0 + 80.0 * (6.0 * x).sin(), 255.0 * (1.5 - 3.0 * far).clamp(0.0, 1.0)].map(|v| v as u8)
+        [
+            60.0 + 150.0 * x,
+            200.0 - 140.0 * y,
+            90.0 + 80.0 * (6.0 * x).sin(),
+            255.0 * (1.5 - 3.0 * far).clamp(0.0, 1.0),
+        ]
+        .map(|v| v as u8)
     });
     Texture { size_px: [side, side], rgba8: rgba8.collect(), encoding: Encoding::Linear }
 }
@@ -50,14 +57,22 @@ fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
     let sequence = sequence(scenario, steady(HEIGHT_M, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
     let channels = [Channel::Color, Channel::Depth];
     let done = render(&engine(), &sequence, &channels, 0).frame;
-    let options = RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
+    let options =
+        RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
     let truth = Oracle::new(sequence).expect("an oracle").render(0, &options);
-    let squares: f64 = done.color_rgba.iter().zip(&truth.color_rgba).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let squares: f64 =
+        done.color_rgba.iter().zip(&truth.color_rgba).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let psnr_db = -10.0 * (squares / done.color_rgba.len() as f64).log10();
     let (found, exact) = (done.depth_m.expect("depth"), truth.depth_m.expect("depth"));
-    let other = found.iter().zip(&exact).filter(|(a, b)| (**a - **b).abs() > 1e-3 * b.abs().max(1.0)).count() as f64 / found.len() as f64;
+    let other = found.iter().zip(&exact).filter(|(a, b)| (**a - **b).abs() > 1e-3 * b.abs().max(1.0)).count()
+        as f64
+        / found.len() as f64;
     let seen = exact.iter().filter(|depth| **depth > 0.0).count() as f64 / exact.len() as f64;
-    eprintln!("{name}: {psnr_db:.1} dB, {:.3} % of depths differ, {:.0} % of the picture", 100.0 * other, 100.0 * seen);
+    eprintln!(
+        "{name}: {psnr_db:.1} dB, {:.3} % of depths differ, {:.0} % of the picture",
+        100.0 * other,
+        100.0 * seen
+    );
     assert!(other < 1e-3, "{name}: {other}");
     (psnr_db, seen)
 }
@@ -81,7 +96,9 @@ fn tints_samplers_and_light_of_their_own() {
     let mut nearest = square(picture(8));
     nearest.material.nearest = true;
     // What is left is the picture's own seam, where it begins again, and half precision.
-    for (name, mesh) in [("tint", tinted), ("emissive", bright), ("mirrored and clamped", wraps), ("nearest", nearest)] {
+    for (name, mesh) in
+        [("tint", tinted), ("emissive", bright), ("mirrored and clamped", wraps), ("nearest", nearest)]
+    {
         let (psnr_db, seen) = compare(name, vec![mesh]);
         assert!(psnr_db > 55.0 && seen > 0.25, "{name}: {psnr_db} dB, {seen}");
     }

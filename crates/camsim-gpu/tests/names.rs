@@ -30,12 +30,16 @@ fn grey(name: &str) -> Arc<Sequence> {
 fn cameras_of_one_seed_and_several_names_have_noise_of_their_own() {
     let of = |name: &str, place: Option<ReverseOn>| {
         let sequence = grey(name);
-        let Some(place) = place else { return Oracle::new(sequence).expect("an oracle").render(0, &RenderOptions::default()).color_rgba };
+        let Some(place) = place else {
+            return Oracle::new(sequence).expect("an oracle").render(0, &RenderOptions::default()).color_rgba;
+        };
         let mut engine = engine();
         engine.set_reverse_on(place);
         render(&engine, &sequence, &[Channel::Color], 0).frame.color_rgba
     };
-    let rms = |a: &[f32], b: &[f32]| (a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (0.75 * a.len() as f64)).sqrt();
+    let rms = |a: &[f32], b: &[f32]| {
+        (a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (0.75 * a.len() as f64)).sqrt()
+    };
     let (unnamed, left, right) = (of("", None), of("left", None), of("right", None));
     for (a, b) in [(&unnamed, &left), (&unnamed, &right), (&left, &right)] {
         // Two independent values of sigma 0.02; 3600 of them, so within 1.2 % (one standard error).

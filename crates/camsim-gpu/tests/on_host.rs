@@ -6,8 +6,8 @@ use std::{collections::HashSet, convert::Infallible, fmt::Debug, hash::Hash, pat
 
 use camsim_core::{
     scenario::{
-        Auto, Axis, Channel, FieldOr, LensModel, LensSpec, MountSpec, OutputEncoding, Readout, Scenario, ShutterSpec, Silhouettes,
-        VibrationSpec,
+        Auto, Axis, Channel, FieldOr, LensModel, LensSpec, MountSpec, OutputEncoding, Readout, Scenario,
+        ShutterSpec, Silhouettes, VibrationSpec,
     },
     sequence::Sequence,
     temporal::TapStage,
@@ -44,7 +44,8 @@ fn camera(exposure_ms: f64) -> Scenario {
 
 fn lens(mut scenario: Scenario) -> Scenario {
     // So bent that the corners have no ray.
-    scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.39, 0.11, 0.001, -0.002, -0.0084] };
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.39, 0.11, 0.001, -0.002, -0.0084] };
     scenario
 }
 
@@ -83,8 +84,8 @@ fn frame(engine: &Engine, sequence: &Arc<Sequence>, frame_number: u64, channels:
     found.expect("a frame")
 }
 
-/// Pixels that one of the two alone sees, or that are more than `most` of the range apart: where rounding decides which surface is seen, or what is still in the ideal frame. And what
-/// the others are apart, RMS.
+/// Pixels that one of the two alone sees, or that are more than `most` of the range apart: where rounding
+/// decides which surface is seen, or what is still in the ideal frame. And what the others are apart, RMS.
 fn apart(a: &[f32], b: &[f32], most: f32) -> (usize, f64) {
     let differs = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > most);
     let (far, near): (Vec<_>, Vec<_>) = a.chunks_exact(4).zip(b.chunks_exact(4)).partition(differs);
@@ -96,10 +97,14 @@ fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, fram
     let [by_host, by_device] = engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &ALL));
     let picture_alone = frame(&engines[0], sequence, frame_number, &[Channel::Color]);
     assert!(host::serves(&by_host.plan), "{name}: {:?}", by_host.plan);
-    assert!(by_host.times.reverse_ms.is_some() && by_device.times.reverse_ms.is_none(), "{name}: each where it should be");
+    assert!(
+        by_host.times.reverse_ms.is_some() && by_device.times.reverse_ms.is_none(),
+        "{name}: each where it should be"
+    );
     let (host, device) = (&by_host.frame.color_rgba, &by_device.frame.color_rgba);
     assert!(*host == picture_alone.frame.color_rgba, "{name}: asking for the truth changes no colour");
-    // Texels weighed with 8 bits: 2^-9 of what neighbours are apart at most, along each axis, and somewhat more where a spline sharpens.
+    // Texels weighed with 8 bits: 2^-9 of what neighbours are apart at most, along each axis, and somewhat
+    // more where a spline sharpens.
     let [most, most_rms] = if is_software(&engines[1]) { [1e-3, 1e-5] } else { [6e-3, 3e-4] };
     let (far, rms) = apart(host, device, most as f32);
     let pixels = device.len() / 4;
@@ -111,16 +116,25 @@ fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, fram
     by_host.plan
 }
 
-/// All but one in a thousand pixels agree about the ray and the time to some units in the last place of floats about 1, 99 of a hundred about the source to 1e-3 px, about the depth to
-/// 1e-5 of it.
+/// All but one in a thousand pixels agree about the ray and the time to some units in the last place of
+/// floats about 1, 99 of a hundred about the source to 1e-3 px, about the depth to 1e-5 of it.
 fn assert_same_truth(name: &str, by_host: &Finished, by_device: &Finished) {
-    let truth = |done: &Finished| (done.frame.coords.clone().expect("coords"), done.frame.depth_m.clone().expect("depth"));
+    let truth = |done: &Finished| {
+        (done.frame.coords.clone().expect("coords"), done.frame.depth_m.clone().expect("depth"))
+    };
     let ((host, host_m), (device, device_m)) = (truth(by_host), truth(by_device));
     let seen: Vec<usize> = (0..host_m.len()).filter(|&i| host_m[i] > 0.0 && device_m[i] > 0.0).collect();
     let differ = (0..host_m.len())
-        .filter(|&i| (host_m[i] > 0.0) != (device_m[i] > 0.0) || [0, 4].iter().any(|&k| (host[i][k] - device[i][k]).abs() > 5e-7))
+        .filter(|&i| {
+            (host_m[i] > 0.0) != (device_m[i] > 0.0)
+                || [0, 4].iter().any(|&k| (host[i][k] - device[i][k]).abs() > 5e-7)
+        })
         .count();
-    assert!(seen.len() > host_m.len() / 2 && differ * 1000 <= host_m.len(), "{name}: {differ} seen by one, {} by both", seen.len());
+    assert!(
+        seen.len() > host_m.len() / 2 && differ * 1000 <= host_m.len(),
+        "{name}: {differ} seen by one, {} by both",
+        seen.len()
+    );
     let p99 = |of: &dyn Fn(usize) -> f32| {
         let mut all: Vec<f32> = seen.iter().map(|&i| of(i)).collect();
         all.sort_by(f32::total_cmp);
@@ -128,8 +142,11 @@ fn assert_same_truth(name: &str, by_host: &Finished, by_device: &Finished) {
     };
     let px = p99(&|i| (host[i][2] - device[i][2]).hypot(host[i][3] - device[i][3]));
     let depth = p99(&|i| (host_m[i] / device_m[i] - 1.0).abs());
-    let point = p99(&|i| (5..8).map(|k| (host[i][k] - device[i][k]).powi(2)).sum::<f32>().sqrt() / device_m[i]);
-    eprintln!("{name}: truth {px:.1e} px, depth {depth:.1e}, point {point:.1e} of it; {differ} seen otherwise");
+    let point =
+        p99(&|i| (5..8).map(|k| (host[i][k] - device[i][k]).powi(2)).sum::<f32>().sqrt() / device_m[i]);
+    eprintln!(
+        "{name}: truth {px:.1e} px, depth {depth:.1e}, point {point:.1e} of it; {differ} seen otherwise"
+    );
     assert!(px < 1e-3 && depth < 1e-5 && point < 1e-5, "{name}: {px:.1e} px, {depth:.1e}, {point:.1e}");
 }
 
@@ -149,8 +166,13 @@ fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
     let coarsely = |scenario: &mut Scenario| scenario.quality.max_error_dn = 40.0;
     let shaking = |hz: f64| {
         move |scenario: &mut Scenario| {
-            scenario.camera.mount.vibration =
-                vec![VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.3, amplitude_m: 0.0, hz, phase_deg: 20.0 }];
+            scenario.camera.mount.vibration = vec![VibrationSpec {
+                axis: Axis::Pitch,
+                amplitude_deg: 0.3,
+                amplitude_m: 0.0,
+                hz,
+                phase_deg: 20.0,
+            }];
         }
     };
     vec![
@@ -172,12 +194,20 @@ fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
         ("1 px", lens(set(camera(20.0), &within(1.0))), flying()),
         ("0.01 px", lens(set(camera(20.0), &within(0.01))), flying()),
         ("0.001 px", set(camera(12.0), &within(0.001)), flying()),
-        ("two looks", lens(set(camera(12.0), &|scenario| scenario.quality.iterations = Auto::Value(2))), flying()),
+        (
+            "two looks",
+            lens(set(camera(12.0), &|scenario| scenario.quality.iterations = Auto::Value(2))),
+            flying(),
+        ),
         ("five looks", set(camera(12.0), &|scenario| scenario.quality.iterations = Auto::Value(5)), flying()),
         ("shaking", lens(set(camera(20.0), &shaking(40.0))), flying()),
         ("shaking fast", lens(set(camera(20.0), &shaking(150.0))), flying()),
         ("shaking faster", set(camera(20.0), &shaking(400.0)), flying()),
-        ("one sample", set(camera(20.0), &|scenario| scenario.quality.blur_samples = Auto::Value(1)), flying()),
+        (
+            "one sample",
+            set(camera(20.0), &|scenario| scenario.quality.blur_samples = Auto::Value(1)),
+            flying(),
+        ),
         ("coarse", lens(set(camera(12.0), &scale(0.7))), flying()),
         ("fine", lens(set(camera(12.0), &scale(2.5))), flying()),
         ("fine, sharp", lens(set(camera(0.0), &scale(2.5))), flying()),
@@ -235,7 +265,8 @@ fn the_host_makes_the_same_picture() {
         let mut scenario = read("houses.toml");
         scenario.camera.size_px = SIZE_PX;
         (scenario.camera.focal_px, scenario.camera.principal_point_px) = ([150.0, 140.0], Some([90.0, 69.0]));
-        scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![radial, 0.0, 0.0, 0.0, 0.0] };
+        scenario.camera.lens =
+            LensSpec { model: LensModel::BrownConrady, coefficients: vec![radial, 0.0, 0.0, 0.0, 0.0] };
         scenario.camera.shutter.exposure_ms = exposure_ms;
         let houses = load_sequence(&scenario).expect("sequence").sequence;
         let plan = assert_same("houses", &engines, &houses, 40);
@@ -245,9 +276,15 @@ fn the_host_makes_the_same_picture() {
     assert!(plans.iter().filter(|plan| plan.copied_from().is_some()).count() >= 4, "some are copied");
     let keys: Vec<PipelineKey> = plans.iter().map(PipelineKey::of).collect();
     assert_all(&keys.iter().map(|key| key.ray).collect(), [RayStage::Pinhole, RayStage::LensMap]);
-    assert_all(&keys.iter().map(|key| key.temporal).collect(), [TemporalKind::Identity, TemporalKind::Rotation, TemporalKind::Reproject]);
+    assert_all(
+        &keys.iter().map(|key| key.temporal).collect(),
+        [TemporalKind::Identity, TemporalKind::Rotation, TemporalKind::Reproject],
+    );
     let blurred = || keys.iter().filter(|key| key.blur && key.temporal == TemporalKind::Reproject);
     assert_all(&blurred().map(|key| key.depths).collect(), NodeDepths::ALL);
     assert_all(&blurred().map(|key| key.path).collect(), PathStage::ALL);
-    assert_all(&keys.iter().map(|key| (key.blur, key.tap)).collect(), TapKind::ALL.into_iter().flat_map(|tap| [(false, tap), (true, tap)]));
+    assert_all(
+        &keys.iter().map(|key| (key.blur, key.tap)).collect(),
+        TapKind::ALL.into_iter().flat_map(|tap| [(false, tap), (true, tap)]),
+    );
 }

@@ -1,5 +1,5 @@
-//! Frames that the host makes, where the device's part of a frame fails: frames before and after it are as they are without a fault. Alone in its process, and in a copy of that: it
-//! takes shaders away.
+//! Frames that the host makes, where the device's part of a frame fails: frames before and after it are as
+//! they are without a fault. Alone in its process, and in a copy of that: it takes shaders away.
 
 mod common;
 
@@ -9,7 +9,9 @@ use std::{
     process::Command,
 };
 
-use camsim_core::scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver};
+use camsim_core::scenario::{
+    Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver,
+};
 use camsim_gpu::{
     Engine,
     engine::{Finished, Session},
@@ -26,7 +28,8 @@ fn flight() -> Scenario {
     scenario.camera.size_px = [96, 72];
     scenario.camera.focal_px = [100.0, 100.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
-    scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
     scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 4.0, ..ShutterSpec::default() };
     scenario.quality.silhouettes = Silhouettes::Rays;
     scenario.quality.solver = Auto::Value(Solver::Reproject);
@@ -53,7 +56,10 @@ fn render(session: &mut Session<'_>, frames: &[u64]) -> (Vec<Finished>, bool) {
         came.push(finished);
         Ok(())
     };
-    let all = session.render::<Infallible>(frames.iter().copied(), &mut keep).inspect_err(|fault| eprintln!("{fault}")).is_ok();
+    let all = session
+        .render::<Infallible>(frames.iter().copied(), &mut keep)
+        .inspect_err(|fault| eprintln!("{fault}"))
+        .is_ok();
     (came, all)
 }
 
@@ -82,7 +88,11 @@ fn a_frame_that_fails_spoils_no_other() {
             .expect("it runs");
         std::fs::remove_dir_all(&folder).expect("the copy goes");
         let said = String::from_utf8_lossy(&again.stdout);
-        assert!(again.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&again.stderr));
+        assert!(
+            again.status.success() && said.contains("1 passed"),
+            "{said}{}",
+            String::from_utf8_lossy(&again.stderr)
+        );
         return;
     };
     let engine = engine();
@@ -90,7 +100,8 @@ fn a_frame_that_fails_spoils_no_other() {
     let (expected, all) = render(&mut whole, &OVER_GROUND);
     assert!(all && expected.iter().all(|done| host::serves(&done.plan) && done.times.reverse_ms.is_some()));
     assert!(!host::serves(&whole.planner().plan(OVER_HOUSES).expect("a plan")), "rays are the device's");
-    let same = |came: &[Finished]| came.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba);
+    let same =
+        |came: &[Finished]| came.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba);
 
     let rays = folder.join("reverse/edges/supersampled.wgsl");
     let text = std::fs::read(&rays).expect("the shader");

@@ -1,4 +1,5 @@
-//! The paper preset on the device against its twins: lens inverse, displacement at the nearest depth, straight blur of stored values, fog.
+//! The paper preset on the device against its twins: lens inverse, displacement at the nearest depth,
+//! straight blur of stored values, fog.
 
 mod common;
 
@@ -22,8 +23,10 @@ fn paper_scenario() -> Scenario {
     scenario.camera.size_px = [320, 240];
     scenario.camera.focal_px = [153.8, 153.8];
     scenario.camera.principal_point_px = Some([152.3, 112.9]);
-    scenario.camera.lens =
-        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63] };
+    scenario.camera.lens = LensSpec {
+        model: LensModel::BrownConrady,
+        coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63],
+    };
     scenario.camera.mount = MountSpec { angles_deg: [5.0, -60.0, 10.0], ..MountSpec::default() };
     scenario.camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 30.0, ..ShutterSpec::default() };
     scenario.quality.preset = Preset::Paper;
@@ -43,15 +46,20 @@ fn the_paper_preset_agrees_with_its_twins() {
     let (done, (ideal, stored, inverse_depth)) = render_with_ideal(&sequence, -0.5);
     let (after, _) = render_with_ideal(&sequence, 0.5);
     let plan = &done.plan;
-    assert_eq!((plan.ray, plan.temporal, plan.edges), (RayStage::GaussNewton, TemporalStage::Rk2, EdgeStage::None));
+    assert_eq!(
+        (plan.ray, plan.temporal, plan.edges),
+        (RayStage::GaussNewton, TemporalStage::Rk2, EdgeStage::None)
+    );
     assert_eq!((plan.ideal.size_px, plan.ideal.principal_px), ([544, 408], DVec2::new(271.5, 203.5)));
     assert_eq!(plan.blur.expect("30 ms").max_samples, 12);
     let sky = DVec3::from_array(scene.sky_linear.map(|v| f64::from(srgb_from_linear(v))));
     let table = line_times(plan);
     let color = ColorImage { size_px: ideal.size_px, rgba: &stored };
     let camera = &plan.camera;
-    let (before, after) = (done.frame.coords.as_ref().expect("asked for"), after.frame.coords.as_ref().expect("asked for"));
-    let (mut other_root, mut worst_ray_px, mut worst_px, mut worst_dn, mut compared, mut invalid) = (0, 0.0_f64, 0.0_f64, 0.0_f64, 0, 0);
+    let (before, after) =
+        (done.frame.coords.as_ref().expect("asked for"), after.frame.coords.as_ref().expect("asked for"));
+    let (mut other_root, mut worst_ray_px, mut worst_px, mut worst_dn, mut compared, mut invalid) =
+        (0, 0.0_f64, 0.0_f64, 0.0_f64, 0, 0);
     let mut square_dn = 0.0;
     for i in 0..camera.size_px[0] * camera.size_px[1] {
         let (x, y, at) = (i % camera.size_px[0], i / camera.size_px[0], i as usize);
@@ -67,7 +75,9 @@ fn the_paper_preset_agrees_with_its_twins() {
         };
         let end = |uv: DVec2, node: u32| {
             let dt_s = f64::from(table.dt_s[(y * table.stride + node) as usize]);
-            ideal.px_from_point(rk2(uv, nearest(uv), &plan.key_twist, dt_s, RK2_STEP_DEG.to_radians()).extend(1.0))
+            ideal.px_from_point(
+                rk2(uv, nearest(uv), &plan.key_twist, dt_s, RK2_STEP_DEG.to_radians()).extend(1.0),
+            )
         };
         let inside = |uv: DVec2| (0..2).all(|node| ideal.contains(end(uv, node)));
         if !valid {
@@ -129,13 +139,18 @@ fn without_motion_lens_and_fog_the_paper_preset_keeps_the_colours() {
     let levels: Vec<f32> = std::iter::zip(&paper.frame.color_rgba, &own.frame.color_rgba)
         .map(|(found, expected)| 255.0 * (srgb_from_linear(*found) - srgb_from_linear(*expected)))
         .collect();
-    let shown = |level: f32| paper.frame.color_rgba.iter().filter(|&&v| (srgb_from_linear(v) - level / 255.0).abs() < 0.1).count();
+    let shown = |level: f32| {
+        paper.frame.color_rgba.iter().filter(|&&v| (srgb_from_linear(v) - level / 255.0).abs() < 0.1).count()
+    };
     assert!(shown(160.0) > 10_000 && shown(230.0) > 10_000, "one colour shows nothing");
     let mean = levels.iter().sum::<f32>() / levels.len() as f32;
     let worst = levels.iter().fold(0.0_f32, |worst, level| worst.max(level.abs()));
     let beyond = levels.iter().filter(|level| level.abs() > 1.1).count();
-    eprintln!("paper preset at rest: mean {mean:.3}, worst {worst:.3} levels of 255 from the default's colours, {beyond} beyond 1.1");
-    // Rounding to 8 bit is half a level; lavapipe's own sRGB encoder adds as much in places (other devices: 0.1). Where a sample falls on the
-    // border of two texels the two frames, of different size, may round to either side, and its filter then differs by a step of its weights.
+    eprintln!(
+        "paper preset at rest: mean {mean:.3}, worst {worst:.3} levels of 255 from the default's colours, {beyond} beyond 1.1"
+    );
+    // Rounding to 8 bit is half a level; lavapipe's own sRGB encoder adds as much in places (other devices:
+    // 0.1). Where a sample falls on the border of two texels the two frames, of different size, may round to
+    // either side, and its filter then differs by a step of its weights.
     assert!(beyond * 50_000 <= levels.len() && worst < 3.0 && mean.abs() < 0.1, "{mean} {worst} {beyond}");
 }

@@ -1,4 +1,5 @@
-//! The frame pipeline: nothing is made on the device once it runs, frames come in the order asked for, and faults stop it at once.
+//! The frame pipeline: nothing is made on the device once it runs, frames come in the order asked for, and
+//! faults stop it at once.
 
 mod common;
 
@@ -31,19 +32,28 @@ fn small() -> Scenario {
     scenario.camera.focal_px = [52.0, 52.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -60.0, 0.0], ..MountSpec::default() };
     scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
-    scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
     scenario
 }
 
 /// Over a pattern: no silhouettes. `zoom`: the lens changes with every frame.
 fn plain(zoom: bool) -> Arc<Sequence> {
     let mut scenario = small();
-    let entry =
-        |at, focal_px: f64, k1| ZoomSpec { at, focal_px: [focal_px; 2], principal_point_px: None, coefficients: vec![k1, 0.02, 0.0, 0.0] };
+    let entry = |at, focal_px: f64, k1| ZoomSpec {
+        at,
+        focal_px: [focal_px; 2],
+        principal_point_px: None,
+        coefficients: vec![k1, 0.02, 0.0, 0.0],
+    };
     if zoom {
         scenario.camera.zoom = vec![entry(1.0, 52.0, -0.2), entry(2.0, 60.0, -0.1)];
     }
-    let mut sequence = Sequence::clone(&sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO), pattern(400.0)));
+    let mut sequence = Sequence::clone(&sequence(
+        scenario,
+        steady(80.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO),
+        pattern(400.0),
+    ));
     if zoom {
         sequence.zoom_track = vec![(0.0, 1.0), (3.3, 2.0)];
     }
@@ -57,11 +67,19 @@ fn houses() -> Arc<Sequence> {
 
 /// Over ridges before the sky: silhouettes of ground alone.
 fn ridges() -> Arc<Sequence> {
-    let heights: Vec<f64> = (0..65 * 65).map(|i| 40.0 * (f64::from(i / 65) * 0.4).sin().abs() + f64::from(i % 65) * 0.2).collect();
-    let terrain = Terrain::from_heights(65, 65, 10.0, &heights, Some(pattern(1.0).meshes[0].material.texture.clone())).expect("a terrain");
+    let heights: Vec<f64> = (0..65 * 65)
+        .map(|i| 40.0 * (f64::from(i / 65) * 0.4).sin().abs() + f64::from(i % 65) * 0.2)
+        .collect();
+    let terrain =
+        Terrain::from_heights(65, 65, 10.0, &heights, Some(pattern(1.0).meshes[0].material.texture.clone()))
+            .expect("a terrain");
     let mut scenario = small();
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -15.0, 0.0], ..MountSpec::default() };
-    sequence(scenario, steady(90.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO), Scene { terrain: Some(terrain), ..Scene::default() })
+    sequence(
+        scenario,
+        steady(90.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO),
+        Scene { terrain: Some(terrain), ..Scene::default() },
+    )
 }
 
 /// What the device holds, by wgpu's own books: transient objects of a frame in flight are among it.
@@ -87,12 +105,17 @@ fn held(engine: &Engine) -> Vec<(&'static str, isize)> {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_frame_makes_nothing_on_the_device() {
     let engine = engine();
-    for (name, sequence) in [("plain", plain(false)), ("zoom lens", plain(true)), ("houses", houses()), ("ridges", ridges())] {
+    for (name, sequence) in
+        [("plain", plain(false)), ("zoom lens", plain(true)), ("houses", houses()), ("ridges", ridges())]
+    {
         let mut session = engine.session::<Infallible>(sequence, &ALL).expect("session");
         session.render::<Infallible>(0..FRAMES, &mut |_| Ok(())).expect("render");
         let before = held(&engine);
         let counted = before.iter().filter(|(_, count)| *count > 0).count();
-        assert!(counted >= before.len() - 1, "wgpu counts all of these, query sets only where frames are timed: {before:?}");
+        assert!(
+            counted >= before.len() - 1,
+            "wgpu counts all of these, query sets only where frames are timed: {before:?}"
+        );
         let mut most = before.clone();
         let mut keep_most = |_| {
             most.iter_mut().zip(held(&engine)).for_each(|(most, now)| most.1 = most.1.max(now.1));
@@ -139,7 +162,8 @@ fn any_number_of_threads_makes_the_same_frames() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let engine = engine();
-            let mut session = engine.session::<Infallible>(houses(), &[Channel::Color, Channel::Depth]).expect("session");
+            let mut session =
+                engine.session::<Infallible>(houses(), &[Channel::Color, Channel::Depth]).expect("session");
             let mut frames = Vec::new();
             let mut keep = |Finished { frame, plan, .. }: Finished| {
                 let plan = format!("{plan:?}");
@@ -180,7 +204,8 @@ fn the_first_fault_stops_everything_and_the_session_goes_on() {
         assert!(matches!(outcome, Err(RenderError::Sink(Full(frame))) if frame == full_at), "{outcome:?}");
         assert!(came.iter().copied().eq(0..=full_at), "{came:?}");
         let begun = planned.load(Ordering::Relaxed);
-        // A frame for each thread, or as many groups of eight that share an ideal frame as there are threads for; another group, and the next frame.
+        // A frame for each thread, or as many groups of eight that share an ideal frame as there are threads
+        // for; another group, and the next frame.
         let ahead = rayon::current_num_threads().min(16).max(8 * Planner::groups_at_once()) as u64 + 8 + 1;
         assert!(begun <= full_at + ahead, "{begun} frames were begun for {full_at}");
     }

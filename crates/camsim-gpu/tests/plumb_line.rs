@@ -1,4 +1,5 @@
-//! A plumb line seen from a turning aircraft leans by rate times readout: measured in rendered pixels over a real log.
+//! A plumb line seen from a turning aircraft leans by rate times readout: measured in rendered pixels over a
+//! real log.
 
 mod common;
 
@@ -20,7 +21,8 @@ const READOUT_S: f64 = 0.033;
 /// Far enough that only rotation matters.
 const DISTANCE_M: f64 = 20_000.0;
 
-/// A plumb wall ahead of the camera whose brightness rises linearly from left to right: lines of equal brightness are plumb lines.
+/// A plumb wall ahead of the camera whose brightness rises linearly from left to right: lines of equal
+/// brightness are plumb lines.
 fn plumb_wall(path: &CameraPath, t_s: f64) -> Scene {
     let pose = path.pose(t_s);
     let ahead = pose.ned_from_camera * DVec3::Z;
@@ -28,7 +30,8 @@ fn plumb_wall(path: &CameraPath, t_s: f64) -> Scene {
     let right = DVec3::new(-level.y, level.x, 0.0);
     let ramp: Vec<u8> = (0..=255).flat_map(|v: u8| [v, v, v, 255]).collect();
     let texture = Arc::new(Texture { size_px: [256, 1], rgba8: ramp, encoding: Encoding::Linear });
-    // 40 px from black to white: steep enough that half-precision colour places the line to a hundredth of a pixel.
+    // 40 px from black to white: steep enough that half-precision colour places the line to a hundredth of a
+    // pixel.
     let half_m = 0.05 * DISTANCE_M;
     let corner = |u: f64, down: f64| {
         let at = right * (2.0 * u - 1.0) * half_m + DVec3::Z * down * DISTANCE_M;
@@ -36,7 +39,10 @@ fn plumb_wall(path: &CameraPath, t_s: f64) -> Scene {
     };
     let vertices = vec![corner(0.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0), corner(1.0, 1.0)];
     let origin_ned_m = pose.position_ned_m + level * DISTANCE_M;
-    Scene { meshes: vec![Mesh::new(vertices, vec![0, 1, 2, 2, 1, 3], texture, origin_ned_m, Wrap::Clamp)], ..Scene::default() }
+    Scene {
+        meshes: vec![Mesh::new(vertices, vec![0, 1, 2, 2, 1, 3], texture, origin_ned_m, Wrap::Clamp)],
+        ..Scene::default()
+    }
 }
 
 /// Columns where each row has brightness 1/2, to a fraction of a pixel.
@@ -55,7 +61,8 @@ fn line_columns(rgba: &[f32], [width, height]: [u32; 2]) -> Vec<(f64, f64)> {
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (my, mx) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
-    points.iter().map(|p| (p.0 - my) * (p.1 - mx)).sum::<f64>() / points.iter().map(|p| (p.0 - my).powi(2)).sum::<f64>()
+    points.iter().map(|p| (p.0 - my) * (p.1 - mx)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - my).powi(2)).sum::<f64>()
 }
 
 /// Slope by the rolling shutter in the image and by rate times readout, columns a row.
@@ -65,7 +72,11 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
     scenario.camera.focal_px = [400.0, 400.0];
     scenario.camera.mount = MountSpec::default();
     let rows = read_flight_log(log, &scenario.flight, HeightConversion::None).expect("a readable log").rows;
-    let path = CameraPath::new(track(&rows, &scenario.tracker).expect("trackable").trajectory, &scenario.camera.mount).expect("mount");
+    let path = CameraPath::new(
+        track(&rows, &scenario.tracker).expect("trackable").trajectory,
+        &scenario.camera.mount,
+    )
+    .expect("mount");
     let scene = plumb_wall(&path, t_s);
     let engine = engine();
     let with_readout = |readout_ms: f64| {
@@ -89,8 +100,8 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
         (slope(&middle), middle[middle.len() / 2])
     };
     let ((still, at), (rolling, _)) = (with_readout(0.0), with_readout(1e3 * READOUT_S));
-    // Flow of a far point under rotation w (camera axes): u' = -(w_y - w_z v) + u (w_x v - w_y u), v' likewise; a line x = x0 + s y
-    // moves along its row by u' - s v'.
+    // Flow of a far point under rotation w (camera axes): u' = -(w_y - w_z v) + u (w_x v - w_y u), v'
+    // likewise; a line x = x0 + s y moves along its row by u' - s v'.
     let w = mean_rate(&path, t_s, 0.25 * READOUT_S);
     let uv = (DVec2::new(at.1, at.0) - DVec2::new(159.5, 119.5)) / 400.0;
     let along = w.x * uv.y - w.y * uv.x;
@@ -98,8 +109,8 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
     (rolling - still, (flow.x - still * flow.y) * READOUT_S / 240.0)
 }
 
-/// Mean angular rate within `half_s` of an instant, in camera axes, rad/s. A real platform's rate changes within a readout; a least-squares
-/// slope of its integral weighs it by 1 - (t/half)^2.
+/// Mean angular rate within `half_s` of an instant, in camera axes, rad/s. A real platform's rate changes
+/// within a readout; a least-squares slope of its integral weighs it by 1 - (t/half)^2.
 fn mean_rate(path: &CameraPath, t_s: f64, half_s: f64) -> DVec3 {
     let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
     for k in -10..=10 {
@@ -112,7 +123,10 @@ fn mean_rate(path: &CameraPath, t_s: f64, half_s: f64) -> DVec3 {
 
 fn check(log: &Path, t_s: f64) {
     let (measured, expected) = measured_and_expected(log, t_s);
-    eprintln!("{} at {t_s} s: leans by {measured:.6} columns a row, rate x readout says {expected:.6}", log.display());
+    eprintln!(
+        "{} at {t_s} s: leans by {measured:.6} columns a row, rate x readout says {expected:.6}",
+        log.display()
+    );
     assert!(expected.abs() > 0.005, "a turn that shows: {expected}");
     assert!((measured / expected - 1.0).abs() < 0.02, "measured {measured}, expected {expected}");
 }

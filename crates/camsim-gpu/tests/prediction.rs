@@ -1,5 +1,5 @@
-//! Is the prediction honest? Random frames of three scenes: the error measured against the oracle is never above the predicted one, and the
-//! predicted one is not far above it.
+//! Is the prediction honest? Random frames of three scenes: the error measured against the oracle is never
+//! above the predicted one, and the predicted one is not far above it.
 //!
 //! `CAMSIM_LONG=1` tries all 200 frames; without it a fifth of them.
 
@@ -10,7 +10,10 @@ use std::{convert::Infallible, sync::Arc, time::Instant};
 use camsim_core::{
     noise::pcg4d,
     reference::{CoordErrors, Oracle, coord_errors},
-    scenario::{Auto, Axis, Channel, FieldOr, LensModel, LensSpec, Readout, Scenario, ShutterSpec, Solver, VibrationSpec},
+    scenario::{
+        Auto, Axis, Channel, FieldOr, LensModel, LensSpec, Readout, Scenario, ShutterSpec, Solver,
+        VibrationSpec,
+    },
     scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, Texture, Wrap},
     sequence::Sequence,
     trajectory::Trajectory,
@@ -53,30 +56,46 @@ fn hills() -> Scene {
         .map(|i| {
             let (x, y) = (f64::from(i % SIDE), f64::from(i / SIDE));
             let [noise, ..] = pcg4d([i, 7, 3, 1]);
-            60.0 * (0.05 * x).sin() * (0.04 * y).cos() + 12.0 * (0.31 * x + 0.2 * y).sin() + 3.0 * (f64::from(noise >> 8) / 1.6e7 - 0.5)
+            60.0 * (0.05 * x).sin() * (0.04 * y).cos()
+                + 12.0 * (0.31 * x + 0.2 * y).sin()
+                + 3.0 * (f64::from(noise >> 8) / 1.6e7 - 0.5)
         })
         .collect();
-    Scene { terrain: Some(Terrain::from_heights(SIDE, SIDE, 16.0, &heights, None).expect("a terrain")), ..Scene::default() }
+    Scene {
+        terrain: Some(Terrain::from_heights(SIDE, SIDE, 16.0, &heights, None).expect("a terrain")),
+        ..Scene::default()
+    }
 }
 
 /// A box on the ground.
 fn building(centre: [f64; 2], half: [f64; 2], height: f64) -> Mesh {
     let corner = |i: u32| {
         let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        let position_m = [(side(0) * half[0]) as f32, (side(1) * half[1]) as f32, if i >> 2 & 1 == 1 { -height as f32 } else { 0.0 }];
+        let position_m = [
+            (side(0) * half[0]) as f32,
+            (side(1) * half[1]) as f32,
+            if i >> 2 & 1 == 1 { -height as f32 } else { 0.0 },
+        ];
         MeshVertex::new(position_m, [0.5, 0.5])
     };
     let quads = [[4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
     let indices = quads.into_iter().flat_map(|[a, b, c, d]| [a, b, c, a, c, d]).collect();
     let texture = Arc::new(Texture::uniform([200, 180, 160, 255], Encoding::Linear));
-    Mesh::new((0..8).map(corner).collect(), indices, texture, DVec3::new(centre[0], centre[1], 0.0), Wrap::Clamp)
+    Mesh::new(
+        (0..8).map(corner).collect(),
+        indices,
+        texture,
+        DVec3::new(centre[0], centre[1], 0.0),
+        Wrap::Clamp,
+    )
 }
 
 fn buildings() -> Scene {
     let mut dice = Dice { seed: 99, thrown: 0 };
     let mut scene = pattern(8000.0);
     for i in 0..36 {
-        let place = [f64::from(i % 6) - 2.5, f64::from(i / 6) - 2.5].map(|k| 60.0 * k + dice.within(-12.0, 12.0));
+        let place =
+            [f64::from(i % 6) - 2.5, f64::from(i / 6) - 2.5].map(|k| 60.0 * k + dice.within(-12.0, 12.0));
         let (half, height) = ([dice.within(5.0, 18.0), dice.within(5.0, 18.0)], dice.within(5.0, 35.0));
         scene.meshes.push(building(place, half, height));
     }
@@ -101,20 +120,38 @@ fn frame(dice: &mut Dice, over_m: [f64; 2]) -> (Scenario, Trajectory) {
             coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63],
         };
     }
-    camera.mount.angles_deg = [dice.within(-10.0, 10.0), dice.within(-90.0, -40.0), dice.within(-180.0, 180.0)];
+    camera.mount.angles_deg =
+        [dice.within(-10.0, 10.0), dice.within(-90.0, -40.0), dice.within(-180.0, 180.0)];
     if dice.one_in(4.0) {
         let hz = dice.within(20.0, 200.0);
         camera.mount.vibration = vec![
-            VibrationSpec { axis: Axis::Pitch, amplitude_deg: dice.within(0.0, 0.2), amplitude_m: 0.0, hz, phase_deg: 40.0 },
-            VibrationSpec { axis: Axis::Y, amplitude_deg: 0.0, amplitude_m: dice.within(0.0, 0.01), hz: 0.7 * hz, phase_deg: 0.0 },
+            VibrationSpec {
+                axis: Axis::Pitch,
+                amplitude_deg: dice.within(0.0, 0.2),
+                amplitude_m: 0.0,
+                hz,
+                phase_deg: 40.0,
+            },
+            VibrationSpec {
+                axis: Axis::Y,
+                amplitude_deg: 0.0,
+                amplitude_m: dice.within(0.0, 0.01),
+                hz: 0.7 * hz,
+                phase_deg: 0.0,
+            },
         ];
     }
     camera.shutter = ShutterSpec {
         delay_ms: if dice.one_in(3.0) { dice.within(0.0, 100.0) } else { 0.0 },
         readout_ms: if dice.one_in(8.0) { 0.0 } else { dice.within(2.0, 60.0) },
-        exposure_ms: if dice.one_in(2.0) { 0.0 } else { dice.within(0.2, 20.0) * if dice.one_in(6.0) { 20.0 } else { 1.0 } },
+        exposure_ms: if dice.one_in(2.0) {
+            0.0
+        } else {
+            dice.within(0.2, 20.0) * if dice.one_in(6.0) { 20.0 } else { 1.0 }
+        },
         interlace_ms: FieldOr::Ms(if dice.one_in(6.0) { 20.0 } else { 0.0 }),
-        readout: [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft][dice.within(0.0, 4.0) as usize],
+        readout: [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft]
+            [dice.within(0.0, 4.0) as usize],
         ..ShutterSpec::default()
     };
     let speed_m_s = if dice.one_in(8.0) { 0.0 } else { dice.within(1.0, 80.0) };
@@ -140,7 +177,8 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
     let plan_ms = 1e3 * begin.elapsed().as_secs_f64();
     let mut phases = vec![0.0];
     if let Some(blur) = plan.blur {
-        // Begin, and the middles of two steps between nodes; exactly 0 would be mid-exposure, which is solved for itself.
+        // Begin, and the middles of two steps between nodes; exactly 0 would be mid-exposure, which is solved
+        // for itself.
         let steps = blur.solved() as f32 - 1.0;
         phases.push(-0.5);
         phases.extend([0.25, 0.75].map(|share| ((share * steps).floor() + 0.5) / steps - 0.5 + 1e-5));
@@ -149,8 +187,15 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
     for phase in phases {
         session.set_coords_phase(phase);
         let mut sink = |done: Finished| {
-            let errors = coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, f64::from(phase), 1)
-                .expect("coords were asked for");
+            let errors = coord_errors(
+                &oracle,
+                done.plan.frame,
+                &done.plan.ideal_view(),
+                &done.frame,
+                f64::from(phase),
+                1,
+            )
+            .expect("coords were asked for");
             if worst.is_none_or(|worst| errors.smooth.p99_px > worst.smooth.p99_px) {
                 worst = Some(errors);
             }
@@ -166,8 +211,11 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
 fn random_frames_stay_within_their_prediction() {
     let long = std::env::var_os("CAMSIM_LONG").is_some_and(|value| value == "1");
     let engine = engine();
-    let scenes =
-        [("plane", pattern(60_000.0), [40.0, 800.0]), ("hills", hills(), [150.0, 700.0]), ("buildings", buildings(), [60.0, 250.0])];
+    let scenes = [
+        ("plane", pattern(60_000.0), [40.0, 800.0]),
+        ("hills", hills(), [150.0, 700.0]),
+        ("buildings", buildings(), [60.0, 250.0]),
+    ];
     let (mut ratios, mut broken, mut empty, mut plan_ms) = (Vec::new(), Vec::new(), 0, 0.0);
     eprintln!(
         "{:>5} {:9} {:>5} {:13} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>5}",
@@ -224,12 +272,15 @@ fn random_frames_stay_within_their_prediction() {
 /// That what was measured is no more than the plan foretold.
 fn assert_predicted(case: &str, Found { plan, worst, .. }: &Found) {
     let (measured_px, predicted_px) = (worst.smooth.p99_px, plan.predicted.total_px);
-    eprintln!("{case}: {measured_px:.2e} px, predicted {predicted_px:.2e}; {:?} {:?}", plan.temporal, plan.blur);
+    eprintln!(
+        "{case}: {measured_px:.2e} px, predicted {predicted_px:.2e}; {:?} {:?}",
+        plan.temporal, plan.blur
+    );
     assert!(measured_px <= predicted_px, "{case}: {measured_px:.2e} px, predicted {predicted_px:.2e}");
 }
 
-/// Two whole periods of the mount within the exposure: at its middle and ends the camera looks the same way, and depth looked up there says nothing of what is
-/// between. Long readouts make every line another phase.
+/// Two whole periods of the mount within the exposure: at its middle and ends the camera looks the same way,
+/// and depth looked up there says nothing of what is between. Long readouts make every line another phase.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn what_happens_between_the_ends_of_an_exposure_is_predicted() {
@@ -239,33 +290,50 @@ fn what_happens_between_the_ends_of_an_exposure_is_predicted() {
         scenario.camera.size_px = [160, 120];
         scenario.camera.focal_px = [100.0, 100.0];
         scenario.camera.mount.angles_deg = [0.0, -75.0, 0.0];
-        scenario.camera.mount.vibration =
-            vec![VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.4, amplitude_m: 0.0, hz: 200.0, phase_deg: 0.0 }];
+        scenario.camera.mount.vibration = vec![VibrationSpec {
+            axis: Axis::Pitch,
+            amplitude_deg: 0.4,
+            amplitude_m: 0.0,
+            hz: 200.0,
+            phase_deg: 0.0,
+        }];
         scenario.camera.shutter = ShutterSpec { readout_ms, exposure_ms: 10.0, ..ShutterSpec::default() };
-        let sequence = sequence(scenario, steady(250.0, 0.0, DVec3::new(60.0, 20.0, 0.0), DVec3::new(0.0, 0.0, 0.2)), hills());
+        let sequence = sequence(
+            scenario,
+            steady(250.0, 0.0, DVec3::new(60.0, 20.0, 0.0), DVec3::new(0.0, 0.0, 0.2)),
+            hills(),
+        );
         assert_predicted(&format!("{readout_ms} ms readout"), &find(&engine, &sequence));
     }
 }
 
-/// A camera that moves far within the exposure: seen from its middle, where the ideal frame is taken, the depth matters least in the middle and at the ends of what a
-/// line between the depths of the ends tells, and most between them.
+/// A camera that moves far within the exposure: seen from its middle, where the ideal frame is taken, the
+/// depth matters least in the middle and at the ends of what a line between the depths of the ends tells, and
+/// most between them.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn long_exposures_are_predicted() {
     let engine = engine();
-    for (exposure_ms, readout_ms, max_error_px) in [(60.0, 0.0, 2e-3), (250.0, 5.0, 0.01), (1000.0, 0.0, 0.05), (1000.0, 0.0, 5e-3)] {
+    for (exposure_ms, readout_ms, max_error_px) in
+        [(60.0, 0.0, 2e-3), (250.0, 5.0, 0.01), (1000.0, 0.0, 0.05), (1000.0, 0.0, 5e-3)]
+    {
         let mut scenario = scenario();
         scenario.quality.max_error_px = max_error_px;
         scenario.camera.size_px = [160, 120];
         scenario.camera.focal_px = [120.0, 120.0];
         scenario.camera.mount.angles_deg = [0.0, -60.0, 0.0];
         scenario.camera.shutter = ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() };
-        let sequence = sequence(scenario, steady(400.0, 30.0, DVec3::new(40.0, 20.0, 0.0), DVec3::new(0.0, 0.02, 0.05)), hills());
+        let sequence = sequence(
+            scenario,
+            steady(400.0, 30.0, DVec3::new(40.0, 20.0, 0.0), DVec3::new(0.0, 0.02, 0.05)),
+            hills(),
+        );
         assert_predicted(&format!("{exposure_ms} ms exposure, {max_error_px} px"), &find(&engine, &sequence));
     }
 }
 
-/// At the border of a fisheye's picture a path bends more than the outermost of a few rays tell: where the probes find so, it gets more nodes.
+/// At the border of a fisheye's picture a path bends more than the outermost of a few rays tell: where the
+/// probes find so, it gets more nodes.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_path_that_is_missed_gets_more_nodes() {
@@ -276,11 +344,17 @@ fn a_path_that_is_missed_gets_more_nodes() {
         let camera = &mut scenario.camera;
         camera.size_px = [160, 120];
         camera.focal_px = [69.67, 69.62];
-        camera.lens =
-            LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.013_721_8, 0.020_727_4, -0.012_786_5, 0.002_524_2] };
+        camera.lens = LensSpec {
+            model: LensModel::KannalaBrandt,
+            coefficients: vec![-0.013_721_8, 0.020_727_4, -0.012_786_5, 0.002_524_2],
+        };
         camera.mount.angles_deg = [0.0, -60.0, 0.0];
         camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() };
-        let sequence = sequence(scenario, steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(1.0, 3.0, 1.0)), pattern(60_000.0));
+        let sequence = sequence(
+            scenario,
+            steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(1.0, 3.0, 1.0)),
+            pattern(60_000.0),
+        );
         let found = find(&engine, &sequence);
         assert_predicted(&format!("{max_error_px} px"), &found);
         assert!(found.plan.predicted.kept, "{max_error_px} px: {:?}", found.plan.predicted.in_the_way);
@@ -311,13 +385,23 @@ fn a_tolerance_buys_what_it_says() {
                 "{name:9} tolerance {tolerance_px:>5}: {:?}, smooth rms {:.1e} p99 {:.1e}, all rms {:.1e} max {:.1e}, predicted {:.1e}",
                 plan.temporal, smooth.rms_px, smooth.p99_px, all.rms_px, all.max_px, plan.predicted.total_px
             );
-            assert!(smooth.p99_px <= tolerance_px && smooth.rms_px <= tolerance_px, "{name} at {tolerance_px}");
-            // Between ground, walls and roofs depth has creases, where it is off by more between the ideal frame's pixels. They are too few to
-            // count in the percentile, but some probe may stand at one: the plan cannot be sure of the tighter tolerance, and says why.
+            assert!(
+                smooth.p99_px <= tolerance_px && smooth.rms_px <= tolerance_px,
+                "{name} at {tolerance_px}"
+            );
+            // Between ground, walls and roofs depth has creases, where it is off by more between the ideal
+            // frame's pixels. They are too few to count in the percentile, but some probe may stand at one:
+            // the plan cannot be sure of the tighter tolerance, and says why.
             let predicted = &plan.predicted;
             let sure = name != "buildings" || i == 0;
-            assert!(predicted.kept == sure && predicted.total_px < 5.0 * tolerance_px.max(smooth.p99_px), "{name} at {tolerance_px}");
-            assert_eq!(predicted.in_the_way.as_ref().map(|cause| cause.contains("depth between")), (!sure).then_some(true));
+            assert!(
+                predicted.kept == sure && predicted.total_px < 5.0 * tolerance_px.max(smooth.p99_px),
+                "{name} at {tolerance_px}"
+            );
+            assert_eq!(
+                predicted.in_the_way.as_ref().map(|cause| cause.contains("depth between")),
+                (!sure).then_some(true)
+            );
             if let TemporalStage::Reproject { iterations } = plan.temporal {
                 look_ups[i] += iterations;
             }

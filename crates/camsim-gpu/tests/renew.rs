@@ -1,4 +1,5 @@
-//! A session that goes on with other sequences gives the frames that a session of each one's own gives, to the last bit.
+//! A session that goes on with other sequences gives the frames that a session of each one's own gives, to
+//! the last bit.
 
 mod common;
 
@@ -42,9 +43,17 @@ fn steps() -> Vec<(&'static str, Sequence, &'static [Channel])> {
         ("the first", base.clone(), &COLOR),
         ("another lens", with(&|s| s.scenario.camera.lens.coefficients = vec![0.1, 0.0]), &COLOR),
         ("no lens", with(&|s| s.scenario.camera.lens = LensSpec::default()), &COLOR),
-        ("noise, so that the ideal frame stays", with(&|s| s.scenario.camera.photometric.noise_sigma = 0.1), &COLOR),
+        (
+            "noise, so that the ideal frame stays",
+            with(&|s| s.scenario.camera.photometric.noise_sigma = 0.1),
+            &COLOR,
+        ),
         ("a vignette", with(&|s| s.vignette = Some(Arc::new(vignette.clone()))), &COLOR),
-        ("smaller", with(&|s| (s.scenario.camera.size_px, s.scenario.camera.focal_px) = ([48, 36], [40.0, 40.0])), &COLOR),
+        (
+            "smaller",
+            with(&|s| (s.scenario.camera.size_px, s.scenario.camera.focal_px) = ([48, 36], [40.0, 40.0])),
+            &COLOR,
+        ),
         ("with truth", base.clone(), &TRUTH),
         ("another scene", other_scene, &TRUTH),
         ("the paper's methods", with(&|s| s.scenario.quality.preset = Preset::Paper), &COLOR),

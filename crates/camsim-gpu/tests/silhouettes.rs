@@ -1,4 +1,5 @@
-//! Pixels at silhouettes against rays cast in f64, each at its own instant: what share of a pixel's area and exposure each surface has.
+//! Pixels at silhouettes against rays cast in f64, each at its own instant: what share of a pixel's area and
+//! exposure each surface has.
 
 mod common;
 
@@ -28,7 +29,13 @@ const EAST: DVec3 = DVec3::new(0.0, 40.0, 0.0);
 const TURN: DVec3 = DVec3::new(0.2, -0.3, 0.5);
 
 /// Compares with 36 and with 4 samples a pixel, and prints what one would give. PSNR against full scale 1.
-fn check(name: &str, scenario: &Scenario, trajectory: &Trajectory, scene: &Scene, [at_least_db, four_at_least_db]: [f64; 2]) {
+fn check(
+    name: &str,
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    scene: &Scene,
+    [at_least_db, four_at_least_db]: [f64; 2],
+) {
     let engine = engine();
     let made = |max_error_dn: f64, silhouettes: Silhouettes| {
         let mut scenario = scenario.clone();
@@ -40,13 +47,21 @@ fn check(name: &str, scenario: &Scenario, trajectory: &Trajectory, scene: &Scene
     let (done, sequence) = made(0.5, Silhouettes::Rays);
     let expected = expected(&sequence, &done.plan);
     let psnr = |done: &Finished| linear_psnr(&done.frame, &expected);
-    let (found, four, one) = (psnr(&done), psnr(&made(COARSE_DN, Silhouettes::Rays).0), psnr(&made(COARSE_DN, Silhouettes::Plain).0));
+    let (found, four, one) = (
+        psnr(&done),
+        psnr(&made(COARSE_DN, Silhouettes::Rays).0),
+        psnr(&made(COARSE_DN, Silhouettes::Plain).0),
+    );
     let edges = done.plan.edges;
     eprintln!(
         "{name}: {found:.1} dB over {} pixels at silhouettes ({edges:?}); 4 samples a pixel {four:.1} dB, 1 sample {one:.1} dB",
         expected.len()
     );
-    assert!(matches!(edges, EdgeStage::Supersampled { .. }) && expected.len() > 500, "{name}: {edges:?} {}", expected.len());
+    assert!(
+        matches!(edges, EdgeStage::Supersampled { .. }) && expected.len() > 500,
+        "{name}: {edges:?} {}",
+        expected.len()
+    );
     assert!(found >= at_least_db && four >= four_at_least_db, "{name}: {found:.1} dB, {four:.1} dB");
 }
 
@@ -84,7 +99,8 @@ fn rays_at_silhouettes_agree_with_their_twin() {
     let (mut sum, mut differing, mut compared) = (0.0, 0, 0);
     for (i, _) in expected(&sequence, plan) {
         let [x, y] = [i as u32 % 120, i as u32 / 120];
-        let uv = (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px) / plan.camera.focal_px;
+        let uv =
+            (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px) / plan.camera.focal_px;
         let poses: Vec<_> = (0..nodes)
             .map(|node| {
                 let phase = f64::from(node) / f64::from(nodes - 1) - 0.5;
@@ -101,9 +117,14 @@ fn rays_at_silhouettes_agree_with_their_twin() {
         differing += u32::from(error > 1.5 / f64::from(samples));
     }
     let mean = sum / f64::from(compared);
-    eprintln!("twin: mean difference {mean:.1e}, {differing} of {compared} pixels differ by more than one ray");
+    eprintln!(
+        "twin: mean difference {mean:.1e}, {differing} of {compared} pixels differ by more than one ray"
+    );
     // In f32 a ray may round to the next sample; a pixel on the mark's border may be gathered plainly.
-    assert!(compared > 300 && mean < 2e-3 && differing * 50 < compared, "{mean:.1e}, {differing} of {compared}");
+    assert!(
+        compared > 300 && mean < 2e-3 && differing * 50 < compared,
+        "{mean:.1e}, {differing} of {compared}"
+    );
 }
 
 #[test]
@@ -121,13 +142,31 @@ fn a_straight_edge_of_full_contrast() {
 fn a_roof_under_a_moving_camera() {
     let mut scenario = camera();
     scenario.camera.shutter = rolling(0.0);
-    check("rolling shutter, translation", &scenario, &steady(120.0, 0.0, EAST, DVec3::ZERO), &black_ground_and_roof(), [43.5, 33.0]);
+    check(
+        "rolling shutter, translation",
+        &scenario,
+        &steady(120.0, 0.0, EAST, DVec3::ZERO),
+        &black_ground_and_roof(),
+        [43.5, 33.0],
+    );
     scenario.camera.shutter = rolling(15.0);
-    check("rolling shutter, blur", &scenario, &steady(120.0, 0.0, EAST, TURN), &black_ground_and_roof(), [41.0, 35.3]);
+    check(
+        "rolling shutter, blur",
+        &scenario,
+        &steady(120.0, 0.0, EAST, TURN),
+        &black_ground_and_roof(),
+        [41.0, 35.3],
+    );
     scenario.camera.lens = lens();
     let mut scene = pattern(600.0);
     scene.meshes.push(roof(60.0, 15.0));
-    check("rolling shutter, blur, lens, pattern", &scenario, &steady(120.0, 0.0, EAST, TURN), &scene, [45.5, 41.0]);
+    check(
+        "rolling shutter, blur, lens, pattern",
+        &scenario,
+        &steady(120.0, 0.0, EAST, TURN),
+        &scene,
+        [45.5, 41.0],
+    );
 }
 
 /// Ridges from west to east in front of the sky.
@@ -156,7 +195,9 @@ fn depths_of_ridges_before_ridges_and_sky_are_those_of_one_of_them() {
     scenario.camera.mount.angles_deg = [4.0, -12.0, 0.0];
     scenario.camera.shutter = rolling(10.0);
     let engine = engine();
-    for (name, velocity, turn) in [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)] {
+    for (name, velocity, turn) in
+        [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)]
+    {
         let sequence = sequence(scenario.clone(), steady(110.0, 0.0, velocity, turn), ridges());
         let done = render(&engine, &sequence, &[Channel::Depth], 0);
         let oracle = Oracle::new(sequence).expect("a usable camera");
@@ -186,7 +227,13 @@ fn ridges_before_ridges_and_sky() {
     check("ridges, still", &scenario, &steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), &ridges(), [48.0, 35.0]);
     scenario.camera.shutter = rolling(10.0);
     scenario.camera.lens = lens();
-    check("ridges, rolling shutter, blur, lens", &scenario, &steady(110.0, 0.0, EAST, TURN), &ridges(), [44.0, 35.4]);
+    check(
+        "ridges, rolling shutter, blur, lens",
+        &scenario,
+        &steady(110.0, 0.0, EAST, TURN),
+        &ridges(),
+        [44.0, 35.4],
+    );
 }
 
 #[test]
@@ -200,10 +247,15 @@ fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
     let engine = engine();
-    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    let mut session =
+        engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     let mut all = 0;
     let mut count = |done: Finished| {
-        assert!(matches!(done.plan.edges, EdgeStage::Supersampled { thin: false, .. }), "{:?}", done.plan.edges);
+        assert!(
+            matches!(done.plan.edges, EdgeStage::Supersampled { thin: false, .. }),
+            "{:?}",
+            done.plan.edges
+        );
         all = done.lod.triangles;
         Ok(())
     };
@@ -213,7 +265,8 @@ fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
     assert!(near > 0 && 2 * near < all, "{near} of {all}");
 }
 
-/// The marks that a frame's colour carries, against the twin's on the depth of the same frame: over tiles, workgroups and the frame's borders.
+/// The marks that a frame's colour carries, against the twin's on the depth of the same frame: over tiles,
+/// workgroups and the frame's borders.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn marks_are_their_twins() {
@@ -224,11 +277,13 @@ fn marks_are_their_twins() {
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
     let engine = engine();
-    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    let mut session =
+        engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
     let (ideal, color, inverse_depth) = session.read_ideal().expect("readable").expect("drawn");
     assert!(ideal.size_px.iter().all(|side| !side.is_multiple_of(16)), "{:?}", ideal.size_px);
-    let centres: Vec<_> = inverse_depth.iter().map(|&w| Centre { inverse_depth: f64::from(w), color: DVec3::ZERO }).collect();
+    let centres: Vec<_> =
+        inverse_depth.iter().map(|&w| Centre { inverse_depth: f64::from(w), color: DVec3::ZERO }).collect();
     let expected = marks(ideal.size_px, 1, &centres, &[]);
     let found = color.chunks_exact(4).map(|c| c[3] < 1.0);
     let (mut marked, mut differ) = (0, 0);
@@ -250,7 +305,8 @@ fn a_surface_that_fills_the_view_is_not_supersampled() {
     assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette supersampling"));
 }
 
-/// Where colours at silhouettes are left as they are depth and coordinates are not, and asking for these changes no colour.
+/// Where colours at silhouettes are left as they are depth and coordinates are not, and asking for these
+/// changes no colour.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn colours_do_not_depend_on_whether_truth_is_wanted() {
@@ -271,7 +327,10 @@ fn colours_do_not_depend_on_whether_truth_is_wanted() {
     let depth_m = both.frame.depth_m.as_ref().expect("depth");
     let [width, height] = both.frame.size_px;
     let differs = |&(x, y): &(u32, u32)| {
-        let expected_m = view.look([x, y], DVec2::ZERO, 0.0).and_then(|look| look.hit).map_or(f64::INFINITY, |hit| hit.depth_m);
+        let expected_m = view
+            .look([x, y], DVec2::ZERO, 0.0)
+            .and_then(|look| look.hit)
+            .map_or(f64::INFINITY, |hit| hit.depth_m);
         (f64::from(depth_m[(y * width + x) as usize]) / expected_m - 1.0).abs() > 1e-4
     };
     let wrong = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(differs).count();
@@ -286,14 +345,16 @@ fn resolved_depth_is_that_of_one_surface() {
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
     let engine = engine();
-    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    let mut session =
+        engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
     let (_, color, inverse_depth) = session.read_ideal().expect("readable").expect("drawn");
     // Level surfaces under a camera that looks straight down: 60 and 120 m, nothing in between.
     for w in &inverse_depth {
         assert!((w * 60.0 - 1.0).abs() < 1e-5 || (w * 120.0 - 1.0).abs() < 1e-5, "{w}");
     }
-    // Marked: a line of two or three pixels along the roof's border of 4 * 80 px, corners and the frame's own border apart.
+    // Marked: a line of two or three pixels along the roof's border of 4 * 80 px, corners and the frame's own
+    // border apart.
     let marked = color.chunks_exact(4).filter(|c| c[3] < 1.0).count();
     assert!((600..1500).contains(&marked), "{marked}");
 }
@@ -306,7 +367,8 @@ fn bytes_do_not_depend_on_the_order_of_frames() {
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
     let engine = engine();
     let all = |order: [u64; 4]| {
-        let mut session = engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
+        let mut session =
+            engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
         let mut frames = Vec::new();
         let mut sink = |done: Finished| {
             frames.push((done.frame.index, done.frame.color_rgba));
@@ -337,11 +399,16 @@ fn a_picture_may_have_a_single_pixel() {
     let moving = (EAST, TURN);
     let forced = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| (Auto::Value(solver), moving));
     let still = DVec3::ZERO;
-    let cases = [(Auto::Auto, (still, still)), (Auto::Auto, (still, TURN)), (Auto::Auto, moving)].into_iter().chain(forced);
+    let cases = [(Auto::Auto, (still, still)), (Auto::Auto, (still, TURN)), (Auto::Auto, moving)]
+        .into_iter()
+        .chain(forced);
     for size_px in [[1, 1], [1, 2], [2, 1], [3, 1]] {
         let mut listed = 0;
         let ways = [Silhouettes::Auto, Silhouettes::Rays];
-        let cases = cases.clone().flat_map(|case| [(case, 0.0), (case, 10.0)]).flat_map(|case| ways.map(|way| (case, way)));
+        let cases = cases
+            .clone()
+            .flat_map(|case| [(case, 0.0), (case, 10.0)])
+            .flat_map(|case| ways.map(|way| (case, way)));
         for (((solver, (velocity, rate)), exposure_ms), way) in cases {
             let mut scenario = tiny(size_px, exposure_ms, solver);
             scenario.quality.silhouettes = way;

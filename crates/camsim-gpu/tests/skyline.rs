@@ -49,7 +49,8 @@ fn rms_dn(found: &[f32], truth: &[f32]) -> f64 {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_skyline_is_where_it_is_from_an_ideal_frame_that_has_it_elsewhere() {
-    // At the first and the last line the wall is up to 1.3 px elsewhere in the ideal frame, and as much more with twice the speed.
+    // At the first and the last line the wall is up to 1.3 px elsewhere in the ideal frame, and as much more
+    // with twice the speed.
     for exposure_ms in [0.0, 6.0] {
         let made = |speed_m_s: f64, place: ReverseOn| {
             let sequence = flying_past(exposure_ms, speed_m_s);
@@ -62,7 +63,8 @@ fn a_skyline_is_where_it_is_from_an_ideal_frame_that_has_it_elsewhere() {
         for place in [ReverseOn::Host, ReverseOn::Device] {
             let [still, slow, fast] = [0.0, 30.0, 60.0].map(|speed_m_s| made(speed_m_s, place));
             eprintln!("{exposure_ms} ms, {place:?}: {still:.3}, {slow:.3}, {fast:.3}/255");
-            // What stays are stairs of the ideal frame's pixels, which a border aslant by the readout has more of; without the reach the twin leaves 4.6 times what it leaves with it (below).
+            // What stays are stairs of the ideal frame's pixels, which a border aslant by the readout has
+            // more of; without the reach the twin leaves 4.6 times what it leaves with it (below).
             assert!(still > 0.5 && slow < 1.4 * still && fast < 1.4 * still, "{still} {slow} {fast}");
         }
     }
@@ -76,7 +78,8 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
     for place in [ReverseOn::Host, ReverseOn::Device] {
         let mut engine = engine();
         engine.set_reverse_on(place);
-        let mut session = engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
+        let mut session =
+            engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
         let mut found = None;
         let mut keep = |finished| {
             found = Some(finished);
@@ -96,21 +99,26 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
             let key = KeyView { ideal: &ideal, depth: &depth, plane, sky_reach_px };
             let pose = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y));
             let (rotation, shift): (DMat3, DVec3) = pose.relative_to(&plan.keys[0].pose);
-            let uv = (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px) / plan.camera.focal_px;
+            let uv = (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px)
+                / plan.camera.focal_px;
             reproject(uv, (rotation, shift), iterations, &key).map(|source| source.at_px)
         };
         let (mut differ, mut squares) = (0, [0.0; 2]);
         for i in 0..SIZE_PX[0] * SIZE_PX[1] {
             let pixel = [i % SIZE_PX[0], i / SIZE_PX[0]];
-            let [with, without] = [plan.sky_reach_px, 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
+            let [with, without] =
+                [plan.sky_reach_px, 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
             let of = |at_px: DVec2| color.sample(at_px).x;
-            let [rendered, exact] = [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba[4 * i as usize]));
-            // Of a kernel that reads more sharply or more softly than the twin here: what is sky or wall all around is so for both.
+            let [rendered, exact] =
+                [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba[4 * i as usize]));
+            // Of a kernel that reads more sharply or more softly than the twin here: what is sky or wall all
+            // around is so for both.
             differ += u32::from((rendered - of(with)).abs() > 0.3);
             squares[0] += (of(with) - exact).powi(2);
             squares[1] += (of(without) - exact).powi(2);
         }
-        let [with, without] = squares.map(|squares: f64| 255.0 * (squares / f64::from(SIZE_PX[0] * SIZE_PX[1])).sqrt());
+        let [with, without] =
+            squares.map(|squares: f64| 255.0 * (squares / f64::from(SIZE_PX[0] * SIZE_PX[1])).sqrt());
         eprintln!("{place:?}: {differ} pixels differ; {with:.2}/255 with a reach, {without:.2} without");
         assert!(differ < 10, "{place:?}: {differ}");
         assert!(with < 0.5 * without, "{with} {without}");
@@ -120,21 +128,30 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
-    for (place, exposure_ms) in [(ReverseOn::Host, 0.0), (ReverseOn::Device, 0.0), (ReverseOn::Host, 6.0), (ReverseOn::Device, 6.0)] {
+    for (place, exposure_ms) in
+        [(ReverseOn::Host, 0.0), (ReverseOn::Device, 0.0), (ReverseOn::Host, 6.0), (ReverseOn::Device, 6.0)]
+    {
         let sequence = flying_past(exposure_ms, 60.0);
         let mut engine = engine();
         engine.set_reverse_on(place);
         let done = common::render(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0);
-        let options = RenderOptions { channels: vec![Channel::Coords, Channel::Depth], max_samples: 1, ..RenderOptions::default() };
+        let options = RenderOptions {
+            channels: vec![Channel::Coords, Channel::Depth],
+            max_samples: 1,
+            ..RenderOptions::default()
+        };
         let exact = Oracle::new(sequence.clone()).expect("oracle").render(0, &options);
-        let (exact_coords, exact_depth_m) = (exact.coords.expect("asked for"), exact.depth_m.expect("asked for"));
-        let (plan, coords, depth_m) = (&done.plan, done.frame.coords.expect("asked for"), done.frame.depth_m.expect("asked for"));
+        let (exact_coords, exact_depth_m) =
+            (exact.coords.expect("asked for"), exact.depth_m.expect("asked for"));
+        let (plan, coords, depth_m) =
+            (&done.plan, done.frame.coords.expect("asked for"), done.frame.depth_m.expect("asked for"));
         let mut sky = 0;
         for i in (0..SIZE_PX[0] * SIZE_PX[1]).filter(|&i| depth_m[i as usize] == 0.0) {
             let [x, y] = [i % SIZE_PX[0], i / SIZE_PX[0]];
             let of_pixel = coords[i as usize];
             let uv = DVec2::new(f64::from(of_pixel[0]), f64::from(of_pixel[1]));
-            let (rotation, _) = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y)).relative_to(&plan.key_pose);
+            let (rotation, _) =
+                sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y)).relative_to(&plan.key_pose);
             let exact = plan.ideal.px_from_point(rotation * uv.extend(1.0));
             let off_px = exact.distance(DVec2::new(f64::from(of_pixel[2]), f64::from(of_pixel[3])));
             // Single precision, of coordinates up to 500 px, and a path through few nodes.
@@ -145,7 +162,8 @@ fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
             assert!((way - pose.ned_from_camera * uv.extend(1.0).normalize()).length() < 1e-6, "{way}");
             let theirs = exact_coords[i as usize];
             assert!(
-                exact_depth_m[i as usize] > 0.0 || (0..8).filter(|k| ![2, 3].contains(k)).all(|k| (of_pixel[k] - theirs[k]).abs() < 2e-6),
+                exact_depth_m[i as usize] > 0.0
+                    || (0..8).filter(|k| ![2, 3].contains(k)).all(|k| (of_pixel[k] - theirs[k]).abs() < 2e-6),
                 "{of_pixel:?} {theirs:?}"
             );
             sky += 1;
@@ -162,6 +180,8 @@ fn nothing_goes_with_a_surface_where_panes_may_stand_before_the_sky() {
     let mut pane = wall();
     pane.meshes[0].material.blends = true;
     Arc::make_mut(&mut blended.scene).meshes.extend(pane.meshes);
-    let reach_px = |sequence: Arc<Sequence>| common::render(&engine(), &sequence, &[Channel::Color], 0).plan.sky_reach_px;
+    let reach_px = |sequence: Arc<Sequence>| {
+        common::render(&engine(), &sequence, &[Channel::Color], 0).plan.sky_reach_px
+    };
     assert_eq!([plain, Arc::new(blended)].map(reach_px), [2.0 * SKY_REACH_PX, 0.0]);
 }

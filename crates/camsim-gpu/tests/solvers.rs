@@ -1,4 +1,5 @@
-//! The constant-twist solvers of the paper on the device: against their twins, and their errors against rays cast into the scene.
+//! The constant-twist solvers of the paper on the device: against their twins, and their errors against rays
+//! cast into the scene.
 
 mod common;
 
@@ -6,7 +7,9 @@ use std::sync::Arc;
 
 use camsim_core::{
     reference::{CoordErrors, Oracle, coord_errors},
-    scenario::{Auto, Axis, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
+    scenario::{
+        Auto, Axis, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec,
+    },
     scene::{Scene, Terrain},
     sequence::Sequence,
     temporal::{
@@ -25,7 +28,8 @@ fn linear_and_rk2_agree_with_their_twins() {
     moving.camera.size_px = [160, 120];
     moving.camera.focal_px = [130.0, 130.0];
     moving.camera.mount = MountSpec { angles_deg: [8.0, -70.0, 15.0], ..MountSpec::default() };
-    moving.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
+    moving.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
     moving.camera.shutter = ShutterSpec { readout_ms: 200.0, exposure_ms: 20.0, ..ShutterSpec::default() };
     for solver in [Solver::Linear, Solver::Rk2] {
         moving.quality.solver = Auto::Value(solver);
@@ -59,7 +63,9 @@ fn linear_and_rk2_agree_with_their_twins() {
                 worst_px = worst_px.max(found.distance(ideal.px_from_point(moved.extend(1.0))));
                 compared += 1;
             }
-            eprintln!("{solver:?} at phase {phase}: {worst_px:.2e} px over {compared} pixels, up to {most_steps} steps");
+            eprintln!(
+                "{solver:?} at phase {phase}: {worst_px:.2e} px over {compared} pixels, up to {most_steps} steps"
+            );
             assert!(compared > 19_000 && most_steps >= 3, "{compared} {most_steps}");
             // f32 of coordinates up to 400 px: 3e-5 px a rounding.
             assert!(worst_px < 5e-4, "{worst_px:.2e}");
@@ -75,7 +81,10 @@ fn hills() -> Scene {
         30.0 * (x / 100.0).sin() * (y / 130.0).cos()
     };
     let heights: Vec<f64> = (0..SIDE * SIDE).map(height).collect();
-    Scene { terrain: Some(Terrain::from_heights(SIDE, SIDE, 30.0, &heights, None).expect("a grid")), ..Scene::default() }
+    Scene {
+        terrain: Some(Terrain::from_heights(SIDE, SIDE, 30.0, &heights, None).expect("a grid")),
+        ..Scene::default()
+    }
 }
 
 struct Case {
@@ -102,14 +111,21 @@ fn cases() -> Vec<Case> {
         scene,
         within_px,
     };
-    let vibration = VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.2, amplitude_m: 0.0, hz: 100.0, phase_deg: 0.0 };
+    let vibration =
+        VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.2, amplitude_m: 0.0, hz: 100.0, phase_deg: 0.0 };
     vec![
         // Straight down, the body's yaw axis is the optical axis.
         case("roll 120 deg/s", 300.0, still, DVec3::new(0.0, 0.0, 120.0), pattern(6000.0), [0.15, 2e-3]),
         case("pitch 120 deg/s", 300.0, still, DVec3::new(0.0, 120.0, 0.0), pattern(6000.0), [0.4, 4e-3]),
-        Case { pitch_deg: -60.0, ..case("plane 30 m/s", 150.0, DVec3::new(30.0, 0.0, 0.0), still, pattern(6000.0), [1e-3, 1e-3]) },
+        Case {
+            pitch_deg: -60.0,
+            ..case("plane 30 m/s", 150.0, DVec3::new(30.0, 0.0, 0.0), still, pattern(6000.0), [1e-3, 1e-3])
+        },
         case("terrain 100 m/s", 150.0, DVec3::new(100.0, 0.0, 0.0), still, hills(), [0.05, 0.05]),
-        Case { vibration: Some(vibration), ..case("vibration 100 Hz 0.2 deg", 300.0, still, still, hills(), [20.0, 20.0]) },
+        Case {
+            vibration: Some(vibration),
+            ..case("vibration 100 Hz 0.2 deg", 300.0, still, still, hills(), [20.0, 20.0])
+        },
     ]
 }
 
@@ -123,11 +139,16 @@ fn of_case(case: &Case, solver: Solver, iterations: Auto<u32>) -> Arc<Sequence> 
     scenario.quality.solver = Auto::Value(solver);
     scenario.quality.iterations = iterations;
     scenario.quality.max_terrain_error_px = 1e-6;
-    let rate = DVec3::new(case.rate_body_deg_s.x.to_radians(), case.rate_body_deg_s.y.to_radians(), case.rate_body_deg_s.z.to_radians());
+    let rate = DVec3::new(
+        case.rate_body_deg_s.x.to_radians(),
+        case.rate_body_deg_s.y.to_radians(),
+        case.rate_body_deg_s.z.to_radians(),
+    );
     sequence(scenario, steady(case.height_m, 20.0, case.velocity_ned_m_s, rate), case.scene.clone())
 }
 
-/// The ladder of solvers on this renderer, a quarter of 640x480 a side (errors in px scale with that): `cargo test -p camsim-gpu --test solvers -- --nocapture` prints it.
+/// The ladder of solvers on this renderer, a quarter of 640x480 a side (errors in px scale with that): `cargo
+/// test -p camsim-gpu --test solvers -- --nocapture` prints it.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn errors_against_rays_cast_into_the_scene() {
@@ -148,9 +169,14 @@ fn errors_against_rays_cast_into_the_scene() {
                 assert_eq!(done.plan.temporal, TemporalStage::Reproject { iterations });
             }
             let oracle = Oracle::new(sequence).expect("a camera");
-            let errors: CoordErrors = coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, 0.0, 1).expect("coords");
+            let errors: CoordErrors =
+                coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, 0.0, 1)
+                    .expect("coords");
             let all = errors.all;
-            eprintln!("{:26} {name:13} RMS {:.2e} p99 {:.2e} max {:.2e} px", case.name, all.rms_px, all.p99_px, all.max_px);
+            eprintln!(
+                "{:26} {name:13} RMS {:.2e} p99 {:.2e} max {:.2e} px",
+                case.name, all.rms_px, all.p99_px, all.max_px
+            );
             assert!(all.count > 19_000 && errors.missing == 0 && errors.falsely_valid == 0, "{errors:?}");
             rms_px.push(all.rms_px);
         }

@@ -1,5 +1,6 @@
-//! Adversarial motion and geometry: the source coordinates that the production shader wrote, against rays that meet a plane in closed form,
-//! each at its own instant in f64. The table of figures is in docs/accuracy/stress.md.
+//! Adversarial motion and geometry: the source coordinates that the production shader wrote, against rays
+//! that meet a plane in closed form, each at its own instant in f64. The table of figures is in
+//! docs/accuracy/stress.md.
 
 mod common;
 
@@ -28,9 +29,15 @@ struct Plane {
 
 const GROUND: Plane = Plane { at_ned_m: DVec3::ZERO, normal_ned: DVec3::Z, half_m: 3000.0 };
 
-/// Where the ray of a pixel at an exposure phase is seen from the key camera: on the plane, or infinitely far in the sky. `None` near the
-/// plane's border, where a bilinear depth tap meets both.
-fn closed_form(plan: &FramePlan, path: &CameraPath, plane: Plane, [x, y]: [u32; 2], phase: f64) -> Option<DVec2> {
+/// Where the ray of a pixel at an exposure phase is seen from the key camera: on the plane, or infinitely far
+/// in the sky. `None` near the plane's border, where a bilinear depth tap meets both.
+fn closed_form(
+    plan: &FramePlan,
+    path: &CameraPath,
+    plane: Plane,
+    [x, y]: [u32; 2],
+    phase: f64,
+) -> Option<DVec2> {
     let uv = plan.camera.unproject(DVec2::new(f64::from(x), f64::from(y)))?;
     let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + phase * plan.shutter.exposure_s();
     let pose = path.pose(t_s);
@@ -44,7 +51,8 @@ fn closed_form(plan: &FramePlan, path: &CameraPath, plane: Plane, [x, y]: [u32; 
     let hit = pose.position_ned_m + depth_m * ray_ned;
     let rim_m = 3.0 * depth_m / plan.ideal.focal_px.min_element();
     let reach_m = (hit - plane.at_ned_m).abs().max_element();
-    (reach_m < plane.half_m - rim_m).then(|| plan.ideal.px_from_point(key_from_ned * (hit - plan.key_pose.position_ned_m)))
+    (reach_m < plane.half_m - rim_m)
+        .then(|| plan.ideal.px_from_point(key_from_ned * (hit - plan.key_pose.position_ned_m)))
 }
 
 /// Errors over the phases begin, middle and end.
@@ -68,7 +76,9 @@ fn errors(sequence: &Arc<Sequence>, plane: Plane) -> (Errors, Finished) {
         let width = done.frame.size_px[0];
         for (i, found) in coords.iter().enumerate() {
             let pixel = [i as u32 % width, i as u32 / width];
-            let Some(exact) = closed_form(&done.plan, &sequence.path, plane, pixel, f64::from(phase)) else { continue };
+            let Some(exact) = closed_form(&done.plan, &sequence.path, plane, pixel, f64::from(phase)) else {
+                continue;
+            };
             if done.frame.color_rgba[4 * i + 3] == 0.0 {
                 missing += usize::from(done.plan.ideal.contains(exact));
                 continue;
@@ -102,7 +112,13 @@ fn check(name: &str, sequence: &Arc<Sequence>, plane: Plane, p99_px: f64) -> Fin
     let (found, done) = errors(sequence, plane);
     eprintln!(
         "{name}: rms {:.2e}, p99 {:.2e}, max {:.2e} px over {}, {} missing; {:?}, {:?}",
-        found.rms_px, found.p99_px, found.max_px, found.compared, found.missing, done.plan.temporal, done.plan.blur
+        found.rms_px,
+        found.p99_px,
+        found.max_px,
+        found.compared,
+        found.missing,
+        done.plan.temporal,
+        done.plan.blur
     );
     assert!(found.compared > 10_000, "{name}: {found:?}");
     assert_eq!(found.missing, 0, "{name}: {found:?}");
@@ -124,9 +140,11 @@ fn a_turn_of_36_degrees_in_one_window() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn vibration_of_200_hz_within_the_exposure() {
     let mut scenario = small(rolling(33.0, 5.0), -90.0);
-    let shake = |axis, phase_deg| VibrationSpec { axis, amplitude_deg: 0.1, amplitude_m: 0.0, hz: 200.0, phase_deg };
+    let shake =
+        |axis, phase_deg| VibrationSpec { axis, amplitude_deg: 0.1, amplitude_m: 0.0, hz: 200.0, phase_deg };
     scenario.camera.mount.vibration = vec![shake(Axis::Pitch, 10.0), shake(Axis::Roll, 80.0)];
-    let sequence = sequence(scenario, steady(150.0, 0.0, DVec3::new(0.0, 30.0, 0.0), DVec3::ZERO), pattern(6000.0));
+    let sequence =
+        sequence(scenario, steady(150.0, 0.0, DVec3::new(0.0, 30.0, 0.0), DVec3::ZERO), pattern(6000.0));
     let done = check("200 Hz vibration, 5 ms exposure", &sequence, GROUND, 0.05);
     // One whole period: its ends alone see nothing.
     assert!(done.plan.blur.is_some_and(|blur| blur.solved() >= 5), "{:?}", done.plan.blur);
@@ -139,7 +157,13 @@ fn wall(distance_m: f64) -> (Scene, Plane) {
     let h = half_m as f32;
     let vertices = vec![corner(-h, -h), corner(h, -h), corner(h, h), corner(-h, h)];
     let texture = pattern(1.0).meshes[0].material.texture.clone();
-    let mesh = Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(distance_m, 0.0, -500.0), Wrap::Clamp);
+    let mesh = Mesh::new(
+        vertices,
+        vec![0, 1, 2, 0, 2, 3],
+        texture,
+        DVec3::new(distance_m, 0.0, -500.0),
+        Wrap::Clamp,
+    );
     let plane = Plane { at_ned_m: mesh.origin_ned_m, normal_ned: DVec3::X, half_m };
     (Scene { meshes: vec![mesh], sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }, plane)
 }
@@ -193,7 +217,11 @@ fn far_from_the_origin_of_place_and_time() {
     let near_place = DVec3::ZERO;
     // 100 km north-east, whole metres and a fraction that f32 would lose (its step there is 8 mm).
     let far_place = DVec3::new(100_000.013, -99_999.257, -12.0);
-    for (name, place, at_s) in [("at the origin", near_place, 0.0), ("100 km away", far_place, 0.0), ("at t = 1e9 s", near_place, 1e9)] {
+    for (name, place, at_s) in [
+        ("at the origin", near_place, 0.0),
+        ("100 km away", far_place, 0.0),
+        ("at t = 1e9 s", near_place, 1e9),
+    ] {
         let mut scene = pattern(6000.0);
         scene.meshes[0].origin_ned_m = place;
         let mut sequence = sequence(small(rolling(33.0, 8.0), -90.0), moved(place, at_s), scene);
@@ -231,7 +259,11 @@ fn no_time_shift_is_the_identity() {
     // The delay is taken by the key's own instant.
     let mut scenario = sequence.scenario.clone();
     scenario.camera.shutter.delay_ms = 700.0;
-    let delayed = common::sequence(scenario, steady(60.0, 0.0, DVec3::new(80.0, 20.0, 3.0), DVec3::new(0.5, -0.7, 0.2)), pattern(6000.0));
+    let delayed = common::sequence(
+        scenario,
+        steady(60.0, 0.0, DVec3::new(80.0, 20.0, 3.0), DVec3::new(0.5, -0.7, 0.2)),
+        pattern(6000.0),
+    );
     let done = check("700 ms of delay", &delayed, GROUND, 1e-4);
     assert_eq!(done.plan.temporal, TemporalStage::Identity);
 }
@@ -239,11 +271,13 @@ fn no_time_shift_is_the_identity() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn what_is_behind_the_camera_stays_there() {
-    // A ground that ends behind the camera's image plane, and a camera that turns 60 deg in one window towards it.
+    // A ground that ends behind the camera's image plane, and a camera that turns 60 deg in one window
+    // towards it.
     let mut scene = pattern(6000.0);
     scene.meshes[0].origin_ned_m = DVec3::new(-3010.0, 0.0, 0.0);
     let plane = Plane { at_ned_m: scene.meshes[0].origin_ned_m, ..GROUND };
-    let turning = steady(30.0, 0.0, DVec3::new(5.0, 0.0, 0.0), DVec3::new(0.0, -60_f64.to_radians() / 0.3, 0.0));
+    let turning =
+        steady(30.0, 0.0, DVec3::new(5.0, 0.0, 0.0), DVec3::new(0.0, -60_f64.to_radians() / 0.3, 0.0));
     let sequence = sequence(small(rolling(300.0, 0.0), -30.0), turning, scene);
     check("ground behind the camera", &sequence, plane, 0.05);
 }

@@ -21,14 +21,24 @@ fn camera(readout: Readout, exposure_ms: f64, interlace_ms: f64) -> Scenario {
     scenario.camera.size_px = SIZE_PX;
     scenario.camera.focal_px = [150.0, 150.0];
     scenario.camera.mount = MountSpec { angles_deg: [3.0, -60.0, 10.0], ..MountSpec::default() };
-    scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
-    scenario.camera.shutter =
-        ShutterSpec { readout, readout_ms: 33.0, exposure_ms, interlace_ms: FieldOr::Ms(interlace_ms), ..ShutterSpec::default() };
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
+    scenario.camera.shutter = ShutterSpec {
+        readout,
+        readout_ms: 33.0,
+        exposure_ms,
+        interlace_ms: FieldOr::Ms(interlace_ms),
+        ..ShutterSpec::default()
+    };
     scenario.camera.photometric.noise_sigma = 0.02;
     scenario
 }
 
-fn frame(sequence: &Arc<Sequence>, channels: &[Channel], pixels_a_thread: u32) -> (RenderedFrame, PipelineKey) {
+fn frame(
+    sequence: &Arc<Sequence>,
+    channels: &[Channel],
+    pixels_a_thread: u32,
+) -> (RenderedFrame, PipelineKey) {
     let mut engine = engine();
     engine.set_pixels_a_thread(pixels_a_thread);
     // The host takes blocks of its own size.
@@ -56,14 +66,18 @@ fn any_number_of_pixels_a_thread_gives_the_same_bytes() {
         ("columns, truth", camera(Readout::RightToLeft, 0.0, 0.0), &all[..]),
     ];
     for (name, scenario, channels) in cases {
-        let sequence = sequence(scenario, steady(120.0, 10.0, DVec3::new(5.0, 30.0, 0.0), DVec3::ZERO), city(6));
+        let sequence =
+            sequence(scenario, steady(120.0, 10.0, DVec3::new(5.0, 30.0, 0.0), DVec3::ZERO), city(6));
         let (one, key) = frame(&sequence, channels, 1);
         assert!(key.holds_line(), "{name}: nothing to be shared in {key:?}");
         assert!(one.color_rgba.iter().any(|&value| value > 0.1), "{name}: a picture");
         for pixels in [3, 16, 1000] {
             let (several, _) = frame(&sequence, channels, pixels);
             assert!(one.color_rgba == several.color_rgba, "{name}: colours of {pixels} pixels a thread");
-            assert!((&one.coords, &one.depth_m) == (&several.coords, &several.depth_m), "{name}: truth of {pixels} pixels a thread");
+            assert!(
+                (&one.coords, &one.depth_m) == (&several.coords, &several.depth_m),
+                "{name}: truth of {pixels} pixels a thread"
+            );
         }
     }
 }

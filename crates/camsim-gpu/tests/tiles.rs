@@ -24,13 +24,18 @@ fn ground() -> Scene {
     };
     let rgba8 = (0..width * height).flat_map(|i| {
         let (fine, coarse) = (mix(i), mix((i % width / 40) * 7919 + i / width / 40));
-        [0, 8, 16].map(|shift| (((fine >> shift) & 255) / 2 + ((coarse >> shift) & 255) / 2) as u8).into_iter().chain([255])
+        [0, 8, 16]
+            .map(|shift| (((fine >> shift) & 255) / 2 + ((coarse >> shift) & 255) / 2) as u8)
+            .into_iter()
+            .chain([255])
     });
     let texture = Texture { size_px: [width, height], rgba8: rgba8.collect(), encoding: Encoding::Srgb };
     let (cols, rows) = (251, 181);
-    let heights: Vec<f64> =
-        (0..cols * rows).map(|i| 25.0 * (f64::from(i % cols) * 0.13).sin() * (f64::from(i / cols) * 0.09).cos()).collect();
-    let terrain = Terrain::from_heights(cols, rows, 10.0, &heights, Some(Arc::new(texture))).expect("a terrain");
+    let heights: Vec<f64> = (0..cols * rows)
+        .map(|i| 25.0 * (f64::from(i % cols) * 0.13).sin() * (f64::from(i / cols) * 0.09).cos())
+        .collect();
+    let terrain =
+        Terrain::from_heights(cols, rows, 10.0, &heights, Some(Arc::new(texture))).expect("a terrain");
     Scene { terrain: Some(terrain), sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }
 }
 
@@ -44,8 +49,13 @@ fn flight(ground: &Scene, max_error_dn: f64, pitch_deg: f64) -> Arc<Sequence> {
     sequence(scenario, steady(160.0, 20.0, DVec3::new(120.0, 90.0, -20.0), DVec3::ZERO), ground.clone())
 }
 
-/// Ideal frames with the picture whole (`None`) or in tiles, how they read it, and tiles on the device, of all.
-fn ideal_frames(sequence: &Arc<Sequence>, limit_px: Option<u32>, frames: &[u64]) -> (Vec<IdealImages>, SurfaceReads, Option<[usize; 2]>) {
+/// Ideal frames with the picture whole (`None`) or in tiles, how they read it, and tiles on the device, of
+/// all.
+fn ideal_frames(
+    sequence: &Arc<Sequence>,
+    limit_px: Option<u32>,
+    frames: &[u64],
+) -> (Vec<IdealImages>, SurfaceReads, Option<[usize; 2]>) {
     let mut engine = engine();
     // Tiles are the device's alone.
     engine.set_ideal_on_host(false);
@@ -72,7 +82,9 @@ fn tiles_show_what_one_texture_does() {
     let mut seen = Vec::new();
     // Straight down over so much ground that tiles make room for others, and for some of them again.
     let far: &[u64] = &[0, 6, 12, 16, 1];
-    for (max_error_dn, pitch_deg, frames) in [(16.0, -90.0, far), (0.05, -12.0, &[0, 6]), (0.6, -60.0, &[6]), (1.0, -45.0, &[6])] {
+    for (max_error_dn, pitch_deg, frames) in
+        [(16.0, -90.0, far), (0.05, -12.0, &[0, 6]), (0.6, -60.0, &[6]), (1.0, -45.0, &[6])]
+    {
         let sequence = flight(&ground, max_error_dn, pitch_deg);
         let (whole, reads, none) = ideal_frames(&sequence, None, frames);
         let (tiled, _, held) = ideal_frames(&sequence, Some(512), frames);
@@ -90,8 +102,9 @@ fn tiles_show_what_one_texture_does() {
                 255.0 * largest,
                 255.0 * mean
             );
-            // Half floats below 1 are up to 0.12/255 apart. Where texels are weighed with 8 bits, a read of black beside white is off by 1/255 at most (2^-9 of it along
-            // each axis), and the same place of a tile is not rounded as that of the whole.
+            // Half floats below 1 are up to 0.12/255 apart. Where texels are weighed with 8 bits, a read of
+            // black beside white is off by 1/255 at most (2^-9 of it along each axis), and the same place of
+            // a tile is not rounded as that of the whole.
             let [most, most_mean] = if is_software(&engine()) { [0.26, 0.002] } else { [2.0, 0.1] };
             assert!(255.0 * largest < most && 255.0 * mean < most_mean, "{largest} {mean}");
         }

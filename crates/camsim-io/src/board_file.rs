@@ -41,8 +41,10 @@ pub enum BoardFileError {
 pub fn read_board(spec: &BoardSpec) -> Result<Board, BoardFileError> {
     let Some(path) = &spec.target else { return Ok(Board::from_spec(spec)?) };
     let target = read_target(path)?;
-    let merged = BoardSpec { diameter_m: spec.diameter_m, first_id: spec.first_id, margin_m: spec.margin_m, ..target };
-    Board::from_spec(&merged).map_err(|error| BoardFileError::Target { path: path.clone(), message: error.to_string() })
+    let merged =
+        BoardSpec { diameter_m: spec.diameter_m, first_id: spec.first_id, margin_m: spec.margin_m, ..target };
+    Board::from_spec(&merged)
+        .map_err(|error| BoardFileError::Target { path: path.clone(), message: error.to_string() })
 }
 
 /// Kalibr's description of a target: `target_type` and what belongs to it.
@@ -50,7 +52,8 @@ pub fn read_board(spec: &BoardSpec) -> Result<Board, BoardFileError> {
 /// # Errors
 /// As [`read_board`].
 pub fn read_target(path: &Path) -> Result<BoardSpec, BoardFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| BoardFileError::Read { path: path.into(), source })?;
+    let text =
+        std::fs::read_to_string(path).map_err(|source| BoardFileError::Read { path: path.into(), source })?;
     let wrong = |message: String| BoardFileError::Target { path: path.into(), message };
     let document = Document::parse(&text).map_err(|problem| wrong(problem.message))?;
     parse(&document.value).map_err(|problem| wrong(format!("{} {}", problem.key, problem.message)))
@@ -69,7 +72,11 @@ fn parse(value: &Value) -> Result<BoardSpec, Problem> {
     let count = |key: &str| {
         let n = number(value, key)?;
         let whole = n.fract() == 0.0 && (1.0..=1e4).contains(&n);
-        if whole { Ok(Some(n as u32)) } else { Err(Problem::new(key, format!("is {n}, not a number of squares, circles or tags"))) }
+        if whole {
+            Ok(Some(n as u32))
+        } else {
+            Err(Problem::new(key, format!("is {n}, not a number of squares, circles or tags")))
+        }
     };
     let in_metres = |key: &str, size: f64| {
         let fix = "targets of Kalibr's are in metres: if these are millimetres divide them by 1000; a board as large is described with scene.board's own keys";
@@ -83,7 +90,10 @@ fn parse(value: &Value) -> Result<BoardSpec, Problem> {
         None => return Err(Problem::new("target_type", "is missing: this is no target of Kalibr's")),
     };
     let Some((_, keys)) = KEYS.iter().find(|(known, _)| *known == kind) else {
-        return Err(Problem::new("target_type", format!("is `{kind}`: `aprilgrid`, `checkerboard` and `circlegrid` are known")));
+        return Err(Problem::new(
+            "target_type",
+            format!("is `{kind}`: `aprilgrid`, `checkerboard` and `circlegrid` are known"),
+        ));
     };
     let known = |key: &str| key == "target_type" || keys.contains(&key);
     if let Some(key) = value.as_object().and_then(|map| map.keys().find(|key| !known(key))) {
@@ -107,7 +117,9 @@ fn parse(value: &Value) -> Result<BoardSpec, Problem> {
             columns: count("targetCols")?,
             rows: count("targetRows")?,
             size_m: Some(metres("colSpacingMeters")?),
-            row_size_m: optional_number(value, "rowSpacingMeters")?.map(|size| in_metres("rowSpacingMeters", size)).transpose()?,
+            row_size_m: optional_number(value, "rowSpacingMeters")?
+                .map(|size| in_metres("rowSpacingMeters", size))
+                .transpose()?,
             ..BoardSpec::default()
         }),
         _ => Ok(BoardSpec {
@@ -140,7 +152,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("target.yaml");
         std::fs::write(&path, text).unwrap();
-        read_board(&BoardSpec { target: Some(path), ..BoardSpec::default() }).map_err(|error| error.to_string())
+        read_board(&BoardSpec { target: Some(path), ..BoardSpec::default() })
+            .map_err(|error| error.to_string())
     }
 
     #[test]
@@ -184,7 +197,10 @@ mod tests {
             ("target_type: 'dots'\n", "target_type is `dots`"),
             ("target_type: 'aprilgrid'\ntagRows: 6\n", "tagCols is missing"),
             ("target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\n", "tagCols is 6.5"),
-            ("target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 600\ntagSize: 1\ntagSpacing: 0.3\n", "rows is 600"),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 600\ntagSize: 1\ntagSpacing: 0.3\n",
+                "rows is 600",
+            ),
             ("target_type: [", "target.yaml"),
             (
                 "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 88\ntagSpacing: 0.3\n",

@@ -1,4 +1,5 @@
-//! The flight that ships inside the program: log, terrain, picture, camera, scenario (see `assets/README.md` for their licences).
+//! The flight that ships inside the program: log, terrain, picture, camera, scenario (see `assets/README.md`
+//! for their licences).
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,8 @@ embedded![
     "vignette.png",
 ];
 
-/// Writes the built-in scene to a folder (files that are there already with the same content stay) and gives the path of `demo.toml`.
+/// Writes the built-in scene to a folder (files that are there already with the same content stay) and gives
+/// the path of `demo.toml`.
 ///
 /// # Errors
 /// [`WriteError`] names the file.

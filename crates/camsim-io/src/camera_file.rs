@@ -1,8 +1,9 @@
 //! Camera files: CAMERA.toml, and the calibration files of other programs.
 //!
-//! An importer is one file here: it takes its part of a [`Document`] and gives an [`ImportedCamera`], or says what it cannot take over. What
-//! a camera here cannot express (skew, thin-prism terms, other lens models) is an error, never left out. Its table of keys says what becomes
-//! of each; a number that no table knows is named in a note.
+//! An importer is one file here: it takes its part of a [`Document`] and gives an [`ImportedCamera`], or says
+//! what it cannot take over. What a camera here cannot express (skew, thin-prism terms, other lens models) is
+//! an error, never left out. Its table of keys says what becomes of each; a number that no table knows is
+//! named in a note.
 
 use std::path::{Path, PathBuf};
 
@@ -95,7 +96,8 @@ pub struct ImportedCamera {
     pub notes: Vec<String>,
 }
 
-/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Paths in it are resolved against its folder.
+/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Paths in it are resolved against its
+/// folder.
 pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     let text = read(path)?;
     let mut spec: CameraSpec = toml::from_str(&text).map_err(|error| CameraFileError::Syntax {
@@ -111,18 +113,23 @@ pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     Ok(spec)
 }
 
-/// Imports another program's calibration, whose format its content tells; see [`import_camera_as`] for the notes.
+/// Imports another program's calibration, whose format its content tells; see [`import_camera_as`] for the
+/// notes.
 pub fn import_camera(path: &Path) -> Result<CameraSpec, CameraFileError> {
     import_camera_as(path, None).map(|imported| imported.spec)
 }
 
-/// Imports another program's calibration, in a given format or in the one that its content tells. A file of several cameras is refused; see
-/// [`import_camera_named`].
-pub fn import_camera_as(path: &Path, format: Option<CameraFormat>) -> Result<ImportedCamera, CameraFileError> {
+/// Imports another program's calibration, in a given format or in the one that its content tells. A file of
+/// several cameras is refused; see [`import_camera_named`].
+pub fn import_camera_as(
+    path: &Path,
+    format: Option<CameraFormat>,
+) -> Result<ImportedCamera, CameraFileError> {
     import_camera_named(path, format, None)
 }
 
-/// Names of the cameras in a file, by which [`import_camera_named`] finds them; one empty name if the file has one camera and no name for it.
+/// Names of the cameras in a file, by which [`import_camera_named`] finds them; one empty name if the file
+/// has one camera and no name for it.
 pub fn camera_names(path: &Path, format: Option<CameraFormat>) -> Result<Vec<String>, CameraFileError> {
     let (document, format) = open(path, format)?;
     let entries = format.entries(&document).map_err(|problem| at_key(path, problem))?;
@@ -130,7 +137,11 @@ pub fn camera_names(path: &Path, format: Option<CameraFormat>) -> Result<Vec<Str
 }
 
 /// As [`import_camera_as`], out of several cameras the one of that name.
-pub fn import_camera_named(path: &Path, format: Option<CameraFormat>, camera: Option<&str>) -> Result<ImportedCamera, CameraFileError> {
+pub fn import_camera_named(
+    path: &Path,
+    format: Option<CameraFormat>,
+    camera: Option<&str>,
+) -> Result<ImportedCamera, CameraFileError> {
     let asked = format.is_some();
     let (document, format) = open(path, format)?;
     let at_key = |problem| at_key(path, problem);
@@ -160,15 +171,22 @@ fn at_key(path: &Path, problem: Problem) -> CameraFileError {
     CameraFileError::Key { path: path.to_owned(), key: problem.key, message: problem.message }
 }
 
-fn import(document: &Document, format: CameraFormat, asked: bool, camera: Option<&str>) -> Result<ImportedCamera, Problem> {
+fn import(
+    document: &Document,
+    format: CameraFormat,
+    asked: bool,
+    camera: Option<&str>,
+) -> Result<ImportedCamera, Problem> {
     let entries = format.entries(document)?;
     let entry = &entries[choose::choose(&entries, camera)?];
     let parts = format.parts(document, &entries, entry);
     for part in &parts {
         keys::refuse(part.keys, &part.leaves)?;
     }
-    let mut imported = format.import(document, entry, asked).map_err(|problem| entry.placed(document, problem))?;
-    let mut done = if format == CameraFormat::Reference { Vec::new() } else { times::apply(&parts, &mut imported)? };
+    let mut imported =
+        format.import(document, entry, asked).map_err(|problem| entry.placed(document, problem))?;
+    let mut done =
+        if format == CameraFormat::Reference { Vec::new() } else { times::apply(&parts, &mut imported)? };
     done.extend(entry.roots.iter().cloned());
     for part in &parts {
         imported.notes.extend(keys::left_out(part.keys, &part.leaves, &done));
@@ -176,7 +194,8 @@ fn import(document: &Document, format: CameraFormat, asked: bool, camera: Option
     Ok(imported)
 }
 
-/// A CAMERA.toml needs no import; binary files of programs whose text is known get a word on how to convert them.
+/// A CAMERA.toml needs no import; binary files of programs whose text is known get a word on how to convert
+/// them.
 fn refuse_own_files(path: &Path) -> Result<(), CameraFileError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     let what = match ending.as_str() {
@@ -184,7 +203,9 @@ fn refuse_own_files(path: &Path) -> Result<(), CameraFileError> {
             read_camera_toml(path)?;
             "this is a CAMERA.toml, and a good one: give it to a scenario as it is"
         }
-        "bin" => "this is binary; of COLMAP, run `colmap model_converter --output_type TXT` and import cameras.txt",
+        "bin" => {
+            "this is binary; of COLMAP, run `colmap model_converter --output_type TXT` and import cameras.txt"
+        }
         _ => return Ok(()),
     };
     Err(CameraFileError::Syntax { path: path.to_owned(), line: None, message: what.to_owned() })
@@ -192,13 +213,20 @@ fn refuse_own_files(path: &Path) -> Result<(), CameraFileError> {
 
 /// The one format whose marks the document bears.
 fn detect(document: &Document) -> Result<CameraFormat, String> {
-    let fitting: Vec<CameraFormat> = CameraFormat::ALL.into_iter().filter(|format| format.fits(document)).collect();
+    let fitting: Vec<CameraFormat> =
+        CameraFormat::ALL.into_iter().filter(|format| format.fits(document)).collect();
     match fitting[..] {
         [format] => Ok(format),
-        [] => Err(format::hint(document).unwrap_or_else(|| "this is no camera file that is known here".to_owned())),
+        [] => {
+            Err(format::hint(document)
+                .unwrap_or_else(|| "this is no camera file that is known here".to_owned()))
+        }
         _ => {
             let names: Vec<&str> = fitting.iter().map(|format| format.name()).collect();
-            Err(format!("the content fits several formats ({}): name the one that is meant with `--format`", names.join(", ")))
+            Err(format!(
+                "the content fits several formats ({}): name the one that is meant with `--format`",
+                names.join(", ")
+            ))
         }
     }
 }
@@ -215,7 +243,9 @@ fn doubts(spec: &CameraSpec) -> Result<Vec<String>, Problem> {
     }
     let mut notes = Vec::new();
     if fx > 0.0 && fy > 0.0 && !(0.5..=2.0).contains(&(fx / fy)) {
-        notes.push(format!("the focal lengths {fx} and {fy} px differ by more than a factor of two: are they right?"));
+        notes.push(format!(
+            "the focal lengths {fx} and {fy} px differ by more than a factor of two: are they right?"
+        ));
     }
     if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
         let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
@@ -270,7 +300,8 @@ fn check(path: &Path, spec: &CameraSpec) -> Result<(), CameraFileError> {
 }
 
 fn read(path: &Path) -> Result<String, CameraFileError> {
-    let bytes = std::fs::read(path).map_err(|source| CameraFileError::Read { path: path.to_owned(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| CameraFileError::Read { path: path.to_owned(), source })?;
     let text = String::from_utf8(bytes).map_err(|_| CameraFileError::Syntax {
         path: path.to_owned(),
         line: None,
@@ -311,7 +342,12 @@ fn camera(
     let used = coefficients.iter().rposition(|k| *k != 0.0).map_or(0, |last| last + 1);
     // Three would be k1, k2 and p1, but could be taken for k1, k2 and k3.
     coefficients.truncate(if used == 3 && model == LensModel::BrownConrady { 4 } else { used });
-    let mut spec = CameraSpec { size_px, focal_px, principal_point_px: Some(principal_point_px), ..CameraSpec::default() };
+    let mut spec = CameraSpec {
+        size_px,
+        focal_px,
+        principal_point_px: Some(principal_point_px),
+        ..CameraSpec::default()
+    };
     // A Kannala-Brandt lens without coefficients is an equidistant fisheye, not a pinhole.
     spec.lens.model = if used == 0 && model == LensModel::BrownConrady { LensModel::Pinhole } else { model };
     spec.lens.coefficients = coefficients;

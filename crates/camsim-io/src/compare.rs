@@ -1,6 +1,7 @@
 //! Two pictures or two folders of pictures, compared (`camsim compare`).
 //!
-//! Values are compared as stored, a code range being 0..=1: so EXR with EXR (linear) and PNG with PNG (as encoded), never one with the other.
+//! Values are compared as stored, a code range being 0..=1: so EXR with EXR (linear) and PNG with PNG (as
+//! encoded), never one with the other.
 
 use std::{
     collections::BTreeSet,
@@ -74,7 +75,14 @@ pub struct Figures {
 impl From<&Comparison> for Figures {
     fn from(c: &Comparison) -> Self {
         let psnr_db = Some(c.psnr_db()).filter(|psnr| psnr.is_finite());
-        Self { rmse: c.rmse, max: c.max, psnr_db, ssim: c.ssim, differing: c.differing, non_finite: c.non_finite }
+        Self {
+            rmse: c.rmse,
+            max: c.max,
+            psnr_db,
+            ssim: c.ssim,
+            differing: c.differing,
+            non_finite: c.non_finite,
+        }
     }
 }
 
@@ -116,9 +124,17 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
         // What is not there is said to be missing before it is said to be no folder.
         _ if !a.exists() || !b.exists() => {
             let missing = if a.exists() { b } else { a };
-            Err(CompareError::Kind { a: a.into(), b: b.into(), message: format!("{} does not exist", missing.display()) })
+            Err(CompareError::Kind {
+                a: a.into(),
+                b: b.into(),
+                message: format!("{} does not exist", missing.display()),
+            })
         }
-        _ => Err(CompareError::Kind { a: a.into(), b: b.into(), message: "one is a folder; give two files or two folders".into() }),
+        _ => Err(CompareError::Kind {
+            a: a.into(),
+            b: b.into(),
+            message: "one is a folder; give two files or two folders".into(),
+        }),
     }
 }
 
@@ -132,14 +148,16 @@ fn compare_folders(a: &Path, b: &Path) -> Result<Report, CompareError> {
         files.push(FileFigures { file: name.clone(), figures: (&comparison).into() });
         all.push(comparison);
     }
-    let total = Comparison::pooled(&all).ok_or_else(|| CompareError::NothingInCommon { a: a.into(), b: b.into() })?;
+    let total =
+        Comparison::pooled(&all).ok_or_else(|| CompareError::NothingInCommon { a: a.into(), b: b.into() })?;
     let only = |one: &BTreeSet<String>, other: &BTreeSet<String>| one.difference(other).cloned().collect();
     Ok(Report { total: (&total).into(), files, only_in_a: only(&in_a, &in_b), only_in_b: only(&in_b, &in_a) })
 }
 
 fn pictures_below(root: &Path, below: &str, names: &mut BTreeSet<String>) -> Result<(), CompareError> {
     let folder = root.join(below);
-    let fail = |error: std::io::Error| CompareError::Read { path: folder.clone(), message: error.to_string() };
+    let fail =
+        |error: std::io::Error| CompareError::Read { path: folder.clone(), message: error.to_string() };
     for entry in fs::read_dir(&folder).map_err(fail)? {
         let entry = entry.map_err(fail)?;
         let file = entry.file_name().to_string_lossy().into_owned();
@@ -178,10 +196,18 @@ fn compare_files(a: &Path, b: &Path) -> Result<Comparison, CompareError> {
         return Err(differ("one is linear EXR, the other encoded PNG; compare files of one format".into()));
     }
     if one.channels != other.channels {
-        return Err(differ(format!("channels {} against {}", one.channels.join(" "), other.channels.join(" "))));
+        return Err(differ(format!(
+            "channels {} against {}",
+            one.channels.join(" "),
+            other.channels.join(" ")
+        )));
     }
     let alpha = one.channels.iter().position(|name| name == "A");
-    metrics::compare(one.view(alpha), other.view(alpha)).map_err(|source| CompareError::Metric { a: a.into(), b: b.into(), source })
+    metrics::compare(one.view(alpha), other.view(alpha)).map_err(|source| CompareError::Metric {
+        a: a.into(),
+        b: b.into(),
+        source,
+    })
 }
 
 fn read(path: &Path) -> Result<Picture, CompareError> {
@@ -197,9 +223,15 @@ fn read(path: &Path) -> Result<Picture, CompareError> {
 /// Channels in the order R G B A, others after them by name: luminance needs the first three.
 fn read_exr(path: &Path) -> Result<Picture, String> {
     let layer = read_first_flat_layer_from_file(path).map_err(|error| error.to_string())?.layer_data;
-    let mut planes: Vec<(String, Vec<f32>)> =
-        layer.channel_data.list.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect())).collect();
-    planes.sort_by_key(|(name, _)| (["R", "G", "B", "A"].iter().position(|n| n == name).unwrap_or(4), name.clone()));
+    let mut planes: Vec<(String, Vec<f32>)> = layer
+        .channel_data
+        .list
+        .iter()
+        .map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect()))
+        .collect();
+    planes.sort_by_key(|(name, _)| {
+        (["R", "G", "B", "A"].iter().position(|n| n == name).unwrap_or(4), name.clone())
+    });
     let pixels = layer.size.0 * layer.size.1;
     if planes.iter().any(|(_, plane)| plane.len() != pixels) {
         return Err("it has subsampled channels".into());
@@ -243,7 +275,9 @@ mod tests {
         let writer = FrameWriter::new(FrameFiles::new(folder, &spec, OutputEncoding::Linear8), 1);
         for index in 0..frames {
             let color_rgba = (0..width * 12).flat_map(|_| [value, value, value, 1.0]).collect();
-            writer.write(RenderedFrame { index, size_px: [width, 12], color_rgba, ..RenderedFrame::default() }).unwrap();
+            writer
+                .write(RenderedFrame { index, size_px: [width, 12], color_rgba, ..RenderedFrame::default() })
+                .unwrap();
         }
         writer.finish().unwrap();
     }
@@ -257,7 +291,10 @@ mod tests {
         render(&c, 0.5, 1, 17);
 
         let equal = compare_paths(&a, &a).unwrap();
-        assert_eq!((equal.total.rmse, equal.total.psnr_db, equal.total.differing, equal.files.len()), (0.0, None, 0.0, 6));
+        assert_eq!(
+            (equal.total.rmse, equal.total.psnr_db, equal.total.differing, equal.files.len()),
+            (0.0, None, 0.0, 6)
+        );
         let json: serde_json::Value = serde_json::to_value(&equal).unwrap();
         for key in ["rmse", "max", "psnr_db", "ssim", "differing"] {
             assert!(json.get(key).is_some(), "{key}");
@@ -265,7 +302,10 @@ mod tests {
 
         let report = compare_paths(&a, &b).unwrap();
         assert_eq!((report.files.len(), report.only_in_a.len(), report.only_in_b.len()), (4, 2, 0));
-        assert_eq!((report.files[0].file.as_str(), report.files[0].figures.rmse), ("color/frame_000000.exr", 0.25));
+        assert_eq!(
+            (report.files[0].file.as_str(), report.files[0].figures.rmse),
+            ("color/frame_000000.exr", 0.25)
+        );
         assert_eq!(report.total.differing, 1.0);
 
         let (exr, png) = ("color/frame_000000.exr", "color/frame_000000.png");
@@ -282,6 +322,11 @@ mod tests {
             assert!(error.contains(expected), "{error}");
         }
         fs::write(a.join("broken.exr"), b"not an exr").unwrap();
-        assert!(compare_paths(&a.join("broken.exr"), &a.join(exr)).unwrap_err().to_string().contains("broken.exr"));
+        assert!(
+            compare_paths(&a.join("broken.exr"), &a.join(exr))
+                .unwrap_err()
+                .to_string()
+                .contains("broken.exr")
+        );
     }
 }

@@ -8,23 +8,29 @@
 //! | `tum` | t s, x, y, z, qx, qy, qz, qw | see below |
 //! | `euroc` | t ns, x, y, z, qw, qx, qy, qz | see below; a first column with a decimal point is seconds |
 //!
-//! Further columns are ignored; the CSV formats may end after the position (then `flight.attitude = "track"` is needed). A header line, also
-//! as a comment, names the columns in any order and takes precedence over the table; it may name units, which are converted (`names`, `units`).
-//! Separators are commas, semicolons (then decimals may have commas), tabs or blanks; fields may stand in quotes; `#` and `%` begin comments; BOM and
-//! CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only columns that are used must be numbers.
+//! Further columns are ignored; the CSV formats may end after the position (then `flight.attitude = "track"`
+//! is needed). A header line, also as a comment, names the columns in any order and takes precedence over the
+//! table; it may name units, which are converted (`names`, `units`). Separators are commas, semicolons (then
+//! decimals may have commas), tabs or blanks; fields may stand in quotes; `#` and `%` begin comments; BOM and
+//! CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only columns
+//! that are used must be numbers.
 //!
-//! GPX files are read too (`gpx`), other kinds of files named with what converts them (`sniff`). What is open to doubt is refused, or taken and said in
-//! the log's notes: units that are named nowhere (`resolve`), clocks that begin again (`clock`), tables merged from several streams (`sparse`).
-//! docs/inputs/LOGS.md lists all names and units; it is made from the tables in here.
+//! GPX files are read too (`gpx`), other kinds of files named with what converts them (`sniff`). What is open
+//! to doubt is refused, or taken and said in the log's notes: units that are named nowhere (`resolve`),
+//! clocks that begin again (`clock`), tables merged from several streams (`sparse`). docs/inputs/LOGS.md
+//! lists all names and units; it is made from the tables in here.
 //!
-//! **TUM and EuRoC** worlds have z up: x is taken as east, y as north. Their quaternions (Hamilton, world from body) belong to a body with x
-//! forward, y left, z up (FLU, as in ROS); it becomes FRD. If the poses are those of a sensor with other axes, the mount makes up for it.
-//! The JPL quaternion of rotation "global to body" has the same numbers as the Hamilton "body to global", so `open_vins` texts read right.
+//! **TUM and EuRoC** worlds have z up: x is taken as east, y as north. Their quaternions (Hamilton, world
+//! from body) belong to a body with x forward, y left, z up (FLU, as in ROS); it becomes FRD. If the poses
+//! are those of a sensor with other axes, the mount makes up for it. The JPL quaternion of rotation "global
+//! to body" has the same numbers as the Hamilton "body to global", so `open_vins` texts read right.
 
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    flight_log::{FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow},
+    flight_log::{
+        FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
+    },
     geodesy::Geodetic,
     scenario::{FlightSpec, LogFormat},
 };
@@ -218,19 +224,31 @@ const JUMP_M_S: f64 = 1000.0;
 
 /// Reads and cleans the log at `path` (which replaces `spec.log`: the caller has resolved it) as `spec` says.
 ///
-/// `height` is the caller's decision, because it depends on the terrain's datum too: no conversion where both agree.
+/// `height` is the caller's decision, because it depends on the terrain's datum too: no conversion where both
+/// agree.
 ///
 /// # Errors
 /// [`FlightLogError`] names the file, the line and the column or key, and what to do.
-pub fn read_flight_log(path: &Path, spec: &FlightSpec, height: HeightConversion) -> Result<FlightLog, FlightLogError> {
+pub fn read_flight_log(
+    path: &Path,
+    spec: &FlightSpec,
+    height: HeightConversion,
+) -> Result<FlightLog, FlightLogError> {
     let raw = read_raw_rows(path, spec)?;
     let options = LogOptions::from_spec(spec, height);
     let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|source| {
         // A header may have something like an attitude.
-        let of_attitude: Vec<&str> =
-            raw.notes.iter().filter(|note| note.text.contains("attitude")).map(|note| note.text.as_str()).collect();
+        let of_attitude: Vec<&str> = raw
+            .notes
+            .iter()
+            .filter(|note| note.text.contains("attitude"))
+            .map(|note| note.text.as_str())
+            .collect();
         if source == LogError::NoAttitude && !of_attitude.is_empty() {
-            return FlightLogError::Values { path: path.to_owned(), problem: format!("{source}: {}", of_attitude.join("; ")) };
+            return FlightLogError::Values {
+                path: path.to_owned(),
+                problem: format!("{source}: {}", of_attitude.join("; ")),
+            };
         }
         FlightLogError::Log { path: path.to_owned(), source }
     })?;
@@ -244,7 +262,9 @@ pub fn read_flight_log(path: &Path, spec: &FlightSpec, height: HeightConversion)
 
 /// What no cleaning has removed and no aircraft does.
 fn jump_note(log: &FlightLog) -> Option<Note> {
-    let is_jump = |pair: &&[LogRow]| pair[0].position_ned_m.distance(pair[1].position_ned_m) > JUMP_M_S * (pair[1].t_s - pair[0].t_s);
+    let is_jump = |pair: &&[LogRow]| {
+        pair[0].position_ned_m.distance(pair[1].position_ned_m) > JUMP_M_S * (pair[1].t_s - pair[0].t_s)
+    };
     let mut jumps = log.rows.windows(2).filter(is_jump);
     let first = jumps.next()?;
     let (from, to) = (first[0], first[1]);
@@ -266,12 +286,13 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
 /// # Errors
 /// As [`read_flight_log`].
 pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let bytes = std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
     if let Some((what, advice)) = sniff::refused(&bytes) {
         return Err(FlightLogError::OtherFormat { path: path.to_owned(), what, advice });
     }
-    let content =
-        std::str::from_utf8(&bytes).map_err(|error| FlightLogError::NotText { path: path.to_owned(), offset: error.valid_up_to() })?;
+    let content = std::str::from_utf8(&bytes)
+        .map_err(|error| FlightLogError::NotText { path: path.to_owned(), offset: error.valid_up_to() })?;
     let content = content.strip_prefix('\u{feff}').unwrap_or(content);
     if content.trim_start().starts_with('<') {
         return gpx::read(path, content.trim_start(), spec);
@@ -305,7 +326,10 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     clock::one_flight(&rows.rows).map_err(problem)?;
     sparse::fill(&mut rows.rows, layout.attitude != AttitudeColumns::None, &mut notes);
     if table.has_decimal_commas {
-        notes.push(Note { is_warning: false, text: "commas are read as the beginning of decimals".to_owned() });
+        notes.push(Note {
+            is_warning: false,
+            text: "commas are read as the beginning of decimals".to_owned(),
+        });
     }
     Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, &layout)).collect(), notes })
 }
@@ -330,7 +354,9 @@ fn raw_row(row: &rows::Row, layout: &Layout) -> RawRow {
         // Where an attitude is stated in part, it is a faulty one.
         _ if !row.states_attitude() => RawAttitude::None,
         AttitudeColumns::None => RawAttitude::None,
-        AttitudeColumns::Euler(_) => RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]]),
+        AttitudeColumns::Euler(_) => {
+            RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]])
+        }
         AttitudeColumns::Quaternion(_) => {
             let world_from_body = DQuat::from_array(row.attitude);
             RawAttitude::Quaternion(match layout.frame {

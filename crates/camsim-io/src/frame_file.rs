@@ -34,14 +34,16 @@
 //!
 //! Many frames in one file: [`list`] says how they are named.
 //!
-//! Depth that is 0, negative, infinite, at least `depth_max_m` or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone,
-//! or, with `holes = "nearest"`, as what is beside it (a depth camera's shadows; not for pictures with sky), or, with `holes = "mark"`, not
-//! at all: output pixels that look there are invalid.
-//! A picture of nothing but 0 and infinity may be sky; one of nothing but what no depth can be (negative, not a number, nearer than a
-//! micrometre) is refused: it is in another sign or unit.
+//! Depth that is 0, negative, infinite, at least `depth_max_m` or not a number is **unknown or sky: taken as
+//! infinitely far**, so it moves with the rotation alone, or, with `holes = "nearest"`, as what is beside it
+//! (a depth camera's shadows; not for pictures with sky), or, with `holes = "mark"`, not at all: output
+//! pixels that look there are invalid. A picture of nothing but 0 and infinity may be sky; one of nothing but
+//! what no depth can be (negative, not a number, nearer than a micrometre) is refused: it is in another sign
+//! or unit.
 //!
-//! A twist is constant **in the camera's own axes**: a screw, whose velocity turns with the camera. With velocity v across rate w the
-//! camera flies a circle of radius |v|/|w|; a camera that turns on a straight flight needs a trajectory.
+//! A twist is constant **in the camera's own axes**: a screw, whose velocity turns with the camera. With
+//! velocity v across rate w the camera flies a circle of radius |v|/|w|; a camera that turns on a straight
+//! flight needs a trajectory.
 
 use std::path::{Path, PathBuf};
 
@@ -235,12 +237,18 @@ enum NameUnit {
 impl FrameSpec {
     /// The first key that chooses a channel of an EXR's colour.
     fn color_key(&self) -> Option<&'static str> {
-        self.color_channels.as_ref().map(|_| "color_channels").or(self.color_layer.as_ref().map(|_| "color_layer"))
+        self.color_channels
+            .as_ref()
+            .map(|_| "color_channels")
+            .or(self.color_layer.as_ref().map(|_| "color_layer"))
     }
 
     /// The same of its depth.
     fn depth_key(&self) -> Option<&'static str> {
-        self.depth_channel.as_ref().map(|_| "depth_channel").or(self.depth_layer.as_ref().map(|_| "depth_layer"))
+        self.depth_channel
+            .as_ref()
+            .map(|_| "depth_channel")
+            .or(self.depth_layer.as_ref().map(|_| "depth_layer"))
     }
 }
 
@@ -275,18 +283,28 @@ fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
         return Err(ScenarioError::Problems(problems).into());
     }
     let spec: FrameSpec = deserialize(&tree)?;
-    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    let fail =
+        |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
     if !spec.focal_px.iter().all(|f| f.is_finite() && *f > 0.0) {
-        return fail("focal_px", "must be [fx, fy], both finite and above 0; for a mirrored axis flip the pictures instead");
+        return fail(
+            "focal_px",
+            "must be [fx, fy], both finite and above 0; for a mirrored axis flip the pictures instead",
+        );
     }
     if !spec.instant_ms.is_finite() {
         return fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp");
     }
     if spec.depth_max_m.is_some_and(|most| most.is_nan() || most <= 0.0) {
-        return fail("depth_max_m", "must be above 0, in metres: what is stored as that far, or farther, is no depth");
+        return fail(
+            "depth_max_m",
+            "must be above 0, in metres: what is stored as that far, or farther, is no depth",
+        );
     }
     if spec.principal_point_px.is_some_and(|centre| centre.iter().any(|v| !v.is_finite())) {
-        return fail("principal_point_px", "must be two finite numbers; leave the key out for the picture's centre");
+        return fail(
+            "principal_point_px",
+            "must be two finite numbers; leave the key out for the picture's centre",
+        );
     }
     if spec.color_channels.as_ref().is_some_and(|names| !matches!(names.len(), 1 | 3)) {
         return fail("color_channels", "must be one name (grey) or three (red, green, blue)");
@@ -305,7 +323,8 @@ fn read_pictures(
     motion: Motion,
     path: &Path,
 ) -> Result<(FrameFile, Origin), FrameFileError> {
-    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
+    let fail =
+        |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
     let color = images::read_color(color, spec, path)?;
     let size_px @ [width, height] = color.size_px;
     let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(color.centre_px));
@@ -313,7 +332,8 @@ fn read_pictures(
     let mut notes = color.notes;
     let mut inverse_depth = match depth {
         Some(depth) => {
-            let depth::Depth { inverse, notes: of_depth } = depth::read_depth(depth, spec, &geometry, color.origin_px, path)?;
+            let depth::Depth { inverse, notes: of_depth } =
+                depth::read_depth(depth, spec, &geometry, color.origin_px, path)?;
             notes.extend(of_depth.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
             inverse
         }
@@ -326,13 +346,21 @@ fn read_pictures(
         None => vec![0.0; (width * height) as usize],
     };
     let fog = match spec.fog {
-        Some(FogSpec { end_m, color }) if end_m.is_finite() && end_m > 0.0 && color.iter().all(|v| (0.0..=1.0).contains(v)) => {
+        Some(FogSpec { end_m, color })
+            if end_m.is_finite() && end_m > 0.0 && color.iter().all(|v| (0.0..=1.0).contains(v)) =>
+        {
             Some(LinearFog { end_m, color: DVec3::from_array(color) })
         }
-        Some(_) => return Err(fail("fog", "needs end_m above 0 in metres and color = [r, g, b] in 0..1 (stored values)")),
+        Some(_) => {
+            return Err(fail(
+                "fog",
+                "needs end_m above 0 in metres and color = [r, g, b] in 0..1 (stored values)",
+            ));
+        }
         None => None,
     };
-    let without_depth = inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
+    let without_depth =
+        inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
     let mut holes = Vec::new();
     match spec.holes {
         Holes::Far => {}
@@ -341,7 +369,13 @@ fn read_pictures(
         Holes::Mark if depth.is_some() => holes = inverse_depth.iter().map(|w| *w == 0.0).collect(),
         Holes::Mark => {}
     }
-    let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, holes, instant_s: 1e-3 * spec.instant_ms };
+    let frame = IdealFrame {
+        geometry,
+        color_rgba: color.rgba,
+        inverse_depth,
+        holes,
+        instant_s: 1e-3 * spec.instant_ms,
+    };
     Ok((FrameFile { frame, motion, fog, without_depth, notes }, color.origin_px))
 }
 

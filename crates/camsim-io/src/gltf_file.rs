@@ -1,7 +1,9 @@
 //! glTF 2.0 models: the triangles of one of a file's scenes, posed at one of its times.
 //!
-//! A model's own axes are glTF's: x left, y up, z ahead, metres. [`Model::place`] stands it in north-east-down. Colour is albedo: base colour
-//! times vertex colour, plus what is emitted; light and shade are the scene's matter, which normals are read for if it asks. What cannot be shown is refused, with its name, or noted.
+//! A model's own axes are glTF's: x left, y up, z ahead, metres. [`Model::place`] stands it in
+//! north-east-down. Colour is albedo: base colour times vertex colour, plus what is emitted; light and shade
+//! are the scene's matter, which normals are read for if it asks. What cannot be shown is refused, with its
+//! name, or noted.
 
 use std::{
     cell::Cell,
@@ -66,11 +68,13 @@ pub enum GltfError {
 pub struct GltfOptions {
     /// Number of the scene; the file's own choice if left out.
     pub scene: Option<usize>,
-    /// Seconds within the animations; as the file's nodes stand if left out. Before the first key and after the last one nothing moves.
+    /// Seconds within the animations; as the file's nodes stand if left out. Before the first key and after
+    /// the last one nothing moves.
     pub time_s: Option<f64>,
     /// Number of the animation; all of them together if left out.
     pub animation: Option<usize>,
-    /// Whether corners get normals, for light to fall on them: the file's own, or where it has none those of flat triangles.
+    /// Whether corners get normals, for light to fall on them: the file's own, or where it has none those of
+    /// flat triangles.
     pub normals: bool,
 }
 
@@ -92,7 +96,8 @@ struct Part {
 }
 
 /// From a model's axes (x left, y up, z ahead) to forward, right, down.
-const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
+const BODY_FROM_MODEL: DMat3 =
+    DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
 
 /// Texels that are made where base colour and emitted light lie in different ways, at most: half a gigabyte.
 const MOST_BAKED: usize = 1 << 27;
@@ -127,7 +132,8 @@ impl Model {
 /// # Errors
 /// [`GltfError`] names the file, or the extension that it would need.
 pub fn read_gltf(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
-    // The glTF crate takes some of what a damaged file says for granted. Nothing outlives the call that it could leave half done.
+    // The glTF crate takes some of what a damaged file says for granted. Nothing outlives the call that it
+    // could leave half done.
     let damaged = |_| Err(GltfError::Broken { path: path.into(), message: "is damaged".into() });
     std::panic::catch_unwind(|| read(path, options)).unwrap_or_else(damaged)
 }
@@ -136,11 +142,20 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     let source = Source::read(path)?;
     let broken = |message: String| GltfError::Broken { path: path.into(), message };
     let document = &source.document;
-    let Some(scene) = options.scene.map_or_else(|| document.default_scene().or(document.scenes().next()), |n| document.scenes().nth(n))
+    let Some(scene) = options
+        .scene
+        .map_or_else(|| document.default_scene().or(document.scenes().next()), |n| document.scenes().nth(n))
     else {
         return match options.scene {
-            Some(n) => Err(broken(format!("has no scene {n}; the last one is {}", document.scenes().count() as i64 - 1))),
-            None => Ok(Model { parts: Vec::new(), notes: vec!["has no scene: nothing of it is shown".into()], reach_m: 0.0 }),
+            Some(n) => Err(broken(format!(
+                "has no scene {n}; the last one is {}",
+                document.scenes().count() as i64 - 1
+            ))),
+            None => Ok(Model {
+                parts: Vec::new(),
+                notes: vec!["has no scene: nothing of it is shown".into()],
+                reach_m: 0.0,
+            }),
         };
     };
     let mut reader = Reader {
@@ -163,7 +178,10 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     if parts.is_empty() {
         notes.push(match &source.hidden_nodes()[..] {
             [] => "has no triangles: nothing of it is shown".into(),
-            hidden => format!("has no triangles that are visible: KHR_node_visibility hides {}, and nothing is shown", hidden.join(", ")),
+            hidden => format!(
+                "has no triangles that are visible: KHR_node_visibility hides {}, and nothing is shown",
+                hidden.join(", ")
+            ),
         });
     }
     if options.time_s.is_some() && document.animations().next().is_none() {
@@ -173,7 +191,10 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         notes.push("animation says nothing without time_s: its nodes are as they stand; give the time of the file that is meant".into());
     }
     if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
-        notes.push("has animations, and no time_s says which instant of them is meant: its nodes are as they stand".into());
+        notes.push(
+            "has animations, and no time_s says which instant of them is meant: its nodes are as they stand"
+                .into(),
+        );
     }
     notes.extend(source.notes.iter().cloned());
     notes.extend(pose_notes);
@@ -193,7 +214,8 @@ struct Reader<'a> {
     materials: Materials<'a>,
     /// By mesh, primitive and whether it is mirrored: those that no node changes.
     shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
-    /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture, or that there is none.
+    /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture,
+    /// or that there is none.
     baked: HashMap<(usize, usize, bool), Option<BakedPart>>,
     /// Texels that further ones may have.
     texels_left: usize,
@@ -206,9 +228,17 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, is_hidden: bool, depth: usize) -> Result<(), GltfError> {
+    fn node(
+        &mut self,
+        node: &gltf::Node<'_>,
+        model_from_parent: DAffine3,
+        is_hidden: bool,
+        depth: usize,
+    ) -> Result<(), GltfError> {
         if depth > DEEPEST {
-            return Err(self.source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
+            return Err(self
+                .source
+                .broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
         }
         if !self.met.insert(node.index()) {
             return Err(self.source.broken(format!("nodes.{}: has two parents", node.index())));
@@ -225,7 +255,12 @@ impl Reader<'_> {
         node.children().try_for_each(|child| self.node(&child, model_from_node, is_hidden, depth + 1))
     }
 
-    fn mesh(&mut self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, model_from_node: DAffine3) -> Result<(), GltfError> {
+    fn mesh(
+        &mut self,
+        node: &gltf::Node<'_>,
+        mesh: &gltf::Mesh<'_>,
+        model_from_node: DAffine3,
+    ) -> Result<(), GltfError> {
         for primitive in mesh.primitives() {
             if self.parts.len() >= MOST_PARTS {
                 return Err(self.source.broken(format!("has more than {MOST_PARTS} parts")));
@@ -243,7 +278,9 @@ impl Reader<'_> {
             let key = (mesh.index(), primitive.index(), mirrored);
             let (material, uv) = self.materials.of(&primitive.material())?;
             if self.options.normals && uv.loses_colors {
-                self.notes.push("what has a picture of emitted light keeps its colours: light does not fall on it".into());
+                self.notes.push(
+                    "what has a picture of emitted light keeps its colours: light does not fall on it".into(),
+                );
             }
             if uv.loses_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
                 self.notes.push("vertex colours under a picture of emitted light are left out".into());
@@ -278,7 +315,9 @@ impl Reader<'_> {
                 },
             };
             let (shape, material) = match (baked, self.shapes.get(&key).filter(|_| !own)) {
-                (Some((shape, texture)), _) => (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material }),
+                (Some((shape, texture)), _) => {
+                    (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material })
+                }
                 (None, Some(shape)) => (shape.clone(), material),
                 (None, None) => {
                     let shape = Arc::new(made.shape(&primitive)?);
@@ -290,10 +329,15 @@ impl Reader<'_> {
             };
             if beyond.get() {
                 let number = mesh.index();
-                self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
+                self.notes.push(format!(
+                    "meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"
+                ));
             }
-            let corner_m =
-                shape.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length()).fold(0.0, f64::max);
+            let corner_m = shape
+                .vertices
+                .iter()
+                .map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length())
+                .fold(0.0, f64::max);
             let reach_m = model_from_shape.translation.length() + corner_m * norm(&model_from_shape.matrix3);
             if reach_m.is_nan() || reach_m > FARTHEST_M {
                 let (node, mesh) = (node.index(), mesh.index());
@@ -312,12 +356,19 @@ impl Reader<'_> {
     }
 
     /// A shape under one picture of its base colour and its emitted light, which lie in different ways on it.
-    fn bake(&mut self, made: &primitive::Making<'_>, primitive: &gltf::Primitive<'_>, of: &Bake) -> Result<Option<BakedPart>, GltfError> {
+    fn bake(
+        &mut self,
+        made: &primitive::Making<'_>,
+        primitive: &gltf::Primitive<'_>,
+        of: &Bake,
+    ) -> Result<Option<BakedPart>, GltfError> {
         // What has emitted light on top is not lit: one picture cannot hold both.
         let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
         let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;
         let name = self.source.material_name(primitive.material().index());
-        let Some(emitted::Baked { shape, texture, coarser }) = emitted::bake(&shape, &light_uvs, of, self.texels_left) else {
+        let Some(emitted::Baked { shape, texture, coarser }) =
+            emitted::bake(&shape, &light_uvs, of, self.texels_left)
+        else {
             self.notes.push(format!(
                 "{name}: its picture of emitted light is left out: it lies otherwise than the base colour, and in neither layout each place of the surface has a place of \
                  its own, or one picture of both would be too large; give it the base colour's texture coordinates"
@@ -331,7 +382,9 @@ impl Reader<'_> {
             ));
         }
         if self.options.normals {
-            self.notes.push("what has a picture of emitted light keeps its colours: light does not fall on it".into());
+            self.notes.push(
+                "what has a picture of emitted light keeps its colours: light does not fall on it".into(),
+            );
         }
         Ok(Some((Arc::new(shape), Arc::new(texture))))
     }

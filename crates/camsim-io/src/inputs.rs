@@ -19,7 +19,8 @@ pub type Inputs = BTreeMap<String, String>;
 /// Bytes that are read at once.
 const AT_ONCE: usize = 1 << 20;
 
-/// Of all files that a scenario names, and of those that these name: a model's buffers and pictures, what lies beside rasters. Camera files are part of the scenario itself.
+/// Of all files that a scenario names, and of those that these name: a model's buffers and pictures, what
+/// lies beside rasters. Camera files are part of the scenario itself.
 #[must_use]
 pub fn of_scenario(scenario: &Scenario) -> Inputs {
     let scene = &scenario.scene;
@@ -114,7 +115,8 @@ mod tests {
         let model = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "a%20mesh.bin", "byteLength": 1 }, { "uri": "data:,x", "byteLength": 1 }],
             "images": [{ "uri": "skin.png" }, { "bufferView": 0 }] }"#;
         for name in names {
-            std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" }).unwrap();
+            std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" })
+                .unwrap();
         }
         let text = r#"
             [camera]
@@ -144,13 +146,20 @@ mod tests {
         assert_eq!(before.len(), names.len() + 1);
         for name in names {
             // Of the same length.
-            std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model.replace("2.0", "2.1") } else { "two".to_owned() })
-                .unwrap();
+            std::fs::write(
+                folder.path().join(name),
+                if name.ends_with("gltf") { model.replace("2.0", "2.1") } else { "two".to_owned() },
+            )
+            .unwrap();
             let now = of_scenario(&scenario);
-            let changed: Vec<&String> =
-                now.iter().filter(|(path, content)| before.get(*path) != Some(content)).map(|(path, _)| path).collect();
+            let changed: Vec<&String> = now
+                .iter()
+                .filter(|(path, content)| before.get(*path) != Some(content))
+                .map(|(path, _)| path)
+                .collect();
             assert_eq!(changed, [&path(name)]);
-            std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" }).unwrap();
+            std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" })
+                .unwrap();
         }
         assert_eq!(of_scenario(&scenario), before);
     }

@@ -1,6 +1,7 @@
 //! Files in, files out: scenarios, flight logs, calibrations, terrain, pictures; EXR, PNG, tables, manifests.
 //!
-//! Readers give plain data of `camsim-core`; every error names the file and, where there is one, the line or the key, and says what to do.
+//! Readers give plain data of `camsim-core`; every error names the file and, where there is one, the line or
+//! the key, and says what to do.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,5 @@
-//! A scenario's files, read, checked against each other, and brought to one local frame: what rendering starts from.
+//! A scenario's files, read, checked against each other, and brought to one local frame: what rendering
+//! starts from.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -31,7 +32,8 @@ use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_place;
 use scene::load_scene;
 
-/// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of it would not end.
+/// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of
+/// it would not end.
 const MOST_FRAMES: f64 = 10e6;
 
 /// Why a scenario cannot be loaded.
@@ -104,7 +106,9 @@ pub enum LoadError {
     #[error("scene.board: {0}")]
     Board(#[from] BoardFileError),
     /// No frame falls into the window.
-    #[error("flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher")]
+    #[error(
+        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher"
+    )]
     NoFrame(f64, f64, f64),
     /// More frames than a sequence may have.
     #[error(
@@ -153,8 +157,9 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
     load_beside(scenario, None)
 }
 
-/// As [`load_sequence`], but what `before` has read for the same keys is not read again, even if files have changed since: for programs that
-/// change a scenario value by value. What is taken over is shared, so that renderers can see that it is the same.
+/// As [`load_sequence`], but what `before` has read for the same keys is not read again, even if files have
+/// changed since: for programs that change a scenario value by value. What is taken over is shared, so that
+/// renderers can see that it is the same.
 ///
 /// # Errors
 /// As [`load_sequence`].
@@ -165,7 +170,9 @@ pub fn reload_sequence(scenario: &Scenario, before: &Loaded) -> Result<Loaded, L
 fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
     let known = before.map(|before| (before, &before.sequence.scenario));
     let (log, trajectory, tracked) = match known.filter(|(_, of)| reads_same_flight(of, scenario)) {
-        Some((before, _)) => (before.log.clone(), before.sequence.path.trajectory.clone(), before.tracked.clone()),
+        Some((before, _)) => {
+            (before.log.clone(), before.sequence.path.trajectory.clone(), before.tracked.clone())
+        }
         None => {
             let (log, tracked) = load_flight(scenario)?;
             (Arc::new(log), tracked.trajectory.clone(), Arc::new(tracked))
@@ -173,10 +180,14 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     };
     let path = CameraPath::new(trajectory, &scenario.camera.mount)?;
     let same_scene = |before: &Loaded, of: &Scenario| {
-        of.scene == scenario.scene && of.flight.height == scenario.flight.height && before.log.frame == log.frame
+        of.scene == scenario.scene
+            && of.flight.height == scenario.flight.height
+            && before.log.frame == log.frame
     };
     let (scene, terrain, scene_notes) = match known.filter(|(before, of)| same_scene(before, of)) {
-        Some((before, _)) => (before.sequence.scene.clone(), before.terrain.clone(), before.scene_notes.clone()),
+        Some((before, _)) => {
+            (before.sequence.scene.clone(), before.terrain.clone(), before.scene_notes.clone())
+        }
         None => {
             let (scene, terrain, notes) = load_scene(scenario, &log)?;
             (Arc::new(scene), terrain, notes)
@@ -191,16 +202,28 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
-    let sequence = Sequence { scenario: scenario.clone(), path: Arc::new(path), epoch_ns, start_s, frames, scene, vignette, zoom_track };
+    let sequence = Sequence {
+        scenario: scenario.clone(),
+        path: Arc::new(path),
+        epoch_ns,
+        start_s,
+        frames,
+        scene,
+        vignette,
+        zoom_track,
+    };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(scene_notes.iter().cloned());
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
 }
 
-/// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all of the log is tracked.
+/// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all
+/// of the log is tracked.
 fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
     let whole = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
-    whole(&a.flight) == whole(&b.flight) && a.tracker_in_force() == b.tracker_in_force() && height_plan(a).0 == height_plan(b).0
+    whole(&a.flight) == whole(&b.flight)
+        && a.tracker_in_force() == b.tracker_in_force()
+        && height_plan(a).0 == height_plan(b).0
 }
 
 /// The log and its trajectory alone: no scene is read.
@@ -231,10 +254,14 @@ fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), 
     let last_s = log.rows.last().map_or(0.0, |row| row.t_s);
     let [start_s, end_s] = scenario.flight.window_s.map_or([0.0, last_s], |window| window.map(|t| t / speed));
     let camera = &scenario.camera;
-    // Without a window the whole log is flown, its last instant included (a log of one row is a still camera: one frame); an explicit
-    // window is half-open, so that [0, 20] at 30 frames a second holds 600 frames.
+    // Without a window the whole log is flown, its last instant included (a log of one row is a still camera:
+    // one frame); an explicit window is half-open, so that [0, 20] at 30 frames a second holds 600 frames.
     let periods = (end_s - start_s) * camera.fps - camera.phase;
-    let count = if scenario.flight.window_s.is_none() { (periods + 1e-9).floor() + 1.0 } else { (periods - 1e-9).ceil() };
+    let count = if scenario.flight.window_s.is_none() {
+        (periods + 1e-9).floor() + 1.0
+    } else {
+        (periods - 1e-9).ceil()
+    };
     if count < 1.0 {
         return Err(LoadError::NoFrame(start_s * speed, end_s * speed, camera.fps));
     }
@@ -244,11 +271,13 @@ fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), 
     Ok((start_s, count as u64))
 }
 
-/// How many frames have the instant of their image centre, `(i + phase)/fps - delay` after `start_s`, outside of the log.
+/// How many frames have the instant of their image centre, `(i + phase)/fps - delay` after `start_s`, outside
+/// of the log.
 fn frames_outside(sequence: &Sequence) -> usize {
     let (first_s, last_s) = sequence.path.span_s();
     let camera = &sequence.scenario.camera;
-    let centre_s = |i: u64| sequence.start_s + (i as f64 + camera.phase) / camera.fps - camera.shutter.delay_ms * 1e-3;
+    let centre_s =
+        |i: u64| sequence.start_s + (i as f64 + camera.phase) / camera.fps - camera.shutter.delay_ms * 1e-3;
     // A nanosecond, the resolution of a stamp, is no excursion.
     (0..sequence.frames).filter(|&i| centre_s(i) < first_s - 1e-9 || centre_s(i) > last_s + 1e-9).count()
 }
@@ -257,9 +286,11 @@ fn frames_outside(sequence: &Sequence) -> usize {
 #[must_use]
 pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
     let mut warnings = tracked.warnings();
-    warnings.extend(tracked.distance_warning(&log.rows).filter(|_| scenario.tracker.kind != TrackerKind::Hold));
+    warnings
+        .extend(tracked.distance_warning(&log.rows).filter(|_| scenario.tracker.kind != TrackerKind::Hold));
     if log.rows.len() == 1 {
-        warnings.push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
+        warnings
+            .push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
     }
     let of_file = log.notes.iter().filter(|note| note.is_warning);
     warnings.extend(of_file.map(|note| format!("{}: {}", scenario.flight.log.display(), note.text)));
@@ -302,16 +333,28 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
     let longer = [
         ("readout_ms", shutter.readout_ms, "the next frame would begin before this one is read"),
         ("exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
-        ("interlace_ms", interlace_ms, "one field would belong to the frame before; \"field\" is half a period"),
+        (
+            "interlace_ms",
+            interlace_ms,
+            "one field would belong to the frame before; \"field\" is half a period",
+        ),
     ];
     let told = |(key, ms, why): &(&str, f64, &str)| {
-        format!("camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = {}): {why}", camera.fps)
+        format!(
+            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = {}): {why}",
+            camera.fps
+        )
     };
     // To the hair, so that 33.3334 at 30 frames a second passes.
     longer.iter().filter(|(_, ms, _)| *ms > 1.0001 * period_ms).map(told).collect()
 }
 
-fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
+fn warnings(
+    sequence: &Sequence,
+    log: &FlightLog,
+    tracked: &Tracked,
+    terrain: Option<&TerrainSummary>,
+) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
     warnings.extend(blind_share_warning(sequence));
     warnings.extend(optics_warnings(sequence));
@@ -322,7 +365,9 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
             far_m / 1e3
         ));
     }
-    if sequence.scenario.quality.ideal_samples == Auto::Value(SAMPLES) && !sequence.scene.has_borders_of_triangles() {
+    if sequence.scenario.quality.ideal_samples == Auto::Value(SAMPLES)
+        && !sequence.scene.has_borders_of_triangles()
+    {
         warnings.push(format!(
             "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"
         ));
@@ -339,8 +384,9 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
     warnings.extend(terrain.and_then(|summary| beyond::beyond_picture_warning(sequence, summary)));
     if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
         let step = (sequence.frames / 200).max(1);
-        let places =
-            (0..sequence.frames).step_by(step as usize).map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
+        let places = (0..sequence.frames)
+            .step_by(step as usize)
+            .map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
         let (mut over, mut beside, mut below, mut all) = (0, 0, 0, 0);
         for place in places {
             all += 1;

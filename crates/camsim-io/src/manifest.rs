@@ -1,6 +1,8 @@
-//! `run.json`: what made the files of a folder, so that the run can be repeated, and resumed only by the same scenario.
+//! `run.json`: what made the files of a folder, so that the run can be repeated, and resumed only by the same
+//! scenario.
 //!
-//! Its paths are relative to it. A folder that was moved, or whose inputs were, is still of the same scenario if they have the same contents.
+//! Its paths are relative to it. A folder that was moved, or whose inputs were, is still of the same scenario
+//! if they have the same contents.
 
 use std::{
     collections::BTreeMap,
@@ -19,7 +21,8 @@ use crate::{
     write::{WriteError, write_atomic},
 };
 
-/// What `run.json` says of its paths. Those of early versions, which say nothing, are of the working directory.
+/// What `run.json` says of its paths. Those of early versions, which say nothing, are of the working
+/// directory.
 pub const PATHS: &str = "relative to this file";
 
 /// Contents of `run.json`.
@@ -98,13 +101,15 @@ impl ResumeError {
 const WAY_OUT: &str = "; render without --resume, or into another folder";
 
 impl RunManifest {
-    /// Writes `run.json` into `folder`; a shard also writes `run.I-of-N.json`, so that shards in one folder keep their own counts.
+    /// Writes `run.json` into `folder`; a shard also writes `run.I-of-N.json`, so that shards in one folder
+    /// keep their own counts.
     ///
     /// # Errors
     /// As [`write_atomic`].
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         let path = folder.join("run.json");
-        let fail = |error: serde_json::Error| WriteError::Encode { path: path.clone(), message: error.to_string() };
+        let fail =
+            |error: serde_json::Error| WriteError::Encode { path: path.clone(), message: error.to_string() };
         let portable = Self {
             paths: PATHS.to_owned(),
             scenario: portable_scenario(&self.scenario, folder).map_err(fail)?,
@@ -135,14 +140,16 @@ fn shortened(differences: &[String]) -> String {
     if more > 0 { format!("{listed}; and {more} more") } else { listed }
 }
 
-/// Whether frames already in `folder` belong to `scenario` and to what is in its files. A folder without `run.json` holds none: `Ok(false)`.
+/// Whether frames already in `folder` belong to `scenario` and to what is in its files. A folder without
+/// `run.json` holds none: `Ok(false)`.
 ///
 /// # Errors
 /// `run.json` cannot be read, or another scenario made it, or the same with other files.
 pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let Some(run) = read_run(&path)? else { return Ok(false) };
-    let parse = |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
+    let parse =
+        |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
     let (mut there, there_inputs) = (part(&run, "scenario", &path)?.clone(), part(&run, "inputs", &path)?);
     let mut here = as_read(&portable_scenario(scenario, folder).map_err(parse)?).map_err(parse)?;
     let here_inputs = portable_inputs(inputs, folder);
@@ -153,23 +160,30 @@ pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Resu
     Ok(true)
 }
 
-/// As [`check_resume`], of whatever stands under `key` in `run.json`; `made` is how the folder was made if that differs.
+/// As [`check_resume`], of whatever stands under `key` in `run.json`; `made` is how the folder was made if
+/// that differs.
 ///
 /// # Errors
 /// As [`check_resume`].
-pub fn check_resume_of(folder: &Path, key: &str, made: &'static str, here: &impl Serialize) -> Result<bool, ResumeError> {
+pub fn check_resume_of(
+    folder: &Path,
+    key: &str,
+    made: &'static str,
+    here: &impl Serialize,
+) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let Some(run) = read_run(&path)? else { return Ok(false) };
-    let here = as_read(here).map_err(|error| ResumeError::Parse { path: path.clone(), message: error.to_string() })?;
+    let here = as_read(here)
+        .map_err(|error| ResumeError::Parse { path: path.clone(), message: error.to_string() })?;
     differs(&path, made, part(&run, key, &path)?, &here)?;
     Ok(true)
 }
 
 fn read_run(path: &Path) -> Result<Option<Value>, ResumeError> {
     match std::fs::read_to_string(path) {
-        Ok(text) => {
-            serde_json::from_str(&text).map(Some).map_err(|error| ResumeError::Parse { path: path.into(), message: error.to_string() })
-        }
+        Ok(text) => serde_json::from_str(&text)
+            .map(Some)
+            .map_err(|error| ResumeError::Parse { path: path.into(), message: error.to_string() }),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(ResumeError::Read { path: path.into(), source }),
     }
@@ -187,7 +201,11 @@ fn as_read(value: &impl Serialize) -> Result<Value, serde_json::Error> {
 fn differs(path: &Path, made: &'static str, there: &Value, here: &Value) -> Result<(), ResumeError> {
     let mut differences = Vec::new();
     compare(there, here, "", &mut differences);
-    if differences.is_empty() { Ok(()) } else { Err(ResumeError::Differs { path: path.into(), made, differences }) }
+    if differences.is_empty() {
+        Ok(())
+    } else {
+        Err(ResumeError::Differs { path: path.into(), made, differences })
+    }
 }
 
 /// Files and folders that are elsewhere than when a folder was made, by what is in the files.
@@ -197,7 +215,8 @@ struct Moved {
 }
 
 impl Moved {
-    /// Pairs the paths under the same keys; those of `there` whose files have the same contents become those of `here`.
+    /// Pairs the paths under the same keys; those of `there` whose files have the same contents become those
+    /// of `here`.
     fn between(there: &mut Value, there_inputs: &Value, here: &mut Value, here_inputs: &Inputs) -> Self {
         let mut now = BTreeMap::new();
         for_each_path(here, &mut |key, path| {
@@ -206,8 +225,14 @@ impl Moved {
         let mut moved = Self { files: BTreeMap::new(), folders: BTreeMap::new() };
         for_each_path(there, &mut |key, path| {
             let Some(new) = now.get(key).filter(|new| *new != path) else { return };
-            let contents = (there_inputs.get(path.as_str()).and_then(Value::as_str), here_inputs.get(new).map(String::as_str));
-            if contents.0.is_none() || contents.0 != contents.1 || contents.0 == Some(crate::inputs::NOT_READABLE) {
+            let contents = (
+                there_inputs.get(path.as_str()).and_then(Value::as_str),
+                here_inputs.get(new).map(String::as_str),
+            );
+            if contents.0.is_none()
+                || contents.0 != contents.1
+                || contents.0 == Some(crate::inputs::NOT_READABLE)
+            {
                 return;
             }
             if let (Some(from), Some(to)) = (Path::new(path).parent(), Path::new(new).parent()) {
@@ -237,7 +262,12 @@ fn compare(there: &Value, here: &Value, key: &str, differences: &mut Vec<String>
     if let (Value::Object(a), Value::Object(b)) = (there, here) {
         for name in a.keys().chain(b.keys().filter(|name| !a.contains_key(*name))) {
             let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-            compare(a.get(name).unwrap_or(&Value::Null), b.get(name).unwrap_or(&Value::Null), &key, differences);
+            compare(
+                a.get(name).unwrap_or(&Value::Null),
+                b.get(name).unwrap_or(&Value::Null),
+                &key,
+                differences,
+            );
         }
     } else if there != here {
         let show = |value: &Value| if value.is_null() { "nothing".to_owned() } else { value.to_string() };
@@ -245,7 +275,8 @@ fn compare(there: &Value, here: &Value, key: &str, differences: &mut Vec<String>
     }
 }
 
-/// Whether shard `[i, n]` (i from 1) has frame `index`: every n-th frame, so that shards take about the same time.
+/// Whether shard `[i, n]` (i from 1) has frame `index`: every n-th frame, so that shards take about the same
+/// time.
 pub fn in_shard(index: u64, [i, n]: [u64; 2]) -> bool {
     n > 0 && index % n + 1 == i
 }
@@ -283,12 +314,20 @@ mod tests {
     fn a_manifest_reads_back_and_only_its_own_scenario_resumes() {
         let dir = tempfile::tempdir().unwrap();
         assert!(!check_resume(dir.path(), &scenario(&[]), &Inputs::new()).unwrap());
-        let ours = manifest(scenario(&[("camera.fps", "29.97"), ("camera.mount.angles_deg", "[0.1, -0.3, 1e-7]")]));
+        let ours =
+            manifest(scenario(&[("camera.fps", "29.97"), ("camera.mount.angles_deg", "[0.1, -0.3, 1e-7]")]));
         ours.write(dir.path()).unwrap();
         let text = std::fs::read_to_string(dir.path().join("run.2-of-4.json")).unwrap();
         let read: RunManifest = serde_json::from_str(&text).unwrap();
         let portable = portable_scenario(&ours.scenario, dir.path()).unwrap();
-        assert_eq!(read, RunManifest { scenario: portable, inputs: portable_inputs(&ours.inputs, dir.path()), ..ours.clone() });
+        assert_eq!(
+            read,
+            RunManifest {
+                scenario: portable,
+                inputs: portable_inputs(&ours.inputs, dir.path()),
+                ..ours.clone()
+            }
+        );
         assert!(check_resume(dir.path(), &ours.scenario, &ours.inputs).unwrap());
         let changed = [("a.csv".to_owned(), "4 bytes".to_owned())].into();
         let error = check_resume(dir.path(), &ours.scenario, &changed).unwrap_err().to_string();
@@ -298,7 +337,11 @@ mod tests {
         other.camera.fps = 25.0;
         other.scene.fog_visibility_m = Some(900.0);
         let error = check_resume(dir.path(), &other, &ours.inputs).unwrap_err().to_string();
-        assert!(error.contains("camera.fps was 29.97, now 25") && error.contains("scene.fog_visibility_m was nothing, now 900"), "{error}");
+        assert!(
+            error.contains("camera.fps was 29.97, now 25")
+                && error.contains("scene.fog_visibility_m was nothing, now 900"),
+            "{error}"
+        );
 
         std::fs::write(dir.path().join("run.json"), "{").unwrap();
         assert!(matches!(check_resume(dir.path(), &other, &ours.inputs), Err(ResumeError::Parse { .. })));
@@ -343,14 +386,18 @@ mod tests {
         let scenario = parse_scenario(text, &dir.path().join("there/s.toml"), &[]).unwrap();
         let ours = manifest(scenario.clone());
         ours.write(&dir.path().join("out")).unwrap();
-        let written: Value = serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+        let written: Value =
+            serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
         assert_eq!(written["scenario"]["flight"]["log"], "../there/logs/a.csv");
         assert_eq!(written["scenario"]["scene"]["terrain"]["dem"], "/maps/dem.tif");
         assert_eq!(written["scenario"]["scene"]["gltf"][1]["file"], "../tower.glb");
         let run = dir.path().join("out/run.json");
         let read = read_scenario(&run, &[], None).unwrap();
         assert_eq!(read.flight.log, dir.path().join("out/../there/logs/a.csv"));
-        assert_eq!(portable_scenario(&read, dir.path()).unwrap(), portable_scenario(&scenario, dir.path()).unwrap());
+        assert_eq!(
+            portable_scenario(&read, dir.path()).unwrap(),
+            portable_scenario(&scenario, dir.path()).unwrap()
+        );
         let sets = [("camera.fps".to_owned(), "12.5".to_owned())];
         assert_eq!(read_scenario(&run, &sets, None).unwrap().camera.fps, 12.5);
         for (text, wanted) in [

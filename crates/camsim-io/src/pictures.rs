@@ -1,4 +1,5 @@
-//! Pictures: textures and grey maps out of PNG, JPEG, WebP, GIF (first frame), BMP and TIFF files. The format is told by content, not by name.
+//! Pictures: textures and grey maps out of PNG, JPEG, WebP, GIF (first frame), BMP and TIFF files. The format
+//! is told by content, not by name.
 //!
 //! A picture that states an orientation (EXIF, or tag 274 of a TIFF) is turned as it says.
 
@@ -51,7 +52,8 @@ impl PictureError {
     }
 }
 
-/// Reads a picture as a texture; `encoding` says what its colour values mean. 16-bit values are rounded to 8 bits.
+/// Reads a picture as a texture; `encoding` says what its colour values mean. 16-bit values are rounded to 8
+/// bits.
 ///
 /// # Errors
 ///
@@ -85,7 +87,8 @@ pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<Stored, Pic
     let largest_of_16_bits = largest_of_16_bits(&picture);
     let picture = picture.into_rgba8();
     let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
-    let texture = Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
+    let texture =
+        Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
     Ok(Stored { texture, orientation: number, largest_of_16_bits })
 }
 
@@ -95,22 +98,28 @@ pub(crate) fn largest_of_16_bits(picture: &DynamicImage) -> Option<u16> {
         DynamicImage::ImageLuma16(picture) => picture.iter().max().copied(),
         DynamicImage::ImageLumaA16(picture) => picture.pixels().map(|pixel| pixel.0[0]).max(),
         DynamicImage::ImageRgb16(picture) => picture.iter().max().copied(),
-        DynamicImage::ImageRgba16(picture) => picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).max(),
+        DynamicImage::ImageRgba16(picture) => {
+            picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).max()
+        }
         _ => None,
     }
 }
 
 /// A picture turned as its orientation (1 to 8, EXIF) says.
 pub(crate) fn oriented(texture: Texture, orientation: u64) -> Texture {
-    let turn = u8::try_from(orientation).ok().and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
+    let turn =
+        u8::try_from(orientation).ok().and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
     let Texture { size_px: [width, height], rgba8, encoding } = texture;
-    let Some(picture) = image::RgbaImage::from_raw(width, height, rgba8) else { return Texture::uniform([0; 4], encoding) };
+    let Some(picture) = image::RgbaImage::from_raw(width, height, rgba8) else {
+        return Texture::uniform([0; 4], encoding);
+    };
     let mut picture = DynamicImage::ImageRgba8(picture);
     picture.apply_orientation(turn);
     Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_rgba8().into_raw(), encoding }
 }
 
-/// Reads a picture as stored grey values 0..=1 (a vignette map, say): no transfer curve is undone. Colours become Rec. 709 luma.
+/// Reads a picture as stored grey values 0..=1 (a vignette map, say): no transfer curve is undone. Colours
+/// become Rec. 709 luma.
 ///
 /// # Errors
 ///
@@ -120,27 +129,40 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
         let raster = Raster::read(path)?;
         let pixels = raster.size[0] as usize * raster.size[1] as usize;
         // Floats of 0 to 255 would be white throughout.
-        let most = if raster.depth_is_whole() == Some(false) { (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max) } else { 0.0 };
+        let most = if raster.depth_is_whole() == Some(false) {
+            (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max)
+        } else {
+            0.0
+        };
         if most > 1.0 + 1e-6 {
             return Err(PictureError::decode(
                 path,
-                format!("grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"),
+                format!(
+                    "grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"
+                ),
             ));
         }
         return match raster.geo.orientation {
-            Some(orientation) => Ok(gray_from_texture(&oriented(raster.to_texture(path, Encoding::Linear)?, orientation))),
+            Some(orientation) => {
+                Ok(gray_from_texture(&oriented(raster.to_texture(path, Encoding::Linear)?, orientation)))
+            }
             None => raster.to_gray(path),
         };
     }
     let (mut picture, orientation) = decode(path)?;
     picture.apply_orientation(orientation);
     if picture.color().has_alpha() && picture.to_rgba8().pixels().any(|pixel| pixel.0[3] < u8::MAX) {
-        return Err(PictureError::decode(path, "grey values are wanted, and parts of it are transparent: flatten it onto black or white"));
+        return Err(PictureError::decode(
+            path,
+            "grey values are wanted, and parts of it are transparent: flatten it onto black or white",
+        ));
     }
     let size_px = [picture.width(), picture.height()];
     let values = match picture {
         DynamicImage::ImageLuma8(gray) => gray.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),
-        DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect(),
+        DynamicImage::ImageLuma16(gray) => {
+            gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect()
+        }
         other => {
             let rgb = other.into_rgb16();
             rgb.pixels().map(|pixel| luma(pixel.0.map(|v| f32::from(v) / 65535.0))).collect()
@@ -150,7 +172,11 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
 }
 
 pub(crate) fn gray_from_texture(texture: &Texture) -> GrayImage {
-    let values = texture.rgba8.chunks_exact(4).map(|p| luma([p[0], p[1], p[2]].map(|v| f32::from(v) / 255.0))).collect();
+    let values = texture
+        .rgba8
+        .chunks_exact(4)
+        .map(|p| luma([p[0], p[1], p[2]].map(|v| f32::from(v) / 255.0)))
+        .collect();
     GrayImage { size_px: texture.size_px, values }
 }
 
@@ -164,7 +190,9 @@ pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
     if bytes.is_empty() {
         return Err("it has no bytes".into());
     }
-    let reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    let reader = ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
     if reader.format().is_none() {
         return Err("it is none of them".into());
     }
@@ -173,19 +201,26 @@ pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
 
 /// A picture within another file.
 pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
     let mut limits = image::Limits::default();
     limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes.len() as u64)));
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| error.to_string())?;
-    if picture.width() == 0 || picture.height() == 0 { Err("the picture has no pixel".into()) } else { Ok(picture) }
+    if picture.width() == 0 || picture.height() == 0 {
+        Err("the picture has no pixel".into())
+    } else {
+        Ok(picture)
+    }
 }
 
 /// The rows as they are stored, and how they are to be turned.
 fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
-    let mut reader =
-        ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| PictureError::open(path, source))?;
+    let mut reader = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(|source| PictureError::open(path, source))?;
     if reader.format().is_none() {
         return Err(PictureError::decode(path, "not a PNG, JPEG, WebP, GIF, BMP or TIFF file"));
     }
@@ -228,7 +263,10 @@ mod tests {
     fn grey_values_keep_their_depth() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep.png");
-        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![1u16, 65535]).unwrap().save(&path).unwrap();
+        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![1u16, 65535])
+            .unwrap()
+            .save(&path)
+            .unwrap();
         let gray = read_gray_image(&path).unwrap();
         assert_eq!(gray.values, [1.0 / 65535.0, 1.0]);
         let path = folder.path().join("colour.png");
@@ -240,10 +278,18 @@ mod tests {
     fn bad_files_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("missing.png");
-        assert!(read_texture(&missing, Encoding::Srgb).unwrap_err().to_string().contains("missing.png: cannot be read"));
-        for (name, bytes) in
-            [("empty.png", &b""[..]), ("text.png", b"hello, world"), ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), ("cut.tif", b"II*\0")]
-        {
+        assert!(
+            read_texture(&missing, Encoding::Srgb)
+                .unwrap_err()
+                .to_string()
+                .contains("missing.png: cannot be read")
+        );
+        for (name, bytes) in [
+            ("empty.png", &b""[..]),
+            ("text.png", b"hello, world"),
+            ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"),
+            ("cut.tif", b"II*\0"),
+        ] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
             let text = read_texture(&path, Encoding::Srgb).unwrap_err().to_string();
@@ -263,7 +309,8 @@ mod tests {
         for name in ["camsim/vignet-S3LowOffset.bmp", "camsim/vignet-fisheye-640x480.bmp"] {
             let gray = read_gray_image(&data.join(name)).unwrap();
             assert_eq!(gray.size_px, [640, 480]);
-            let (low, high) = gray.values.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+            let (low, high) =
+                gray.values.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
             assert!((0.0..0.2).contains(&low) && (0.6..=1.0).contains(&high), "{name} {low} {high}");
         }
         for (name, size) in [
@@ -273,7 +320,11 @@ mod tests {
             ("terrain/sertig/sertig_valley_color.tif", [641, 917]),
         ] {
             let texture = read_texture(&data.join(name), Encoding::Srgb).unwrap();
-            assert_eq!((texture.size_px, texture.rgba8.len()), (size, 4 * (size[0] * size[1]) as usize), "{name}");
+            assert_eq!(
+                (texture.size_px, texture.rgba8.len()),
+                (size, 4 * (size[0] * size[1]) as usize),
+                "{name}"
+            );
         }
     }
 }

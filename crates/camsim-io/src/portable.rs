@@ -1,4 +1,5 @@
-//! Paths in output folders: relative to the file that holds them, so that a folder can be moved together with what it names.
+//! Paths in output folders: relative to the file that holds them, so that a folder can be moved together with
+//! what it names.
 
 use std::{
     io,
@@ -15,8 +16,9 @@ use crate::{
 /// Folder of copies in an output folder.
 const COPIES: &str = "inputs";
 
-/// `path` as a file in `folder` names it, with `/` between its parts: relative where both are below one folder other than the root, absolute where
-/// they have nothing in common but that. What is no file or folder (a pipe) keeps its name.
+/// `path` as a file in `folder` names it, with `/` between its parts: relative where both are below one
+/// folder other than the root, absolute where they have nothing in common but that. What is no file or folder
+/// (a pipe) keeps its name.
 #[must_use]
 pub fn relative_to(path: &Path, folder: &Path) -> PathBuf {
     if path.metadata().is_ok_and(|of| !of.is_file() && !of.is_dir()) {
@@ -67,12 +69,14 @@ fn lexical(path: PathBuf) -> PathBuf {
 /// A path that is not Unicode, which no text file can hold.
 pub fn portable_scenario(scenario: &Scenario, folder: &Path) -> Result<Scenario, serde_json::Error> {
     let mut tree = serde_json::to_value(scenario)?;
-    for_each_path(&mut tree, &mut |_, path| *path = relative_to(Path::new(path), folder).to_string_lossy().into_owned());
+    for_each_path(&mut tree, &mut |_, path| {
+        *path = relative_to(Path::new(path), folder).to_string_lossy().into_owned()
+    });
     serde_json::from_value(tree)
 }
 
-/// Writes `folder/camera.toml`, which reads back to `camera` wherever the folder is: vignette and zoom track are in the folder, as copies in `inputs/` where
-/// they were not in it before.
+/// Writes `folder/camera.toml`, which reads back to `camera` wherever the folder is: vignette and zoom track
+/// are in the folder, as copies in `inputs/` where they were not in it before.
 ///
 /// # Errors
 /// A file cannot be read or written.
@@ -84,10 +88,12 @@ pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError
         }
     }
     let target = folder.join("camera.toml");
-    let encode = |error: toml::ser::Error| WriteError::Encode { path: target.clone(), message: error.to_string() };
+    let encode =
+        |error: toml::ser::Error| WriteError::Encode { path: target.clone(), message: error.to_string() };
     let text = toml::to_string(&own).map_err(encode)?;
-    let text =
-        format!("# The camera of this run: `camera = \"camera.toml\"` in a scenario uses it. Paths are relative to this file.\n{text}");
+    let text = format!(
+        "# The camera of this run: `camera = \"camera.toml\"` in a scenario uses it. Paths are relative to this file.\n{text}"
+    );
     write_atomic(&target, text.as_bytes())
 }
 
@@ -141,7 +147,10 @@ mod tests {
             assert_eq!(found, Path::new(wanted), "{path} from {folder}");
         }
         // Nothing in common but the root.
-        assert_eq!(relative_to(Path::new("/no-such-place/dem.tif"), &at("runs")), Path::new("/no-such-place/dem.tif"));
+        assert_eq!(
+            relative_to(Path::new("/no-such-place/dem.tif"), &at("runs")),
+            Path::new("/no-such-place/dem.tif")
+        );
     }
 
     #[cfg(unix)]
@@ -165,14 +174,24 @@ mod tests {
         std::fs::write(at("v.png"), "a picture").unwrap();
         std::fs::create_dir_all(at("out/scene")).unwrap();
         std::fs::write(at("out/scene/zoom.csv"), "t_s,zoom\n").unwrap();
-        let zoom =
-            [1.0, 2.0].map(|at| ZoomSpec { at, focal_px: [500.0 * at; 2], principal_point_px: None, coefficients: Vec::new() }).to_vec();
-        let mut camera = CameraSpec { zoom, zoom_track: Some(at("out/scene/zoom.csv")), ..CameraSpec::default() };
+        let zoom = [1.0, 2.0]
+            .map(|at| ZoomSpec {
+                at,
+                focal_px: [500.0 * at; 2],
+                principal_point_px: None,
+                coefficients: Vec::new(),
+            })
+            .to_vec();
+        let mut camera =
+            CameraSpec { zoom, zoom_track: Some(at("out/scene/zoom.csv")), ..CameraSpec::default() };
         camera.photometric.vignette = Some(at("v.png"));
         write_camera(&at("out"), &camera).unwrap();
         std::fs::remove_file(at("v.png")).unwrap();
         std::fs::rename(at("out"), at("elsewhere")).unwrap();
-        for read in [read_camera(&at("elsewhere/camera.toml")).unwrap(), read_camera_toml(&at("elsewhere/camera.toml")).unwrap()] {
+        for read in [
+            read_camera(&at("elsewhere/camera.toml")).unwrap(),
+            read_camera_toml(&at("elsewhere/camera.toml")).unwrap(),
+        ] {
             let vignette = read.photometric.vignette.unwrap();
             assert_eq!(vignette, at("elsewhere/inputs/vignette.png"));
             assert_eq!(std::fs::read_to_string(vignette).unwrap(), "a picture");

@@ -1,7 +1,8 @@
 //! Scenario files: TOML, a camera file inside it, `--set` on top, each mistake with its file, line and key.
 //!
-//! The order is: parse, put `camera = "file.toml"` in its place, apply `--set`, check keys and types against the schema, resolve paths
-//! against the folder of the file that names them (those of `--set` against the working directory), deserialise, check ranges.
+//! The order is: parse, put `camera = "file.toml"` in its place, apply `--set`, check keys and types against
+//! the schema, resolve paths against the folder of the file that names them (those of `--set` against the
+//! working directory), deserialise, check ranges.
 
 use std::path::{Path, PathBuf};
 
@@ -70,11 +71,17 @@ pub enum ScenarioError {
     Problems(Vec<String>),
 }
 
-/// Reads a scenario, or that of a `run.json`, with `sets` (`--set key=value`, in order) and `preset` on top, and checks all of it.
+/// Reads a scenario, or that of a `run.json`, with `sets` (`--set key=value`, in order) and `preset` on top,
+/// and checks all of it.
 ///
 /// # Errors
-/// The file or its camera file cannot be read or is not TOML; a key is unknown, of the wrong type or out of range.
-pub fn read_scenario(path: &Path, sets: &[(String, String)], preset: Option<Preset>) -> Result<Scenario, ScenarioError> {
+/// The file or its camera file cannot be read or is not TOML; a key is unknown, of the wrong type or out of
+/// range.
+pub fn read_scenario(
+    path: &Path,
+    sets: &[(String, String)],
+    preset: Option<Preset>,
+) -> Result<Scenario, ScenarioError> {
     finish(Tree::read_scenario(path)?, sets, preset)
 }
 
@@ -110,7 +117,9 @@ pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
         return Ok(camera);
     }
     // In a camera file the keys stand at the root.
-    let line = |problem: &Problem| format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."));
+    let line = |problem: &Problem| {
+        format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."))
+    };
     Err(ScenarioError::Problems(problems.iter().map(line).collect()))
 }
 
@@ -119,13 +128,18 @@ pub fn print_default() -> String {
     include_str!("scenario_file/default.toml").to_owned()
 }
 
-/// Every key of a scenario file and what it takes, in the order of `--print-default`; elements of arrays of tables stand without their index.
+/// Every key of a scenario file and what it takes, in the order of `--print-default`; elements of arrays of
+/// tables stand without their index.
 #[must_use]
 pub fn keys() -> &'static [(&'static str, Kind)] {
     schema::SCENARIO.keys
 }
 
-fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> Result<Scenario, ScenarioError> {
+fn finish(
+    mut tree: Tree,
+    sets: &[(String, String)],
+    preset: Option<Preset>,
+) -> Result<Scenario, ScenarioError> {
     tree.resolve_camera()?;
     for (key, text) in sets {
         tree.set(key, text)?;
@@ -142,12 +156,17 @@ fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> 
     if problems.is_empty() {
         return Ok(scenario);
     }
-    Err(ScenarioError::Problems(problems.iter().map(|problem| format!("{}: {problem}", tree.place(&problem.key))).collect()))
+    Err(ScenarioError::Problems(
+        problems.iter().map(|problem| format!("{}: {problem}", tree.place(&problem.key))).collect(),
+    ))
 }
 
-/// The schema lets nothing through that the struct does not take; should it, the file is named without a line.
+/// The schema lets nothing through that the struct does not take; should it, the file is named without a
+/// line.
 pub(crate) fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
-    let described = |error: toml::de::Error| ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())]);
+    let described = |error: toml::de::Error| {
+        ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())])
+    };
     toml::Value::Table(tree.root.clone()).try_into().map_err(described)
 }
 

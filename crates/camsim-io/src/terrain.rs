@@ -33,7 +33,9 @@ use camsim_core::{
 use glam::DVec3;
 
 use crate::pictures::PictureError;
-pub(crate) use beside::{files as files_beside_raster, read_mask as read_mask_beside, read_tags as read_tags_beside};
+pub(crate) use beside::{
+    files as files_beside_raster, read_mask as read_mask_beside, read_tags as read_tags_beside,
+};
 pub use docs::documentation;
 
 pub(crate) use systems::unit_of_name;
@@ -44,7 +46,8 @@ use ortho::Ortho;
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
 pub type NedFromGeodetic<'a> = &'a (dyn Fn(f64, f64, f64) -> DVec3 + Sync);
 
-/// Metres to add to a height at latitude, longitude (radians): the geoid's undulation, where DEM and log differ in datum.
+/// Metres to add to a height at latitude, longitude (radians): the geoid's undulation, where DEM and log
+/// differ in datum.
 pub type HeightShift<'a> = &'a (dyn Fn(f64, f64) -> f64 + Sync);
 
 /// A terrain and what to say about it.
@@ -79,9 +82,11 @@ pub struct TerrainSummary {
     pub void_heights: u64,
     /// Heights for which the ortho-image has nothing: `scene.terrain.beyond` says what is seen there.
     pub outside_ortho: u64,
-    /// Texture coordinates of the ortho-image's own corners, which is larger where the ground goes on in grey.
+    /// Texture coordinates of the ortho-image's own corners, which is larger where the ground goes on in
+    /// grey.
     pub picture_uv: [[f64; 2]; 2],
-    /// How many times finer along each side the picture was made, so that it holds the light on each height; 1 without light.
+    /// How many times finer along each side the picture was made, so that it holds the light on each height;
+    /// 1 without light.
     pub picture_times: u32,
 }
 
@@ -97,7 +102,9 @@ pub enum TerrainFileError {
         source: PictureError,
     },
     /// A picture where heights are wanted.
-    #[error("{path}: has {bands} bands, so it is a picture and no DEM: heights are one band (scene.terrain.ortho takes the picture)")]
+    #[error(
+        "{path}: has {bands} bands, so it is a picture and no DEM: heights are one band (scene.terrain.ortho takes the picture)"
+    )]
     NotHeights {
         /// The file.
         path: PathBuf,
@@ -132,7 +139,9 @@ pub enum TerrainFileError {
         path: PathBuf,
     },
     /// The coordinate system is not stated.
-    #[error("{path}: the file does not state its coordinate system: set scene.terrain.epsg, for example scene.terrain.epsg = 32632")]
+    #[error(
+        "{path}: the file does not state its coordinate system: set scene.terrain.epsg, for example scene.terrain.epsg = 32632"
+    )]
     NoCrs {
         /// The file.
         path: PathBuf,
@@ -149,7 +158,9 @@ pub enum TerrainFileError {
         epsg: u16,
     },
     /// The file and the scenario disagree.
-    #[error("{path}: the file states EPSG:{stated} but scene.terrain.epsg = {wanted}: remove the key, or reproject the file")]
+    #[error(
+        "{path}: the file states EPSG:{stated} but scene.terrain.epsg = {wanted}: remove the key, or reproject the file"
+    )]
     CrsConflict {
         /// The file.
         path: PathBuf,
@@ -199,7 +210,9 @@ pub enum TerrainFileError {
         source: TerrainError,
     },
     /// Coordinates that the projection has no answer for.
-    #[error("{path}: {count} heights lie outside of the domain of EPSG:{epsg}: check scene.terrain.epsg and the georeference")]
+    #[error(
+        "{path}: {count} heights lie outside of the domain of EPSG:{epsg}: check scene.terrain.epsg and the georeference"
+    )]
     OutsideCrs {
         /// The DEM.
         path: PathBuf,
@@ -228,8 +241,9 @@ impl TerrainFileError {
     }
 }
 
-/// Reads `scene.terrain`. Paths are used as they stand. `height_shift` is added to the heights of the file where its vertical datum is not
-/// that of the flight log; horizontal datum transformations never touch heights.
+/// Reads `scene.terrain`. Paths are used as they stand. `height_shift` is added to the heights of the file
+/// where its vertical datum is not that of the flight log; horizontal datum transformations never touch
+/// heights.
 ///
 /// # Errors
 ///
@@ -272,9 +286,20 @@ pub fn read_terrain_in_light(
         ));
     }
     let is_void = spec.beyond == Beyond::Void;
-    let grid = Grid { dem: &dem, ned_from_geodetic, height_shift, ortho: ortho.as_ref(), is_void, outside_crs: AtomicBool::new(false) };
-    let without_picture = ortho.as_ref().map_or(0, |ortho| dem.count(|at| !dem.height_m(at).is_nan() && !ortho.shows(&dem, at)));
-    if let Some(path) = spec.ortho.as_ref().filter(|_| without_picture > 0 && without_picture == dem.points() - heights.voids) {
+    let grid = Grid {
+        dem: &dem,
+        ned_from_geodetic,
+        height_shift,
+        ortho: ortho.as_ref(),
+        is_void,
+        outside_crs: AtomicBool::new(false),
+    };
+    let without_picture = ortho
+        .as_ref()
+        .map_or(0, |ortho| dem.count(|at| !dem.height_m(at).is_nan() && !ortho.shows(&dem, at)));
+    if let Some(path) =
+        spec.ortho.as_ref().filter(|_| without_picture > 0 && without_picture == dem.points() - heights.voids)
+    {
         return Err(TerrainFileError::NoOverlap { ortho: path.clone(), dem: dem.path.clone() });
     }
     let texture = match &ortho {
@@ -295,12 +320,22 @@ pub fn read_terrain_in_light(
             ortho.texture.clone()
         }
         // Colours of heights have a light of their own, but for that of the scene.
-        None => shade::relief(dem.size, heights.range_m, &|at| dem.height_m(at), &|at| grid.point_ned_m(at), light.is_none()),
+        None => shade::relief(
+            dem.size,
+            heights.range_m,
+            &|at| dem.height_m(at),
+            &|at| grid.point_ned_m(at),
+            light.is_none(),
+        ),
     };
     let [cols, rows] = dem.size;
     let made = Terrain::of_grid(cols, rows, &grid, Arc::new(texture));
     if grid.outside_crs.load(Ordering::Relaxed) {
-        return Err(TerrainFileError::OutsideCrs { path: dem.path.clone(), epsg: dem.crs.epsg, count: dem.count_outside_crs() });
+        return Err(TerrainFileError::OutsideCrs {
+            path: dem.path.clone(),
+            epsg: dem.crs.epsg,
+            count: dem.count_outside_crs(),
+        });
     }
     let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
     terrain.beyond = ortho.as_ref().and_then(Ortho::color_beyond);
@@ -329,7 +364,11 @@ impl TerrainGrid for Grid<'_> {
         };
         let height_m = self.dem.height_m(at);
         let is_left_out = self.is_void && self.ortho.is_some_and(|ortho| !ortho.shows(self.dem, at));
-        if height_m.is_nan() || is_left_out { DVec3::NAN } else { (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon])) }
+        if height_m.is_nan() || is_left_out {
+            DVec3::NAN
+        } else {
+            (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon]))
+        }
     }
 
     fn uv(&self, at: [u32; 2]) -> [f32; 2] {
@@ -355,7 +394,8 @@ impl Grid<'_> {
             .filter_map(|at| dem.geodetic_rad(at))
             .fold([EMPTY_RANGE; 2], |ranges, place| [0, 1].map(|k: usize| widened(ranges[k], place[k])));
         let middle = dem.model_from_pixel.apply(dem.size.map(|n| 0.5 * f64::from(n)));
-        let centre_rad = dem.crs.geodetic_from_model(middle).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
+        let centre_rad =
+            dem.crs.geodetic_from_model(middle).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
         // 190 degrees east are 170 degrees west.
         let turns = std::f64::consts::TAU * (centre_rad[1] / std::f64::consts::TAU).round();
         let [west, east, centre_lon] = [west, east, centre_rad[1]].map(|lon| lon - turns);

@@ -16,7 +16,8 @@
 //!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
 //!
-//! `output.format` chooses the formats of colour; the other channels have one each. An empty `format` writes no frame files at all.
+//! `output.format` chooses the formats of colour; the other channels have one each. An empty `format` writes
+//! no frame files at all.
 
 use std::{io, path::PathBuf};
 
@@ -38,8 +39,8 @@ pub use frames::{FrameFiles, FrameWriter, WriteSummary};
 pub use picture::write_picture;
 pub use png_file::contact_sheet;
 pub use tables::{
-    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, ROWS_COLUMNS, TRAJECTORY_COLUMNS, TrajectoryRecord, camera_trajectory_csv, rows_csv,
-    trajectory_csv,
+    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, ROWS_COLUMNS, TRAJECTORY_COLUMNS, TrajectoryRecord,
+    camera_trajectory_csv, rows_csv, trajectory_csv,
 };
 
 /// Why a file was not written.
@@ -88,7 +89,9 @@ pub enum WriteError {
 fn advice(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on the disk and run again",
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "choose a folder that you may write to, with -o",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "choose a folder that you may write to, with -o"
+        }
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists | io::ErrorKind::IsADirectory => {
             "something else has that name; choose another folder with -o"
         }

@@ -1,8 +1,10 @@
-//! `camsim apply` through its files, against rays cast into a scene of planes: an oracle that shares nothing with it.
+//! `camsim apply` through its files, against rays cast into a scene of planes: an oracle that shares nothing
+//! with it.
 //!
-//! The ideal picture's colours are its own pixel coordinates, so that the output's colours tell where each pixel looked, and, with an
-//! exposure, the mean of where it looked. The oracle integrates the camera's pose in small steps, inverts the lens by Newton's method on
-//! differences, and meets the planes one by one, all in f64.
+//! The ideal picture's colours are its own pixel coordinates, so that the output's colours tell where each
+//! pixel looked, and, with an exposure, the mean of where it looked. The oracle integrates the camera's pose
+//! in small steps, inverts the lens by Newton's method on differences, and meets the planes one by one, all
+//! in f64.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -46,15 +48,21 @@ fn cast(from: DVec3, along: DVec3) -> Option<(usize, DVec3)> {
     let hits = SCENE.iter().enumerate().filter_map(|(i, panel)| {
         let share = (panel.offset_m - panel.normal.dot(from)) / panel.normal.dot(along);
         let at = from + share * along;
-        let within = (panel.x_m[0]..=panel.x_m[1]).contains(&at.x) && (panel.y_m[0]..=panel.y_m[1]).contains(&at.y);
+        let within =
+            (panel.x_m[0]..=panel.x_m[1]).contains(&at.x) && (panel.y_m[0]..=panel.y_m[1]).contains(&at.y);
         (share > 0.0 && within).then_some((share, i, at))
     });
     hits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, i, at)| (i, at))
 }
 
-/// Camera axes in the world, and its place, at an instant: classical Runge-Kutta on `R' = R [w]x`, `p' = R v`. The world is the camera at 0.
+/// Camera axes in the world, and its place, at an instant: classical Runge-Kutta on `R' = R [w]x`, `p' = R
+/// v`. The world is the camera at 0.
 fn pose(t_s: f64) -> (DMat3, DVec3) {
-    let cross = DMat3::from_cols(DVec3::new(0.0, RATE.z, -RATE.y), DVec3::new(-RATE.z, 0.0, RATE.x), DVec3::new(RATE.y, -RATE.x, 0.0));
+    let cross = DMat3::from_cols(
+        DVec3::new(0.0, RATE.z, -RATE.y),
+        DVec3::new(-RATE.z, 0.0, RATE.x),
+        DVec3::new(RATE.y, -RATE.x, 0.0),
+    );
     let steps = 200;
     let h = t_s / f64::from(steps);
     (0..steps).fold((DMat3::IDENTITY, DVec3::ZERO), |(r, p), _| {
@@ -73,8 +81,10 @@ fn distorted(uv: DVec2) -> DVec2 {
     let [k1, k2, p1, p2] = LENS;
     let r2 = uv.length_squared();
     let radial = 1.0 + k1 * r2 + k2 * r2 * r2;
-    let tangential =
-        DVec2::new(2.0 * p1 * uv.x * uv.y + p2 * (r2 + 2.0 * uv.x * uv.x), p1 * (r2 + 2.0 * uv.y * uv.y) + 2.0 * p2 * uv.x * uv.y);
+    let tangential = DVec2::new(
+        2.0 * p1 * uv.x * uv.y + p2 * (r2 + 2.0 * uv.x * uv.x),
+        p1 * (r2 + 2.0 * uv.y * uv.y) + 2.0 * p2 * uv.x * uv.y,
+    );
     uv * radial + tangential
 }
 
@@ -110,7 +120,8 @@ fn look(pixel: DVec2, (axes, place): (DMat3, DVec3)) -> Look {
     if at.z <= 0.0 || at_px.cmplt(DVec2::ZERO).any() || at_px.cmpgt(last).any() {
         return Look::Outside;
     }
-    let seen = cast(DVec3::ZERO, at).is_some_and(|(first, first_at)| first == panel && first_at.distance(at) < 1e-6);
+    let seen =
+        cast(DVec3::ZERO, at).is_some_and(|(first, first_at)| first == panel && first_at.distance(at) < 1e-6);
     if seen { Look::Seen { panel, at_px } } else { Look::Hidden }
 }
 
@@ -123,7 +134,8 @@ fn row_s(y: u32) -> f64 {
 fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, UnseenCounts) {
     let [width, height] = IDEAL_PX;
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (f64::from(x), f64::from(y))));
-    let mut ideal = RenderedFrame { size_px: IDEAL_PX, depth_m: Some(Vec::new()), ..RenderedFrame::default() };
+    let mut ideal =
+        RenderedFrame { size_px: IDEAL_PX, depth_m: Some(Vec::new()), ..RenderedFrame::default() };
     for (x, y) in pixels {
         let ray = ((DVec2::new(x, y) - IDEAL_CENTRE) / IDEAL_FOCAL).extend(1.0);
         ideal.color_rgba.extend([x as f32 / 512.0, y as f32 / 512.0, 0.0, 1.0]);
@@ -207,14 +219,23 @@ fn sources_are_those_of_rays_into_the_scene() {
         100.0 * right
     );
     // The test sees what it is about.
-    assert!(clear.len() > 60_000 && near.len() > 1_000 && hidden > 500, "{} {} {hidden}", clear.len(), near.len());
-    // The contract is 0.05 RMS; 0.003 is measured. Over planes the sources are exact to 1e-6 (core's tests), but here colours tell them, which
-    // the gather reads between pixels.
+    assert!(
+        clear.len() > 60_000 && near.len() > 1_000 && hidden > 500,
+        "{} {} {hidden}",
+        clear.len(),
+        near.len()
+    );
+    // The contract is 0.05 RMS; 0.003 is measured. Over planes the sources are exact to 1e-6 (core's tests),
+    // but here colours tell them, which the gather reads between pixels.
     assert!(rms(&clear) < 0.01 && worst < 0.02, "{} {worst}", rms(&clear));
-    // A wrong side of a silhouette is possible within half a texel of it, and nothing else is: of the pixels within one of it an eighth.
+    // A wrong side of a silhouette is possible within half a texel of it, and nothing else is: of the pixels
+    // within one of it an eighth.
     assert!(right > 0.86, "{right}");
     // What is not shown is empty; the border of the picture may fall either way in the last bit.
-    assert!(wrongly_empty <= 2 && counts.outside.abs_diff(outside) <= 5 && counts.no_ray == 0, "{wrongly_empty} {counts:?} {outside}");
+    assert!(
+        wrongly_empty <= 2 && counts.outside.abs_diff(outside) <= 5 && counts.no_ray == 0,
+        "{wrongly_empty} {counts:?} {outside}"
+    );
 }
 
 #[test]
@@ -229,23 +250,38 @@ fn blur_is_the_mean_of_rays_over_the_exposure() {
         let phase = |k: u32| (f64::from(k) + 0.5) / f64::from(INSTANTS) - 0.5;
         let poses: Vec<_> = (0..INSTANTS).map(|k| pose(row_s(y) + phase(k) * exposure_s)).collect();
         for x in (0..OUT_PX[0]).step_by(2) {
-            let looks: Vec<Look> = poses.iter().map(|&pose| look(DVec2::new(f64::from(x), f64::from(y)), pose)).collect();
+            let looks: Vec<Look> =
+                poses.iter().map(|&pose| look(DVec2::new(f64::from(x), f64::from(y)), pose)).collect();
             let seen: Vec<(usize, DVec2)> = looks
                 .iter()
-                .filter_map(|look| if let Look::Seen { panel, at_px } = look { Some((*panel, *at_px)) } else { None })
+                .filter_map(|look| {
+                    if let Look::Seen { panel, at_px } = look { Some((*panel, *at_px)) } else { None }
+                })
                 .collect();
             if seen.len() < looks.len() {
                 continue;
             }
             let Some(found) = found_px(&frame, x, y) else { continue };
-            let error = found.distance(seen.iter().map(|(_, at_px)| *at_px).sum::<DVec2>() / f64::from(INSTANTS));
-            if seen.iter().all(|(panel, _)| *panel == seen[0].0) { one.push(error) } else { mixed.push(error) }
+            let error =
+                found.distance(seen.iter().map(|(_, at_px)| *at_px).sum::<DVec2>() / f64::from(INSTANTS));
+            if seen.iter().all(|(panel, _)| *panel == seen[0].0) {
+                one.push(error)
+            } else {
+                mixed.push(error)
+            }
         }
     }
-    eprintln!("one surface {}: RMS {:.5}; several {}: RMS {:.3}", one.len(), rms(&one), mixed.len(), rms(&mixed));
+    eprintln!(
+        "one surface {}: RMS {:.5}; several {}: RMS {:.3}",
+        one.len(),
+        rms(&one),
+        mixed.len(),
+        rms(&mixed)
+    );
     assert!(one.len() > 10_000 && mixed.len() > 300, "{} {}", one.len(), mixed.len());
     // 0.008 is measured.
     assert!(rms(&one) < 0.012, "{}", rms(&one));
-    // Each surface's share of the exposure is known to about one sample, and to half a texel of its silhouette.
+    // Each surface's share of the exposure is known to about one sample, and to half a texel of its
+    // silhouette.
     assert!(rms(&mixed) < 0.35, "{}", rms(&mixed));
 }

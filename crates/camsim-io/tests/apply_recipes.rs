@@ -15,7 +15,8 @@ fn recipes() -> Vec<String> {
 fn write_exr(path: &Path, channels: &[&str]) {
     let list: SmallVec<[AnyChannel<FlatSamples>; 4]> =
         channels.iter().map(|name| AnyChannel::new(*name, FlatSamples::F32(vec![2.0; 12]))).collect();
-    let image = Image::from_encoded_channels(Vec2(4_usize, 3), Encoding::UNCOMPRESSED, AnyChannels::sort(list));
+    let image =
+        Image::from_encoded_channels(Vec2(4_usize, 3), Encoding::UNCOMPRESSED, AnyChannels::sort(list));
     image.write().to_file(path).unwrap();
 }
 
@@ -49,14 +50,20 @@ fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
         ("color", "png") => image::RgbImage::from_pixel(4, 3, image::Rgb([90, 80, 70])).save(&path).unwrap(),
         ("depth", "pfm") => {
             let values = [2.0_f32, 65_504.0].into_iter().cycle().take(12).flat_map(f32::to_le_bytes);
-            fs::write(&path, b"Pf\n4 3\n-1.000000\n".iter().copied().chain(values).collect::<Vec<u8>>()).unwrap();
+            fs::write(&path, b"Pf\n4 3\n-1.000000\n".iter().copied().chain(values).collect::<Vec<u8>>())
+                .unwrap();
         }
         ("depth", "tiff") => {
             let file = fs::File::create(&path).unwrap();
             let values = [2.0, f32::INFINITY, f32::NAN].into_iter().cycle().take(12).collect::<Vec<f32>>();
-            tiff::encoder::TiffEncoder::new(file).unwrap().write_image::<tiff::encoder::colortype::Gray32Float>(4, 3, &values).unwrap();
+            tiff::encoder::TiffEncoder::new(file)
+                .unwrap()
+                .write_image::<tiff::encoder::colortype::Gray32Float>(4, 3, &values)
+                .unwrap();
         }
-        ("depth", "png") => image::ImageBuffer::from_pixel(4, 3, image::Luma([4000_u16])).save(&path).unwrap(),
+        ("depth", "png") => {
+            image::ImageBuffer::from_pixel(4, 3, image::Luma([4000_u16])).save(&path).unwrap()
+        }
         ("color" | "depth" | "frames", "txt") => {
             let time = if key == "depth" { 12.51 } else { 12.5 };
             let row = |folder_name: &str| format!("{folder_name}/{time}.png");
@@ -69,8 +76,12 @@ fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
             };
             fs::write(&path, format!("# comment\n{time} {}{pair}\n", row(key))).unwrap();
         }
-        ("trajectory", "txt") => fs::write(&path, "# t x y z qx qy qz qw\n12 0 0 0 0 0 0 1\n13 1 0 0 0 0 0 1\n").unwrap(),
-        ("trajectory", "csv") => fs::write(&path, "t_s,x,y,z,qw,qx,qy,qz\n12,0,0,0,1,0,0,0\n13,1,0,0,1,0,0,0\n").unwrap(),
+        ("trajectory", "txt") => {
+            fs::write(&path, "# t x y z qx qy qz qw\n12 0 0 0 0 0 0 1\n13 1 0 0 0 0 0 1\n").unwrap()
+        }
+        ("trajectory", "csv") => {
+            fs::write(&path, "t_s,x,y,z,qw,qx,qy,qz\n12,0,0,0,1,0,0,0\n13,1,0,0,1,0,0,0\n").unwrap()
+        }
         other => panic!("the page names {name} as {other:?}: teach the test what that is"),
     }
 }
@@ -95,7 +106,10 @@ fn every_recipe_is_read() {
         for index in 0..set.entries().len() {
             let file = set.read(index).unwrap_or_else(|error| panic!("{recipe}\n{error}"));
             assert_eq!(file.frame.geometry.size_px, [4, 3]);
-            assert!(file.without_depth < 1.0 && file.frame.inverse_depth.iter().any(|w| *w > 0.0), "{recipe}");
+            assert!(
+                file.without_depth < 1.0 && file.frame.inverse_depth.iter().any(|w| *w > 0.0),
+                "{recipe}"
+            );
             // Sky, where a stub has some, is told from the rest.
             let sky = if recipe.contains("65504") {
                 0.5

@@ -19,7 +19,12 @@ use camsim_core::scenario::{CameraSpec, LensModel};
 use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_named};
 
 /// Imports a text as a file of that name.
-fn import(name: &str, text: &str, format: Option<CameraFormat>, camera: Option<&str>) -> Result<ImportedCamera, String> {
+fn import(
+    name: &str,
+    text: &str,
+    format: Option<CameraFormat>,
+    camera: Option<&str>,
+) -> Result<ImportedCamera, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
@@ -60,19 +65,38 @@ fn check(what: &str, imported: &ImportedCamera, wants: &[Want]) {
         match want {
             Want::Intrinsics(wanted) => {
                 let found = intrinsics(spec);
-                assert!(found.iter().zip(wanted).all(|(a, b)| near(*a, *b)), "{what}: {found:?} instead of {wanted:?}");
+                assert!(
+                    found.iter().zip(wanted).all(|(a, b)| near(*a, *b)),
+                    "{what}: {found:?} instead of {wanted:?}"
+                );
             }
             Want::Size(wanted) => assert_eq!(spec.size_px, *wanted, "{what}"),
             Want::Lens(model, coefficients) => {
-                assert_eq!((spec.lens.model, spec.lens.coefficients.as_slice()), (*model, *coefficients), "{what}");
+                assert_eq!(
+                    (spec.lens.model, spec.lens.coefficients.as_slice()),
+                    (*model, *coefficients),
+                    "{what}"
+                );
             }
-            Want::Readout(ms) => assert!(near(spec.shutter.readout_ms, *ms), "{what}: {} ms instead of {ms}", spec.shutter.readout_ms),
+            Want::Readout(ms) => assert!(
+                near(spec.shutter.readout_ms, *ms),
+                "{what}: {} ms instead of {ms}",
+                spec.shutter.readout_ms
+            ),
             Want::Fps(fps) => assert!(near(spec.fps, *fps), "{what}: {} fps", spec.fps),
             Want::Note(text) => {
-                assert!(imported.notes.iter().any(|note| note.contains(text)), "{what}: `{text}` is not in {:?}", imported.notes)
+                assert!(
+                    imported.notes.iter().any(|note| note.contains(text)),
+                    "{what}: `{text}` is not in {:?}",
+                    imported.notes
+                )
             }
             Want::Without(text) => {
-                assert!(imported.notes.iter().all(|note| !note.contains(text)), "{what}: `{text}` is in {:?}", imported.notes)
+                assert!(
+                    imported.notes.iter().all(|note| !note.contains(text)),
+                    "{what}: `{text}` is in {:?}",
+                    imported.notes
+                )
             }
         }
     }

@@ -1,4 +1,5 @@
-//! The files in `assets/` can be read with the crates that camsim uses, and belong together: the flight is over its terrain.
+//! The files in `assets/` can be read with the crates that camsim uses, and belong together: the flight is
+//! over its terrain.
 
 #![allow(clippy::unwrap_used)]
 
@@ -33,7 +34,10 @@ fn scenarios_name_files_that_exist() {
         files.extend(scenario.scene.pattern.map(|pattern| pattern.image));
         if let Some(terrain) = scenario.scene.terrain {
             // Equal references need no geoid: the demo must not depend on one.
-            assert_eq!((scenario.flight.height, terrain.height), (HeightReference::Msl, HeightReference::Msl));
+            assert_eq!(
+                (scenario.flight.height, terrain.height),
+                (HeightReference::Msl, HeightReference::Msl)
+            );
             files.push(terrain.dem);
             files.extend(terrain.ortho);
         }
@@ -47,13 +51,15 @@ fn scenarios_name_files_that_exist() {
 
 #[test]
 fn the_flight_stays_over_its_terrain() {
-    let mut dem = Decoder::new(fs::File::open(asset("demo_dem.tif")).unwrap()).unwrap().with_limits(Limits::default());
+    let mut dem =
+        Decoder::new(fs::File::open(asset("demo_dem.tif")).unwrap()).unwrap().with_limits(Limits::default());
     let (cols, rows) = dem.dimensions().unwrap();
     let scale = dem.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
     let tie = dem.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
     let DecodingResult::F32(heights_m) = dem.read_image().unwrap() else { panic!("demo_dem.tif is float32") };
     assert_eq!((cols, rows), (1007, 633));
-    let (low_m, high_m) = heights_m.iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
+    let (low_m, high_m) =
+        heights_m.iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
     assert_eq!((low_m, high_m), (2543.0, 3946.25));
 
     let window_s = scenario("demo.toml").flight.window_s.unwrap();
@@ -67,7 +73,10 @@ fn the_flight_stays_over_its_terrain() {
         let row = ((tie[4] - lat_deg) / scale[1]).floor();
         let col = ((lon_deg - tie[3]) / scale[0]).floor();
         // 500 m from the border: the picture is not of the terrain's edge.
-        assert!((50.0..f64::from(rows) - 50.0).contains(&row) && (62.0..f64::from(cols) - 62.0).contains(&col), "{line}");
+        assert!(
+            (50.0..f64::from(rows) - 50.0).contains(&row) && (62.0..f64::from(cols) - 62.0).contains(&col),
+            "{line}"
+        );
         let above_m = height_m - f64::from(heights_m[row as usize * cols as usize + col as usize]);
         assert!((300.0..900.0).contains(&above_m), "{above_m} m above ground: {line}");
         assert!((t_s - last_s) > 0.0);

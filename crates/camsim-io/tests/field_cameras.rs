@@ -1,4 +1,5 @@
-//! Calibrations as users' files look when they go wrong (`tests/data/field/calib`): the right value, or a refusal that helps.
+//! Calibrations as users' files look when they go wrong (`tests/data/field/calib`): the right value, or a
+//! refusal that helps.
 
 #![allow(clippy::unwrap_used)]
 
@@ -34,7 +35,10 @@ fn a_rolling_shutter_of_vins_is_33_ms() {
     let spec = &imported.spec;
     assert!((spec.shutter.readout_ms - 33.0).abs() < 1e-12);
     assert_eq!(spec.shutter.readout, Readout::TopToBottom);
-    assert_eq!((spec.size_px, spec.focal_px, spec.principal_point_px), ([640, 480], [610.0, 609.0], Some([319.0, 235.5])));
+    assert_eq!(
+        (spec.size_px, spec.focal_px, spec.principal_point_px),
+        ([640, 480], [610.0, 609.0], Some([319.0, 235.5]))
+    );
     assert_eq!(spec.lens.coefficients, [9.2e-2, -1.8e-1, -6.5e-4, -3.5e-4]);
     assert!(says(&imported, "left out: td = 0.007"), "{:?}", imported.notes);
     assert!(!says(&imported, "no shutter times"), "{:?}", imported.notes);
@@ -44,7 +48,8 @@ fn a_rolling_shutter_of_vins_is_33_ms() {
 fn a_mirror_parameter_is_no_brown_conrady_lens() {
     let error = refused("omni_sample.yml");
     assert!(error.contains("xi: is 1.4") && error.contains("MEI (omnidirectional)"), "{error}");
-    let forced = import_camera_as(&field("omni_sample.yml"), Some(CameraFormat::OpenCv)).unwrap_err().to_string();
+    let forced =
+        import_camera_as(&field("omni_sample.yml"), Some(CameraFormat::OpenCv)).unwrap_err().to_string();
     assert!(forced.contains("MEI (omnidirectional)"), "{forced}");
 }
 
@@ -55,8 +60,14 @@ fn four_coefficients_without_a_model_are_asked_about() {
     let coefficients = [-0.0077, 0.0419, -0.0391, 0.0067];
     let as_ = |format| import_camera_as(&field("fisheye_K_D.yml"), Some(format)).unwrap().spec;
     let (plain, fisheye) = (as_(CameraFormat::OpenCv), as_(CameraFormat::OpenCvFisheye));
-    assert_eq!((plain.lens.model, plain.lens.coefficients.as_slice()), (LensModel::BrownConrady, &coefficients[..]));
-    assert_eq!((fisheye.lens.model, fisheye.lens.coefficients.as_slice()), (LensModel::KannalaBrandt, &coefficients[..]));
+    assert_eq!(
+        (plain.lens.model, plain.lens.coefficients.as_slice()),
+        (LensModel::BrownConrady, &coefficients[..])
+    );
+    assert_eq!(
+        (fisheye.lens.model, fisheye.lens.coefficients.as_slice()),
+        (LensModel::KannalaBrandt, &coefficients[..])
+    );
     assert_eq!((fisheye.focal_px, fisheye.principal_point_px), ([286.1, 286.3], Some([319.7, 240.2])));
 }
 
@@ -67,8 +78,15 @@ fn camera_info_messages_with_a_region_of_interest() {
     assert_eq!((imported.format, spec.size_px), (CameraFormat::RosCameraInfo, [640, 400]));
     near(spec.focal_px, [403.911583563, 403.911583563]);
     near(spec.principal_point_px.unwrap(), [631.065444573 - 320.0, 375.688877091 - 200.0]);
-    assert_eq!(spec.lens.coefficients, [0.0153369206277, -0.0432553402055, -0.00118657118488, -0.00147661359656, 0.00896220693898]);
-    assert!(says(&imported, "the picture is the region [640.0, 400.0] px from [320.0, 200.0]"), "{:?}", imported.notes);
+    assert_eq!(
+        spec.lens.coefficients,
+        [0.0153369206277, -0.0432553402055, -0.00118657118488, -0.00147661359656, 0.00896220693898]
+    );
+    assert!(
+        says(&imported, "the picture is the region [640.0, 400.0] px from [320.0, 200.0]"),
+        "{:?}",
+        imported.notes
+    );
 }
 
 #[test]
@@ -85,11 +103,18 @@ fn binning_divides_matrix_and_size() {
     let text = std::fs::read_to_string(field("baxter2.yaml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("binned.yaml");
-    std::fs::write(&path, text.replace("binning_x: 1", "binning_x: 4").replace("binning_y: 1", "binning_y: 4")).unwrap();
+    std::fs::write(
+        &path,
+        text.replace("binning_x: 1", "binning_x: 4").replace("binning_y: 1", "binning_y: 4"),
+    )
+    .unwrap();
     let imported = import_camera_as(&path, None).unwrap();
     assert_eq!(imported.spec.size_px, [160, 100]);
     near(imported.spec.focal_px, [403.911583563 / 4.0, 403.911583563 / 4.0]);
-    near(imported.spec.principal_point_px.unwrap(), [(631.065444573 - 320.0) / 4.0, (375.688877091 - 200.0) / 4.0]);
+    near(
+        imported.spec.principal_point_px.unwrap(),
+        [(631.065444573 - 320.0) / 4.0, (375.688877091 - 200.0) / 4.0],
+    );
     assert!(says(&imported, "binned by [4.0, 4.0]"), "{:?}", imported.notes);
 }
 
@@ -98,9 +123,15 @@ fn ros_ini() {
     let imported = read("ic33.ini");
     let spec = &imported.spec;
     assert_eq!((imported.format, spec.size_px), (CameraFormat::RosIni, [640, 480]));
-    assert_eq!((spec.focal_px, spec.principal_point_px), ([369.344588, 367.154330], Some([320.739078, 203.592450])));
+    assert_eq!(
+        (spec.focal_px, spec.principal_point_px),
+        ([369.344588, 367.154330], Some([320.739078, 203.592450]))
+    );
     assert_eq!(spec.lens.model, LensModel::BrownConrady);
-    assert_eq!(spec.lens.coefficients, [0.189544, -0.018229, -0.000630, 0.000054, -0.000212, 0.543582, -0.027892]);
+    assert_eq!(
+        spec.lens.coefficients,
+        [0.189544, -0.018229, -0.000630, 0.000054, -0.000212, 0.543582, -0.027892]
+    );
     assert!(says(&imported, "projection_matrix, which differs"), "{:?}", imported.notes);
 }
 
@@ -115,7 +146,10 @@ fn a_region_of_interest_in_a_file() {
 fn a_symmetrical_gyroflow_profile_has_its_principal_point_in_the_middle() {
     let imported = read("gyro_min.json");
     let spec = &imported.spec;
-    assert_eq!((spec.size_px, spec.principal_point_px, spec.fps), ([1920, 1080], Some([960.0, 540.0]), 59.94));
+    assert_eq!(
+        (spec.size_px, spec.principal_point_px, spec.fps),
+        ([1920, 1080], Some([960.0, 540.0]), 59.94)
+    );
     assert_eq!((spec.shutter.readout_ms, spec.shutter.readout), (15.2, Readout::TopToBottom));
     assert_eq!((spec.lens.model, spec.lens.coefficients.as_slice()), (LensModel::KannalaBrandt, &[0.1][..]));
     assert!(says(&imported, "[565.6, 1206.0]"), "{:?}", imported.notes);
@@ -137,7 +171,10 @@ fn three_coefficients_could_be_two_things() {
 fn cameras_of_a_metashape_project() {
     let imported = read("metashape_cams.xml");
     let spec = &imported.spec;
-    assert_eq!((imported.format, spec.size_px, spec.focal_px), (CameraFormat::Agisoft, [5472, 3648], [3666.2, 3666.2]));
+    assert_eq!(
+        (imported.format, spec.size_px, spec.focal_px),
+        (CameraFormat::Agisoft, [5472, 3648], [3666.2, 3666.2])
+    );
     near(spec.principal_point_px.unwrap(), [2736.0 - 11.7 - 0.5, 1824.0 + 18.2 - 0.5]);
     assert_eq!(spec.lens.coefficients, [0.0093, -0.03, 0.0012, 0.0004, 0.029]);
 }
@@ -145,7 +182,10 @@ fn cameras_of_a_metashape_project() {
 #[test]
 fn a_matrix_as_a_list_of_rows() {
     let spec = read("py_nested.yaml").spec;
-    assert_eq!((spec.size_px, spec.focal_px, spec.principal_point_px), ([640, 480], [657.1, 657.3], Some([319.5, 239.5])));
+    assert_eq!(
+        (spec.size_px, spec.focal_px, spec.principal_point_px),
+        ([640, 480], [657.1, 657.3], Some([319.5, 239.5]))
+    );
     assert_eq!(spec.lens.coefficients, [-0.2, 0.05, 0.001, -0.001, 0.01]);
 }
 
@@ -153,9 +193,15 @@ fn a_matrix_as_a_list_of_rows() {
 fn no_word_on_extrinsics_that_are_not_there() {
     let imported = read("kal_none.yaml");
     let spec = &imported.spec;
-    assert_eq!((spec.size_px, spec.focal_px, spec.principal_point_px), ([512, 512], [257.3, 257.4], Some([254.9, 256.8])));
+    assert_eq!(
+        (spec.size_px, spec.focal_px, spec.principal_point_px),
+        ([512, 512], [257.3, 257.4], Some([254.9, 256.8]))
+    );
     assert_eq!(spec.lens.model, LensModel::Pinhole);
-    assert_eq!(imported.notes, ["no frame rate and no shutter times are in the file: fps is 30, the shutter global"]);
+    assert_eq!(
+        imported.notes,
+        ["no frame rate and no shutter times are in the file: fps is 30, the shutter global"]
+    );
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Flight logs as users' files look when they go wrong, and every real one: the right value, or words that help.
+//! Flight logs as users' files look when they go wrong, and every real one: the right value, or words that
+//! help.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,7 +7,9 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin, TimeUnit},
+    scenario::{
+        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin, TimeUnit,
+    },
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DVec3, EulerRot};
@@ -98,7 +101,10 @@ fn every_log_gives_its_value_or_says_why_not() {
         (
             "header-units/airdata.csv",
             spec(),
-            Gives(Flight { warnings: &["altitude_above_seaLevel(feet)` says above mean sea level"], ..usual() }),
+            Gives(Flight {
+                warnings: &["altitude_above_seaLevel(feet)` says above mean sea level"],
+                ..usual()
+            }),
         ),
         ("header-units/alt_ft.csv", spec(), Gives(usual())),
         ("header-units/flytrex.csv", track(), Gives(Flight { yaw_deg: 0.0, ..usual() })),
@@ -108,8 +114,16 @@ fn every_log_gives_its_value_or_says_why_not() {
         ("header-units/tu_min.csv", track(), Gives(Flight { yaw_deg: 0.0, ..usual() })),
         ("header-units/tu_msec.csv", track(), Gives(Flight { yaw_deg: 0.0, ..usual() })),
         // Units that no header names.
-        ("time-unit-guess/epoch_ms.csv", spec(), Gives(Flight { warnings: &["read as ms", "2023"], ..usual() })),
-        ("time-unit-guess/epoch_us.csv", spec(), Gives(Flight { warnings: &["read as us", "2023"], ..usual() })),
+        (
+            "time-unit-guess/epoch_ms.csv",
+            spec(),
+            Gives(Flight { warnings: &["read as ms", "2023"], ..usual() }),
+        ),
+        (
+            "time-unit-guess/epoch_us.csv",
+            spec(),
+            Gives(Flight { warnings: &["read as us", "2023"], ..usual() }),
+        ),
         (
             "time-unit-guess/px4_global.csv",
             track(),
@@ -126,9 +140,17 @@ fn every_log_gives_its_value_or_says_why_not() {
         (
             "time-unit-guess/px4_global.csv",
             FlightSpec { height: HeightReference::Msl, time_unit: TimeUnit::Us, ..track() },
-            Gives(Flight { yaw_deg: 0.0, warnings: &["`alt` counts, because flight.height is \"msl\""], ..usual() }),
+            Gives(Flight {
+                yaw_deg: 0.0,
+                warnings: &["`alt` counts, because flight.height is \"msl\""],
+                ..usual()
+            }),
         ),
-        ("time-unit-guess/time_ms_nounit.csv", spec(), Refused(&["flight.time_unit", "rows 1000 s apart at 0.01 m/s"])),
+        (
+            "time-unit-guess/time_ms_nounit.csv",
+            spec(),
+            Refused(&["flight.time_unit", "rows 1000 s apart at 0.01 m/s"]),
+        ),
         ("time-unit-guess/time_ms_nounit.csv", time(TimeUnit::Ms), Gives(level())),
         // Receivers without a fix.
         (
@@ -161,7 +183,11 @@ fn every_log_gives_its_value_or_says_why_not() {
         ("ned-quaternion/airsim_named.txt", spec(), Refused(&["csv-ned", "POS_X", "flight.format"])),
         ("ned-quaternion/airsim_named.txt", format(LogFormat::CsvNed), Gives(airsim())),
         ("ned-quaternion/airsim_rec.txt", spec(), Refused(&["csv-ned", "POS_X", "flight.format"])),
-        ("ned-quaternion/airsim_rec.txt", format(LogFormat::CsvNed), Gives(Flight { warnings: &["read as ms", "2021"], ..airsim() })),
+        (
+            "ned-quaternion/airsim_rec.txt",
+            format(LogFormat::CsvNed),
+            Gives(Flight { warnings: &["read as ms", "2021"], ..airsim() }),
+        ),
         // Two columns for one quantity, angles without a unit.
         ("two-columns/heading_and_yaw.csv", spec(), Refused(&["`heading`", "`yaw`", "line 1"])),
         ("two-columns/heading_and_yaw.csv", track(), Gives(Flight { yaw_deg: 0.0, ..level() })),
@@ -170,7 +196,11 @@ fn every_log_gives_its_value_or_says_why_not() {
             spec(),
             Gives(Flight { north_m: -200.0, yaw_deg: f64::NAN, warnings: &["read as radians"], ..level() }),
         ),
-        ("two-columns/rad_nounit.csv", angle(AngleUnit::Rad), Gives(Flight { north_m: -200.0, yaw_deg: f64::NAN, ..level() })),
+        (
+            "two-columns/rad_nounit.csv",
+            angle(AngleUnit::Rad),
+            Gives(Flight { north_m: -200.0, yaw_deg: f64::NAN, ..level() }),
+        ),
         // Times, quotes, separators, missing values.
         (
             "bad-message/a.gpx",
@@ -191,11 +221,19 @@ fn every_log_gives_its_value_or_says_why_not() {
             }),
         ),
         ("bad-message/a.gpx", spec(), Refused(&["flight.attitude = \"track\""])),
-        ("bad-message/a.gpx", FlightSpec { format: LogFormat::Tum, ..track() }, Refused(&["flight.format is \"tum\" but the file is GPX"])),
+        (
+            "bad-message/a.gpx",
+            FlightSpec { format: LogFormat::Tum, ..track() },
+            Refused(&["flight.format is \"tum\" but the file is GPX"]),
+        ),
         ("bad-message/dji.SRT", track(), Refused(&["subtitles", "exiftool", "lat_deg"])),
         ("bad-message/dupalt.csv", track(), Refused(&["line 1", "4 (`alt`) and 5 (`alt`)", "one quantity"])),
         ("bad-message/iso.csv", spec(), Gives(usual())),
-        ("bad-message/midnight.csv", spec(), Gives(Flight { warnings: &["begins again at line 12", "midnight"], ..level() })),
+        (
+            "bad-message/midnight.csv",
+            spec(),
+            Gives(Flight { warnings: &["begins again at line 12", "midnight"], ..level() }),
+        ),
         ("bad-message/na.csv", spec(), Gives(Flight { rows: 20, left_out: [0, 0, 1], ..level() })),
         ("bad-message/opentx.csv", spec(), Gives(Flight { yaw_deg: 0.524_f64.to_degrees(), ..usual() })),
         ("bad-message/quoted.csv", spec(), Gives(level())),
@@ -215,13 +253,26 @@ fn every_log_gives_its_value_or_says_why_not() {
         (
             "bad-message/tum_2q.txt",
             spec(),
-            Gives(Flight { north_m: 0.0, climb_m: 0.0, yaw_deg: f64::NAN, warnings: &["length 2.000, not 1"], ..local() }),
+            Gives(Flight {
+                north_m: 0.0,
+                climb_m: 0.0,
+                yaw_deg: f64::NAN,
+                warnings: &["length 2.000, not 1"],
+                ..local()
+            }),
         ),
         // Prose before the names.
         (
             "tum-header/format_header.txt",
             spec(),
-            Gives(Flight { rows: 100, seconds: 4.95, north_m: 19.898_487, climb_m: 0.0, yaw_deg: f64::NAN, ..local() }),
+            Gives(Flight {
+                rows: 100,
+                seconds: 4.95,
+                north_m: 19.898_487,
+                climb_m: 0.0,
+                yaw_deg: f64::NAN,
+                ..local()
+            }),
         ),
     ];
     let mut faults = Vec::new();
@@ -262,11 +313,16 @@ fn check(result: &Result<FlightLog, String>, expected: &Expected) -> Result<(), 
     let (first, last) = (log.rows.first().unwrap(), log.rows.last().unwrap());
     let moved = last.position_ned_m - first.position_ned_m;
     let near = |what: &str, found: f64, expected: f64, within: f64| {
-        if expected.is_nan() || (found - expected).abs() <= within { Ok(()) } else { Err(format!("{what} {found}, not {expected}")) }
+        if expected.is_nan() || (found - expected).abs() <= within {
+            Ok(())
+        } else {
+            Err(format!("{what} {found}, not {expected}"))
+        }
     };
     near("rows", log.rows.len() as f64, flight.rows as f64, 0.0)?;
     near("seconds", log.duration_s(), flight.seconds, 2e-6)?;
-    // Feet with two decimals and degrees with eight are good to millimetres; the Earth's curvature is 3 mm over 200 m.
+    // Feet with two decimals and degrees with eight are good to millimetres; the Earth's curvature is 3 mm
+    // over 200 m.
     near("north", moved.x, flight.north_m, 0.05)?;
     near("climb", -moved.z, flight.climb_m, 0.01)?;
     near("yaw", yaw_deg(log), flight.yaw_deg, 0.05)?;
@@ -285,8 +341,11 @@ fn check(result: &Result<FlightLog, String>, expected: &Expected) -> Result<(), 
         }
         _ => return Err("one of origin and frame".into()),
     }
-    let warnings: Vec<&str> = log.notes.iter().filter(|note| note.is_warning).map(|note| note.text.as_str()).collect();
-    if let Some(word) = flight.warnings.iter().find(|word| !warnings.iter().any(|warning| warning.contains(*word))) {
+    let warnings: Vec<&str> =
+        log.notes.iter().filter(|note| note.is_warning).map(|note| note.text.as_str()).collect();
+    if let Some(word) =
+        flight.warnings.iter().find(|word| !warnings.iter().any(|warning| warning.contains(*word)))
+    {
         return Err(format!("no warning has `{word}`"));
     }
     match warnings.iter().find(|warning| !flight.warnings.iter().any(|word| warning.contains(word))) {
@@ -312,7 +371,10 @@ fn a_prose_header_shifts_no_columns() {
 fn angles_in_radians_without_a_unit_are_those() {
     let log = read(&field().join("log-two-columns/rad_nounit.csv"), &spec()).unwrap();
     let (yaw, pitch, roll) = log.rows[0].ned_from_body.to_euler(EulerRot::ZYX);
-    assert!((yaw - 2.8).abs() < 1e-9 && (pitch + 0.05).abs() < 1e-9 && (roll - 0.1).abs() < 1e-9, "{yaw} {pitch} {roll}");
+    assert!(
+        (yaw - 2.8).abs() < 1e-9 && (pitch + 0.05).abs() < 1e-9 && (roll - 0.1).abs() < 1e-9,
+        "{yaw} {pitch} {roll}"
+    );
     let degrees = FlightSpec { angle_unit: AngleUnit::Deg, ..spec() };
     let log = read(&field().join("log-two-columns/rad_nounit.csv"), &degrees).unwrap();
     assert!((log.rows[0].ned_from_body.to_euler(EulerRot::ZYX).0.to_degrees() - 2.8).abs() < 1e-9);
@@ -369,9 +431,17 @@ fn every_real_flight_gives_its_value_or_says_why_not() {
                 let notes = log.notes.iter().map(|note| note.text.clone());
                 let said: Vec<String> = notes.chain([said]).filter(|text| !text.is_empty()).collect();
                 let speed = log.speed_percentile_m_s(0.999);
-                format!("| {file} | {key} | {} | {:.2} | {speed:.2} | {} |\n", log.rows.len(), log.duration_s(), name(said.join("; ")))
+                format!(
+                    "| {file} | {key} | {} | {:.2} | {speed:.2} | {} |\n",
+                    log.rows.len(),
+                    log.duration_s(),
+                    name(said.join("; "))
+                )
             }
-            Err(error) => format!("| {file} | {key} | | | | refused: {} |\n", name(error.clone()).trim_start_matches(&format!("{file}: "))),
+            Err(error) => format!(
+                "| {file} | {key} | | | | refused: {} |\n",
+                name(error.clone()).trim_start_matches(&format!("{file}: "))
+            ),
         };
         match (&result, expected) {
             (Ok(log), Ok(rows)) if log.rows.len() == *rows => {

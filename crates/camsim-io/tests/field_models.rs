@@ -1,4 +1,5 @@
-//! Models and RGB-D frames as users have them: each gives the value that it states, or is refused with what helps.
+//! Models and RGB-D frames as users have them: each gives the value that it states, or is refused with what
+//! helps.
 
 #![allow(clippy::unwrap_used)]
 
@@ -29,7 +30,8 @@ fn frame_error(text: &str) -> String {
 
 fn load(name: &str) -> Result<Loaded, String> {
     let path = field("gltf").join(name);
-    let scenario = parse_scenario(&std::fs::read_to_string(&path).unwrap(), &path, &[]).map_err(|error| error.to_string())?;
+    let scenario = parse_scenario(&std::fs::read_to_string(&path).unwrap(), &path, &[])
+        .map_err(|error| error.to_string())?;
     load_sequence(&scenario).map_err(|error| error.to_string())
 }
 
@@ -52,9 +54,10 @@ fn depth_of_carla_is_asked_for_and_read() {
     let folder = field("apply");
     let path = tempfile::tempdir().unwrap();
     let path = path.path().join("FRAME.toml");
-    let named = text
-        .replace("\"c.png\"", &format!("{:?}", folder.join("c.png")))
-        .replace("depth = \"carla.png\"", &format!("depth = {:?}\ndepth_encoding = \"carla\"", folder.join("carla.png")));
+    let named = text.replace("\"c.png\"", &format!("{:?}", folder.join("c.png"))).replace(
+        "depth = \"carla.png\"",
+        &format!("depth = {:?}\ndepth_encoding = \"carla\"", folder.join("carla.png")),
+    );
     std::fs::write(&path, named).unwrap();
     let file = read_frame(&path).unwrap();
     // 167 772 of 16 777 215 parts of a kilometre, everywhere.
@@ -69,9 +72,12 @@ fn depth_of_carla_is_asked_for_and_read() {
 
 #[test]
 fn what_is_said_to_be_packed_otherwise_is_read_so() {
-    // It is CARLA's, and the file says that it is the other: its formula is in the docs, and the far picture is what was asked for.
+    // It is CARLA's, and the file says that it is the other: its formula is in the docs, and the far picture
+    // is what was asked for.
     let file = read_frame(&field("apply/carla_packed24.toml")).unwrap();
-    assert!((1.0 / f64::from(file.frame.inverse_depth[0]) - (92.0 * 255.0 + 143.0 + 2.0 / 255.0)).abs() < 0.01);
+    assert!(
+        (1.0 / f64::from(file.frame.inverse_depth[0]) - (92.0 * 255.0 + 143.0 + 2.0 / 255.0)).abs() < 0.01
+    );
 }
 
 #[test]
@@ -79,7 +85,11 @@ fn the_scale_of_a_pfm_is_applied_and_told() {
     let file = read_frame(&field("apply/pfm_scale01.toml")).unwrap();
     // 100 stored, times 0.1.
     assert!(file.frame.inverse_depth.iter().all(|w| (f64::from(*w) - 0.1).abs() < 1e-7));
-    assert!(file.notes.len() == 1 && file.notes[0].contains("d01.pfm: the scale -0.1 of its header is applied"), "{:?}", file.notes);
+    assert!(
+        file.notes.len() == 1 && file.notes[0].contains("d01.pfm: the scale -0.1 of its header is applied"),
+        "{:?}",
+        file.notes
+    );
     // Its order of rows is asked for.
     let error = frame_error("color = \"c.png\"\nfocal_px = [60, 60]\ndepth = \"d01.pfm\"\n");
     assert!(error.contains("depth_rows: is missing"), "{error}");
@@ -89,7 +99,10 @@ fn the_scale_of_a_pfm_is_applied_and_told() {
 fn nodes_that_are_not_visible_show_nothing() {
     let (meshes, warnings) = meshes("invisible.toml");
     assert!(meshes.is_empty());
-    assert!(warnings.iter().any(|warning| warning.contains("invisible.gltf: has no triangles")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|warning| warning.contains("invisible.gltf: has no triangles")),
+        "{warnings:?}"
+    );
 }
 
 #[test]
@@ -97,11 +110,18 @@ fn accessors_without_data_are_zeros() {
     let (meshes, warnings) = meshes("uv_nobufferview.toml");
     assert_eq!(meshes.len(), 1);
     let shape = &meshes[0].shape;
-    assert!(shape.indices.len() == 6 && shape.vertices.iter().all(|vertex| vertex.uv == [0.0; 2]), "{:?}", shape.vertices);
+    assert!(
+        shape.indices.len() == 6 && shape.vertices.iter().all(|vertex| vertex.uv == [0.0; 2]),
+        "{:?}",
+        shape.vertices
+    );
     // The square of 10 m is where it is, with heading 180 its x east and its -z north.
     let corner = meshes[0].position_ned_m(0);
     assert!(corner.distance(DVec3::new(5.0, -5.0, 0.0)) < 1e-9, "{corner}");
-    assert!(warnings.iter().any(|warning| warning.contains("accessors.1: has no bufferView: its numbers are 0")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|warning| warning.contains("accessors.1: has no bufferView: its numbers are 0")),
+        "{warnings:?}"
+    );
 }
 
 #[test]

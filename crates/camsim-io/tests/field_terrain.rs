@@ -1,5 +1,6 @@
-//! Terrain from the field: heights and colours at known places. In all of tests/data/field the true height at the centre of pixel (column, row) is
-//! 400 + 0.7 column + 0.3 row metres, and the true colour (40 + 2 column, 30 + 2 row, 100).
+//! Terrain from the field: heights and colours at known places. In all of tests/data/field the true height at
+//! the centre of pixel (column, row) is 400 + 0.7 column + 0.3 row metres, and the true colour (40 + 2
+//! column, 30 + 2 row, 100).
 
 #![allow(clippy::unwrap_used)]
 
@@ -26,7 +27,8 @@ fn with_ortho(ortho: &str) -> TerrainSpec {
 
 /// A frame in which down is just the height turned over, near 47 N, 9 E.
 fn read(spec: &TerrainSpec) -> Result<LoadedTerrain, TerrainFileError> {
-    let ned = |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.82) * 6.37e6, (lon - 0.157) * 6.37e6, -height);
+    let ned =
+        |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.82) * 6.37e6, (lon - 0.157) * 6.37e6, -height);
     read_terrain(spec, &ned, None)
 }
 
@@ -43,7 +45,8 @@ fn height_m(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> Option<f64> {
 fn assert_heights(loaded: &LoadedTerrain, is_void: impl Fn(u32, u32) -> bool) {
     assert_eq!(loaded.summary.size, [96, 96]);
     for (column, row) in (0..96).flat_map(|row| (0..96).map(move |column| (column, row))) {
-        let expected = (!is_void(column, row)).then(|| 400.0 + 0.7 * f64::from(column) + 0.3 * f64::from(row));
+        let expected =
+            (!is_void(column, row)).then(|| 400.0 + 0.7 * f64::from(column) + 0.3 * f64::from(row));
         let found = height_m(loaded, [column, row]);
         let near = match (found, expected) {
             (Some(found), Some(expected)) => (found - expected).abs() < 1e-3,
@@ -63,8 +66,12 @@ fn color(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> [u8; 3] {
 fn assert_colors(loaded: &LoadedTerrain, columns: std::ops::Range<u32>, most: u8) {
     assert_eq!(loaded.terrain.texture.size_px, [96, 96]);
     for (column, row) in (0..96).flat_map(|row| columns.clone().map(move |column| (column, row))) {
-        let (found, expected) = (color(loaded, [column, row]), [40 + 2 * column as u8, 30 + 2 * row as u8, 100]);
-        assert!((0..3).all(|k| found[k].abs_diff(expected[k]) <= most), "({column}, {row}): {found:?} {expected:?}");
+        let (found, expected) =
+            (color(loaded, [column, row]), [40 + 2 * column as u8, 30 + 2 * row as u8, 100]);
+        assert!(
+            (0..3).all(|k| found[k].abs_diff(expected[k]) <= most),
+            "({column}, {row}): {found:?} {expected:?}"
+        );
     }
 }
 
@@ -83,7 +90,9 @@ fn scale_offset_and_unit_of_heights_are_applied() {
 
 #[test]
 fn a_vertical_system_gives_the_unit_and_warns_where_it_contradicts() {
-    for (name, says) in [("comp_6360", "EPSG:6360, NAVD88 height (ftUS)"), ("egm96", "EPSG:5773, EGM96 height")] {
+    for (name, says) in
+        [("comp_6360", "EPSG:6360, NAVD88 height (ftUS)"), ("egm96", "EPSG:5773, EGM96 height")]
+    {
         let path = format!("dem-scale-unit/d_{name}.tif");
         let loaded = read(&spec(&path)).unwrap();
         assert_heights(&loaded, never);
@@ -98,11 +107,15 @@ fn a_vertical_system_gives_the_unit_and_warns_where_it_contradicts() {
 
 #[test]
 fn the_key_for_the_unit_may_not_contradict_the_file() {
-    let unit =
-        |name: &str, unit: HeightUnit| read(&TerrainSpec { height_unit: Some(unit), ..spec(&format!("dem-scale-unit/d_{name}.tif")) });
+    let unit = |name: &str, unit: HeightUnit| {
+        read(&TerrainSpec { height_unit: Some(unit), ..spec(&format!("dem-scale-unit/d_{name}.tif")) })
+    };
     assert_heights(&unit("unit_ft", HeightUnit::Ft).unwrap(), never);
     let error = unit("unit_ft", HeightUnit::M).unwrap_err().to_string();
-    assert!(error.contains("unit `ft` of 0.3048 m") && error.contains("scene.terrain.height_unit"), "{error}");
+    assert!(
+        error.contains("unit `ft` of 0.3048 m") && error.contains("scene.terrain.height_unit"),
+        "{error}"
+    );
     // Where the file says nothing, it says it.
     let loaded = read(&TerrainSpec { height_unit: Some(HeightUnit::Ft), ..spec("ortho/dem.tif") }).unwrap();
     assert!((height_m(&loaded, [50, 50]).unwrap() - 450.0 * 0.3048).abs() < 1e-3);
@@ -137,12 +150,17 @@ fn a_masked_picture_shows_nothing_there() {
 fn dark_pictures_of_more_than_8_bits_are_named_with_their_scale() {
     let loaded = read(&with_ortho("ortho/o_u16_11bit.tif")).unwrap();
     let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
-    assert!(note.contains("end at 1840 of 65535") && note.contains("scene.terrain.ortho_white = 2047"), "{note}");
+    assert!(
+        note.contains("end at 1840 of 65535") && note.contains("scene.terrain.ortho_white = 2047"),
+        "{note}"
+    );
     // The files were made by times 8.
-    let loaded = read(&TerrainSpec { ortho_white: Some(2040.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
+    let loaded =
+        read(&TerrainSpec { ortho_white: Some(2040.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
     assert_colors(&loaded, 0..96, 0);
     assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
-    let loaded = read(&TerrainSpec { ortho_white: Some(1000.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
+    let loaded =
+        read(&TerrainSpec { ortho_white: Some(1000.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
     assert!(loaded.notes[0].contains("brighter than scene.terrain.ortho_white = 1000"), "{:?}", loaded.notes);
 }
 
@@ -150,15 +168,36 @@ fn dark_pictures_of_more_than_8_bits_are_named_with_their_scale() {
 fn what_agencies_ship_is_read() {
     // Both are lossy: GDAL itself finds colours of up to 6 and 10 away from the true ones.
     for (name, most, by_gdal) in [
-        ("jpeg_ycbcr", 6, [([28, 3], [98, 36, 103]), ([80, 70], [202, 169, 98]), ([31, 0], [99, 32, 103]), ([32, 0], [103, 31, 97])]),
-        ("webp", 10, [([28, 3], [94, 36, 97]), ([80, 70], [200, 168, 99]), ([31, 0], [97, 37, 98]), ([32, 0], [98, 36, 96])]),
+        (
+            "jpeg_ycbcr",
+            6,
+            [
+                ([28, 3], [98, 36, 103]),
+                ([80, 70], [202, 169, 98]),
+                ([31, 0], [99, 32, 103]),
+                ([32, 0], [103, 31, 97]),
+            ],
+        ),
+        (
+            "webp",
+            10,
+            [
+                ([28, 3], [94, 36, 97]),
+                ([80, 70], [200, 168, 99]),
+                ([31, 0], [97, 37, 98]),
+                ([32, 0], [98, 36, 96]),
+            ],
+        ),
     ] {
         let loaded = read(&with_ortho(&format!("ortho/o_{name}.tif"))).unwrap();
         assert_colors(&loaded, 0..96, most);
         // Decoders may round otherwise, and make smaller colour planes larger in their own ways.
         for (at, expected) in by_gdal {
             let found = color(&loaded, at);
-            assert!((0..3).all(|k| found[k].abs_diff(expected[k]) <= 2), "{name} {at:?}: {found:?} {expected:?}");
+            assert!(
+                (0..3).all(|k| found[k].abs_diff(expected[k]) <= 2),
+                "{name} {at:?}: {found:?} {expected:?}"
+            );
         }
         assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
     }
@@ -168,7 +207,9 @@ fn what_agencies_ship_is_read() {
 fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
     let loaded = read_terrain(
         &TerrainSpec { ortho: Some(field("ortho/o_170.tif")), ..spec("ortho/d_190.tif") },
-        &|lat, lon, height| DVec3::new(6.37e6 * (lat - (-17f64).to_radians()), 6.37e6 * (lon - 190f64.to_radians()), -height),
+        &|lat, lon, height| {
+            DVec3::new(6.37e6 * (lat - (-17f64).to_radians()), 6.37e6 * (lon - 190f64.to_radians()), -height)
+        },
         None,
     )
     .unwrap();
@@ -180,13 +221,20 @@ fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
         let uv = loaded.terrain.vertices[index].uv;
         assert!((0..2).all(|k| (uv[k] * 96.0 - at[k] as f32 - 0.5).abs() < 1e-3), "{uv:?} {at:?}");
     }
-    assert!((loaded.summary.centre_rad[1].to_degrees() - -169.9952).abs() < 1e-9, "{}", loaded.summary.centre_rad[1].to_degrees());
+    assert!(
+        (loaded.summary.centre_rad[1].to_degrees() - -169.9952).abs() < 1e-9,
+        "{}",
+        loaded.summary.centre_rad[1].to_degrees()
+    );
 }
 
-/// The field's ground of 96 x 96 cells of 10 m, with a picture of 20 x 20 pixels of 10 m whose first one is that in column 30, row 40.
+/// The field's ground of 96 x 96 cells of 10 m, with a picture of 20 x 20 pixels of 10 m whose first one is
+/// that in column 30, row 40.
 fn small_picture(folder: &Path) -> PathBuf {
     let path = folder.join("small.png");
-    image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([200, 10 * x as u8, 10 * y as u8])).save(&path).unwrap();
+    image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([200, 10 * x as u8, 10 * y as u8]))
+        .save(&path)
+        .unwrap();
     std::fs::write(folder.join("small.pgw"), "10 0 0 -10 500305 5199595").unwrap();
     path
 }
@@ -197,27 +245,42 @@ fn ground_beyond_its_picture_is_what_the_key_says() {
     let spec = TerrainSpec { ortho: Some(small_picture(folder.path())), ..spec("ortho/dem.tif") };
     let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
     let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
-    for (beyond, says) in [(Beyond::Grey, "is grey"), (Beyond::Edge, "of the colours at its border"), (Beyond::Void, "left out")] {
+    for (beyond, says) in [
+        (Beyond::Grey, "is grey"),
+        (Beyond::Edge, "of the colours at its border"),
+        (Beyond::Void, "left out"),
+    ] {
         let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
-        assert!(note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(says), "{note}");
+        assert!(
+            note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(says),
+            "{note}"
+        );
         assert_eq!(loaded.summary.outside_ortho, 96 * 96 - 400);
         assert_heights(&loaded, |column, row| beyond == Beyond::Void && !inside(column, row));
-        // In the middle of the picture's pixel (3, 5), and far beyond it, at full size and in every smaller version.
+        // In the middle of the picture's pixel (3, 5), and far beyond it, at full size and in every smaller
+        // version.
         let texture = &loaded.terrain.texture;
         let at = |column: u32, row: u32| {
             let [x, y] = [column, row].map(|n| n / 64);
-            let vertex =
-                loaded.terrain.chunks[(2 * y + x) as usize].first_vertex + (row - 64 * y) * (if x == 0 { 65 } else { 32 }) + column
-                    - 64 * x;
+            let vertex = loaded.terrain.chunks[(2 * y + x) as usize].first_vertex
+                + (row - 64 * y) * (if x == 0 { 65 } else { 32 })
+                + column
+                - 64 * x;
             loaded.terrain.vertices[vertex as usize].uv
         };
-        let pixel = |uv: [f32; 2], size: [u32; 2]| [0, 1].map(|k| (uv[k] * size[k] as f32).clamp(0.0, size[k] as f32 - 1.0) as u32);
+        let pixel = |uv: [f32; 2], size: [u32; 2]| {
+            [0, 1].map(|k| (uv[k] * size[k] as f32).clamp(0.0, size[k] as f32 - 1.0) as u32)
+        };
         let [x, y] = pixel(at(33, 45), texture.size_px);
-        let stored = |bytes: &[u8], [x, y]: [u32; 2], width: u32| bytes[4 * (y * width + x) as usize..][..3].to_vec();
+        let stored =
+            |bytes: &[u8], [x, y]: [u32; 2], width: u32| bytes[4 * (y * width + x) as usize..][..3].to_vec();
         assert_eq!(stored(&texture.rgba8, [x, y], texture.size_px[0]), [200, 30, 50]);
         if beyond == Beyond::Grey {
-            assert_eq!(stored(&texture.rgba8, pixel(at(0, 0), texture.size_px), texture.size_px[0]), [118; 3]);
+            assert_eq!(
+                stored(&texture.rgba8, pixel(at(0, 0), texture.size_px), texture.size_px[0]),
+                [118; 3]
+            );
             for level in texture.mips_within(TexelForm::Stored, loaded.terrain.beyond) {
                 for place in [[0, 0], [95, 3], [5, 95], [95, 95]] {
                     assert_eq!(
@@ -235,9 +298,16 @@ fn ground_beyond_its_picture_is_what_the_key_says() {
 #[test]
 fn a_picture_that_holds_the_ground_stays_as_it_is() {
     let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
-    assert_eq!((loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.picture_uv), ([96, 96], None, [[0.0; 2], [1.0; 2]]));
+    assert_eq!(
+        (loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.picture_uv),
+        ([96, 96], None, [[0.0; 2], [1.0; 2]])
+    );
     // Half of it is masked.
-    assert!(loaded.notes[0].contains("50.00 % of the terrain's area has no picture and is grey"), "{:?}", loaded.notes);
+    assert!(
+        loaded.notes[0].contains("50.00 % of the terrain's area has no picture and is grey"),
+        "{:?}",
+        loaded.notes
+    );
     let loaded = read(&TerrainSpec { beyond: Beyond::Void, ..with_ortho("ortho/o_mask.tif") }).unwrap();
     assert_heights(&loaded, |column, _| column < 48);
 }
@@ -251,7 +321,11 @@ fn the_documentation_is_what_the_tables_say() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, &page).unwrap();
     }
-    assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), page, "CAMSIM_BLESS=1 writes docs/inputs/TERRAIN.md");
+    assert_eq!(
+        std::fs::read_to_string(&path).unwrap_or_default(),
+        page,
+        "CAMSIM_BLESS=1 writes docs/inputs/TERRAIN.md"
+    );
 }
 
 /// Heights and colours of real terrains at three places each, as GDAL reads them.
@@ -275,16 +349,31 @@ fn real_terrains_are_what_gdal_reads() {
         (
             "hinwil/hinwil.tif",
             [([120, 59], 535.931_030_3), ([180, 118], 536.607_055_7), ([353, 231], 540.106_567_4)],
-            Some(("hinwil/hinwil_color.tif", [([120, 59], [163, 163, 129]), ([180, 118], [154, 155, 138]), ([353, 231], [58, 89, 74])])),
+            Some((
+                "hinwil/hinwil_color.tif",
+                [([120, 59], [163, 163, 129]), ([180, 118], [154, 155, 138]), ([353, 231], [58, 89, 74])],
+            )),
         ),
-        ("hinwil/hinwil_large_dem.tif", [([141, 83], 536.051_635_7), ([212, 166], 536.897_583), ([417, 328], 540.611_084)], None),
-        ("bern/swissALTI3D_bern_2m.tif", [([333, 250], 558.060_119_6), ([500, 500], 620.913_024_9), ([993, 995], 604.958_313)], None),
+        (
+            "hinwil/hinwil_large_dem.tif",
+            [([141, 83], 536.051_635_7), ([212, 166], 536.897_583), ([417, 328], 540.611_084)],
+            None,
+        ),
+        (
+            "bern/swissALTI3D_bern_2m.tif",
+            [([333, 250], 558.060_119_6), ([500, 500], 620.913_024_9), ([993, 995], 604.958_313)],
+            None,
+        ),
         (
             "brighton_beach/brighton_beach_dsm_10cm.tif",
             [([355, 244], f64::NAN), ([532, 489], 162.520_004_3), ([1058, 973], f64::NAN)],
             Some(("brighton_beach/brighton_beach_rgb_10cm.tif", [([532, 489], [126, 146, 68]); 3])),
         ),
-        ("jacksboro/jacksboro_fault_dem.tif", [([134, 86], 521.0), ([201, 172], 583.0), ([396, 339], 273.0)], None),
+        (
+            "jacksboro/jacksboro_fault_dem.tif",
+            [([134, 86], 521.0), ([201, 172], 583.0), ([396, 339], 273.0)],
+            None,
+        ),
         (
             "sertig/sertig_valley.tif",
             [([213, 229], 1_754.481_567_4), ([320, 458], 1_918.926_147_5), ([634, 912], 2_560.678_222_7)],

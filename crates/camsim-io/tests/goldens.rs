@@ -1,7 +1,9 @@
-//! `camsim apply` with the paper's methods against frames that the paper's own program computed (docs/reproduction/goldens.md).
+//! `camsim apply` with the paper's methods against frames that the paper's own program computed
+//! (docs/reproduction/goldens.md).
 //!
-//! Needs the frames: CAMSIM_DATA is the folder that holds `golden/`. Every pixel that differs by more than two grey levels must be explained
-//! by a fault of that program, and the fault, put into the model, must give that program's value.
+//! Needs the frames: CAMSIM_DATA is the folder that holds `golden/`. Every pixel that differs by more than
+//! two grey levels must be explained by a fault of that program, and the fault, put into the model, must give
+//! that program's value.
 
 #![allow(clippy::unwrap_used)]
 
@@ -49,8 +51,11 @@ fn goldens() -> Option<Vec<Golden>> {
         eprintln!("CAMSIM_DATA is not set: the reference program's frames are not compared");
         return None;
     };
-    let mut folders: Vec<PathBuf> =
-        fs::read_dir(data.join("golden")).unwrap().map(|entry| entry.unwrap().path()).filter(|p| p.is_dir()).collect();
+    let mut folders: Vec<PathBuf> = fs::read_dir(data.join("golden"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|p| p.is_dir())
+        .collect();
     folders.sort();
     assert_eq!(folders.len(), 8);
     Some(folders.iter().map(|folder| golden(folder)).collect())
@@ -63,8 +68,12 @@ fn golden(folder: &Path) -> Golden {
         found.find(|path| path.to_str().unwrap().ends_with(ending)).unwrap()
     };
     let json: serde_json::Value = serde_json::from_slice(&fs::read(find(".json")).unwrap()).unwrap();
-    let numbers: BTreeMap<String, f64> =
-        json["inputVect"].as_object().unwrap().iter().map(|(key, value)| (key.clone(), value.as_f64().unwrap())).collect();
+    let numbers: BTreeMap<String, f64> = json["inputVect"]
+        .as_object()
+        .unwrap()
+        .iter()
+        .map(|(key, value)| (key.clone(), value.as_f64().unwrap()))
+        .collect();
     let n = |key: &str| numbers[key];
     let coefficients: Vec<f64> = ["k1", "k2", "t1", "t2", "k3"].map(n).into();
     let spec = CameraSpec {
@@ -100,7 +109,8 @@ fn golden(folder: &Path) -> Golden {
     });
     colored.save(work.path().join("color.png")).unwrap();
     fs::copy(find("_ideal_depth.png"), work.path().join("depth.png")).unwrap();
-    // The ideal frame is centred on the middle of its picture. Its instant: that program takes td and half of ti into the pose.
+    // The ideal frame is centred on the middle of its picture. Its instant: that program takes td and half of
+    // ti into the pose.
     let toml = format!(
         "color = \"color.png\"\ndepth = \"depth.png\"\ndepth_encoding = \"packed24\"\nfocal_px = [{}, {}]\ninstant_ms = {}\n\
          [motion]\nvelocity_m_s = [{}, {}, {}]\nangular_rate_rad_s = [{}, {}, {}]\n",
@@ -114,7 +124,11 @@ fn golden(folder: &Path) -> Golden {
         n("wy"),
         n("wz"),
     );
-    let fog = if n("fog_end") > 0.0 { format!("[fog]\nend_m = {}\ncolor = {FOG:?}\n", n("fog_end")) } else { String::new() };
+    let fog = if n("fog_end") > 0.0 {
+        format!("[fog]\nend_m = {}\ncolor = {FOG:?}\n", n("fog_end"))
+    } else {
+        String::new()
+    };
     let path = work.path().join("FRAME.toml");
     fs::write(&path, toml + &fog).unwrap();
     let file = read_frame(&path).unwrap();
@@ -141,19 +155,24 @@ fn golden(folder: &Path) -> Golden {
 /// Faults of that program that show in these frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Fault {
-    /// A vignette value between the thresholds stays as it is: from 0.5 it jumps to 1. The rule is min(v / t2, 1).
+    /// A vignette value between the thresholds stays as it is: from 0.5 it jumps to 1. The rule is min(v /
+    /// t2, 1).
     VignetteJump,
     /// The vignette's texture is filtered with a black border.
     VignetteBorder,
-    /// Sky is decided by the *filtered* alpha, so that horizon pixels mix with the colour that cleared texels hide, or become all sky.
+    /// Sky is decided by the *filtered* alpha, so that horizon pixels mix with the colour that cleared texels
+    /// hide, or become all sky.
     SkyAfterFilter,
-    /// Filter weights there have eight bits, up to half a step off in either direction, so an alpha within a level of one half may be sky ...
+    /// Filter weights there have eight bits, up to half a step off in either direction, so an alpha within a
+    /// level of one half may be sky ...
     TieIsSky,
     /// ... or as ground.
     TieIsGround,
-    /// Sky is 65.281 km away, what its depth buffer was cleared to, and moves with translation: here by up to half a pixel.
+    /// Sky is 65.281 km away, what its depth buffer was cleared to, and moves with translation: here by up to
+    /// half a pixel.
     SkyIsNear,
-    /// The fog's ray is taken from the principal point, where the coordinate counts from the middle of the picture.
+    /// The fog's ray is taken from the principal point, where the coordinate counts from the middle of the
+    /// picture.
     FogCentre,
 }
 
@@ -197,18 +216,20 @@ impl Model<'_> {
         let (begin_px, end_px) = (at_phase(-0.5)?, at_phase(0.5)?);
         let samples = n("extra_sampling_points") + 2.0;
         // Alpha below which a filtered texel is sky; `None` decides texel by texel, before filtering.
-        let sky_below = has(Fault::SkyAfterFilter).then(|| match (has(Fault::TieIsSky), has(Fault::TieIsGround)) {
-            (true, false) => 128.5,
-            (false, true) => 126.5,
-            _ => 127.5,
-        });
+        let sky_below =
+            has(Fault::SkyAfterFilter).then(|| match (has(Fault::TieIsSky), has(Fault::TieIsGround)) {
+                (true, false) => 128.5,
+                (false, true) => 126.5,
+                _ => 127.5,
+            });
         let mut sum = DVec3::ZERO;
         for i in 0..samples as u32 {
             sum += self.color(begin_px.lerp(end_px, f64::from(i) / (samples - 1.0)), sky_below);
         }
         let mut color = sum / samples;
         if n("fog_end") > 0.0 {
-            let wrong = DVec2::new(0.5 * n("width") - n("ox"), 0.5 * n("height") - n("oy")) / DVec2::new(n("fx"), n("fy"));
+            let wrong = DVec2::new(0.5 * n("width") - n("ox"), 0.5 * n("height") - n("oy"))
+                / DVec2::new(n("fx"), n("fy"));
             let ray = if has(Fault::FogCentre) { uv + wrong } else { uv };
             let share = (ray.extend(1.0).length() / inverse_depth / n("fog_end")).clamp(0.0, 1.0);
             color = color.lerp(255.0 * DVec3::from_array(FOG), share);
@@ -231,7 +252,11 @@ impl Model<'_> {
             let [r, g, b] = if a < 128 && sky_below.is_none() { SKY } else { [r, g, b] };
             sum += weight * glam::DVec4::new(f64::from(r), f64::from(g), f64::from(b), f64::from(a));
         }
-        if sky_below.is_some_and(|alpha| sum.w < alpha) { DVec3::new(0.65, 0.85, 1.0) * 255.0 } else { sum.truncate() }
+        if sky_below.is_some_and(|alpha| sum.w < alpha) {
+            DVec3::new(0.65, 0.85, 1.0) * 255.0
+        } else {
+            sum.truncate()
+        }
     }
 
     fn vignette(&self, [x, y]: [u32; 2], jump: bool, border: bool) -> f64 {
@@ -273,7 +298,8 @@ fn levels_of(frame: &RenderedFrame, i: usize) -> Option<[f64; 3]> {
     (p[3] > 0.0).then(|| [p[0], p[1], p[2]].map(|v| f64::from((255.0 * srgb_from_linear(v)).round())))
 }
 
-/// That program's test whether an iterate of the lens inverse left the ideal frame: about the principal point instead of the middle.
+/// That program's test whether an iterate of the lens inverse left the ideal frame: about the principal point
+/// instead of the middle.
 fn fails_the_margin_test(golden: &Golden, uv: DVec2) -> bool {
     let n = |key: &str| golden.numbers[key];
     let at = uv / n("extra_margin") * DVec2::new(n("fx"), n("fy")) + DVec2::new(n("ox"), n("oy"));
@@ -301,7 +327,8 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
             let theirs = [r, g, b].map(f64::from);
             let (red, black) = (theirs == [255.0, 0.0, 0.0], theirs == [0.0; 3]);
             let Some(ours) = levels_of(&rendered, (y * width + x) as usize) else {
-                // No source in the ideal frame: alpha 0 here; there black, black under fog, or the red of "no convergence".
+                // No source in the ideal frame: alpha 0 here; there black, black under fog, or the red of "no
+                // convergence".
                 let fogged = golden.paper.fog.is_some() && {
                     let share = theirs[2] / FOG[2];
                     share > 0.0 && difference(theirs, FOG.map(|v| share * v)) <= AGREES
@@ -325,8 +352,14 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
                 continue;
             }
             // The fewest faults that give that program's value; each must change it.
-            let subsets = (1..1_u32 << FAULTS.len())
-                .map(|bits| FAULTS.into_iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, f)| f).collect::<Vec<_>>());
+            let subsets = (1..1_u32 << FAULTS.len()).map(|bits| {
+                FAULTS
+                    .into_iter()
+                    .enumerate()
+                    .filter(|(i, _)| bits >> i & 1 == 1)
+                    .map(|(_, f)| f)
+                    .collect::<Vec<_>>()
+            });
             let mut subsets: Vec<Vec<Fault>> = subsets.collect();
             subsets.sort_by_key(Vec::len);
             let plain = model.levels([x, y], &[]).unwrap();
@@ -344,7 +377,11 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
                 all_act && difference(value.map(f64::round), theirs) <= AGREES
             };
             match subsets.iter().find(|faults| explains(faults)) {
-                Some(faults) => *causes.entry(faults.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>().join(" + ")).or_default() += 1,
+                Some(faults) => {
+                    *causes
+                        .entry(faults.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>().join(" + "))
+                        .or_default() += 1
+                }
                 None => {
                     missed += 1;
                     eprintln!("{} {x} {y}: {theirs:?}, here {ours:?}", golden.name);
@@ -373,16 +410,19 @@ fn in_fog(golden: &Golden) -> IdealFrame {
     let Some(fog) = &golden.paper.fog else { return ideal };
     let geometry = ideal.geometry;
     for (i, (color, w)) in ideal.color_rgba.chunks_exact_mut(4).zip(&ideal.inverse_depth).enumerate() {
-        let at_px = DVec2::new((i as u32 % geometry.size_px[0]).into(), (i as u32 / geometry.size_px[0]).into());
+        let at_px =
+            DVec2::new((i as u32 % geometry.size_px[0]).into(), (i as u32 / geometry.size_px[0]).into());
         let uv = (at_px - geometry.principal_px) / geometry.focal_px;
-        let stored = DVec3::from_array([color[0], color[1], color[2]].map(|v| f64::from(srgb_from_linear(v))));
+        let stored =
+            DVec3::from_array([color[0], color[1], color[2]].map(|v| f64::from(srgb_from_linear(v))));
         let foggy = fog.over(stored, uv, f64::from(*w)).to_array().map(|v| linear_from_srgb(v as f32));
         color[..3].copy_from_slice(&foggy);
     }
     ideal
 }
 
-/// camsim's own methods on the same inputs: how far the paper's source coordinates are from the exact ones, and the pictures from each other.
+/// camsim's own methods on the same inputs: how far the paper's source coordinates are from the exact ones,
+/// and the pictures from each other.
 #[test]
 fn own_methods_beside_the_reference_programs() {
     let Some(goldens) = goldens() else { return };
@@ -406,7 +446,11 @@ fn own_methods_beside_the_reference_programs() {
         }
         off_px.sort_by(f64::total_cmp);
         let at = |share: f64| off_px[((off_px.len() as f64 * share) as usize).min(off_px.len() - 1)];
-        let weights = vignette_weights(&golden.vignette, golden.spec.size_px, golden.spec.photometric.vignette_thresholds);
+        let weights = vignette_weights(
+            &golden.vignette,
+            golden.spec.size_px,
+            golden.spec.photometric.vignette_thresholds,
+        );
         let compare = |frame: &RenderedFrame| {
             let (mut square, mut seen, mut over) = (0.0, 0_u32, 0_u32);
             for (i, weight) in weights.iter().enumerate() {
@@ -427,7 +471,8 @@ fn own_methods_beside_the_reference_programs() {
             "| {} | {p50:.1e} | {p99:.1e} | {worst:.1e} | {rms:.2} | {over:.2} % | {stored_rms:.2} | {stored_over:.2} % |",
             golden.name
         );
-        // The law of its step, e = r theta step^2 / 6, gives 0.06 px for 18 deg at 560 px; at steps of depth it is worse.
+        // The law of its step, e = r theta step^2 / 6, gives 0.06 px for 18 deg at 560 px; at steps of depth
+        // it is worse.
         assert!(p50 < 0.1, "{}: {p50}", golden.name);
     }
 }

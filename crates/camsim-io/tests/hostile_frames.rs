@@ -1,4 +1,5 @@
-//! RGB-D frames, vignettes and zoom tracks that would be read otherwise than they say: the right value, or a refusal that names the key.
+//! RGB-D frames, vignettes and zoom tracks that would be read otherwise than they say: the right value, or a
+//! refusal that names the key.
 
 #![allow(clippy::unwrap_used)]
 
@@ -41,7 +42,8 @@ impl Folder {
     }
 
     fn depth(&self, depth: &str, more: &str) -> Result<Vec<f32>, String> {
-        self.read(&format!("color = \"c.png\"\nfocal_px = [2, 2]\ndepth = \"{depth}\"\n{more}")).map(|file| file.frame.inverse_depth)
+        self.read(&format!("color = \"c.png\"\nfocal_px = [2, 2]\ndepth = \"{depth}\"\n{more}"))
+            .map(|file| file.frame.inverse_depth)
     }
 
     fn color(&self, color: &str, more: &str) -> Result<FrameFile, String> {
@@ -76,20 +78,28 @@ fn arrays_of_numpy_are_depth_in_any_order_and_kind() {
     assert_eq!(folder.depth("a.npy", "").unwrap(), expected);
     folder.write("a.npy", &npy("<f4", "True", "(2, 3, 1)", &f32s(&[1.0, f32::INFINITY, 2.0, 0.5, 4.0, 8.0])));
     assert_eq!(folder.depth("a.npy", "").unwrap(), expected);
-    let millimetres: Vec<u8> = [1000_u16, 2000, 4000, 0, 500, 8000].iter().flat_map(|value| value.to_be_bytes()).collect();
+    let millimetres: Vec<u8> =
+        [1000_u16, 2000, 4000, 0, 500, 8000].iter().flat_map(|value| value.to_be_bytes()).collect();
     folder.write("a.npy", &npy(">u2", "False", "(2, 3)", &millimetres));
     names(&folder.depth("a.npy", "").unwrap_err(), &["depth_per_metre: is missing", "1000 for millimetres"]);
     assert_eq!(folder.depth("a.npy", "depth_per_metre = 1000\n").unwrap(), expected);
     // The same as floats: no metres either.
-    folder.write("a.npy", &npy("<f4", "False", "(2, 3)", &f32s(&[1000.0, 2000.0, 4000.0, 0.0, 500.0, 8000.0])));
-    names(&folder.depth("a.npy", "").unwrap_err(), &["depth_per_metre: is missing", "whole numbers from 500 to 8000", "1 for metres"]);
+    folder
+        .write("a.npy", &npy("<f4", "False", "(2, 3)", &f32s(&[1000.0, 2000.0, 4000.0, 0.0, 500.0, 8000.0])));
+    names(
+        &folder.depth("a.npy", "").unwrap_err(),
+        &["depth_per_metre: is missing", "whole numbers from 500 to 8000", "1 for metres"],
+    );
     assert_eq!(folder.depth("a.npy", "depth_per_metre = 1000\n").unwrap(), expected);
     assert_eq!(folder.depth("a.npy", "depth_per_metre = 1\n").unwrap()[0], 1e-3);
     folder.write("a.npy", &npy("<f4", "False", "(3, 2)", &f32s(&[1.0; 6])));
     names(&folder.depth("a.npy", "").unwrap_err(), &["a.npy: is 2x3, but the colour is 3x2"]);
     folder.write("a.npz", b"PK\x03\x04 whatever");
     names(&folder.depth("a.npz", "").unwrap_err(), &["a.npz: is an archive of arrays", "numpy.save"]);
-    names(&folder.depth("a.npy", "depth_encoding = \"carla\"\n").unwrap_err(), &["depth_encoding: \"carla\" is of 8-bit RGB"]);
+    names(
+        &folder.depth("a.npy", "depth_encoding = \"carla\"\n").unwrap_err(),
+        &["depth_encoding: \"carla\" is of 8-bit RGB"],
+    );
 }
 
 #[test]
@@ -101,12 +111,19 @@ fn along_the_ray_and_inverse_are_kinds_of_every_file() {
     assert!((f64::from(range[4]) - (1.0 + 0.25_f64.powi(2)).sqrt() / 2.5).abs() < 1e-7);
     // A disparity of 10 pixels at 400 px and 0.12 m: 4.8 m.
     folder.write("d.npy", &npy("<f4", "False", "(2, 3)", &f32s(&[10.0, 0.0, -1.0, 20.0, 40.0, 48.0])));
-    names(&folder.depth("d.npy", "depth_kind = \"inverse\"\n").unwrap_err(), &["depth_per_metre: is missing", "baseline"]);
+    names(
+        &folder.depth("d.npy", "depth_kind = \"inverse\"\n").unwrap_err(),
+        &["depth_per_metre: is missing", "baseline"],
+    );
     let found = folder.depth("d.npy", "depth_kind = \"inverse\"\ndepth_per_metre = 48\n").unwrap();
     for (w, depth_m) in found.iter().zip([4.8, f64::INFINITY, f64::INFINITY, 2.4, 1.2, 1.0]) {
         assert!((f64::from(*w) - 1.0 / depth_m).abs() < 1e-7, "{found:?}");
     }
-    assert_eq!(folder.depth("d.npy", "depth_kind = \"inverse\"\ndepth_per_metre = 48\ndepth_max_m = 3\n").unwrap()[0], 0.0);
+    assert_eq!(
+        folder.depth("d.npy", "depth_kind = \"inverse\"\ndepth_per_metre = 48\ndepth_max_m = 3\n").unwrap()
+            [0],
+        0.0
+    );
 }
 
 #[test]
@@ -117,13 +134,22 @@ fn pictures_that_do_not_tell_what_depth_they_hold_are_refused() {
     names(&folder.depth("g.png", "").unwrap_err(), &["g.png: is no 16-bit grey picture but an 8-bit one"]);
     let wide = DynamicImage::ImageRgb16(image::ImageBuffer::from_pixel(3, 2, image::Rgb([700, 8, 9])));
     folder.write("w.png", &encoded(&wide, ImageFormat::Png));
-    names(&folder.depth("w.png", "depth_per_metre = 1000\n").unwrap_err(), &["w.png: is no 16-bit grey picture of one channel"]);
+    names(
+        &folder.depth("w.png", "depth_per_metre = 1000\n").unwrap_err(),
+        &["w.png: is no 16-bit grey picture of one channel"],
+    );
     let clear = DynamicImage::ImageLumaA16(image::ImageBuffer::from_pixel(3, 2, image::LumaA([700, 8])));
     folder.write("a.png", &encoded(&clear, ImageFormat::Png));
-    names(&folder.depth("a.png", "depth_per_metre = 1000\n").unwrap_err(), &["a.png: is no 16-bit grey picture of one channel"]);
+    names(
+        &folder.depth("a.png", "depth_per_metre = 1000\n").unwrap_err(),
+        &["a.png: is no 16-bit grey picture of one channel"],
+    );
     let packed = DynamicImage::ImageRgba8(image::RgbaImage::from_pixel(3, 2, image::Rgba([92, 143, 2, 255])));
     folder.write("p.webp", &encoded(&packed, ImageFormat::WebP));
-    names(&folder.depth("p.webp", "depth_encoding = \"carla\"\n").unwrap_err(), &["p.webp: is not lossless", "PNG, BMP or PPM"]);
+    names(
+        &folder.depth("p.webp", "depth_encoding = \"carla\"\n").unwrap_err(),
+        &["p.webp: is not lossless", "PNG, BMP or PPM"],
+    );
     folder.write("p.png", &encoded(&packed, ImageFormat::Png));
     let found = folder.depth("p.png", "depth_encoding = \"carla\"\n").unwrap();
     assert!((1.0 / f64::from(found[0]) - 10.0).abs() < 1e-3);
@@ -152,48 +178,85 @@ fn a_mark_for_no_depth_in_a_tiff_is_heeded() {
 #[test]
 fn colours_of_sixteen_bits_webp_and_tiff_are_what_they_say() {
     let folder = Folder::new();
-    let deep = DynamicImage::ImageRgb16(image::ImageBuffer::from_pixel(3, 2, image::Rgb([32_768, 257, 65_535])));
+    let deep =
+        DynamicImage::ImageRgb16(image::ImageBuffer::from_pixel(3, 2, image::Rgb([32_768, 257, 65_535])));
     let expected = [32_768.0_f32 / 65_535.0, 1.0 / 255.0, 1.0].map(linear_from_srgb);
     for (name, format) in [("deep.png", ImageFormat::Png), ("deep.tif", ImageFormat::Tiff)] {
         folder.write(name, &encoded(&deep, format));
         let file = folder.color(name, "").unwrap();
-        assert!(file.frame.color_rgba[..3].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6) && file.notes.is_empty(), "{name}");
+        assert!(
+            file.frame.color_rgba[..3].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6)
+                && file.notes.is_empty(),
+            "{name}"
+        );
     }
     let plain = DynamicImage::ImageRgb8(image::RgbImage::from_pixel(3, 2, image::Rgb([10, 100, 200])));
     folder.write("plain.webp", &encoded(&plain, ImageFormat::WebP));
     let file = folder.color("plain.webp", "").unwrap();
-    assert!(file.frame.color_rgba[..3].iter().zip([10.0, 100.0, 200.0]).all(|(a, b)| (a - linear_from_srgb(b / 255.0)).abs() < 1e-6));
-    let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::from_pixel(3, 2, image::Rgb([0.5, 2.0, 0.25])));
+    assert!(
+        file.frame.color_rgba[..3].iter().zip([10.0, 100.0, 200.0]).all(|(a, b)| (a - linear_from_srgb(
+            b / 255.0
+        ))
+        .abs()
+            < 1e-6)
+    );
+    let floats =
+        DynamicImage::ImageRgb32F(image::ImageBuffer::from_pixel(3, 2, image::Rgb([0.5, 2.0, 0.25])));
     folder.write("light.tif", &encoded(&floats, ImageFormat::Tiff));
-    names(&folder.color("light.tif", "").unwrap_err(), &["color_space: is missing", "light.tif holds floats"]);
-    assert_eq!(folder.color("light.tif", "color_space = \"linear\"\n").unwrap().frame.color_rgba[..3], [0.5, 2.0, 0.25]);
+    names(
+        &folder.color("light.tif", "").unwrap_err(),
+        &["color_space: is missing", "light.tif holds floats"],
+    );
+    assert_eq!(
+        folder.color("light.tif", "color_space = \"linear\"\n").unwrap().frame.color_rgba[..3],
+        [0.5, 2.0, 0.25]
+    );
 }
 
 #[test]
 fn what_colour_pictures_say_beside_their_pixels_is_heeded_or_told() {
     let folder = Folder::new();
-    let clear = DynamicImage::ImageRgba8(image::RgbaImage::from_fn(3, 2, |x, _| image::Rgba([9, 9, 9, if x == 0 { 0 } else { 255 }])));
+    let clear = DynamicImage::ImageRgba8(image::RgbaImage::from_fn(3, 2, |x, _| {
+        image::Rgba([9, 9, 9, if x == 0 { 0 } else { 255 }])
+    }));
     folder.write("clear.png", &encoded(&clear, ImageFormat::Png));
     let notes = folder.color("clear.png", "").unwrap().notes;
     names(&notes.join("\n"), &["clear.png: its alpha is not read: 33.3 % of the pixels are not opaque"]);
     // gAMA behind IHDR: what is stored is light itself.
-    let png = encoded(&DynamicImage::ImageRgb8(image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3]))), ImageFormat::Png);
+    let png = encoded(
+        &DynamicImage::ImageRgb8(image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3]))),
+        ImageFormat::Png,
+    );
     let gamma = |value: u32| {
         let chunk = [b"gAMA".as_slice(), &value.to_be_bytes()].concat();
         let crc = crc32fast::hash(&chunk).to_be_bytes();
         [&png[..33], &4_u32.to_be_bytes(), &chunk, &crc, &png[33..]].concat()
     };
     folder.write("linear.png", &gamma(100_000));
-    names(&folder.color("linear.png", "").unwrap_err(), &["color_space: is missing", "to the power of 1 (gAMA)"]);
-    assert_eq!(folder.color("linear.png", "color_space = \"linear\"\n").unwrap().frame.color_rgba[0], 9.0 / 255.0);
+    names(
+        &folder.color("linear.png", "").unwrap_err(),
+        &["color_space: is missing", "to the power of 1 (gAMA)"],
+    );
+    assert_eq!(
+        folder.color("linear.png", "color_space = \"linear\"\n").unwrap().frame.color_rgba[0],
+        9.0 / 255.0
+    );
     folder.write("usual.png", &gamma(45_455));
     assert!(folder.color("usual.png", "").is_ok());
     // A JPEG that is to be turned by a quarter.
-    let jpeg = encoded(&DynamicImage::ImageRgb8(image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3]))), ImageFormat::Jpeg);
-    let exif = [b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0".as_slice()].concat();
-    let turned = [&jpeg[..2], &[0xff, 0xe1], &(exif.len() as u16 + 2).to_be_bytes(), &exif, &jpeg[2..]].concat();
+    let jpeg = encoded(
+        &DynamicImage::ImageRgb8(image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3]))),
+        ImageFormat::Jpeg,
+    );
+    let exif =
+        [b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0".as_slice()].concat();
+    let turned =
+        [&jpeg[..2], &[0xff, 0xe1], &(exif.len() as u16 + 2).to_be_bytes(), &exif, &jpeg[2..]].concat();
     folder.write("turned.jpg", &turned);
-    names(&folder.color("turned.jpg", "").unwrap_err(), &["turned.jpg: is stored turned (EXIF orientation 6)", "exiftool"]);
+    names(
+        &folder.color("turned.jpg", "").unwrap_err(),
+        &["turned.jpg: is stored turned (EXIF orientation 6)", "exiftool"],
+    );
 }
 
 #[test]
@@ -210,8 +273,12 @@ fn headers_of_exr_files_are_heeded_or_told() {
         image.write().to_file(folder.path(name)).unwrap();
     };
     write("wide.exr", &["R", "G", "B"], &|attributes| attributes.pixel_aspect = 2.0);
-    let told = |focal: &str| folder.read(&format!("color = \"wide.exr\"\nfocal_px = {focal}\n")).unwrap().notes;
-    names(&told("[2, 2]").join("\n"), &["wide.exr: its header says that a pixel is 2 times as wide as high", "focal_px counts"]);
+    let told =
+        |focal: &str| folder.read(&format!("color = \"wide.exr\"\nfocal_px = {focal}\n")).unwrap().notes;
+    names(
+        &told("[2, 2]").join("\n"),
+        &["wide.exr: its header says that a pixel is 2 times as wide as high", "focal_px counts"],
+    );
     assert!(told("[1, 2]").is_empty());
     write("aces.exr", &["R", "G", "B"], &|attributes| {
         let at = |x: f32, y: f32| exr::math::Vec2(x, y);
@@ -222,17 +289,30 @@ fn headers_of_exr_files_are_heeded_or_told() {
             white: at(0.32168, 0.33767),
         });
     });
-    names(&folder.color("aces.exr", "").unwrap().notes.join("\n"), &["aces.exr: its chromaticities are not those of sRGB"]);
+    names(
+        &folder.color("aces.exr", "").unwrap().notes.join("\n"),
+        &["aces.exr: its chromaticities are not those of sRGB"],
+    );
     write("inverse.exr", &["inv_depth"], &|_| {});
-    names(&folder.depth("inverse.exr", "").unwrap_err(), &["inv_depth: is a disparity or an inverse depth by its name"]);
-    assert_eq!(folder.depth("inverse.exr", "depth_kind = \"inverse\"\ndepth_per_metre = 1\n").unwrap(), [0.5; 6]);
+    names(
+        &folder.depth("inverse.exr", "").unwrap_err(),
+        &["inv_depth: is a disparity or an inverse depth by its name"],
+    );
+    assert_eq!(
+        folder.depth("inverse.exr", "depth_kind = \"inverse\"\ndepth_per_metre = 1\n").unwrap(),
+        [0.5; 6]
+    );
     // A flow of another part of the picture.
     write("flow.exr", &["X", "Y"], &|_| {});
     let mut moved = Image::from_channels((3, 2), planes(&["R", "G", "B"]));
     moved.layer_data.attributes.layer_position = exr::math::Vec2(5, 0);
     moved.write().to_file(folder.path("part.exr")).unwrap();
-    let text = "color = \"part.exr\"\nfocal_px = [2, 2]\n[motion]\nflow = \"flow.exr\"\nflow_interval_ms = 40\n";
-    names(&folder.read(text).unwrap_err(), &["flow.exr: begins at pixel [0, 0] of its file, the colour at [5, 0]"]);
+    let text =
+        "color = \"part.exr\"\nfocal_px = [2, 2]\n[motion]\nflow = \"flow.exr\"\nflow_interval_ms = 40\n";
+    names(
+        &folder.read(text).unwrap_err(),
+        &["flow.exr: begins at pixel [0, 0] of its file, the colour at [5, 0]"],
+    );
 }
 
 #[test]
@@ -262,9 +342,12 @@ fn tables_of_frames_say_their_unit() {
         let set = read_frame_set(&folder.path("FRAME.toml")).map_err(|error| error.to_string())?;
         Ok::<_, String>((set.entries()[0].stamp_ns, set.notes().to_vec()))
     };
-    for table in
-        ["t_s,color\n2.5,c.png\n", "t_ms,color\n2500,c.png\n", "color,timestamp [us]\nc.png,2500000\n", "T_NS,color\n2500000000,c.png\n"]
-    {
+    for table in [
+        "t_s,color\n2.5,c.png\n",
+        "t_ms,color\n2500,c.png\n",
+        "color,timestamp [us]\nc.png,2500000\n",
+        "T_NS,color\n2500000000,c.png\n",
+    ] {
         assert_eq!(stamps(table).unwrap(), (Some(2_500_000_000), Vec::new()), "{table}");
     }
     for (table, wanted) in [
@@ -286,24 +369,33 @@ const SCENARIO: &str = "[flight]\nlog = \"log.csv\"\n[scene.board]\nkind = \"cir
 fn warnings(folder: &Path, camera: &str) -> Result<Vec<String>, String> {
     let log = "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n100,0,0,-50,0,0,0\n102,2,0,-50,0,0,0\n";
     fs::write(folder.join("log.csv"), log).unwrap();
-    let scenario = parse_scenario(&format!("{SCENARIO}{camera}"), &folder.join("s.toml"), &[]).map_err(|error| error.to_string())?;
+    let scenario = parse_scenario(&format!("{SCENARIO}{camera}"), &folder.join("s.toml"), &[])
+        .map_err(|error| error.to_string())?;
     load_sequence(&scenario).map(|loaded| loaded.warnings).map_err(|error| error.to_string())
 }
 
 #[test]
 fn zoom_tracks_have_units_and_an_end() {
     let folder = Folder::new();
-    let zoom = "zoom_track = \"z.csv\"\nzoom = [{ at = 1, focal_px = [40, 40] }, { at = 2, focal_px = [80, 80] }]\n";
+    let zoom =
+        "zoom_track = \"z.csv\"\nzoom = [{ at = 1, focal_px = [40, 40] }, { at = 2, focal_px = [80, 80] }]\n";
     let told = |table: &str| {
         folder.write("z.csv", table.as_bytes());
-        warnings(folder.0.path(), zoom)
-            .map(|warnings| warnings.into_iter().filter(|warning| warning.contains("zoom")).collect::<Vec<_>>().join("\n"))
+        warnings(folder.0.path(), zoom).map(|warnings| {
+            warnings.into_iter().filter(|warning| warning.contains("zoom")).collect::<Vec<_>>().join("\n")
+        })
     };
     for table in ["t_s,zoom\n100,1\n102,2\n", "\u{feff}t_ms,zoom\n100000,1\n102000,2\n"] {
         assert_eq!(told(table).unwrap(), "", "{table}");
     }
-    names(&told("t_s,zoom\n0,1\n2,2\n").unwrap(), &["camera.zoom_track covers -100.000 s to -98.000 s", "one clock"]);
-    names(&told("t_s,zoom\n100,1\n102,4\n").unwrap(), &["1 of 2 rows of camera.zoom_track are beyond", "1 to 4 where 1 to 2 are known"]);
+    names(
+        &told("t_s,zoom\n0,1\n2,2\n").unwrap(),
+        &["camera.zoom_track covers -100.000 s to -98.000 s", "one clock"],
+    );
+    names(
+        &told("t_s,zoom\n100,1\n102,4\n").unwrap(),
+        &["1 of 2 rows of camera.zoom_track are beyond", "1 to 4 where 1 to 2 are known"],
+    );
     for (table, wanted) in [
         ("t,zoom\n100,1\n", "z.csv, line 1: the header is `t,zoom` and not `t_s,zoom`"),
         ("t_s,focal_mm\n100,35\n", "the header is `t_s,focal_mm`"),
@@ -321,26 +413,42 @@ fn vignettes_that_look_wrong_are_told_or_refused() {
     let told = |picture: &DynamicImage| {
         folder.write("v.png", &encoded(picture, ImageFormat::Png));
         let of = warnings(folder.0.path(), "[camera.photometric]\nvignette = \"v.png\"\n");
-        of.map(|warnings| warnings.into_iter().filter(|warning| warning.contains("vignette")).collect::<Vec<_>>())
+        of.map(|warnings| {
+            warnings.into_iter().filter(|warning| warning.contains("vignette")).collect::<Vec<_>>()
+        })
     };
-    let gray16 =
-        |size: [u32; 2], value: u16| DynamicImage::ImageLuma16(image::ImageBuffer::from_pixel(size[0], size[1], image::Luma([value])));
+    let gray16 = |size: [u32; 2], value: u16| {
+        DynamicImage::ImageLuma16(image::ImageBuffer::from_pixel(size[0], size[1], image::Luma([value])))
+    };
     assert!(told(&gray16([80, 60], 65_535)).unwrap().is_empty());
-    names(&told(&gray16([80, 60], 4095)).unwrap().join("\n"), &["v.png: the brightest value of the vignette is 6.2 %", "fewer bits"]);
+    names(
+        &told(&gray16([80, 60], 4095)).unwrap().join("\n"),
+        &["v.png: the brightest value of the vignette is 6.2 %", "fewer bits"],
+    );
     names(
         &told(&gray16([80, 45], 65_535)).unwrap().join("\n"),
         &["the vignette is of 80x45 pixels and is stretched to the picture's 40x30"],
     );
-    let clear = DynamicImage::ImageRgba8(image::RgbaImage::from_pixel(40, 30, image::Rgba([255, 255, 255, 9])));
-    names(&told(&clear).unwrap_err(), &["v.png: cannot be decoded: grey values are wanted, and parts of it are transparent", "vignette"]);
+    let clear =
+        DynamicImage::ImageRgba8(image::RgbaImage::from_pixel(40, 30, image::Rgba([255, 255, 255, 9])));
+    names(
+        &told(&clear).unwrap_err(),
+        &["v.png: cannot be decoded: grey values are wanted, and parts of it are transparent", "vignette"],
+    );
     let bright = |most: f32| {
         let floats = DynamicImage::ImageRgb32F(image::ImageBuffer::from_pixel(2, 1, image::Rgb([most; 3])));
         let mut bytes = Cursor::new(Vec::new());
         let values: Vec<f32> = floats.to_rgb32f().pixels().map(|pixel| pixel.0[0]).collect();
-        tiff::encoder::TiffEncoder::new(&mut bytes).unwrap().write_image::<tiff::encoder::colortype::Gray32Float>(2, 1, &values).unwrap();
+        tiff::encoder::TiffEncoder::new(&mut bytes)
+            .unwrap()
+            .write_image::<tiff::encoder::colortype::Gray32Float>(2, 1, &values)
+            .unwrap();
         folder.write("v.tif", &bytes.into_inner());
         read_gray_image(&folder.path("v.tif")).map(|gray| gray.values).map_err(|error| error.to_string())
     };
     assert_eq!(bright(0.75).unwrap(), [0.75; 2]);
-    names(&bright(200.0).unwrap_err(), &["v.tif: cannot be decoded: grey values of floats are 0 to 1, and the largest is 200"]);
+    names(
+        &bright(200.0).unwrap_err(),
+        &["v.tif: cannot be decoded: grey values of floats are 0 to 1, and the largest is 200"],
+    );
 }

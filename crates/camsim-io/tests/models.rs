@@ -18,24 +18,37 @@ fn load(folder: &Path, log: &str, scene: &str) -> Result<Vec<camsim_core::scene:
     std::fs::write(folder.join("model.gltf"), MODEL).unwrap();
     std::fs::write(folder.join("log.csv"), log).unwrap();
     let text = format!("[flight]\nlog = \"log.csv\"\n[scene]\n{scene}\n");
-    let scenario = parse_scenario(&text, &folder.join("scenario.toml"), &[]).map_err(|error| error.to_string())?;
+    let scenario =
+        parse_scenario(&text, &folder.join("scenario.toml"), &[]).map_err(|error| error.to_string())?;
     Ok(load_sequence(&scenario).map_err(|error| error.to_string())?.sequence.scene.meshes.clone())
 }
 
 const LOCAL: &str = "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n0,0,0,-50,0,0,0\n1,1,0,-50,0,0,0\n";
-const ON_EARTH: &str = "t_s,lat_deg,lon_deg,height_m,roll_deg,pitch_deg,yaw_deg\n0,47,8,500,0,0,0\n1,47.0001,8,500,0,0,0\n";
+const ON_EARTH: &str =
+    "t_s,lat_deg,lon_deg,height_m,roll_deg,pitch_deg,yaw_deg\n0,47,8,500,0,0,0\n1,47.0001,8,500,0,0,0\n";
 
 #[test]
 fn models_stand_where_the_scenario_puts_them() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("places.csv"), "n_m,e_m,d_m,heading_deg,scale\n10,20,-1,90,2\n30,40,-2,0,1\n").unwrap();
+    std::fs::write(
+        folder.path().join("places.csv"),
+        "n_m,e_m,d_m,heading_deg,scale\n10,20,-1,90,2\n30,40,-2,0,1\n",
+    )
+    .unwrap();
     let scene = "gltf = [{ file = \"model.gltf\", at = [1, 2, 3] }, { file = \"model.gltf\", placements = \"places.csv\", scale = 3 }]";
     let meshes = load(folder.path(), LOCAL, scene).unwrap();
     let origins: Vec<DVec3> = meshes.iter().map(|mesh| mesh.origin_ned_m).collect();
-    assert_eq!(origins, [DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, -1.0), DVec3::new(30.0, 40.0, -2.0)]);
+    assert_eq!(
+        origins,
+        [DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, -1.0), DVec3::new(30.0, 40.0, -2.0)]
+    );
     assert!(Arc::ptr_eq(&meshes[1].shape, &meshes[2].shape), "copies share their triangles");
     // Half a metre to the left of a model that looks east is north of it, six times as large.
-    assert!(meshes[1].position_ned_m(1).distance(DVec3::new(13.0, 20.0, -1.0)) < 1e-9, "{}", meshes[1].position_ned_m(1));
+    assert!(
+        meshes[1].position_ned_m(1).distance(DVec3::new(13.0, 20.0, -1.0)) < 1e-9,
+        "{}",
+        meshes[1].position_ned_m(1)
+    );
 }
 
 #[test]
@@ -47,7 +60,10 @@ fn places_on_earth_are_those_of_the_log() {
     // The board first; 20 m below the log's first row, and the model 111 m north of it.
     assert!(meshes[0].origin_ned_m.distance(DVec3::new(0.0, 0.0, 20.0)) < 1e-6, "{}", meshes[0].origin_ned_m);
     let model = meshes[1].origin_ned_m;
-    assert!((model.x - 111.2).abs() < 0.2 && model.y.abs() < 1e-6 && (model.z - 50.0).abs() < 0.01, "{model}");
+    assert!(
+        (model.x - 111.2).abs() < 0.2 && model.y.abs() < 1e-6 && (model.z - 50.0).abs() < 0.01,
+        "{model}"
+    );
     let error = load(folder.path(), LOCAL, scene).unwrap_err();
     assert!(error.contains("log.csv has local coordinates") && error.contains("flight.origin"), "{error}");
 }
@@ -63,7 +79,10 @@ fn what_cannot_stand_is_named() {
         ("gltf = [{ file = \"model.gltf\", scene = 3 }]", "has no scene 3"),
         ("gltf = [{ file = \"model.gltf\", animation = 3, time_s = 1.0 }]", "has no animation 3"),
         ("gltf = [{ at = [1, 2, 3] }]", "file: is missing"),
-        ("gltf = [{ file = \"model.gltf\", scale = 1e12 }]", "model.gltf reaches 8.7e11 m from the local frame's origin"),
+        (
+            "gltf = [{ file = \"model.gltf\", scale = 1e12 }]",
+            "model.gltf reaches 8.7e11 m from the local frame's origin",
+        ),
         ("gltf = [{ file = \"model.gltf\", at = [1e300, 0, 0] }]", "check its place and scale"),
     ] {
         let error = load(folder.path(), LOCAL, scene).unwrap_err();

@@ -1,4 +1,5 @@
-//! Every published calibration file of the data folder, through its importer: value or reason. Runs where CAMSIM_DATA names the folder.
+//! Every published calibration file of the data folder, through its importer: value or reason. Runs where
+//! CAMSIM_DATA names the folder.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +26,10 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     while let Some(path) = open.pop() {
         if path.is_dir() {
             open.extend(std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
-        } else if path.extension().is_some_and(|ending| ["yaml", "yml", "xml", "json"].iter().any(|known| ending == *known)) {
+        } else if path
+            .extension()
+            .is_some_and(|ending| ["yaml", "yml", "xml", "json"].iter().any(|known| ending == *known))
+        {
             found.push(path);
         }
     }
@@ -70,7 +74,12 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
             Some(imported.spec)
         }
         Err(error) => {
-            writeln!(table, "| {file}{named} | refused | | | | | | | {} |", reason(&error, path).replace('|', "/")).unwrap();
+            writeln!(
+                table,
+                "| {file}{named} | refused | | | | | | | {} |",
+                reason(&error, path).replace('|', "/")
+            )
+            .unwrap();
             None
         }
     }
@@ -89,8 +98,11 @@ fn every_file_gives_a_value_or_a_reason() {
         for path in files(&data.join(folder)) {
             let file = path.strip_prefix(&data).unwrap().display().to_string();
             let names = camera_names(&path, None).unwrap_or_default();
-            let cameras: Vec<Option<&str>> =
-                if names.len() > 1 { names.iter().map(|name| Some(name.as_str())).collect() } else { vec![None] };
+            let cameras: Vec<Option<&str>> = if names.len() > 1 {
+                names.iter().map(|name| Some(name.as_str())).collect()
+            } else {
+                vec![None]
+            };
             for camera in cameras {
                 match row(&mut table, &file, &path, camera) {
                     Some(_) => read += 1,
@@ -148,7 +160,8 @@ fn near(a: f64, b: f64) -> bool {
 }
 
 fn agrees(spec: &CameraSpec, row: &Row) -> bool {
-    // The table has the number that stands in the file; half a pixel is between that program's corners and our centres.
+    // The table has the number that stands in the file; half a pixel is between that program's corners and
+    // our centres.
     let shift = if row.name == "camsim_S3_fisheye_agisoft" { 0.5 } else { 0.0 };
     let [cx, cy] = spec.principal_point_px.unwrap();
     let [fx, fy] = spec.focal_px;
@@ -156,7 +169,8 @@ fn agrees(spec: &CameraSpec, row: &Row) -> bool {
     let coefficient = |at: usize| spec.lens.coefficients.get(at).copied().unwrap_or(0.0);
     let undistorted = spec.lens.model == LensModel::Pinhole && row.model == LensModel::BrownConrady;
     let count = spec.lens.coefficients.len().max(row.coefficients.len());
-    let coefficients = (0..count).all(|at| near(coefficient(at), row.coefficients.get(at).copied().unwrap_or(0.0)));
+    let coefficients =
+        (0..count).all(|at| near(coefficient(at), row.coefficients.get(at).copied().unwrap_or(0.0)));
     spec.size_px == row.size_px && intrinsics && coefficients && (undistorted || spec.lens.model == row.model)
 }
 
@@ -165,7 +179,9 @@ fn cameras(path: &Path) -> Vec<CameraSpec> {
     let names = camera_names(path, None).unwrap_or_default();
     names
         .iter()
-        .filter_map(|name| import_camera_named(path, None, Some(name.as_str()).filter(|name| !name.is_empty())).ok())
+        .filter_map(|name| {
+            import_camera_named(path, None, Some(name.as_str()).filter(|name| !name.is_empty())).ok()
+        })
         .map(|imported| imported.spec)
         .collect()
 }
@@ -182,7 +198,13 @@ fn mended(data: &Path, row: &Row, folder: &Path) -> Option<PathBuf> {
         ("intrinsics.yml", format!("{text}\nimage_width: {width}\nimage_height: {height}\n"))
     } else if row.source.contains("OpenSfM") {
         let model = open_sfm(&row.name);
-        ("camera_models.json", format!("{{\"v2 {} {width} {height}\": {{\"width\": {width}, \"height\": {height}, {model}}}}}", row.name))
+        (
+            "camera_models.json",
+            format!(
+                "{{\"v2 {} {width} {height}\": {{\"width\": {width}, \"height\": {height}, {model}}}}}",
+                row.name
+            ),
+        )
     } else {
         return None;
     };
@@ -205,7 +227,9 @@ fn open_sfm(name: &str) -> &'static str {
         "opensfm_garmin_virb" => r#""focal": 0.57, "k1": -0.30, "k2": 0.06"#,
         "opensfm_drift_ghost_s" => r#""focal": 0.47, "k1": -0.22, "k2": 0.03"#,
         "opensfm_xiaoyi" => r#""focal": 0.5, "k1": -0.19, "k2": 0.028"#,
-        "opensfm_dji_fc300s_phantom3" => r#""focal": 0.5930666527479901, "k1": -0.012137318698010527, "k2": 0.016199087342953698"#,
+        "opensfm_dji_fc300s_phantom3" => {
+            r#""focal": 0.5930666527479901, "k1": -0.012137318698010527, "k2": 0.016199087342953698"#
+        }
         "opensfm_dji_zenmuse_p1" => {
             r#""projection_type": "brown", "focal_x": 0.993855582350662, "focal_y": 0.993855582350662, "c_x": -0.000890260610982073,
                "c_y": 0.0017658361729384116, "k1": -0.04734574598470396, "k2": 0.00875629525446153, "p1": 0.002032062604630639,

@@ -59,6 +59,8 @@ fn only_what_has_changed_is_read_again() {
 #[test]
 fn a_file_that_is_named_anew_is_read() {
     let before = load_sequence(&demo(&[])).unwrap();
-    let error = reload_sequence(&demo(&[("camera.photometric.vignette", "nowhere.png")]), &before).unwrap_err().to_string();
+    let error = reload_sequence(&demo(&[("camera.photometric.vignette", "nowhere.png")]), &before)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("nowhere.png"), "{error}");
 }

@@ -29,7 +29,11 @@ fn agile_flights_are_followed_to_a_degree() {
             let report = tracked.report(&log.rows).unwrap();
             eprintln!("{file}, {kind:?}: {:.3} deg RMS", report.rms.attitude_deg);
             assert!(report.rms.attitude_deg < most_deg, "{file}, {kind:?}: {:?}", report.rms);
-            assert!(report.rms.north_m.max(report.rms.east_m).max(report.rms.down_m) < 0.02, "{file}, {kind:?}: {:?}", report.rms);
+            assert!(
+                report.rms.north_m.max(report.rms.east_m).max(report.rms.down_m) < 0.02,
+                "{file}, {kind:?}: {:?}",
+                report.rms
+            );
             assert_eq!(tracked.distance_warning(&log.rows), None);
         }
         // Under the paper's limits it is not, and that is said.
@@ -39,6 +43,11 @@ fn agile_flights_are_followed_to_a_degree() {
         assert!(tracked.report(&log.rows).unwrap().rms.attitude_deg > 10.0);
         let warning = tracked.distance_warning(&log.rows).unwrap();
         assert!(warning.contains("deg RMS from the log"), "{warning}");
-        assert!(tracked.holds.iter().all(|hold| hold.limit.key() == "max_angular_acceleration_deg_s2" || hold.duration_s() < 1.0));
+        assert!(
+            tracked
+                .holds
+                .iter()
+                .all(|hold| hold.limit.key() == "max_angular_acceleration_deg_s2" || hold.duration_s() < 1.0)
+        );
     }
 }

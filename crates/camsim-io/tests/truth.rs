@@ -1,4 +1,5 @@
-//! What is written fits together: source coordinates with the frame that they are in, the sky with the rows' poses, stamps with their clock.
+//! What is written fits together: source coordinates with the frame that they are in, the sky with the rows'
+//! poses, stamps with their clock.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -28,7 +29,8 @@ fn demo(sets: &[(&str, &str)]) -> Loaded {
         ("camera.principal_point_px", "[31.0, 24.5]"),
         ("camera.mount.angles_deg", "[0.4, -10.0, -0.6]"),
     ];
-    let sets: Vec<_> = small.iter().chain(sets).map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let sets: Vec<_> =
+        small.iter().chain(sets).map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
     load_sequence(&read_scenario(&path, &sets, None).unwrap()).unwrap()
 }
 
@@ -39,7 +41,8 @@ fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
     let oracle = Oracle::new(sequence.clone()).unwrap();
     let plan = planner.plan(7).unwrap();
     let key = Some(IdealView { pose: plan.key_pose, ideal: plan.ideal });
-    let options = RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
+    let options =
+        RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
     let frame = oracle.render(7, &options);
     let source = SourceFrame::new(&plan, sequence.epoch_ns);
     let (depths, coords) = (frame.depth_m.unwrap(), frame.coords.unwrap());
@@ -53,7 +56,8 @@ fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
         }
         let from_source = if depths[i] > 0.0 { vector - source.pose.position_ned_m } else { vector };
         let seen = source.pose.ned_from_camera.conjugate() * from_source;
-        let at_px = DVec2::from(source.focal_px) * seen.truncate() / seen.z + DVec2::from(source.principal_px);
+        let at_px =
+            DVec2::from(source.focal_px) * seen.truncate() / seen.z + DVec2::from(source.principal_px);
         // Points are f32: 1 km in steps of 6e-5 m, seen from 100 m or more.
         assert!(at_px.distance(DVec2::new(x, y)) < 1e-3, "{at_px} ({x}, {y})");
         // What the row's own pose gives.
@@ -65,7 +69,10 @@ fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
             assert!(vector.distance(row.position_ned_m + f64::from(depths[i]) * way) < 2e-3);
             ground += 1;
         } else {
-            assert!(vector.distance(way.normalize()) < 1e-6 && (vector.length() - 1.0).abs() < 1e-6, "{vector}");
+            assert!(
+                vector.distance(way.normalize()) < 1e-6 && (vector.length() - 1.0).abs() < 1e-6,
+                "{vector}"
+            );
             sky += 1;
         }
     }
@@ -84,7 +91,12 @@ fn stamps_begin_where_they_are_told_to() {
         let loaded = demo(sets);
         let frame = Oracle::new(loaded.sequence.clone()).unwrap();
         let rows = frame.row_records(3);
-        (loaded.log.epoch_ns, loaded.sequence.epoch_ns, loaded.sequence.start_s, rows.iter().map(|row| row.t_mid_ns).collect::<Vec<_>>())
+        (
+            loaded.log.epoch_ns,
+            loaded.sequence.epoch_ns,
+            loaded.sequence.start_s,
+            rows.iter().map(|row| row.t_mid_ns).collect::<Vec<_>>(),
+        )
     };
     let (log_ns, epoch_ns, start_s, by_log) = stamps(&[]);
     assert_eq!((log_ns, start_s), (epoch_ns, 25.0));
@@ -93,15 +105,21 @@ fn stamps_begin_where_they_are_told_to() {
     // Frame 3 is 0.1 s after the window's beginning, and the middle of its readout is the stamp.
     let middle_ns = (from_zero[23] + from_zero[24]) / 2;
     assert!((middle_ns - 100_000_000).abs() <= 1, "{middle_ns}");
-    let (_, _, _, from_epoch) = stamps(&[("output.stamps", "zero"), ("output.epoch_ns", "1700000000000000000")]);
+    let (_, _, _, from_epoch) =
+        stamps(&[("output.stamps", "zero"), ("output.epoch_ns", "1700000000000000000")]);
     for ((log, zero), epoch) in by_log.iter().zip(&from_zero).zip(&from_epoch) {
         assert_eq!(log - zero, log_ns + 25_000_000_000);
         assert_eq!(epoch - zero, 1_700_000_000_000_000_000);
     }
     let folder = tempfile::tempdir().unwrap();
     let path = builtin::unpack(folder.path()).unwrap();
-    let error = read_scenario(&path, &[("output.epoch_ns".into(), "5".into())], None).unwrap_err().to_string();
-    assert!(error.contains("output.epoch_ns: is what stamps begin with") && error.contains("output.stamps = \"zero\""), "{error}");
+    let error =
+        read_scenario(&path, &[("output.epoch_ns".into(), "5".into())], None).unwrap_err().to_string();
+    assert!(
+        error.contains("output.epoch_ns: is what stamps begin with")
+            && error.contains("output.stamps = \"zero\""),
+        "{error}"
+    );
 }
 
 #[test]
@@ -111,6 +129,11 @@ fn shutters_that_no_sensor_has_are_named() {
     for (key, ms) in [("readout_ms", "40"), ("exposure_ms", "33.5"), ("interlace_ms", "70")] {
         let key = format!("camera.shutter.{key}");
         let said = warnings(&[(&key, ms)]);
-        assert!(said.contains(&format!("{key} = {ms} is longer than a frame's period of 33.333 ms (camera.fps = 30)")), "{said}");
+        assert!(
+            said.contains(&format!(
+                "{key} = {ms} is longer than a frame's period of 33.333 ms (camera.fps = 30)"
+            )),
+            "{said}"
+        );
     }
 }

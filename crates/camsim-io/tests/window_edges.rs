@@ -9,7 +9,8 @@ use camsim_io::{
     scenario_file::read_scenario,
 };
 
-/// The pattern scenario (2 s of a log of 46 s, 30 frames a second) with changes; its warnings about the log's ends.
+/// The pattern scenario (2 s of a log of 46 s, 30 frames a second) with changes; its warnings about the log's
+/// ends.
 fn outside(sets: &[(&str, &str)]) -> Result<Vec<String>, LoadError> {
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");

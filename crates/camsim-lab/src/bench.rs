@@ -1,7 +1,8 @@
 //! Run time against error: every case with every method, in one table (`camsim bench`).
 //!
-//! Time is that of frames rendered and read back, measured in interleaved rounds ([`rounds`]). Error is measured against the oracle
-//! ([`truth`]): of the source coordinates in pixels of the ideal frame, and of the picture in decibels on linear values with peak 1.
+//! Time is that of frames rendered and read back, measured in interleaved rounds ([`rounds`]). Error is
+//! measured against the oracle ([`truth`]): of the source coordinates in pixels of the ideal frame, and of
+//! the picture in decibels on linear values with peak 1.
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
@@ -119,7 +120,11 @@ pub enum Step<'a> {
 ///
 /// # Errors
 /// An unknown case, or whatever the renderer or `watch` meets.
-pub fn run<E: From<BenchError>>(engine: &Engine, options: &Options, watch: &mut dyn FnMut(Step<'_>) -> Result<(), E>) -> Result<Report, E> {
+pub fn run<E: From<BenchError>>(
+    engine: &Engine,
+    options: &Options,
+    watch: &mut dyn FnMut(Step<'_>) -> Result<(), E>,
+) -> Result<Report, E> {
     let begin = Instant::now();
     let chosen = choose(cases().map_err(BenchError::from)?, options)?;
     let mut report = Report {
@@ -136,16 +141,23 @@ pub fn run<E: From<BenchError>>(engine: &Engine, options: &Options, watch: &mut 
         elapsed_s: 0.0,
     };
     let effort = effort(options.quick);
-    let work = |case: &Case, variants: &[Variant]| variants.iter().map(|variant| cost(case, variant)).sum::<f64>();
+    let work =
+        |case: &Case, variants: &[Variant]| variants.iter().map(|variant| cost(case, variant)).sum::<f64>();
     let prepared: Vec<_> = chosen.iter().map(|case| (case, usable(case, options.quick))).collect();
-    let (mut left, mut done) = (prepared.iter().map(|(case, (variants, _))| work(case, variants)).sum::<f64>(), 0.0);
+    let (mut left, mut done) =
+        (prepared.iter().map(|(case, (variants, _))| work(case, variants)).sum::<f64>(), 0.0);
     for (case, (variants, refused)) in prepared {
         let rest = match report.cases[0] {
             0 => String::new(),
             _ => format!(", about {} left", minutes(begin.elapsed().as_secs_f64() * left / done)),
         };
         let place = report.cases[0] + 1;
-        watch(Step::Begins(&format!("{place} of {}: {}, {} rows{rest}", report.cases[1], case.name, variants.len())))?;
+        watch(Step::Begins(&format!(
+            "{place} of {}: {}, {} rows{rest}",
+            report.cases[1],
+            case.name,
+            variants.len()
+        )))?;
         report.refused.extend(refused);
         let mut rows = measure::case(engine, case, &variants, effort)?;
         pareto::mark_fronts(&mut rows);
@@ -218,10 +230,16 @@ fn usable(case: &Case, quick: bool) -> (Vec<Variant>, Vec<Refused>) {
     let (mut usable, mut refused) = (Vec::new(), Vec::new());
     for variant in variants(case, quick) {
         // The log, the scene and the vignette are in memory and not in the scenario.
-        let problem = validate(&variant.sequence.scenario).into_iter().find(|problem| problem.key.starts_with("quality"));
+        let problem = validate(&variant.sequence.scenario)
+            .into_iter()
+            .find(|problem| problem.key.starts_with("quality"));
         match problem {
             None => usable.push(variant),
-            Some(problem) => refused.push(Refused { case: case.name.into(), knob: variant.knob, reason: problem.to_string() }),
+            Some(problem) => refused.push(Refused {
+                case: case.name.into(),
+                knob: variant.knob,
+                reason: problem.to_string(),
+            }),
         }
     }
     (usable, refused)
@@ -235,7 +253,8 @@ mod tests {
 
     fn row(case: &str, group: &'static str, knob: &str, ms: f64, rms_px: f64) -> Row {
         let times = Times { wall_ms: vec![ms; 3], ..Times::default() };
-        let mut row = Row { knob: knob.into(), group, coord_rms_px: Some(rms_px), ..Row::empty(case, [640, 480]) };
+        let mut row =
+            Row { knob: knob.into(), group, coord_rms_px: Some(rms_px), ..Row::empty(case, [640, 480]) };
         row.set_times(&times, Some(&times));
         row
     }
@@ -267,7 +286,10 @@ mod tests {
             ablation: vec![left_out("nothing", 20.0, [0.0; 3]), left_out("lens", 25.0, [4.0, 5.0, 6.0])],
             violations: Vec::new(),
             refused: Vec::new(),
-            about: BTreeMap::from([("plane-30".to_owned(), "a plane"), ("blender-plane".to_owned(), "another")]),
+            about: BTreeMap::from([
+                ("plane-30".to_owned(), "a plane"),
+                ("blender-plane".to_owned(), "another"),
+            ]),
             elapsed_s: 1.0,
         }
     }
@@ -305,11 +327,20 @@ mod tests {
         for line in text.lines().filter(|line| line.starts_with('|')) {
             assert!(line.ends_with('|'), "{line}");
         }
-        let table: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("### plane-30")).skip(4).take(4).collect();
-        assert!(table.iter().all(|line| line.matches('|').count() == table[0].matches('|').count()), "{table:#?}");
+        let table: Vec<&str> =
+            text.lines().skip_while(|line| !line.starts_with("### plane-30")).skip(4).take(4).collect();
+        assert!(
+            table.iter().all(|line| line.matches('|').count() == table[0].matches('|').count()),
+            "{table:#?}"
+        );
         assert!(text.contains("| Blender Cycles, two cores | 8900 |"), "{text}");
         // A frame without its lens takes longer: the promise is not kept, and the table says so.
-        assert!(text.contains("| sampled alike, a frame takes no more time without an effect | more without lens | no |"), "{text}");
+        assert!(
+            text.contains(
+                "| sampled alike, a frame takes no more time without an effect | more without lens | no |"
+            ),
+            "{text}"
+        );
         assert_eq!(report.csv().lines().count(), 1 + report.rows.len());
         let svg = report.plot().expect("a plot");
         assert!(svg.contains("smooth") && svg.contains("all effects"));
@@ -322,16 +353,24 @@ mod tests {
             let options = Options { cases: list.iter().map(|name| (*name).to_owned()).collect(), quick };
             choose(all.clone(), &options).map(|cases| cases.iter().map(|case| case.name).collect::<Vec<_>>())
         };
-        assert_eq!(names(&["lens-s3", "vibration"], false).expect("cases"), ["vibration-100", "vibration-200", "lens-s3"]);
+        assert_eq!(
+            names(&["lens-s3", "vibration"], false).expect("cases"),
+            ["vibration-100", "vibration-200", "lens-s3"]
+        );
         assert_eq!(names(&[], true).expect("cases"), QUICK);
         let unknown = names(&["lens-s4"], false).expect_err("no such case").to_string();
         assert!(unknown.contains("lens-s4") && unknown.contains("lens-s3"), "{unknown}");
         let (_, groups) = unknown.split_once("groups are ").expect("groups");
-        assert!(groups.split(", ").all(|group| names(&[group], false).is_ok_and(|cases| !cases.is_empty())), "{groups}");
         assert!(
-            ["smooth", "lenses", "vibration", "all effects"]
-                .iter()
-                .all(|name| groups.split(", ").filter(|group| group == name).count() == 1),
+            groups.split(", ").all(|group| names(&[group], false).is_ok_and(|cases| !cases.is_empty())),
+            "{groups}"
+        );
+        assert!(
+            ["smooth", "lenses", "vibration", "all effects"].iter().all(|name| groups
+                .split(", ")
+                .filter(|group| group == name)
+                .count()
+                == 1),
             "{groups}"
         );
     }

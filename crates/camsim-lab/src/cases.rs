@@ -6,8 +6,8 @@ use camsim_core::{
     mount::{CameraPath, MountError},
     pose::BodyState,
     scenario::{
-        Axis, CameraSpec, FieldOr, FlightSpec, LensModel, LensSpec, MountSpec, OutputSpec, PhotometricSpec, QualitySpec, Scenario,
-        SceneSpec, ShutterSpec, TrackerSpec, VibrationSpec,
+        Axis, CameraSpec, FieldOr, FlightSpec, LensModel, LensSpec, MountSpec, OutputSpec, PhotometricSpec,
+        QualitySpec, Scenario, SceneSpec, ShutterSpec, TrackerSpec, VibrationSpec,
     },
     scene::{Scene, TerrainError},
     sequence::Sequence,
@@ -191,12 +191,25 @@ fn recipes() -> Vec<Recipe> {
     let mut everything = lens(LensModel::BrownConrady, FOCAL_PX, [305.599, 226.736], &S3);
     everything.mount.angles_deg = [0.0, -75.0, 0.0];
     everything.shutter.exposure_ms = 8.0;
-    everything.photometric = PhotometricSpec { noise_sigma: 0.01, vignette: Some("in-memory".into()), ..PhotometricSpec::default() };
+    everything.photometric = PhotometricSpec {
+        noise_sigma: 0.01,
+        vignette: Some("in-memory".into()),
+        ..PhotometricSpec::default()
+    };
     let everything = shaking(shaking(everything, Axis::Pitch, 0.05, 60.0), Axis::Yaw, 0.05, 45.0);
-    let brown = |focal_px, principal, coefficients: &[f64]| lens(LensModel::BrownConrady, focal_px, principal, coefficients);
-    let of_lens =
-        |name, about, camera| Recipe { name, group: Group::Lens, about, ground: Plane, flight: flight(150.0, 30.0, still), camera };
-    let case = |name, group, about, ground, flight, camera| Recipe { name, group, about, ground, flight, camera };
+    let brown = |focal_px, principal, coefficients: &[f64]| {
+        lens(LensModel::BrownConrady, focal_px, principal, coefficients)
+    };
+    let of_lens = |name, about, camera| Recipe {
+        name,
+        group: Group::Lens,
+        about,
+        ground: Plane,
+        flight: flight(150.0, 30.0, still),
+        camera,
+    };
+    let case =
+        |name, group, about, ground, flight, camera| Recipe { name, group, about, ground, flight, camera };
     vec![
         case(
             "roll-36",
@@ -206,9 +219,30 @@ fn recipes() -> Vec<Recipe> {
             flight(150.0, 0.0, [0.0, 0.0, 36.0]),
             nadir(1000.0, 0.0),
         ),
-        case("pitch-36", Smooth, "36 deg of pitch within a frame", Plane, flight(150.0, 0.0, [0.0, 36.0, 0.0]), nadir(1000.0, 0.0)),
-        case("plane-30", Smooth, "30 m/s over a plane, 33 ms readout", Plane, flight(150.0, 30.0, still), nadir(33.0, 0.0)),
-        case("terrain-100", Smooth, "100 m/s over hills, 33 ms", hills, flight(150.0, 100.0, still), nadir(33.0, 0.0)),
+        case(
+            "pitch-36",
+            Smooth,
+            "36 deg of pitch within a frame",
+            Plane,
+            flight(150.0, 0.0, [0.0, 36.0, 0.0]),
+            nadir(1000.0, 0.0),
+        ),
+        case(
+            "plane-30",
+            Smooth,
+            "30 m/s over a plane, 33 ms readout",
+            Plane,
+            flight(150.0, 30.0, still),
+            nadir(33.0, 0.0),
+        ),
+        case(
+            "terrain-100",
+            Smooth,
+            "100 m/s over hills, 33 ms",
+            hills,
+            flight(150.0, 100.0, still),
+            nadir(33.0, 0.0),
+        ),
         case(
             "combined-58",
             Smooth,
@@ -217,7 +251,14 @@ fn recipes() -> Vec<Recipe> {
             flight(150.0, 40.0, [30.0, 25.0, 43.0]),
             nadir(100.0, 0.0),
         ),
-        case("interlace", Smooth, "40 m/s, 20 deg/s, fields 16.7 ms apart", hills, flight(150.0, 40.0, [0.0, 0.0, 20.0]), interlaced),
+        case(
+            "interlace",
+            Smooth,
+            "40 m/s, 20 deg/s, fields 16.7 ms apart",
+            hills,
+            flight(150.0, 40.0, [0.0, 0.0, 20.0]),
+            interlaced,
+        ),
         case(
             "vibration-100",
             Vibration,
@@ -258,7 +299,14 @@ fn recipes() -> Vec<Recipe> {
             flight(35.0, 60.0, still),
             camera(-35.0, 33.0, 0.0),
         ),
-        case("delay-1s", LongWindow, "1 s of delay, 50 m/s over hills", hills, flight(150.0, 50.0, still), one_second_late),
+        case(
+            "delay-1s",
+            LongWindow,
+            "1 s of delay, 50 m/s over hills",
+            hills,
+            flight(150.0, 50.0, still),
+            one_second_late,
+        ),
         case(
             "rolling-1s",
             LongWindow,
@@ -275,21 +323,55 @@ fn recipes() -> Vec<Recipe> {
             flight(100.0, 15.0, still),
             nadir(1000.0, 0.0),
         ),
-        case("exposure-1", Exposure, "1 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 1.0)),
-        case("exposure-10", Exposure, "10 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 10.0)),
-        case("exposure-100", Exposure, "100 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 100.0)),
+        case(
+            "exposure-1",
+            Exposure,
+            "1 ms at 40 m/s and 30 deg/s",
+            hills,
+            flight(150.0, 40.0, [0.0, 30.0, 0.0]),
+            nadir(33.0, 1.0),
+        ),
+        case(
+            "exposure-10",
+            Exposure,
+            "10 ms at 40 m/s and 30 deg/s",
+            hills,
+            flight(150.0, 40.0, [0.0, 30.0, 0.0]),
+            nadir(33.0, 10.0),
+        ),
+        case(
+            "exposure-100",
+            Exposure,
+            "100 ms at 40 m/s and 30 deg/s",
+            hills,
+            flight(150.0, 40.0, [0.0, 30.0, 0.0]),
+            nadir(33.0, 100.0),
+        ),
         of_lens("lens-none", "no distortion", nadir(33.0, 0.0)),
         of_lens(
             "lens-euroc",
             "EuRoC's cam0",
             brown(458.654, [310.0, 248.375], &[-0.283_408_11, 0.073_959_07, 0.000_193_59, 1.761_871_14e-5]),
         ),
-        of_lens("lens-s3", "the paper's fisheye (Agisoft's calibration)", brown(FOCAL_PX, [305.599, 226.736], &S3)),
-        of_lens("lens-gopro-fold", "a barrel that folds inside the image", brown(300.0, [320.1, 235.1], &[-0.26, 0.03, 0.0006, -0.0004])),
+        of_lens(
+            "lens-s3",
+            "the paper's fisheye (Agisoft's calibration)",
+            brown(FOCAL_PX, [305.599, 226.736], &S3),
+        ),
+        of_lens(
+            "lens-gopro-fold",
+            "a barrel that folds inside the image",
+            brown(300.0, [320.1, 235.1], &[-0.26, 0.03, 0.0006, -0.0004]),
+        ),
         of_lens(
             "lens-kannala-brandt",
             "TUM-VI's fisheye coefficients at f = 450 px",
-            lens(LensModel::KannalaBrandt, 450.0, centre, &[0.003_482_389, 0.000_715_035, -0.002_053_236, 0.000_202_937]),
+            lens(
+                LensModel::KannalaBrandt,
+                450.0,
+                centre,
+                &[0.003_482_389, 0.000_715_035, -0.002_053_236, 0.000_202_937],
+            ),
         ),
         of_lens("lens-tangential", "p1 = 0.1, p2 = -0.1", brown(450.0, centre, &[-0.1, 0.01, 0.1, -0.1])),
         case(
@@ -325,7 +407,8 @@ fn make(world: &World, recipe: Recipe) -> Result<Case, CaseError> {
     };
     let trajectory = steady(&flight).ok_or(CaseError::Motion(name))?;
     let vignetted = camera.photometric.vignette.is_some();
-    let mut sequence = sequence(camera, trajectory, scene).map_err(|source| CaseError::Mount { case: name, source })?;
+    let mut sequence =
+        sequence(camera, trajectory, scene).map_err(|source| CaseError::Mount { case: name, source })?;
     sequence.vignette = vignetted.then(|| Arc::new(vignette()));
     Ok(Case { name, group, about, sequence: Arc::new(sequence) })
 }
@@ -403,22 +486,32 @@ mod tests {
     #[test]
     fn every_case_can_be_planned_and_moves_as_it_says() {
         let cases = cases().expect("cases");
-        assert_eq!(cases.iter().map(|case| case.name).collect::<HashSet<_>>().len(), cases.len(), "names are unique");
+        assert_eq!(
+            cases.iter().map(|case| case.name).collect::<HashSet<_>>().len(),
+            cases.len(),
+            "names are unique"
+        );
         for case in &cases {
             let planner = Planner::new(case.sequence.clone(), &[Channel::Color], 16_384).expect(case.name);
             let plan = planner.plan(1).expect(case.name);
             let megapixels = plan.ideal.size_px.iter().map(|&side| f64::from(side)).product::<f64>() / 1e6;
             assert!(megapixels < 4.0, "{}: an ideal frame of {:?} px", case.name, plan.ideal.size_px);
             let silhouettes = plan.edges != EdgeStage::None || plan.predicted.silhouettes.is_some();
-            let of_houses =
-                case.sequence.scene.meshes.len() > 1 || case.group == Group::AllEffects && case.sequence.scene.terrain.is_some();
+            let of_houses = case.sequence.scene.meshes.len() > 1
+                || case.group == Group::AllEffects && case.sequence.scene.terrain.is_some();
             assert!(silhouettes || !of_houses, "{}: {:?}", case.name, plan.edges);
             match case.name {
                 "roll-36" | "pitch-36" => {
                     // Half of it to either side of the middle.
-                    let own =
-                        Planner::new(by_itself(&case.sequence), &[Channel::Color], 16_384).expect(case.name).plan(1).expect(case.name);
-                    assert!((own.motion.rotation_rad.to_degrees() - 18.0).abs() < 0.1, "{}", own.motion.rotation_rad.to_degrees());
+                    let own = Planner::new(by_itself(&case.sequence), &[Channel::Color], 16_384)
+                        .expect(case.name)
+                        .plan(1)
+                        .expect(case.name);
+                    assert!(
+                        (own.motion.rotation_rad.to_degrees() - 18.0).abs() < 0.1,
+                        "{}",
+                        own.motion.rotation_rad.to_degrees()
+                    );
                 }
                 "exposure-100" => assert!(plan.motion.blur_px > 15.0, "{}", plan.motion.blur_px),
                 _ => assert!(plan.motion.travel_m > 0.0, "{}", case.name),

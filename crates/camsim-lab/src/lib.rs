@@ -1,4 +1,5 @@
-//! Experiments on the whole of camsim: run time against error (`camsim bench`), and the paper's section 8 (`camsim reproduce`).
+//! Experiments on the whole of camsim: run time against error (`camsim bench`), and the paper's section 8
+//! (`camsim reproduce`).
 
 pub mod bench;
 pub mod cases;

@@ -58,7 +58,9 @@ impl Plot {
     /// # Errors
     /// Nothing to show.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let [x, y] = [0, 1].map(|axis| self.range(axis)).map(|range| range.ok_or_else(|| PlotError::Empty(self.title.clone())));
+        let [x, y] = [0, 1]
+            .map(|axis| self.range(axis))
+            .map(|range| range.ok_or_else(|| PlotError::Empty(self.title.clone())));
         let (x, y) = (x?, y?);
         let mut text = String::new();
         let legend = self.emptiest_corner(&x, &y);
@@ -80,8 +82,13 @@ impl Plot {
 
     /// Smallest and largest value of an axis, with some room.
     fn range(&self, axis: usize) -> Option<Range<f64>> {
-        let values = self.series.iter().flat_map(|series| self.shown(series)).map(|(x, y)| if axis == 0 { x } else { y });
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let values = self
+            .series
+            .iter()
+            .flat_map(|series| self.shown(series))
+            .map(|(x, y)| if axis == 0 { x } else { y });
+        let (low, high) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         if low > high {
             return None;
         }
@@ -100,12 +107,18 @@ impl Plot {
         };
         let mut places: Vec<(f64, f64)> = Vec::new();
         for series in &self.series {
-            let points: Vec<_> = self.shown(series).map(|(u, v)| (share(u, x, self.log[0]), share(v, y, self.log[1]))).collect();
+            let points: Vec<_> = self
+                .shown(series)
+                .map(|(u, v)| (share(u, x, self.log[0]), share(v, y, self.log[1])))
+                .collect();
             if series.joined {
                 // Along the lines too.
-                let between =
-                    |pair: &[(f64, f64)], k: f64| (pair[0].0 + k * (pair[1].0 - pair[0].0), pair[0].1 + k * (pair[1].1 - pair[0].1));
-                places.extend(points.windows(2).flat_map(|pair| [0.2, 0.4, 0.6, 0.8].map(|k| between(pair, k))));
+                let between = |pair: &[(f64, f64)], k: f64| {
+                    (pair[0].0 + k * (pair[1].0 - pair[0].0), pair[0].1 + k * (pair[1].1 - pair[0].1))
+                };
+                places.extend(
+                    points.windows(2).flat_map(|pair| [0.2, 0.4, 0.6, 0.8].map(|k| between(pair, k))),
+                );
             }
             places.extend(points);
         }
@@ -131,8 +144,11 @@ impl Plot {
         X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
-        let label = |value: &f64| format!("{value:.4}").trim_end_matches('0').trim_end_matches('.').to_owned();
-        let label = |value: &f64| if value.abs() < 1e-3 && *value != 0.0 { format!("{value:.0e}") } else { label(value) };
+        let label =
+            |value: &f64| format!("{value:.4}").trim_end_matches('0').trim_end_matches('.').to_owned();
+        let label = |value: &f64| {
+            if value.abs() < 1e-3 && *value != 0.0 { format!("{value:.0e}") } else { label(value) }
+        };
         let said = |error: DrawingAreaErrorKind<_>| error.to_string();
         let root = SVGBackend::with_string(text, SIZE_PX).into_drawing_area();
         root.fill(&WHITE).map_err(said)?;
@@ -156,7 +172,9 @@ impl Plot {
             let color = Palette99::pick(i).to_rgba();
             let points: Vec<_> = self.shown(series).collect();
             if series.joined {
-                chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2))).map_err(said)?;
+                chart
+                    .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))
+                    .map_err(said)?;
             }
             chart
                 .draw_series(points.iter().map(|&at| Circle::new(at, 3, color.filled())))
@@ -186,7 +204,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_shown_is_left_out_and_nothing_at_all_is_refused() {
-        let svg = plot(vec![(1.0, 0.1), (2.0, f64::NAN), (0.0, 3.0), (10.0, 1.0)], [true, true]).svg().expect("a plot");
+        let svg = plot(vec![(1.0, 0.1), (2.0, f64::NAN), (0.0, 3.0), (10.0, 1.0)], [true, true])
+            .svg()
+            .expect("a plot");
         assert_eq!(svg.matches("<circle").count(), 2 + 1, "two points and the legend: {svg}");
         assert!(svg.contains("curve &lt;1&gt;"));
         assert!(matches!(plot(vec![(0.0, 1.0)], [true, false]).svg(), Err(PlotError::Empty(_))));
@@ -195,9 +215,14 @@ mod tests {
 
     #[test]
     fn the_legend_stays_off_the_curve() {
-        let corner = |points: &[(f64, f64)], log| plot(points.to_vec(), log).emptiest_corner(&(1.0..100.0), &(1.0..100.0));
+        let corner = |points: &[(f64, f64)], log| {
+            plot(points.to_vec(), log).emptiest_corner(&(1.0..100.0), &(1.0..100.0))
+        };
         assert!(matches!(corner(&[(1.0, 100.0), (100.0, 1.0)], [false; 2]), SeriesLabelPosition::UpperRight));
         assert!(matches!(corner(&[(1.0, 1.0), (100.0, 100.0)], [true; 2]), SeriesLabelPosition::LowerRight));
-        assert!(matches!(corner(&[(1.0, 1.0), (100.0, 1.0), (100.0, 100.0)], [false; 2]), SeriesLabelPosition::UpperLeft));
+        assert!(matches!(
+            corner(&[(1.0, 1.0), (100.0, 1.0), (100.0, 100.0)], [false; 2]),
+            SeriesLabelPosition::UpperLeft
+        ));
     }
 }

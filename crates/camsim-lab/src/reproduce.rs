@@ -1,8 +1,9 @@
-//! The experiments of the paper's section 8, done again: what its text and figures claim, measured against truth.
+//! The experiments of the paper's section 8, done again: what its text and figures claim, measured against
+//! truth.
 //!
-//! Each experiment is one file and gives a [`Report`]: tables, plots, pictures and remarks. Inputs that are not part of camsim (the paper's
-//! flight log, its calibrations and camera poses) come from a data folder; without one an experiment runs on a built-in substitute and
-//! says so in its first remark.
+//! Each experiment is one file and gives a [`Report`]: tables, plots, pictures and remarks. Inputs that are
+//! not part of camsim (the paper's flight log, its calibrations and camera poses) come from a data folder;
+//! without one an experiment runs on a built-in substitute and says so in its first remark.
 
 use std::{
     convert::Infallible,
@@ -11,8 +12,8 @@ use std::{
 
 use camsim_gpu::{Engine, GpuError, RenderError};
 use camsim_io::{
-    camera_file::CameraFileError, flight_log::FlightLogError, load::LoadError, pictures::PictureError, scenario_file::ScenarioError,
-    write::WriteError,
+    camera_file::CameraFileError, flight_log::FlightLogError, load::LoadError, pictures::PictureError,
+    scenario_file::ScenarioError, write::WriteError,
 };
 
 use crate::plot::PlotError;
@@ -60,7 +61,16 @@ pub enum Experiment {
 
 impl Experiment {
     /// All, in the paper's order.
-    pub const ALL: [Self; 8] = [Self::Tracking, Self::Lens, Self::Time, Self::Blur, Self::Shutter, Self::Interlace, Self::Map, Self::Speed];
+    pub const ALL: [Self; 8] = [
+        Self::Tracking,
+        Self::Lens,
+        Self::Time,
+        Self::Blur,
+        Self::Shutter,
+        Self::Interlace,
+        Self::Map,
+        Self::Speed,
+    ];
 
     /// Its name on the command line and of its folder.
     #[must_use]
@@ -115,11 +125,13 @@ impl Experiment {
 pub struct Setup<'a> {
     /// The device.
     pub engine: &'a Engine,
-    /// The folder that holds `camsim/` (log, calibrations and poses of the paper's program), `flights/`, `terrain/`.
+    /// The folder that holds `camsim/` (log, calibrations and poses of the paper's program), `flights/`,
+    /// `terrain/`.
     pub data: Option<&'a Path>,
     /// Where inputs made here are put (the built-in flight).
     pub scratch: &'a Path,
-    /// Width of the pictures; the paper's are 640 x 480. Smaller ones are quicker, with the same field of view.
+    /// Width of the pictures; the paper's are 640 x 480. Smaller ones are quicker, with the same field of
+    /// view.
     pub width_px: u32,
 }
 

@@ -8,8 +8,9 @@ pub fn ms(duration: Duration) -> f64 {
     1e3 * duration.as_secs_f64()
 }
 
-/// Time that this program's threads have had a processor, milliseconds; those that have ended count too, so that it never falls.
-/// With a software adapter that is the work itself, whatever else runs on the machine. `None` on systems without such a clock.
+/// Time that this program's threads have had a processor, milliseconds; those that have ended count too, so
+/// that it never falls. With a software adapter that is the work itself, whatever else runs on the machine.
+/// `None` on systems without such a clock.
 #[must_use]
 pub fn processor_ms() -> Option<f64> {
     #[cfg(unix)]
@@ -21,7 +22,8 @@ pub fn processor_ms() -> Option<f64> {
     None
 }
 
-/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there is no such file.
+/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there
+/// is no such file.
 #[must_use]
 pub fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

@@ -1,4 +1,5 @@
-//! Calibration boards: are their edges where the picture shows them, and did OpenCV find the camera again (scripts/goldens/board_opencv.py)?
+//! Calibration boards: are their edges where the picture shows them, and did OpenCV find the camera again
+//! (scripts/goldens/board_opencv.py)?
 
 use std::{convert::Infallible, path::PathBuf, sync::Arc};
 
@@ -56,19 +57,30 @@ const REACH: i64 = 5;
 /// Lines of pixels that a mean is taken over, at least.
 const LEAST_LINES: usize = 12;
 
-/// Mean distance of an edge from where it should be, along the rows or columns of pixels that cross it more steeply; `None` with few of them in
-/// the picture. Light changes from one side to the other once: the share of it that is on the first side, added up, is the edge's place in a line of pixels.
-/// What a pixel's filter leaves of its phase is lost in the mean, because neighbouring lines have other phases.
+/// Mean distance of an edge from where it should be, along the rows or columns of pixels that cross it more
+/// steeply; `None` with few of them in the picture. Light changes from one side to the other once: the share
+/// of it that is on the first side, added up, is the edge's place in a line of pixels. What a pixel's filter
+/// leaves of its phase is lost in the mean, because neighbouring lines have other phases.
 fn edge_error(frame: &RenderedFrame, eye: &Eye, from_m: DVec2, to_m: DVec2) -> Option<f64> {
     let [from_px, to_px] = [0.1, 0.9].map(|share| eye.px(from_m.lerp(to_m, share)));
     // Across the edge by columns (0) or rows (1).
     let axis = usize::from((to_px - from_px).x.abs() > (to_px - from_px).y.abs());
-    let [first, last] = [from_px[1 - axis].min(to_px[1 - axis]).ceil() as i64, from_px[1 - axis].max(to_px[1 - axis]).floor() as i64];
-    let errors: Vec<f64> = (first..=last).filter_map(|line| line_error(frame, eye, [from_m, to_m], axis, line)).collect();
+    let [first, last] = [
+        from_px[1 - axis].min(to_px[1 - axis]).ceil() as i64,
+        from_px[1 - axis].max(to_px[1 - axis]).floor() as i64,
+    ];
+    let errors: Vec<f64> =
+        (first..=last).filter_map(|line| line_error(frame, eye, [from_m, to_m], axis, line)).collect();
     (errors.len() >= LEAST_LINES).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
 }
 
-fn line_error(frame: &RenderedFrame, eye: &Eye, [from_m, to_m]: [DVec2; 2], axis: usize, line: i64) -> Option<f64> {
+fn line_error(
+    frame: &RenderedFrame,
+    eye: &Eye,
+    [from_m, to_m]: [DVec2; 2],
+    axis: usize,
+    line: i64,
+) -> Option<f64> {
     let light = |at: [i64; 2]| -> Option<f64> {
         let inside = (0..2).all(|k| (0..i64::from(frame.size_px[k])).contains(&at[k]));
         let index = 4 * (at[1] * i64::from(frame.size_px[0]) + at[0]);
@@ -79,7 +91,11 @@ fn line_error(frame: &RenderedFrame, eye: &Eye, [from_m, to_m]: [DVec2; 2], axis
     let rising = eye.px(to_m)[1 - axis] > eye.px(from_m)[1 - axis];
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if (eye.px(from_m.lerp(to_m, middle))[1 - axis] < line as f64) == rising { low = middle } else { high = middle }
+        if (eye.px(from_m.lerp(to_m, middle))[1 - axis] < line as f64) == rising {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     let truth = eye.px(from_m.lerp(to_m, low))[axis];
     let first = truth.round() as i64 - REACH;
@@ -99,7 +115,8 @@ fn measure(frame: &RenderedFrame, eye: &Eye, edges: &[(DVec2, DVec2)]) -> (f64, 
 }
 
 fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
-    let engine = Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+    let engine = Engine::new(AdapterChoice::Software)
+        .expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color]).expect("a session");
     let mut found = None;
     session
@@ -113,8 +130,9 @@ fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
 
 /// A pose from near the board.
 const FRAME: u64 = 3;
-/// RMS and largest error of an edge. The oracle's pixels are means over their area. The device reads a pixel at its middle from an ideal frame
-/// with 1.6 pixels for each: of the reading's phase only edges along the rows have anything left.
+/// RMS and largest error of an edge. The oracle's pixels are means over their area. The device reads a pixel
+/// at its middle from an ideal frame with 1.6 pixels for each: of the reading's phase only edges along the
+/// rows have anything left.
 const OF_ORACLE_PX: [f64; 2] = [0.002, 0.005];
 const OF_DEVICE_PX: [f64; 2] = [0.02, 0.15];
 
@@ -124,9 +142,16 @@ fn edges_of_a_chessboard_are_where_the_lens_shows_them() {
     let (sequence, board, spec) = before(|spec| spec);
     let columns = spec.columns.expect("columns") as usize;
     let eye = Eye::new(&sequence, &spec, FRAME);
-    let along = board.points().windows(2).filter(|two| !(two[1].id as usize).is_multiple_of(columns)).map(|two| (two[0].at_m, two[1].at_m));
-    let edges: Vec<_> = along.chain(board.points().iter().zip(&board.points()[columns..]).map(|(a, b)| (a.at_m, b.at_m))).collect();
-    let options = RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.5, ..RenderOptions::default() };
+    let along = board
+        .points()
+        .windows(2)
+        .filter(|two| !(two[1].id as usize).is_multiple_of(columns))
+        .map(|two| (two[0].at_m, two[1].at_m));
+    let edges: Vec<_> = along
+        .chain(board.points().iter().zip(&board.points()[columns..]).map(|(a, b)| (a.at_m, b.at_m)))
+        .collect();
+    let options =
+        RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.5, ..RenderOptions::default() };
     let oracle = Oracle::new(sequence.clone()).expect("an oracle").render(FRAME, &options);
     let pictures = [("device", render(&sequence, FRAME), OF_DEVICE_PX), ("oracle", oracle, OF_ORACLE_PX)];
     let found = pictures.map(|(name, frame, most)| (name, measure(&frame, &eye, &edges), most));
@@ -150,7 +175,8 @@ fn edges_of_tags_are_where_the_lens_shows_them() {
         ..spec
     });
     let eye = Eye::new(&sequence, &spec, FRAME);
-    let around = |tag: &[BoardPoint]| (0..4).map(|k| (tag[k].at_m, tag[(k + 1) % 4].at_m)).collect::<Vec<_>>();
+    let around =
+        |tag: &[BoardPoint]| (0..4).map(|k| (tag[k].at_m, tag[(k + 1) % 4].at_m)).collect::<Vec<_>>();
     let edges: Vec<_> = board.points().chunks_exact(4).flat_map(around).collect();
     let (rms, worst, count) = measure(&render(&sequence, FRAME), &eye, &edges);
     eprintln!("AprilGrid: {rms:.4} px RMS, at most {worst:.4} px over {count} edges");
@@ -173,7 +199,10 @@ fn opencv_found_the_camera_again() {
     let text = std::fs::read_to_string(data("opencv.json")).expect("figures");
     let found: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     let number = |value: &serde_json::Value| value.as_f64().expect("a number");
-    assert!((number(&found["corners_against_truth_rms_px"]) - rms_px).abs() < 1e-3, "the figures are not of these corners: {rms_px}");
+    assert!(
+        (number(&found["corners_against_truth_rms_px"]) - rms_px).abs() < 1e-3,
+        "the figures are not of these corners: {rms_px}"
+    );
     let camera = &sequence.scenario.camera;
     let principal_px = camera.principal_point_px.expect("a principal point");
     for axis in 0..2 {

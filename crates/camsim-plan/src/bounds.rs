@@ -32,7 +32,8 @@ pub struct LensReach {
     pub camera: Arc<CameraModel>,
     /// Ideal rays and their pixels.
     pub rays: Vec<(DVec2, [u32; 2])>,
-    /// d(ideal px)/d(output px) in its lesser direction, tenth percentile over the image: below 1 the lens magnifies.
+    /// d(ideal px)/d(output px) in its lesser direction, tenth percentile over the image: below 1 the lens
+    /// magnifies.
     pub least_stretch: f64,
     /// Pixels at which errors are predicted.
     pub(super) probes: Vec<Probe>,
@@ -47,18 +48,23 @@ impl LensReach {
         let candidates = candidates(&camera);
         let mut rays = Vec::new();
         for band in 0..BANDS * BANDS {
-            let of_band: Vec<_> = candidates.iter().filter(|(_, pixel)| band_of(*pixel, camera.size_px) == band).collect();
+            let of_band: Vec<_> =
+                candidates.iter().filter(|(_, pixel)| band_of(*pixel, camera.size_px) == band).collect();
             for k in 0..DIRECTIONS {
-                let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
-                if let Some(&&outermost) = of_band.iter().max_by(|a, b| a.0.dot(direction).total_cmp(&b.0.dot(direction)))
+                let direction =
+                    DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
+                if let Some(&&outermost) =
+                    of_band.iter().max_by(|a, b| a.0.dot(direction).total_cmp(&b.0.dot(direction)))
                     && !rays.contains(&outermost)
                 {
                     rays.push(outermost);
                 }
             }
         }
-        // A tenth of the pixels may be magnified more: finer ideal pixels for a few corners would cost time in all of the image.
-        let mut stretches: Vec<f64> = candidates.iter().step_by(7).map(|(uv, _)| least_stretch(&camera, *uv)).collect();
+        // A tenth of the pixels may be magnified more: finer ideal pixels for a few corners would cost time
+        // in all of the image.
+        let mut stretches: Vec<f64> =
+            candidates.iter().step_by(7).map(|(uv, _)| least_stretch(&camera, *uv)).collect();
         stretches.sort_by(f64::total_cmp);
         let least_stretch = stretches.get(stretches.len() / 10).copied().unwrap_or(1.0);
         let probes = probes(&camera);
@@ -66,7 +72,8 @@ impl LensReach {
         (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes, probe_px })
     }
 
-    /// The same with every second of its probes: two neighbours in time, one `odd` and one not, have all of them.
+    /// The same with every second of its probes: two neighbours in time, one `odd` and one not, have all of
+    /// them.
     pub(super) fn with_half_the_probes(&self, odd: bool) -> Self {
         self.with_every_second(|probe| probe.is_odd == odd)
     }
@@ -87,8 +94,8 @@ impl LensReach {
         }
     }
 
-    /// Ideal pixels for each of the camera's, at least: a lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory
-    /// is not worth it.
+    /// Ideal pixels for each of the camera's, at least: a lens that magnifies somewhere needs a finer ideal
+    /// frame there; beyond 2 the memory is not worth it.
     #[must_use]
     pub fn least_scale(&self) -> f64 {
         (1.0 / self.least_stretch).clamp(1.0, 2.0)
@@ -116,24 +123,34 @@ fn band_of(pixel: [u32; 2], size_px: [u32; 2]) -> u32 {
     band(pixel[1], size_px[1]) * BANDS + band(pixel[0], size_px[0])
 }
 
-/// Valid pixels on a coarse grid that includes the borders, and every pixel of cells that the edge of validity crosses.
+/// Valid pixels on a coarse grid that includes the borders, and every pixel of cells that the edge of
+/// validity crosses.
 fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
     let [width, height] = camera.size_px;
     let ticks = |size: u32| {
-        (0..size).step_by(STEP_PX as usize).chain((!(size - 1).is_multiple_of(STEP_PX)).then_some(size - 1)).collect::<Vec<u32>>()
+        (0..size)
+            .step_by(STEP_PX as usize)
+            .chain((!(size - 1).is_multiple_of(STEP_PX)).then_some(size - 1))
+            .collect::<Vec<u32>>()
     };
     let ray = |x: u32, y: u32| camera.unproject(DVec2::new(f64::from(x), f64::from(y)));
     let (xs, ys) = (ticks(width), ticks(height));
     use rayon::prelude::*;
-    let grid: Vec<Vec<Option<DVec2>>> = ys.par_iter().map(|&y| xs.iter().map(|&x| ray(x, y)).collect()).collect();
+    let grid: Vec<Vec<Option<DVec2>>> =
+        ys.par_iter().map(|&y| xs.iter().map(|&x| ray(x, y)).collect()).collect();
     let mut found = Vec::new();
     for (j, &y) in ys.iter().enumerate() {
         for (i, &x) in xs.iter().enumerate() {
             found.extend(grid[j][i].map(|uv| (uv, [x, y])));
             let (Some(&x1), Some(&y1)) = (xs.get(i + 1), ys.get(j + 1)) else { continue };
-            let valid = [grid[j][i], grid[j][i + 1], grid[j + 1][i], grid[j + 1][i + 1]].iter().flatten().count();
+            let valid =
+                [grid[j][i], grid[j][i + 1], grid[j + 1][i], grid[j + 1][i + 1]].iter().flatten().count();
             if (1..4).contains(&valid) {
-                found.extend((y..=y1).flat_map(|y| (x..=x1).map(move |x| (x, y))).filter_map(|(x, y)| ray(x, y).map(|uv| (uv, [x, y]))));
+                found.extend(
+                    (y..=y1)
+                        .flat_map(|y| (x..=x1).map(move |x| (x, y)))
+                        .filter_map(|(x, y)| ray(x, y).map(|uv| (uv, [x, y]))),
+                );
             }
         }
     }
@@ -156,19 +173,27 @@ impl View {
     /// Its pixels. `scale` is that of its focal length to the camera's.
     pub fn pixels(self, camera: &CameraModel, scale: f64) -> IdealGeometry {
         let focal_px = camera.focal_px * scale;
-        // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels fall together.
+        // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels
+        // fall together.
         let principal_px = camera.principal_point_px;
         let first_px = (self.low * focal_px + principal_px).floor() - RIM_PX;
         let last_px = (self.high * focal_px + principal_px).ceil() + RIM_PX;
         let size = last_px - first_px + 1.0;
-        let side = |length: f64| if length.is_finite() { length.clamp(2.0, f64::from(u32::MAX / 2)) as u32 } else { u32::MAX / 2 };
-        IdealGeometry { size_px: [side(size.x), side(size.y)], focal_px, principal_px: principal_px - first_px }
+        let side = |length: f64| {
+            if length.is_finite() { length.clamp(2.0, f64::from(u32::MAX / 2)) as u32 } else { u32::MAX / 2 }
+        };
+        IdealGeometry {
+            size_px: [side(size.x), side(size.y)],
+            focal_px,
+            principal_px: principal_px - first_px,
+        }
     }
 }
 
-/// What an ideal frame must show to hold every source of the frame: each kept ray at its own line's instants (start, middle and end of the
-/// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time. A `demanded` constant-twist solver
-/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth.
+/// What an ideal frame must show to hold every source of the frame: each kept ray at its own line's instants
+/// (start, middle and end of the exposure), at infinity and at the nearest depth in view, in the two keys
+/// that are nearest in time. A `demanded` constant-twist solver also looks where the point is not: there too,
+/// and at the ray's own place, where it reads the depth.
 pub(super) fn view(
     reach: &LensReach,
     path: &CameraPath,
@@ -206,7 +231,9 @@ pub(super) fn view(
                         include(in_key.truncate() / in_key.z);
                     }
                 }
-                if let Some(at) = demanded.and_then(|(stage, twist)| stage.displaced(uv, w, &twist, t_s - key_s)) {
+                if let Some(at) =
+                    demanded.and_then(|(stage, twist)| stage.displaced(uv, w, &twist, t_s - key_s))
+                {
                     include(at);
                     include(uv);
                 }
@@ -220,7 +247,8 @@ pub(super) fn view(
 fn still_tangents(reach: &LensReach, slant: f64) -> [f64; 4] {
     let mut tangents = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
     for (uv, _) in &reach.rays {
-        tangents = [tangents[0].min(uv.x), tangents[1].max(uv.x), tangents[2].min(uv.y), tangents[3].max(uv.y)];
+        tangents =
+            [tangents[0].min(uv.x), tangents[1].max(uv.x), tangents[2].min(uv.y), tangents[3].max(uv.y)];
     }
     let spare = 0.1 * slant;
     [tangents[0] - spare, tangents[1] + spare, tangents[2] - spare, tangents[3] + spare]

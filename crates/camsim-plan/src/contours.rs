@@ -1,13 +1,15 @@
-//! What silhouettes cost in grey levels where nothing is done for them: a pixel of the ideal frame then shows one of the two surfaces, and
-//! an output pixel reads from there as it does elsewhere.
+//! What silhouettes cost in grey levels where nothing is done for them: a pixel of the ideal frame then shows
+//! one of the two surfaces, and an output pixel reads from there as it does elsewhere.
 //!
-//! Two things go wrong. The border runs along whole pixels, so that pixels on it have too much of one surface; and within the parallax
-//! between the two surfaces a pixel looks where the other one is. Both are a share of the contrast across the border. How wide the strip within
-//! parallax is the rays around the probes tell; a few silhouettes have most of it, at which hardly any probe stands, so that the share that holes
+//! Two things go wrong. The border runs along whole pixels, so that pixels on it have too much of one
+//! surface; and within the parallax between the two surfaces a pixel looks where the other one is. Both are a
+//! share of the contrast across the border. How wide the strip within parallax is the rays around the probes
+//! tell; a few silhouettes have most of it, at which hardly any probe stands, so that the share that holes
 //! have of the picture (`holes.rs`) is asked too.
 //!
-//! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of its pixels where the border is. Where
-//! meshes of other colours touch, rays change nothing: only a finer ideal frame does.
+//! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of
+//! its pixels where the border is. Where meshes of other colours touch, rays change nothing: only a finer
+//! ideal frame does.
 
 mod rays;
 
@@ -29,15 +31,20 @@ const SAFETY: f64 = 1.3;
 pub(super) const UNSURE: f64 = 1.5;
 /// Times what is found at borders, squared, at most, that is taken to lie between those.
 const MOST_FINER: f64 = 2.0;
-/// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
+/// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers
+/// it up, and a pixel there may take either.
 const STRIPS: f64 = 2.0;
-/// How far the ground's borders are displaced, in times of all of it: they are ridges, which coarser triangles cut off. Over an alpine valley the whole error by a level of detail of 0.25 px was 0.34 to
-/// 0.51/255 in ten frames, with 3500 houses or none; what is foretold with this factor was 0.8 to 1.1 times that, and more since the skyline is known by itself.
+/// How far the ground's borders are displaced, in times of all of it: they are ridges, which coarser
+/// triangles cut off. Over an alpine valley the whole error by a level of detail of 0.25 px was 0.34 to
+/// 0.51/255 in ten frames, with 3500 houses or none; what is foretold with this factor was 0.8 to 1.1 times
+/// that, and more since the skyline is known by itself.
 const RIDGES: f64 = 1.5;
-/// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
+/// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at
+/// them may be off, RMS.
 const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
-/// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
+/// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the
+/// ideal frame.
 const LEAST_LEFT: f64 = 0.1;
 const LEAST_LEFT_BY_SAMPLES: f64 = 0.02;
 /// What silhouettes cost, as they are made.
@@ -64,7 +71,8 @@ pub(super) struct Outlook {
     hidden_share: f64,
     /// Mean squared error over the picture by strips, of the linear range.
     strips: f64,
-    /// Squared contrast of borders, times their length in pixels, mean over the pixels of the picture: of steps of depth,
+    /// Squared contrast of borders, times their length in pixels, mean over the pixels of the picture: of
+    /// steps of depth,
     steps: f64,
     /// the same as a look once a pixel finds them,
     steps_apart: f64,
@@ -81,7 +89,8 @@ pub(super) struct Outlook {
 }
 
 impl Outlook {
-    /// From what is seen around all probes by a camera, the ideal frame's pose, the plane that is nearest to what is seen from there, what is not, and the least share that pixels at silhouettes have.
+    /// From what is seen around all probes by a camera, the ideal frame's pose, the plane that is nearest to
+    /// what is seen from there, what is not, and the least share that pixels at silhouettes have.
     pub fn new(
         Surroundings { around, skyline }: &Surroundings,
         camera: &CameraModel,
@@ -92,18 +101,27 @@ impl Outlook {
     ) -> Self {
         let found = || around.iter().filter_map(|around| around.contour.as_ref());
         let near = found().count();
-        let mean = |of: &dyn Fn(&Contour) -> f64| found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
+        let mean = |of: &dyn Fn(&Contour) -> f64| {
+            found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64
+        };
         let share = near as f64 / around.len().max(1) as f64;
         let contrast2 = mean(&|contour| contour.contrast2);
         let surfaces2: Vec<f64> = found().filter_map(|contour| contour.surfaces2).collect();
-        let hidden2 = if surfaces2.is_empty() { contrast2 } else { surfaces2.iter().sum::<f64>() / surfaces2.len() as f64 };
+        let hidden2 = if surfaces2.is_empty() {
+            contrast2
+        } else {
+            surfaces2.iter().sum::<f64>() / surfaces2.len() as f64
+        };
         // Few lines cross a border: where borders stand apart, what the wider look finds is surer.
         let over_all = |of: &dyn Fn(&Crossed) -> f64| {
-            SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
+            SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed))
+                / around.len().max(1) as f64
         };
         // Few probes are near the sky, whose border lines between them know.
         let of_skyline = skyline.steps();
-        let at_probes = |contour: &Contour| if of_skyline.is_some() { contour.steps_between_surfaces } else { contour.steps() };
+        let at_probes = |contour: &Contour| {
+            if of_skyline.is_some() { contour.steps_between_surfaces } else { contour.steps() }
+        };
         let of_skyline = SAFETY * SAFETY * of_skyline.unwrap_or(0.0);
         let of_probes = SAFETY * SAFETY * share * mean(&at_probes) + of_skyline;
         let of_lines = over_all(&|crossed| crossed.steps);
@@ -121,14 +139,16 @@ impl Outlook {
             flush: unsure * finer * over_all(&|crossed| crossed.flush),
             feet: unsure * finer * over_all(&|crossed| crossed.feet),
             once_a_pixel: (unsure * finer * finer).recip(),
-            of_ground: SAFETY * SAFETY * around.iter().map(|around| around.of_ground).sum::<f64>() / around.len().max(1) as f64,
+            of_ground: SAFETY * SAFETY * around.iter().map(|around| around.of_ground).sum::<f64>()
+                / around.len().max(1) as f64,
             skyline: skyline.clone(),
             places: Places::new(around.iter().filter_map(Around::place)),
         }
     }
 
-    /// RMS error over the picture by borders of a ground that is displaced by so much, RMS, pixels of the camera's focal length; 1/255 of the linear range. A border passes over as much of
-    /// a pixel as it is displaced, as often across it as along it; before the sky it is known by how much.
+    /// RMS error over the picture by borders of a ground that is displaced by so much, RMS, pixels of the
+    /// camera's focal length; 1/255 of the linear range. A border passes over as much of a pixel as it is
+    /// displaced, as often across it as along it; before the sky it is known by how much.
     pub fn ground_dn(&self, displaced_px: f64, detail: &TerrainDetail<'_>) -> f64 {
         let before_ground = (RIDGES * displaced_px).powi(2) * 0.5 * self.of_ground;
         255.0 * (before_ground + self.skyline.lowered(detail)).sqrt()
@@ -139,10 +159,12 @@ impl Outlook {
         self.of((self.steps + self.flush + self.feet) * self.places.left(sampling, blur) + self.strips)
     }
 
-    /// About the least that they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's; whether those may have several samples.
+    /// About the least that they cost left as they are, whatever reads an ideal frame with so many pixels for
+    /// each of the camera's; whether those may have several samples.
     pub fn plain_at_best(&self, scale: f64, may_have_samples: bool) -> Contours {
         let least_left = if may_have_samples { LEAST_LEFT_BY_SAMPLES } else { LEAST_LEFT };
-        self.of(least_left * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
+        self.of(least_left * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale)
+            + self.strips)
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -154,18 +176,24 @@ impl Outlook {
     }
 }
 
-/// Times what is found at borders that there may well be, squared: where a few probes found most of it they tell less than as many alike.
+/// Times what is found at borders that there may well be, squared: where a few probes found most of it they
+/// tell less than as many alike.
 fn unsure(around: &[Around]) -> f64 {
     let found = || around.iter().filter_map(Around::place).map(|(found, _)| found);
-    let [sum, squares] = found().fold([0.0; 2], |[sum, squares], found| [sum + found, squares + found * found]);
+    let [sum, squares] =
+        found().fold([0.0; 2], |[sum, squares], found| [sum + found, squares + found * found]);
     if sum > 0.0 { 1.0 + UNSURE * squares.sqrt() / sum } else { 1.0 }
 }
 
-/// Times the borders that are found there are more, nearer to each other than what is looked at: as many times as what is found thrice a pixel is more
-/// than what is found once.
+/// Times the borders that are found there are more, nearer to each other than what is looked at: as many
+/// times as what is found thrice a pixel is more than what is found once.
 fn finer(around: &[Around]) -> f64 {
-    let of = |Crossed { steps, flush, feet, once_a_pixel, .. }: &Crossed| [steps + flush + feet, *once_a_pixel];
-    let [all, once] = around.iter().map(|around| of(&around.crossed)).fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    let of =
+        |Crossed { steps, flush, feet, once_a_pixel, .. }: &Crossed| [steps + flush + feet, *once_a_pixel];
+    let [all, once] = around
+        .iter()
+        .map(|around| of(&around.crossed))
+        .fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
     if once > 0.0 { (all / once).clamp(1.0, MOST_FINER) } else { 1.0 }
 }
 
@@ -191,7 +219,9 @@ pub(super) mod tests {
         rays::{RAYS_LEAVE, SAFETY_WITH_RAYS},
         *,
     };
-    use crate::{LensReach, SurfaceReads, around::Search, exposure::ExposurePath, stairs, surfaces::Surfaces};
+    use crate::{
+        LensReach, SurfaceReads, around::Search, exposure::ExposurePath, stairs, surfaces::Surfaces,
+    };
     use camsim_core::{
         mount::CameraPath,
         pose::BodyState,
@@ -227,9 +257,15 @@ pub(super) mod tests {
         CameraPath::new(Trajectory::uniform(-1.0, 0.1, 1.0, knots).unwrap(), &mount).unwrap()
     }
 
-    /// A white roof of 50 m, 50 m above black ground, from 100 m above it, flying east with a readout of 100 ms.
+    /// A white roof of 50 m, 50 m above black ground, from 100 m above it, flying east with a readout of 100
+    /// ms.
     fn outlook(exposure_ms: f64, gain: f64, holes: Holes) -> Outlook {
-        outlook_on(vec![Mesh::level_picture(plain(255), DVec3::new(0.0, 0.0, -50.0), 50.0)], exposure_ms, gain, holes)
+        outlook_on(
+            vec![Mesh::level_picture(plain(255), DVec3::new(0.0, 0.0, -50.0), 50.0)],
+            exposure_ms,
+            gain,
+            holes,
+        )
     }
 
     fn plain(byte: u8) -> Arc<Texture> {
@@ -246,14 +282,32 @@ pub(super) mod tests {
         let meshes = [vec![Mesh::level_picture(plain(0), DVec3::ZERO, 5000.0)], others].concat();
         let scene = Scene { meshes, ..Scene::default() };
         let path = flying_east();
-        let shutter =
-            Shutter::from_spec(&ShutterSpec { readout_ms: 100.0, exposure_ms, ..ShutterSpec::default() }, 5.0, [400, 300]).unwrap();
+        let shutter = Shutter::from_spec(
+            &ShutterSpec { readout_ms: 100.0, exposure_ms, ..ShutterSpec::default() },
+            5.0,
+            [400, 300],
+        )
+        .unwrap();
         let camera = CameraModel::new([400, 300], [FOCAL_PX; 2], None, LensModel::Pinhole, &[]).unwrap();
         let reach = LensReach::new(Arc::new(camera)).unwrap();
         let (key_pose, gain) = (path.pose(0.0), |_: [u32; 2]| gain);
         let surfaces = Surfaces::new(Arc::new(scene));
-        let search = Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, gain: &gain };
-        Outlook::new(&search.look_around(), &reach.camera, &key_pose, &SeenPlane::fitted(key_pose, std::iter::empty()), holes, 0.0)
+        let search = Search {
+            reach: &reach,
+            surfaces: &surfaces,
+            path: &path,
+            shutter: &shutter,
+            stamp_s: 0.0,
+            gain: &gain,
+        };
+        Outlook::new(
+            &search.look_around(),
+            &reach.camera,
+            &key_pose,
+            &SeenPlane::fitted(key_pose, std::iter::empty()),
+            holes,
+            0.0,
+        )
     }
 
     #[test]
@@ -268,8 +322,9 @@ pub(super) mod tests {
 
     #[test]
     fn borders_of_what_is_thin_are_all_counted_whichever_way_they_run() {
-        // White bars 1 m wide, which is 2 px, and 4 m apart, all over the picture: along its rows, its columns, its diagonals, or nearly, so that they
-        // are not all as far from the middle of a pixel, and between.
+        // White bars 1 m wide, which is 2 px, and 4 m apart, all over the picture: along its rows, its
+        // columns, its diagonals, or nearly, so that they are not all as far from the middle of a pixel, and
+        // between.
         for angle in [0.05, FRAC_PI_2 + 0.05, FRAC_PI_4 + 0.05, 0.4, 0.5_f32] {
             let (sin, cos) = angle.sin_cos();
             let (mut vertices, mut indices) = (Vec::new(), Vec::new());
@@ -277,7 +332,10 @@ pub(super) mod tests {
                 let first = vertices.len() as u32;
                 for [along, across] in [[-200.0, 0.0], [200.0, 0.0], [200.0, 1.0], [-200.0, 1.0_f32]] {
                     let across = across + 4.0 * k as f32;
-                    vertices.push(MeshVertex::new([along * cos - across * sin, along * sin + across * cos, 0.0], [0.0; 2]));
+                    vertices.push(MeshVertex::new(
+                        [along * cos - across * sin, along * sin + across * cos, 0.0],
+                        [0.0; 2],
+                    ));
                 }
                 indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
             }
@@ -305,7 +363,8 @@ pub(super) mod tests {
                 };
                 let [low, high] = [(2 * k, tints[0]), (2 * k + 2, tints[1])];
                 vertices.extend(
-                    [(-200.0, low), (200.0, low), (200.0, high), (-200.0, high)].map(|(along, (at, tint))| corner(along, at, tint)),
+                    [(-200.0, low), (200.0, low), (200.0, high), (-200.0, high)]
+                        .map(|(along, (at, tint))| corner(along, at, tint)),
                 );
                 indices.extend([0, 1, 2, 0, 2, 3].map(|corner| from + corner));
             }
@@ -314,18 +373,34 @@ pub(super) mod tests {
         let of_number = |k: i32| [(k % 2 == 0) as u8 as f32; 2];
         let only = |odd: i32| move |k: i32| (k.rem_euclid(2) == odd).then(|| of_number(k));
         let found = outlook_on(vec![stripes(&only(0)), stripes(&only(1))], 0.0, 1.0, Holes::default());
-        // The same in one mesh, by the colours of its corners; where those change gradually there is no border.
+        // The same in one mesh, by the colours of its corners; where those change gradually there is no
+        // border.
         let in_one = outlook_on(vec![stripes(&|k| Some(of_number(k)))], 0.0, 1.0, Holes::default());
         assert_eq!((in_one.flush, in_one.steps), (found.flush, 0.0));
-        let gradual = outlook_on(vec![stripes(&|k| Some([k, k + 1].map(|k| 0.5 + k as f32 / 320.0)))], 0.0, 1.0, Holes::default());
+        let gradual = outlook_on(
+            vec![stripes(&|k| Some([k, k + 1].map(|k| 0.5 + k as f32 / 320.0)))],
+            0.0,
+            1.0,
+            Holes::default(),
+        );
         assert_eq!((gradual.flush, gradual.steps), (0.0, 0.0));
         let expected = UNSURE_OF_ALL * SAFETY * SAFETY / 4.0;
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.steps, 0.0);
-        let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2, u32::MAX)].map(|of| of.error_dn);
-        let left = stairs::left(&stairs::Reading { width_px: 2.0, taps: TapStage::Bilinear, samples_a_pixel: 1, exposure: None });
+        let [plain, rays] =
+            [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2, u32::MAX)]
+                .map(|of| of.error_dn);
+        let left = stairs::left(&stairs::Reading {
+            width_px: 2.0,
+            taps: TapStage::Bilinear,
+            samples_a_pixel: 1,
+            exposure: None,
+        });
         let rays_alike = rays * SAFETY / SAFETY_WITH_RAYS / found.once_a_pixel.sqrt();
-        assert!((plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
+        assert!(
+            (plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9,
+            "{plain} {rays}"
+        );
     }
 
     #[test]
@@ -350,7 +425,11 @@ pub(super) mod tests {
         assert!((with_rays(1) / feet.plain(&read_at(2.0), None).error_dn - less).abs() < 1e-12);
         // Of 1/12 in a pixel's width, in pixels half as wide.
         let along_whole_pixels = 255.0 * (1e-3_f64 / 12.0).sqrt() / 2.0;
-        assert!((with_rays(3) / along_whole_pixels - less * RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{}", with_rays(3));
+        assert!(
+            (with_rays(3) / along_whole_pixels - less * RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12,
+            "{}",
+            with_rays(3)
+        );
     }
 
     #[test]
@@ -360,8 +439,8 @@ pub(super) mod tests {
             found.of(found.strips)
         };
         let found = outlook_of(Holes::default());
-        // At the roof's two borders across the flight 50 px from the middle: a sixth of the readout from its middle the camera has flown 2/3 m, and
-        // (1/100 - 1/150) of that is between roof and ground.
+        // At the roof's two borders across the flight 50 px from the middle: a sixth of the readout from its
+        // middle the camera has flown 2/3 m, and (1/100 - 1/150) of that is between roof and ground.
         let width_px = FOCAL_PX * SPEED_M_S * 0.1 / 6.0 * (1.0 / 100.0 - 1.0 / 150.0);
         // All along the other two borders the readout goes by, with parallax along and not across them.
         let at_most_dn = 255.0 * width_px / 7_f64.sqrt();
@@ -377,7 +456,10 @@ pub(super) mod tests {
         let spline = |scale: f64| Sampling { taps: TapStage::Spline, ..read_at(scale) };
         let [coarse, fine] = [1.0, 2.0].map(|scale| still.plain(&spline(scale), None).at_dn);
         let strips = still.of(still.strips).at_dn;
-        assert!(fine < 0.6 * coarse && fine > strips && strips > 0.0, "the strips stay: {fine} {coarse} {strips}");
+        assert!(
+            fine < 0.6 * coarse && fine > strips && strips > 0.0,
+            "the strips stay: {fine} {coarse} {strips}"
+        );
         let samples = ExposurePath::STRAIGHT.with_samples(2.0, 64);
         let blurred = outlook(20.0, 1.0, Holes::default()).plain(&spline(1.0), Some(samples));
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);
@@ -387,7 +469,9 @@ pub(super) mod tests {
         assert!(with_rays(1.0, 1).error_dn < still.plain(&spline(1.0), None).error_dn);
         assert_eq!(with_rays(2.0, 1), with_rays(1.0, 2));
         // What nothing can leave less of lets nobody think that more would be left.
-        for (scale, samples_a_pixel) in [1.0, 1.41, 2.0, 2.83, 4.0, 5.0].into_iter().flat_map(|scale| [(scale, 1), (scale, 4)]) {
+        for (scale, samples_a_pixel) in
+            [1.0, 1.41, 2.0, 2.83, 4.0, 5.0].into_iter().flat_map(|scale| [(scale, 1), (scale, 4)])
+        {
             for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Area, TapStage::Grid { most: 5 }] {
                 let plain = still.plain(&Sampling { taps, samples_a_pixel, ..read_at(scale) }, None);
                 let at_best = still.plain_at_best(scale, samples_a_pixel > 1);

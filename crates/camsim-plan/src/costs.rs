@@ -1,9 +1,11 @@
-//! What ways of sampling cost: milliseconds that a frame of 640x480 takes, by the clock, on two processor cores without a GPU. Other machines have other
-//! times; plans are compared by their ratios.
+//! What ways of sampling cost: milliseconds that a frame of 640x480 takes, by the clock, on two processor
+//! cores without a GPU. Other machines have other times; plans are compared by their ratios.
 //!
-//! From the times that the host takes for ideal frames and what is made from them in `benches/all_effects.toml` and `benches/houses.toml`, with an exposure and without,
-//! and in two cases of `camsim bench`, each with ideal frames of 1 to 2.5 times the camera's scale, all ways of reading surfaces and the ideal frame, and 3 or 16 samples of the exposure;
-//! and from the device's for rays at silhouettes (docs/PERFORMANCE.md, "What the plan takes things to cost").
+//! From the times that the host takes for ideal frames and what is made from them in
+//! `benches/all_effects.toml` and `benches/houses.toml`, with an exposure and without, and in two cases of
+//! `camsim bench`, each with ideal frames of 1 to 2.5 times the camera's scale, all ways of reading surfaces
+//! and the ideal frame, and 3 or 16 samples of the exposure; and from the device's for rays at silhouettes
+//! (docs/PERFORMANCE.md, "What the plan takes things to cost").
 
 use camsim_core::scene::SurfaceFilter;
 use glam::DMat2;
@@ -18,21 +20,23 @@ use camsim_core::{
     temporal::{Footprint, Kernel, TapStage},
 };
 
-/// Of an ideal pixel for each of the camera's: what any takes, each read of a surface's picture, what it takes more to read two of its smaller
-/// versions, and to find out how many reads there are.
+/// Of an ideal pixel for each of the camera's: what any takes, each read of a surface's picture, what it
+/// takes more to read two of its smaller versions, and to find out how many reads there are.
 const IDEAL_MS: f64 = 1.6;
 const SURFACE_READ_MS: f64 = 0.4;
 const TWO_VERSIONS_MS: f64 = 0.2;
 const ANY_READS_MS: f64 = 0.7;
-/// Of choosing and drawing a thousand triangles; and at most, for any ideal frame and for each time that it is as fine as the camera: their level of detail and what is in
-/// view leave no more. Of the terrain, and of models.
+/// Of choosing and drawing a thousand triangles; and at most, for any ideal frame and for each time that it
+/// is as fine as the camera: their level of detail and what is in view leave no more. Of the terrain, and of
+/// models.
 const TRIANGLES_MS: f64 = 0.04;
 const TERRAIN_MS: [f64; 2] = [0.8, 3.7];
 const MODELS_MS: [f64; 2] = [2.5, 2.0];
 /// What several samples a pixel take more at most, in the same way.
 const TERRAIN_SAMPLES_MS: [f64; 2] = [2.0, 2.5];
 const MODELS_SAMPLES_MS: [f64; 2] = [7.0, 4.0];
-/// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
+/// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by
+/// either.
 const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;
 const GRID_MS: [f64; 2] = [1.2, 0.4];
@@ -43,14 +47,15 @@ const AREA_MS: [f64; 2] = [0.7, 0.22];
 const SPLINE_SAMPLES_MS: [f64; 2] = [1.0, 0.75];
 const GRID_SAMPLES_MS: [f64; 2] = [1.5, 0.38];
 const EITHER_SAMPLES_MS: [f64; 2] = [2.0, 0.77];
-/// Of a pixel whatever it reads, and for each time that the ideal frame is finer, since fewer reads then find a pixel that is at hand already; and both
-/// where a lens bends rows.
+/// Of a pixel whatever it reads, and for each time that the ideal frame is finer, since fewer reads then find
+/// a pixel that is at hand already; and both where a lens bends rows.
 const ANY_MS: [f64; 2] = [1.5, 0.8];
 const BENT_MS: [f64; 2] = [3.7, 2.3];
-/// Frames with rays at silhouettes are the device's, which takes one to five times what the host does, by scene.
+/// Frames with rays at silhouettes are the device's, which takes one to five times what the host does, by
+/// scene.
 const ON_DEVICE: f64 = 3.0;
-/// Of the rays: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes each of a pixel's rays, and more
-/// where their samples are coarse.
+/// Of the rays: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is
+/// all silhouettes each of a pixel's rays, and more where their samples are coarse.
 const MARKS_MS: f64 = 6.0;
 const RAYS_MS: [f64; 2] = [4.7, 7.0];
 
@@ -65,11 +70,13 @@ impl Drawn {
     /// Of all triangles that there are.
     pub fn new(scene: &Scene) -> Self {
         let ms = |triangles: usize| 1e-3 * TRIANGLES_MS * triangles as f64;
-        let of_terrain = scene
-            .terrain
-            .as_ref()
-            .map_or(0, |terrain| terrain.chunks.iter().map(|chunk| 2 * chunk.cells[0] as usize * chunk.cells[1] as usize).sum());
-        Self { terrain_ms: ms(of_terrain), models_ms: ms(scene.meshes.iter().map(|mesh| mesh.shape.indices.len() / 3).sum()) }
+        let of_terrain = scene.terrain.as_ref().map_or(0, |terrain| {
+            terrain.chunks.iter().map(|chunk| 2 * chunk.cells[0] as usize * chunk.cells[1] as usize).sum()
+        });
+        Self {
+            terrain_ms: ms(of_terrain),
+            models_ms: ms(scene.meshes.iter().map(|mesh| mesh.shape.indices.len() / 3).sum()),
+        }
     }
 
     fn ms(self, scale: f64) -> f64 {
@@ -106,7 +113,11 @@ impl Prospect<'_> {
     }
 
     /// Of the ideal frame.
-    pub fn ideal_ms(&self, &Sampling { scale, surface_reads, samples_a_pixel, .. }: &Sampling, ideal_share: f64) -> f64 {
+    pub fn ideal_ms(
+        &self,
+        &Sampling { scale, surface_reads, samples_a_pixel, .. }: &Sampling,
+        ideal_share: f64,
+    ) -> f64 {
         let a_px = self.mean(|sight| surface_ms(sight.texel_from_key * scale.recip(), surface_reads));
         let samples_ms = if samples_a_pixel > 1 { self.drawn.samples_ms(scale) } else { 0.0 };
         ideal_share * (self.drawn.ms(scale) + scale * scale * a_px + samples_ms)
@@ -124,8 +135,8 @@ impl Prospect<'_> {
         any_ms + finer_ms * (scale - 1.0) + self.mean(of)
     }
 
-    /// Of giving pixels at silhouettes, which have a share of the picture, rays of their own: with so many fine pixels along a side of each ideal one, all
-    /// triangles drawn once more.
+    /// Of giving pixels at silhouettes, which have a share of the picture, rays of their own: with so many
+    /// fine pixels along a side of each ideal one, all triangles drawn once more.
     pub fn rays_ms(&self, share: f64, scale: f64, fine: u32, rays: u32, ideal_share: f64) -> f64 {
         let finer = scale * f64::from(fine);
         let [least_ms, coarse_ms] = RAYS_MS;
@@ -158,7 +169,8 @@ fn footprint_ms(stage: TapStage, area: &Footprint, samples: Option<u32>) -> f64 
             TapStage::Area => area_ms(area).map_or(EITHER_MS[0], |ms| AREA_MS[0] + ms),
             TapStage::Grid { .. } => GRID_MS[0] + GRID_MS[1] * (reads - 1.0),
             TapStage::SplineOrGrid { .. } => {
-                EITHER_MS[0] + EITHER_MS[1] * if matches!(area.kernel, Kernel::Spline(_)) { 0.0 } else { reads }
+                EITHER_MS[0]
+                    + EITHER_MS[1] * if matches!(area.kernel, Kernel::Spline(_)) { 0.0 } else { reads }
             }
         };
     };
@@ -208,7 +220,8 @@ mod tests {
 
     #[test]
     fn reads_of_two_versions_take_longer_and_grids_end_where_one_read_does() {
-        let ms = |texels: f64, reads: SurfaceReads| surface_ms(DMat2::from_diagonal(DVec2::splat(texels)), reads);
+        let ms =
+            |texels: f64, reads: SurfaceReads| surface_ms(DMat2::from_diagonal(DVec2::splat(texels)), reads);
         for reads in SurfaceReads::ALL {
             assert!(ms(0.3, reads) < ms(4.0, reads), "{reads:?}");
         }
@@ -219,8 +232,12 @@ mod tests {
     #[test]
     fn few_triangles_take_their_time_and_many_what_a_level_of_detail_leaves() {
         let picture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-        let heights = |side: u32| Terrain::from_heights(side, side, 10.0, &vec![0.0; (side * side) as usize], None).unwrap();
-        let of = |terrain: Option<Terrain>, meshes: Vec<Mesh>| Drawn::new(&Scene { terrain, meshes, ..Scene::default() });
+        let heights = |side: u32| {
+            Terrain::from_heights(side, side, 10.0, &vec![0.0; (side * side) as usize], None).unwrap()
+        };
+        let of = |terrain: Option<Terrain>, meshes: Vec<Mesh>| {
+            Drawn::new(&Scene { terrain, meshes, ..Scene::default() })
+        };
         assert_eq!(Drawn::new(&Scene::default()).ms(1.0), 0.0);
         let of_64_cells = 1e-3 * TRIANGLES_MS * 2.0 * 64.0 * 64.0;
         assert!((of(Some(heights(65)), vec![]).ms(2.0) - of_64_cells).abs() < 1e-9);

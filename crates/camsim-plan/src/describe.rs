@@ -5,7 +5,8 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{
-    BlurStage, EdgeStage, FramePlan, Holes, Layers, Motion, NodeDepths, PathStage, Predicted, RayStage, Skip, SurfaceReads, TemporalStage,
+    BlurStage, EdgeStage, FramePlan, Holes, Layers, Motion, NodeDepths, PathStage, Predicted, RayStage, Skip,
+    SurfaceReads, TemporalStage,
 };
 use camsim_core::{
     scenario::Preset,
@@ -37,7 +38,8 @@ pub struct PlanSummary<'a> {
     pub key_s: f64,
     /// Instants of the ideal frames, path time, seconds.
     pub key_times_s: Vec<f64>,
-    /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
+    /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its
+    /// own.
     pub shared_by: Option<[u64; 2]>,
     /// Why that is so.
     pub alone: Option<&'static str>,
@@ -101,12 +103,20 @@ impl FramePlan {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-        let mixed = if self.predicted.layers.is_some() { ", blended surfaces last and from behind to the front" } else { "" };
+        let mixed = if self.predicted.layers.is_some() {
+            ", blended surfaces last and from behind to the front"
+        } else {
+            ""
+        };
         passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed){samples}, {reads}{mixed}{shared}"));
         if let EdgeStage::Supersampled { scale, thin, .. } = self.edges {
             let marks = format!("{width}x{height} px, marked where several surfaces are seen");
             let color = if scale > 1 { "rgba16float + " } else { "" };
-            let fine = format!("{frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale);
+            let fine = format!(
+                "{frames}{}x{} px {color}depth32float, 4 samples each",
+                width * scale,
+                height * scale
+            );
             if thin {
                 passes.push(format!("ideal_fine: {fine}"));
                 passes.push(format!("marks: {marks}, by their samples too"));
@@ -126,18 +136,26 @@ impl FramePlan {
         let temporal = match self.temporal {
             TemporalStage::Identity => "no motion".to_owned(),
             TemporalStage::Rotation => "rotation per line".to_owned(),
-            TemporalStage::Reproject { iterations } => format!("reproject per line, {iterations} depth look-ups"),
+            TemporalStage::Reproject { iterations } => {
+                format!("reproject per line, {iterations} depth look-ups")
+            }
             TemporalStage::Linear => "linear displacement (eq. 16) at the key instant's twist".to_owned(),
-            TemporalStage::Rk2 => format!("RK2 displacement (eq. 18), steps of {RK2_STEP_DEG} deg, at the key instant's twist"),
+            TemporalStage::Rk2 => {
+                format!("RK2 displacement (eq. 18), steps of {RK2_STEP_DEG} deg, at the key instant's twist")
+            }
         };
         let gather = match self.blur {
             None => "sharp".to_owned(),
-            Some(blur) if self.preset == Preset::Paper => format!("straight blur of {} samples, ends included", blur.max_samples),
+            Some(blur) if self.preset == Preset::Paper => {
+                format!("straight blur of {} samples, ends included", blur.max_samples)
+            }
             Some(blur) => {
                 let depth = match (self.temporal, blur.depths) {
                     (TemporalStage::Reproject { .. }, NodeDepths::Mid) => " of one depth",
                     (TemporalStage::Reproject { .. }, NodeDepths::Ends) => " with depth of both ends",
-                    (TemporalStage::Reproject { .. }, NodeDepths::Three) => " with depth of both ends and the middle",
+                    (TemporalStage::Reproject { .. }, NodeDepths::Three) => {
+                        " with depth of both ends and the middle"
+                    }
                     _ => "",
                 };
                 let curve = match blur.path {
@@ -145,7 +163,11 @@ impl FramePlan {
                     PathStage::Parabola => "parabolas",
                     PathStage::Quartic => "quartics",
                 };
-                format!("blur along {curve} through {} nodes{depth}, {:.2} samples a px", blur.solved(), blur.samples_per_px)
+                format!(
+                    "blur along {curve} through {} nodes{depth}, {:.2} samples a px",
+                    blur.solved(),
+                    blur.samples_per_px
+                )
             }
         };
         let taps = match self.taps {
@@ -204,17 +226,37 @@ impl FramePlan {
 impl Predicted {
     /// By cause, the largest first.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, displaced_dn, ground, .. } = *self;
-        writeln!(f, "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)")?;
+        let Self {
+            total_px,
+            probes,
+            silhouette_share,
+            level_of_detail_px,
+            blur_dn,
+            resampling_dn,
+            displaced_dn,
+            ground,
+            ..
+        } = *self;
+        writeln!(
+            f,
+            "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)"
+        )?;
         if probes == 0 {
-            return writeln!(f, "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty");
+            return writeln!(
+                f,
+                "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty"
+            );
         }
         let verdict = if self.kept { "within the tolerance" } else { "the tolerance is NOT KEPT" };
         writeln!(f, "  at most {total_px:.2e} in all, from dry runs of {probes} pixels: {verdict}")?;
         if let Some(cause) = &self.in_the_way {
             writeln!(f, "  in the way: {cause}")?;
         }
-        let detail = if level_of_detail_px > 0.0 { format!(" (level of detail {level_of_detail_px:.2e})") } else { String::new() };
+        let detail = if level_of_detail_px > 0.0 {
+            format!(" (level of detail {level_of_detail_px:.2e})")
+        } else {
+            String::new()
+        };
         let mut causes = [
             (self.lens_px, "lens inverse", ""),
             (self.temporal_px, "temporal inverse", ""),
@@ -227,17 +269,29 @@ impl Predicted {
             writeln!(f, "  {px:.2e} {cause}{more}")?;
         }
         if silhouette_share > 0.0 {
-            writeln!(f, "  apart: at least {:.0} % of the pixels, at a step or fold of depth", 100.0 * silhouette_share)?;
+            writeln!(
+                f,
+                "  apart: at least {:.0} % of the pixels, at a step or fold of depth",
+                100.0 * silhouette_share
+            )?;
         }
         if let Some(Holes { share, width_px, .. }) = self.holes {
             let of_one = self.holes_of_one.filter(|_| self.holes != self.holes_of_one);
-            let beside =
-                of_one.map_or_else(String::new, |one| format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.share, one.width_px));
+            let beside = of_one.map_or_else(String::new, |one| {
+                format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.share, one.width_px)
+            });
             let share = 100.0 * share;
-            writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
+            writeln!(
+                f,
+                "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}"
+            )?;
         }
-        let ground = ground.map_or_else(String::new, |ground| format!(", {:.2} by the terrain's level of detail", ground.error_dn()));
-        let silhouettes = self.silhouettes.map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
+        let ground = ground.map_or_else(String::new, |ground| {
+            format!(", {:.2} by the terrain's level of detail", ground.error_dn())
+        });
+        let silhouettes = self
+            .silhouettes
+            .map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
         let layers = self.layers.map_or_else(String::new, |Layers { share, error_dn }| {
             format!(
                 ", {error_dn:.2} as light mixed of several surfaces ({:.0} % of the picture) moves with the depth of one",
@@ -257,14 +311,16 @@ impl Predicted {
 }
 
 impl FramePlan {
-    /// What makes the picture wrong and is no part of its predicted error, for people to read; nothing where nothing is predicted.
+    /// What makes the picture wrong and is no part of its predicted error, for people to read; nothing where
+    /// nothing is predicted.
     #[must_use]
     pub fn not_in_the_picture(&self) -> Vec<String> {
         let Predicted { probes, silhouette_share, silhouettes, ground, .. } = self.predicted;
         if probes == 0 {
             return Vec::new();
         }
-        let paper = (self.preset == Preset::Paper).then(|| "vignette, fog and stored colours as the paper has them".to_owned());
+        let paper = (self.preset == Preset::Paper)
+            .then(|| "vignette, fog and stored colours as the paper has them".to_owned());
         let ignored = (silhouettes.is_none() && silhouette_share > 0.0).then(|| {
             let of_ground = if ground.is_some() { ", and how coarse the terrain's borders are" } else { "" };
             format!(
@@ -278,10 +334,23 @@ impl FramePlan {
 
 impl fmt::Display for FramePlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Motion { nearest_m, travel_m, rotation_rad, parallax_px, rotation_px, blur_px, blur_sagitta_px, .. } = self.motion;
+        let Motion {
+            nearest_m,
+            travel_m,
+            rotation_rad,
+            parallax_px,
+            rotation_px,
+            blur_px,
+            blur_sagitta_px,
+            ..
+        } = self.motion;
         let [width, height] = self.camera.size_px;
         writeln!(f, "frame {} at {:.6} s of the flight, {width}x{height} px", self.frame, self.stamp_s)?;
-        let outside = if self.extrapolated { " (reaches outside the log: extrapolated at constant velocity)" } else { "" };
+        let outside = if self.extrapolated {
+            " (reaches outside the log: extrapolated at constant velocity)"
+        } else {
+            ""
+        };
         writeln!(f, "  sees {:.6} .. {:.6} s{outside}", self.window_s[0], self.window_s[1])?;
         if let Some(zoom) = self.zoom {
             writeln!(f, "  zoom {zoom}")?;
@@ -292,8 +361,14 @@ impl fmt::Display for FramePlan {
             "  travel {travel_m:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away",
             rotation_rad.to_degrees()
         )?;
-        writeln!(f, "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)")?;
-        writeln!(f, "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px")?;
+        writeln!(
+            f,
+            "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)"
+        )?;
+        writeln!(
+            f,
+            "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px"
+        )?;
         self.predicted.write(f)?;
         for cause in self.not_in_the_picture() {
             writeln!(f, "  not in it: {cause}")?;

@@ -1,5 +1,5 @@
-//! The reverse pipeline run dry at one probe: the temporal inverse in f64 over the very texels that the ideal frame will hold, beside the
-//! place where the probe's own ray, cast from its own line's pose, truly looks.
+//! The reverse pipeline run dry at one probe: the temporal inverse in f64 over the very texels that the ideal
+//! frame will hold, beside the place where the probe's own ray, cast from its own line's pose, truly looks.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -71,7 +71,8 @@ pub(super) struct Outcome {
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
     pub after: [f64; MAX_LOOK_UPS + 1],
-    /// After n look-ups, or n - 1 and at least one where they begin with the depth that the other end of the exposure finds.
+    /// After n look-ups, or n - 1 and at least one where they begin with the depth that the other end of the
+    /// exposure finds.
     pub handed_on: [f64; MAX_LOOK_UPS + 1],
     /// The part of `after` that more look-ups would mend.
     pub unsettled: [f64; MAX_LOOK_UPS + 1],
@@ -80,7 +81,8 @@ pub(super) struct Outcome {
     pub rk2_px: f64,
     /// Displacement by parallax.
     pub parallax_px: f64,
-    /// The key frame's inverse depth of what the probe meets at the end of its exposure that is farther from its instant, 1/m.
+    /// The key frame's inverse depth of what the probe meets at the end of its exposure that is farther from
+    /// its instant, 1/m.
     pub elsewhere: f64,
 }
 
@@ -95,7 +97,8 @@ struct KeyDepth<'a> {
 }
 
 impl Trial<'_> {
-    /// Where one probe looks at an instant of its exposure (-0.5 to 0.5); `None` where its ray has no source in the ideal frame.
+    /// Where one probe looks at an instant of its exposure (-0.5 to 0.5); `None` where its ray has no source
+    /// in the ideal frame.
     pub fn look(&self, probe: &Probe, phase: f64) -> Option<Truth> {
         let t_s = self.instant_s(probe, phase + 0.5);
         let pose = self.path.pose(t_s);
@@ -125,15 +128,19 @@ impl Trial<'_> {
         let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth.at_px) } else { f64::INFINITY };
         // Where the pixel itself would look: one pose for all lines. The paper's models read the depth there.
         let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
-        let mut outcome =
-            Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
+        let mut outcome = Outcome {
+            still_px: off(own_px),
+            parallax_px: off(self.ideal.px_from_point(truth.direction)),
+            ..Outcome::default()
+        };
         let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16), drawn: None };
         let places = self.settle(probe.uv, truth.in_key, None, &mut depth);
         outcome.after = places.map(off);
         outcome.after[0] = outcome.parallax_px;
         outcome.elsewhere = self.key_inverse_depth(probe, truth, truth.far_end());
         let begun_there = self.settle(probe.uv, truth.in_key, Some(outcome.elsewhere), &mut depth).map(off);
-        outcome.handed_on = std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after[n]));
+        outcome.handed_on =
+            std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after[n]));
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
         if let Some(twist) = &self.twist {
@@ -149,21 +156,39 @@ impl Trial<'_> {
         outcome
     }
 
-    /// How far from the truth a probe looks with the depth that n look-ups find at mid-exposure: at its own instant, or at the end of its exposure that is farther from that, where `elsewhere` is
+    /// How far from the truth a probe looks with the depth that n look-ups find at mid-exposure: at its own
+    /// instant, or at the end of its exposure that is farther from that, where `elsewhere` is
     /// [`Outcome::elsewhere`].
-    pub fn of_mid(&self, probe: &Probe, truth: &Truth, elsewhere: f64, detail: Option<&TerrainDetail<'_>>) -> [f64; MAX_LOOK_UPS + 1] {
+    pub fn of_mid(
+        &self,
+        probe: &Probe,
+        truth: &Truth,
+        elsewhere: f64,
+        detail: Option<&TerrainDetail<'_>>,
+    ) -> [f64; MAX_LOOK_UPS + 1] {
         let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(8), drawn: None };
-        let looked_at = self.settle(probe.uv, self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose), None, &mut depth);
-        let (rotation, end_shift) = self.path.pose(self.instant_s(probe, truth.far_end())).relative_to(self.key_pose);
-        let (end_direction, (direction, shift)) = (rotation * probe.uv.extend(1.0), (truth.direction, truth.in_key.1));
+        let looked_at = self.settle(
+            probe.uv,
+            self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose),
+            None,
+            &mut depth,
+        );
+        let (rotation, end_shift) =
+            self.path.pose(self.instant_s(probe, truth.far_end())).relative_to(self.key_pose);
+        let (end_direction, (direction, shift)) =
+            (rotation * probe.uv.extend(1.0), (truth.direction, truth.in_key.1));
         let at_end_px = |w: f64| self.ideal.px_from_point(end_direction + w * end_shift);
         // Where something else is met there a silhouette has passed.
         let is_one_surface = (elsewhere / truth.key_inverse_depth - 1.0).abs() < ONE_SURFACE;
-        let true_end_px = depth_on_line(end_direction, end_shift, elsewhere).filter(|_| is_one_surface).map(at_end_px);
+        let true_end_px =
+            depth_on_line(end_direction, end_shift, elsewhere).filter(|_| is_one_surface).map(at_end_px);
         std::array::from_fn(|n| {
             let found = n.checked_sub(1).map(|last| depth.inverse_depth(looked_at[last]));
-            let on_line = |direction, shift| found.and_then(|found| depth_on_line(direction, shift, found)).unwrap_or(0.0);
-            let at_end = true_end_px.map_or(0.0, |end_px| at_end_px(on_line(end_direction, end_shift)).distance(end_px));
+            let on_line = |direction, shift| {
+                found.and_then(|found| depth_on_line(direction, shift, found)).unwrap_or(0.0)
+            };
+            let at_end = true_end_px
+                .map_or(0.0, |end_px| at_end_px(on_line(end_direction, end_shift)).distance(end_px));
             self.off_px(truth, direction + on_line(direction, shift) * shift).max(at_end)
         })
     }
@@ -188,8 +213,9 @@ impl Trial<'_> {
         if z > 0.0 { inverse_depth / z } else { 0.0 }
     }
 
-    /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends, and by the parabola through these and that of its middle.
-    /// `elsewhere` is [`Outcome::elsewhere`], if that is known.
+    /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends,
+    /// and by the parabola through these and that of its middle. `elsewhere` is [`Outcome::elsewhere`], if
+    /// that is known.
     pub fn between_px(&self, probe: &Probe, truth: &Truth, elsewhere: Option<f64>) -> [f64; 2] {
         let found @ [first, _, last] = [0.0, 0.5, 1.0].map(|share| match elsewhere {
             Some(known) if share == truth.far_end() => known,
@@ -208,7 +234,8 @@ impl Trial<'_> {
         mid_s + self.shutter.exposure_s() * (share - 0.5)
     }
 
-    /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth in the line's camera.
+    /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth
+    /// in the line's camera.
     pub fn true_source_px(&self, probe: &Probe, share: f64) -> (DVec2, f64) {
         let pose = self.path.pose(self.instant_s(probe, share));
         let met = self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
@@ -217,7 +244,8 @@ impl Trial<'_> {
         (self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + inverse_depth * shift), inverse_depth)
     }
 
-    /// How far polynomial `k` of the exposure's path is from where the probe looks; 0 where its ray passes a silhouette meanwhile.
+    /// How far polynomial `k` of the exposure's path is from where the probe looks; 0 where its ray passes a
+    /// silhouette meanwhile.
     pub fn miss_along_surfaces_px(&self, probe: &Probe, path: PathStage, stretches: u32, k: u32) -> f64 {
         let mut along = Vec::new();
         let px = miss_px(path, stretches, k, |share| {
@@ -226,7 +254,9 @@ impl Trial<'_> {
             at_px
         });
         let is_step = |pair: &[(f64, f64)]| match *pair {
-            [(from, a), (to, b)] => steps(a, b, |share| self.true_source_px(probe, from + (to - from) * share).1),
+            [(from, a), (to, b)] => {
+                steps(a, b, |share| self.true_source_px(probe, from + (to - from) * share).1)
+            }
             _ => false,
         };
         if along.windows(2).any(is_step) { 0.0 } else { px }
@@ -238,8 +268,9 @@ impl Trial<'_> {
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + truth.inverse_depth * shift)
     }
 
-    /// The places looked at: after no look-up, after one and so on, the first of which takes the key's inverse depth to be `guess`, or that of the plane. The same
-    /// steps as [`camsim_core::temporal::reproject`].
+    /// The places looked at: after no look-up, after one and so on, the first of which takes the key's
+    /// inverse depth to be `guess`, or that of the plane. The same steps as
+    /// [`camsim_core::temporal::reproject`].
     fn settle(
         &self,
         uv: DVec2,
@@ -281,7 +312,8 @@ impl Trial<'_> {
         moved(inverse(drawn_m)).distance(moved(inverse(depth_m)))
     }
 
-    /// How far the place of the terrain's picture that is drawn at the true source is from there, ideal pixels: to first order, and no more than is allowed.
+    /// How far the place of the terrain's picture that is drawn at the true source is from there, ideal
+    /// pixels: to first order, and no more than is allowed.
     pub fn ground_px(&self, truth: &Truth, detail: &TerrainDetail<'_>) -> f64 {
         let Some(Met { depth_m, terrain: Some(hit), .. }) = truth.seen else { return 0.0 };
         let ray_ned = self.key_ray(truth.at_px);
@@ -299,22 +331,27 @@ impl Trial<'_> {
         detail.map_or(hit.t, |detail| detail.drawn_t(hit, self.key_pose.position_ned_m, ray_ned))
     }
 
-    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it; with
-    /// `folds` also a fold.
+    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera
+    /// sees a step of depth beside it; with `folds` also a fold.
     pub fn at_silhouette(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
         truth.is_hidden() || self.near_a_step(probe, truth, folds)
     }
 
-    /// At its own instant, along rows, columns and diagonals of three by three places: what crosses the square crosses its border.
+    /// At its own instant, along rows, columns and diagonals of three by three places: what crosses the
+    /// square crosses its border.
     fn near_a_step(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
         let pose = self.path.pose(truth.t_s);
         let look = |place: DVec2| {
             let uv = probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * place);
-            self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
+            self.surfaces
+                .meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
+                .map_or(0.0, |met| 1.0 / met.depth_m)
         };
-        let places: [DVec2; 9] = std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
+        let places: [DVec2; 9] =
+            std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
         let seen = places.map(look);
-        let steps_between = |a: usize, b: usize| steps(seen[a], seen[b], |share| look(places[a].lerp(places[b], share)));
+        let steps_between =
+            |a: usize, b: usize| steps(seen[a], seen[b], |share| look(places[a].lerp(places[b], share)));
         LINES.iter().any(|&[a, b, c]| {
             let of_line = [seen[a], seen[b], seen[c]];
             // Between places 3 px apart a crease bends threefold.
@@ -351,7 +388,8 @@ impl KeyDepth<'_> {
         let at = at_px.clamp(DVec2::ZERO, last);
         let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
         let [x, y] = [base.x as i64, base.y as i64];
-        let texels = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel([x.min(width - 1), y.min(height - 1)]));
+        let texels = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
+            .map(|[x, y]| self.texel([x.min(width - 1), y.min(height - 1)]));
         blend_inverse_depths(texels, at - base)
     }
 
@@ -362,7 +400,11 @@ impl KeyDepth<'_> {
         match (trial.surfaces.meet(origin, ray), self.detail) {
             (None, _) => 0.0,
             (Some(Met { terrain: Some(hit), .. }), Some(detail)) => {
-                let drawn = self.drawn.take().filter(|drawn| drawn.is_of(&hit)).unwrap_or_else(|| detail.drawn_at(&hit));
+                let drawn = self
+                    .drawn
+                    .take()
+                    .filter(|drawn| drawn.is_of(&hit))
+                    .unwrap_or_else(|| detail.drawn_at(&hit));
                 1.0 / self.drawn.insert(drawn).t(&hit, origin, ray)
             }
             (Some(met), _) => 1.0 / met.depth_m,

@@ -1,7 +1,8 @@
-//! Whether silhouettes can be in view: only then is the ideal frame supersampled and are pixels at silhouettes solved sample by sample.
+//! Whether silhouettes can be in view: only then is the ideal frame supersampled and are pixels at
+//! silhouettes solved sample by sample.
 //!
-//! A surface has a silhouette where it turns edge-on to the view, or where it ends. Both are bounded from boxes and slopes that are
-//! found once a scene; the bounds err on the side of work.
+//! A surface has a silhouette where it turns edge-on to the view, or where it ends. Both are bounded from
+//! boxes and slopes that are found once a scene; the bounds err on the side of work.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -22,9 +23,11 @@ const FACING_MARGIN: f64 = 0.95;
 pub(super) const IGNORED_DN: f64 = 16.0;
 /// Most fine pixels along a side of an ideal pixel.
 pub(super) const MOST_FINE: u32 = 3;
-/// Depth of 4 samples and the border between them, and with more than one fine pixel a pixel the colours of the samples.
+/// Depth of 4 samples and the border between them, and with more than one fine pixel a pixel the colours of
+/// the samples.
 pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 4 + 8 + 4 * 8;
-/// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead of 9.
+/// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead
+/// of 9.
 const MAX_FINE_BYTES: u64 = 512 << 20;
 /// A flat mesh with more corners than this is not looked at any closer.
 const MAX_FLAT_VERTICES: usize = 64;
@@ -35,33 +38,36 @@ const MAX_FLAT_VERTICES: usize = 64;
 pub enum EdgeStage {
     /// No silhouette in view: one sample a pixel of the ideal frame.
     None,
-    /// The ideal frame keeps `4 scale^2` samples of depth a pixel (with `scale` above 1 of colour too), and an output pixel that sees a
-    /// silhouette takes `samples` rays of its own.
+    /// The ideal frame keeps `4 scale^2` samples of depth a pixel (with `scale` above 1 of colour too), and
+    /// an output pixel that sees a silhouette takes `samples` rays of its own.
     Supersampled {
         /// Fine pixels along a side of an ideal pixel, each with 4 samples.
         scale: u32,
         /// Rays over the area and exposure of an output pixel.
         samples: u32,
-        /// Whether something thinner than a pixel may be in view: silhouettes are then looked for among all samples, otherwise between the
-        /// middles of pixels, and only what is near them is drawn with samples.
+        /// Whether something thinner than a pixel may be in view: silhouettes are then looked for among all
+        /// samples, otherwise between the middles of pixels, and only what is near them is drawn with
+        /// samples.
         thin: bool,
     },
 }
 
 /// Margin of [`FramePlan::mark_reach_px`], ideal pixels: for the reads around a place, and for what rounds.
 const REACH_MARGIN_PX: f64 = 3.0;
-/// Rays are looked at from this many times the inverse depth of the nearest surface on, and a line's camera that moves towards it gives it
-/// at most [`MOST_STRETCH`] times that: as in `shaders/reverse/edges/near.wgsl`.
+/// Rays are looked at from this many times the inverse depth of the nearest surface on, and a line's camera
+/// that moves towards it gives it at most [`MOST_STRETCH`] times that: as in
+/// `shaders/reverse/edges/near.wgsl`.
 const LOOK_NEARER: f64 = 1.02;
 const MOST_STRETCH: f64 = 4.0;
 
 impl FramePlan {
-    /// How far from a pixel's source the rays of that pixel may look, ideal pixels. Their parallax: `w' = w / (1 - t_z w)` is at most the
-    /// inverse depth that a line's camera gives to the nearest surface `w`, and `shaders/reverse/edges/near.wgsl`, which bounds it likewise,
-    /// begins 2 % nearer than that.
+    /// How far from a pixel's source the rays of that pixel may look, ideal pixels. Their parallax: `w' = w /
+    /// (1 - t_z w)` is at most the inverse depth that a line's camera gives to the nearest surface `w`, and
+    /// `shaders/reverse/edges/near.wgsl`, which bounds it likewise, begins 2 % nearer than that.
     #[must_use]
     pub fn mark_reach_px(&self) -> u32 {
-        let approach = (LOOK_NEARER * self.motion.travel_m / self.motion.nearest_m).min(1.0 - 1.0 / MOST_STRETCH);
+        let approach =
+            (LOOK_NEARER * self.motion.travel_m / self.motion.nearest_m).min(1.0 - 1.0 / MOST_STRETCH);
         // Saturates: then every mark reaches everything.
         (LOOK_NEARER * self.motion.parallax_px / (1.0 - approach) + REACH_MARGIN_PX).ceil() as u32
     }
@@ -102,7 +108,11 @@ struct MeshOutline {
 impl SceneOutline {
     pub(super) fn new(scene: &Scene) -> Self {
         let terrain = scene.terrain.as_ref().map_or_else(PatchTree::default, PatchTree::new);
-        let meshes = scene.meshes.iter().map(|mesh| MeshOutline { bounds: mesh.bounds(), flat_convex: is_flat_convex(mesh) }).collect();
+        let meshes = scene
+            .meshes
+            .iter()
+            .map(|mesh| MeshOutline { bounds: mesh.bounds(), flat_convex: is_flat_convex(mesh) })
+            .collect();
         Self { terrain, meshes }
     }
 
@@ -113,20 +123,27 @@ impl SceneOutline {
         self.meshes.iter().any(|mesh| frustum.may_see(&grown(&mesh.bounds)))
     }
 
-    /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents` (u_min, u_max, v_min, v_max).
-    pub(super) fn reason_for_none(&self, scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> Option<String> {
+    /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents`
+    /// (u_min, u_max, v_min, v_max).
+    pub(super) fn reason_for_none(
+        &self,
+        scene: &Scene,
+        pose: &CameraPose,
+        tangents: [f64; 4],
+        travel_m: f64,
+    ) -> Option<String> {
         let frustum = Frustum::new(pose, tangents);
         let terrain = self.terrain.any(CHUNK_LEVEL, &|patch| frustum.may_see(&patch.bounds));
-        let mut meshes = self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| frustum.may_see(&outline.bounds));
+        let mut meshes =
+            self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| frustum.may_see(&outline.bounds));
         match (terrain, meshes.next(), meshes.next()) {
             (false, None, _) => Some("nothing but sky is in view".into()),
             (true, None, _) => {
                 let edge = self.terrain.any(0, &|patch| may_end_or_turn(&frustum, patch, pose, travel_m));
                 (!edge).then(|| "the terrain fills the view and no slope in it can be seen edge-on".into())
             }
-            (false, Some((outline, mesh)), None) => {
-                (outline.flat_convex && covers(mesh, pose, tangents)).then(|| "one flat surface fills the view".into())
-            }
+            (false, Some((outline, mesh)), None) => (outline.flat_convex && covers(mesh, pose, tangents))
+                .then(|| "one flat surface fills the view".into()),
             _ => None,
         }
     }
@@ -170,7 +187,10 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
         return EdgeStage::None;
     }
     if let Some(Contours { at_dn, error_dn, .. }) = plain {
-        skip("silhouette supersampling", format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"));
+        skip(
+            "silhouette supersampling",
+            format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"),
+        );
         return EdgeStage::None;
     }
     let scale = most_fine(ideal.size_px, max_side_px).min(case.fine);
@@ -183,7 +203,8 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
 pub(super) fn most_fine(ideal_px: [u32; 2], max_side_px: u32) -> u32 {
     let [width, height] = ideal_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
     let fits = |scale: u64| {
-        width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
+        width.max(height) * scale <= u64::from(max_side_px)
+            && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
     };
     (2..=MOST_FINE).rev().find(|&scale| fits(u64::from(scale))).unwrap_or(1)
 }
@@ -192,12 +213,16 @@ impl Patch {
     const EMPTY: Self = Self { bounds: Aabb::EMPTY, slope: 0.0, rim: false };
 
     fn join(self, other: Self) -> Self {
-        Self { bounds: self.bounds.union(&other.bounds), slope: self.slope.max(other.slope), rim: self.rim || other.rim }
+        Self {
+            bounds: self.bounds.union(&other.bounds),
+            slope: self.slope.max(other.slope),
+            rim: self.rim || other.rim,
+        }
     }
 }
 
-/// Patches of 8x8 cells, and above them patches of 2x2 of the level below, up to one: a question that no patch answers with yes unless all those
-/// around it do is asked where it may be answered so.
+/// Patches of 8x8 cells, and above them patches of 2x2 of the level below, up to one: a question that no
+/// patch answers with yes unless all those around it do is asked where it may be answered so.
 #[derive(Debug, Default)]
 struct PatchTree {
     levels: Vec<PatchLevel>,
@@ -216,11 +241,19 @@ const CHUNK_LEVEL: usize = (CHUNK_CELLS / BLOCK_CELLS).trailing_zeros() as usize
 impl PatchTree {
     fn new(terrain: &Terrain) -> Self {
         let size = terrain.cells.map(|cells| cells.div_ceil(BLOCK_CELLS));
-        let patches = (0..size[0] * size[1]).into_par_iter().map(|i| block(terrain, [i % size[0], i / size[0]])).collect();
+        let patches = (0..size[0] * size[1])
+            .into_par_iter()
+            .map(|i| block(terrain, [i % size[0], i / size[0]]))
+            .collect();
         let mut levels = vec![PatchLevel { size, patches }];
         while let Some(below) = levels.last().filter(|level| level.size != [1, 1]) {
             let size = below.size.map(|n| n.div_ceil(2));
-            let joined = |i: u32| below.children([i % size[0], i / size[0]]).map(|at| below.get(at)).fold(Patch::EMPTY, Patch::join);
+            let joined = |i: u32| {
+                below
+                    .children([i % size[0], i / size[0]])
+                    .map(|at| below.get(at))
+                    .fold(Patch::EMPTY, Patch::join)
+            };
             let patches = (0..size[0] * size[1]).map(joined).collect();
             levels.push(PatchLevel { size, patches });
         }
@@ -234,7 +267,9 @@ impl PatchTree {
         while let Some((at_level, at)) = stack.pop() {
             if holds(&self.levels[at_level].get(at)) {
                 match at_level.checked_sub(1) {
-                    Some(below) if at_level > level => stack.extend(self.levels[below].children(at).map(|at| (below, at))),
+                    Some(below) if at_level > level => {
+                        stack.extend(self.levels[below].children(at).map(|at| (below, at)))
+                    }
                     _ => return true,
                 }
             }
@@ -264,7 +299,8 @@ fn block(terrain: &Terrain, at: [u32; 2]) -> Patch {
     for row in north..(north + BLOCK_CELLS).min(rows) {
         for column in west..(west + BLOCK_CELLS).min(columns) {
             let (chunk, [i, j]) = terrain.chunk_of_cell([column, row]);
-            let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| terrain.position_ned_m(chunk, i + a, j + b));
+            let corners =
+                [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| terrain.position_ned_m(chunk, i + a, j + b));
             let at_rim = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
             block = block.join(cell(corners, at_rim));
         }
@@ -292,7 +328,8 @@ fn cell(corners: [DVec3; 4], at_rim: bool) -> Patch {
     patch
 }
 
-/// All triangles in one plane and turned the same way, and no corner outside of a border edge (one that a single triangle has).
+/// All triangles in one plane and turned the same way, and no corner outside of a border edge (one that a
+/// single triangle has).
 fn is_flat_convex(mesh: &Mesh) -> bool {
     let Shape { vertices, indices, .. } = &*mesh.shape;
     // What has holes, or is not there from behind, covers nothing for certain.
@@ -301,12 +338,14 @@ fn is_flat_convex(mesh: &Mesh) -> bool {
         return false;
     }
     let at = |vertex: u32| mesh.position_ned_m(vertex);
-    let mut normals = indices.chunks_exact(3).map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero());
+    let mut normals =
+        indices.chunks_exact(3).map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero());
     let Some(normal) = normals.next() else { return false };
     let reach = indices.iter().map(|&v| at(v).distance(at(indices[0]))).fold(0.0, f64::max);
     let flat = indices.iter().all(|&v| normal.dot(at(v) - at(indices[0])).abs() <= 1e-6 * reach);
     let turned_alike = normal != DVec3::ZERO && normals.all(|n| n.dot(normal) > 0.999);
-    let edges: Vec<[u32; 2]> = indices.chunks_exact(3).flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]).collect();
+    let edges: Vec<[u32; 2]> =
+        indices.chunks_exact(3).flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]).collect();
     let border = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
     let convex = |&[a, b]: &[u32; 2]| {
         let inward = normal.cross(at(b) - at(a)).normalize_or_zero();
@@ -319,11 +358,14 @@ fn is_flat_convex(mesh: &Mesh) -> bool {
 fn covers(mesh: &Mesh, pose: &CameraPose, [u_min, u_max, v_min, v_max]: [f64; 4]) -> bool {
     [DVec2::new(u_min, v_min), DVec2::new(u_max, v_min), DVec2::new(u_min, v_max), DVec2::new(u_max, v_max)]
         .into_iter()
-        .all(|uv| mesh.intersect(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0), f64::INFINITY).is_some())
+        .all(|uv| {
+            mesh.intersect(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0), f64::INFINITY)
+                .is_some()
+        })
 }
 
-/// False only if the patch is out of sight, or continues beyond its borders and faces the camera everywhere: a surface of slope s
-/// faces a ray that goes down by more than s for each metre ahead.
+/// False only if the patch is out of sight, or continues beyond its borders and faces the camera everywhere:
+/// a surface of slope s faces a ray that goes down by more than s for each metre ahead.
 fn may_end_or_turn(frustum: &Frustum, patch: &Patch, pose: &CameraPose, travel_m: f64) -> bool {
     if !frustum.may_see(&patch.bounds) {
         return false;
@@ -351,16 +393,23 @@ mod tests {
     const VIEW: [f64; 4] = [-0.6, 0.6, -0.5, 0.5];
 
     fn hills(height_m: f64) -> Scene {
-        let heights: Vec<f64> =
-            (0..129 * 129).map(|i| height_m * (f64::from(i % 129) * 0.3).sin() * (f64::from(i / 129) * 0.2).cos()).collect();
-        Scene { terrain: Some(Terrain::from_heights(129, 129, 20.0, &heights, None).unwrap()), ..Scene::default() }
+        let heights: Vec<f64> = (0..129 * 129)
+            .map(|i| height_m * (f64::from(i % 129) * 0.3).sin() * (f64::from(i / 129) * 0.2).cos())
+            .collect();
+        Scene {
+            terrain: Some(Terrain::from_heights(129, 129, 20.0, &heights, None).unwrap()),
+            ..Scene::default()
+        }
     }
 
     /// Camera at a height, its axis `pitch_deg` above the horizon (-90 = straight down), towards north.
     fn pose(height_m: f64, pitch_deg: f64) -> CameraPose {
         let body = DQuat::from_euler(EulerRot::ZYX, 0.0, pitch_deg.to_radians(), 0.0);
         let body_from_camera = DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
-        CameraPose { position_ned_m: DVec3::new(0.0, 0.0, -height_m), ned_from_camera: body * body_from_camera }
+        CameraPose {
+            position_ned_m: DVec3::new(0.0, 0.0, -height_m),
+            ned_from_camera: body * body_from_camera,
+        }
     }
 
     fn none(scene: &Scene, pose: &CameraPose) -> bool {
@@ -385,20 +434,28 @@ mod tests {
 
     #[test]
     fn the_tree_answers_as_all_its_blocks_do() {
-        let heights: Vec<f64> =
-            (0..300 * 200).map(|i| 60.0 * (f64::from(i % 300) * 0.09).sin() * (f64::from(i / 300) * 0.05).cos()).collect();
-        let scene = Scene { terrain: Some(Terrain::from_heights(300, 200, 20.0, &heights, None).unwrap()), ..Scene::default() };
+        let heights: Vec<f64> = (0..300 * 200)
+            .map(|i| 60.0 * (f64::from(i % 300) * 0.09).sin() * (f64::from(i / 300) * 0.05).cos())
+            .collect();
+        let scene = Scene {
+            terrain: Some(Terrain::from_heights(300, 200, 20.0, &heights, None).unwrap()),
+            ..Scene::default()
+        };
         let outline = SceneOutline::new(&scene);
         let blocks = &outline.terrain.levels[0];
         assert_eq!((blocks.size, outline.terrain.levels.len()), ([38, 25], 7));
         let (mut edges, mut none) = (0, 0);
         for i in 0..400_u32 {
-            let [x, y, height, pitch] = camsim_core::noise::pcg4d([i, 7, 0, 0]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
+            let [x, y, height, pitch] =
+                camsim_core::noise::pcg4d([i, 7, 0, 0]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
             let mut pose = pose(100.0 + 1500.0 * height, -90.0 + 60.0 * pitch);
             pose.position_ned_m += DVec3::new(3000.0 * (x - 0.5), 4000.0 * (y - 0.5), 0.0);
             let frustum = Frustum::new(&pose, VIEW);
             let expected = blocks.patches.iter().any(|block| may_end_or_turn(&frustum, block, &pose, 1.0));
-            assert_eq!(outline.terrain.any(0, &|patch| may_end_or_turn(&frustum, patch, &pose, 1.0)), expected);
+            assert_eq!(
+                outline.terrain.any(0, &|patch| may_end_or_turn(&frustum, patch, &pose, 1.0)),
+                expected
+            );
             (edges, none) = if expected { (edges + 1, none) } else { (edges, none + 1) };
         }
         assert!(edges > 50 && none > 50, "{edges} {none}");
@@ -408,7 +465,10 @@ mod tests {
     fn voids_end_a_surface() {
         let mut heights = vec![0.0; 65 * 65];
         heights[32 * 65 + 32] = f64::NAN;
-        let scene = Scene { terrain: Some(Terrain::from_heights(65, 65, 20.0, &heights, None).unwrap()), ..Scene::default() };
+        let scene = Scene {
+            terrain: Some(Terrain::from_heights(65, 65, 20.0, &heights, None).unwrap()),
+            ..Scene::default()
+        };
         assert!(!none(&scene, &pose(200.0, -90.0)));
     }
 

@@ -1,9 +1,12 @@
-//! How far the sources of a frame's pixels will be off, by cause, and the cheapest temporal inverse that keeps the tolerance.
+//! How far the sources of a frame's pixels will be off, by cause, and the cheapest temporal inverse that
+//! keeps the tolerance.
 //!
-//! The prediction is no formula: the pipeline is run dry at a few hundred probes, in f64, over the scene's own surfaces, against exact
-//! rays (`dry_run.rs`), and what single precision adds comes from the sizes of the numbers (`rounding.rs`). The largest error of n probes
-//! is above the 99th percentile of all pixels with a probability of `1 - 0.99^n` (98.7 % of 432). Frames that share an ideal frame are alike: each is run dry at a quarter of the probes, and all
-//! that are solved in the same way answer for the largest error of any (88.8 % of two, 98.7 % of four). What it misses is what [`SAFETY`] is for.
+//! The prediction is no formula: the pipeline is run dry at a few hundred probes, in f64, over the scene's
+//! own surfaces, against exact rays (`dry_run.rs`), and what single precision adds comes from the sizes of
+//! the numbers (`rounding.rs`). The largest error of n probes is above the 99th percentile of all pixels with
+//! a probability of `1 - 0.99^n` (98.7 % of 432). Frames that share an ideal frame are alike: each is run dry
+//! at a quarter of the probes, and all that are solved in the same way answer for the largest error of any
+//! (88.8 % of two, 98.7 % of four). What it misses is what [`SAFETY`] is for.
 
 mod forecast;
 mod ground;
@@ -15,7 +18,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, SeenPlane, TemporalStage,
+    BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage,
+    SeenPlane, TemporalStage,
     contours::Outlook,
     displaced::ShownWaves,
     dry_run::{MAX_LOOK_UPS, Trial, Truth},
@@ -47,10 +51,11 @@ const BOUND_SHARE: f64 = 0.5;
 const OF_NODES: f64 = 0.3;
 /// Steps of eq. 18 up to which it takes less time than a look-up of depth in every node.
 const CHEAP_RK2_STEPS: f64 = 2.0;
-/// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
+/// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the
+/// grid of 24 columns.
 const SHARE_STEP: usize = 5;
-/// Phases of the exposure that the probes take turns in. On a shaking mount the middle and the ends may be whole periods apart, where nothing has
-/// moved: the last two then stand in no simple ratio to them.
+/// Phases of the exposure that the probes take turns in. On a shaking mount the middle and the ends may be
+/// whole periods apart, where nothing has moved: the last two then stand in no simple ratio to them.
 const PHASES: [f64; 5] = [0.0, -0.5, 0.5, -0.309, 0.191];
 /// As many of them do for a mount at rest.
 const AT_REST: usize = 3;
@@ -91,7 +96,8 @@ pub(super) struct Choice<'a> {
     pub way: Way,
     pub terrain_error_px: f64,
     pub predicted: Predicted,
-    /// How far the path between the exposure's nodes is missed, and what tolerance is to be kept, ideal pixels, where one is broken.
+    /// How far the path between the exposure's nodes is missed, and what tolerance is to be kept, ideal
+    /// pixels, where one is broken.
     pub missed_px: Option<[f64; 2]>,
     pub truths: Truths<'a>,
 }
@@ -103,7 +109,8 @@ pub(super) struct Way {
     pub blur: Option<BlurStage>,
 }
 
-/// Of a camera of its own for each line, and of a look-up of depth, milliseconds as in `costs.rs`: from its reverse passes, less their reads.
+/// Of a camera of its own for each line, and of a look-up of depth, milliseconds as in `costs.rs`: from its
+/// reverse passes, less their reads.
 const POSE_MS: f64 = 0.05;
 const LOOK_UP_MS: f64 = 0.25;
 
@@ -111,9 +118,10 @@ impl Way {
     /// Look-ups of depth, if those at mid-exposure are all that there are.
     fn look_ups_of_mid(self) -> Option<usize> {
         match self {
-            Self { temporal: TemporalStage::Reproject { iterations }, blur: Some(BlurStage { depths: NodeDepths::Mid, .. }) } => {
-                Some((iterations as usize).min(MAX_LOOK_UPS))
-            }
+            Self {
+                temporal: TemporalStage::Reproject { iterations },
+                blur: Some(BlurStage { depths: NodeDepths::Mid, .. }),
+            } => Some((iterations as usize).min(MAX_LOOK_UPS)),
             _ => None,
         }
     }
@@ -132,7 +140,9 @@ impl Way {
             TemporalStage::Identity => 0.0,
             TemporalStage::Rotation | TemporalStage::Linear | TemporalStage::Rk2 => poses,
             // What begins with what another has found needs one less.
-            TemporalStage::Reproject { iterations } => poses + f64::from(iterations + others * (iterations.max(2) - 1)) * LOOK_UP_MS,
+            TemporalStage::Reproject { iterations } => {
+                poses + f64::from(iterations + others * (iterations.max(2) - 1)) * LOOK_UP_MS
+            }
         }
     }
 }
@@ -144,7 +154,8 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
     let truths = case.truths();
     let ground::Coarsened { error_px: terrain_error_px, detail, ground } = ground::coarsest(case, &truths);
     let forecast = truths.forecast(detail.as_ref(), ground);
-    // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
+    // Something small and near may pass between the probes: where there are silhouettes only the bound
+    // counts.
     let may_skip_depth = !case.silhouettes_in_view || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match case.demanded {
         Some(temporal) => Way { temporal, blur: case.blur },
@@ -152,7 +163,8 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
     };
     let mut predicted = forecast.predict(case, way);
     if case.silhouettes_in_view {
-        predicted.silhouette_share = case.silhouettes.map_or_else(|| truths.silhouette_share(), |silhouettes| silhouettes.share);
+        predicted.silhouette_share =
+            case.silhouettes.map_or_else(|| truths.silhouette_share(), |silhouettes| silhouettes.share);
     }
     let missed_px = missed_px(case, &predicted);
     Choice { way, terrain_error_px, predicted, missed_px, truths }
@@ -170,8 +182,8 @@ fn missed_px(case: &Case<'_>, predicted: &Predicted) -> Option<[f64; 2]> {
 }
 
 impl<'a> Case<'a> {
-    /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the depth beside where they look: not
-    /// for silhouettes.
+    /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the
+    /// depth beside where they look: not for silhouettes.
     fn ways(&self, motion: &Motion, may_skip_depth: bool) -> Vec<Way> {
         let with = |temporal| Way { temporal, blur: self.blur };
         let mut ways = Vec::new();
@@ -186,7 +198,8 @@ impl<'a> Case<'a> {
         }
         let look_ups = |depths: NodeDepths| {
             let blur = self.blur.map(|blur| BlurStage { depths, ..blur });
-            (1..=MAX_LOOK_UPS as u32).map(move |iterations| Way { temporal: TemporalStage::Reproject { iterations }, blur })
+            (1..=MAX_LOOK_UPS as u32)
+                .map(move |iterations| Way { temporal: TemporalStage::Reproject { iterations }, blur })
         };
         let depths: &[NodeDepths] = match self.blur.map(|blur| blur.solved()) {
             None => &[NodeDepths::Each],
@@ -204,12 +217,16 @@ impl<'a> Case<'a> {
     /// Whether the solvers of constant twist are tried.
     fn may_take_twist(&self) -> bool {
         let quality = &self.sequence.scenario.quality;
-        self.constant_twist && quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view
+        self.constant_twist
+            && quality.solver == Auto::Auto
+            && quality.key_frames == Auto::Auto
+            && !self.silhouettes_in_view
     }
 
     /// Whether anybody wants to know what these solvers do.
     fn asks_for_twist(&self) -> bool {
-        matches!(self.demanded, Some(TemporalStage::Linear | TemporalStage::Rk2)) || self.demanded.is_none() && self.may_take_twist()
+        matches!(self.demanded, Some(TemporalStage::Linear | TemporalStage::Rk2))
+            || self.demanded.is_none() && self.may_take_twist()
     }
 
     /// What the ground leaves for sources beside their place, 1/255.
@@ -237,7 +254,8 @@ impl<'a> Case<'a> {
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
             plane: DVec3::ZERO,
         };
-        let mut truths = Truths::new(self.reach, self.ray, trial, phases(&self.sequence.path, self.blur.is_some()), 1);
+        let mut truths =
+            Truths::new(self.reach, self.ray, trial, phases(&self.sequence.path, self.blur.is_some()), 1);
         truths.trial.plane = truths.plane().normal_per_m;
         truths
     }
@@ -290,9 +308,11 @@ impl Looked {
 impl<'a> Truths<'a> {
     /// Of one probe in `step`.
     fn new(reach: &'a LensReach, ray: RayStage, trial: Trial<'a>, phases: &[f64], step: usize) -> Self {
-        let look =
-            |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(i * step, *probe, truth));
-        let looked = reach.probes.par_iter().step_by(step).enumerate().with_min_len(16).filter_map(look).collect();
+        let look = |(i, probe): (usize, &Probe)| {
+            trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(i * step, *probe, truth))
+        };
+        let looked =
+            reach.probes.par_iter().step_by(step).enumerate().with_min_len(16).filter_map(look).collect();
         Truths { reach, ray, trial, looked }
     }
 
@@ -306,7 +326,8 @@ impl<'a> Truths<'a> {
         self.largest(|_, looked| self.trial.level_of_detail_px(&looked.truth, detail))
     }
 
-    /// The largest of a figure over the probes that are not to be counted apart. Only the largest are asked whether they are.
+    /// The largest of a figure over the probes that are not to be counted apart. Only the largest are asked
+    /// whether they are.
     fn largest(&self, of: impl Fn(usize, &Looked) -> f64) -> f64 {
         let counted = self.looked.iter().enumerate().filter(|(_, looked)| looked.apart.get() != Some(&true));
         let mut order: Vec<(f64, &Looked)> = counted.map(|(i, looked)| (of(i, looked), looked)).collect();
@@ -322,13 +343,18 @@ impl<'a> Truths<'a> {
     /// Share of the pixels at silhouettes: of one probe in [`SHARE_STEP`].
     pub fn silhouette_share(&self) -> f64 {
         let asked: Vec<&Looked> = self.looked.iter().step_by(SHARE_STEP).collect();
-        let apart = asked.par_iter().with_min_len(8).filter(|looked| self.trial.at_silhouette(&looked.probe, &looked.truth, true)).count();
+        let apart = asked
+            .par_iter()
+            .with_min_len(8)
+            .filter(|looked| self.trial.at_silhouette(&looked.probe, &looked.truth, true))
+            .count();
         apart as f64 / asked.len().max(1) as f64
     }
 
     /// The same of all of them, given which probes are beside a step or fold.
     pub fn share_apart(&self, is_beside: impl Fn(usize) -> bool) -> f64 {
-        let apart = self.looked.iter().filter(|looked| looked.truth.is_hidden() || is_beside(looked.number)).count();
+        let apart =
+            self.looked.iter().filter(|looked| looked.truth.is_hidden() || is_beside(looked.number)).count();
         apart as f64 / self.looked.len().max(1) as f64
     }
 
@@ -336,7 +362,9 @@ impl<'a> Truths<'a> {
     pub fn plane(&self) -> SeenPlane {
         let Trial { key_pose, ideal, .. } = self.trial;
         let surfaces = self.looked.iter().filter(|looked| looked.truth.key_inverse_depth > 0.0);
-        let seen = |Looked { truth, .. }: &Looked| ((truth.at_px - ideal.principal_px) / ideal.focal_px, truth.key_inverse_depth);
+        let seen = |Looked { truth, .. }: &Looked| {
+            ((truth.at_px - ideal.principal_px) / ideal.focal_px, truth.key_inverse_depth)
+        };
         SeenPlane::fitted(*key_pose, surfaces.map(seen))
     }
 
@@ -351,10 +379,11 @@ impl<'a> Truths<'a> {
         self.trial.ideal.scale(&self.reach.camera) * self.reach.probe_px
     }
 
-    /// Miss of what lies between the depths of the exposure's ends, and between these and its middle, of each probe, and the largest. `elsewhere` is
-    /// [`Outcome::elsewhere`] of each, if that is known.
+    /// Miss of what lies between the depths of the exposure's ends, and between these and its middle, of each
+    /// probe, and the largest. `elsewhere` is [`Outcome::elsewhere`] of each, if that is known.
     fn between_px(&self, elsewhere: impl Fn(usize) -> Option<f64> + Sync) -> (Vec<[f64; 2]>, [f64; 2]) {
-        let of = |(i, looked): (usize, &Looked)| self.trial.between_px(&looked.probe, &looked.truth, elsewhere(i));
+        let of =
+            |(i, looked): (usize, &Looked)| self.trial.between_px(&looked.probe, &looked.truth, elsewhere(i));
         let px: Vec<[f64; 2]> = self.looked.par_iter().enumerate().with_min_len(16).map(of).collect();
         let largest = [0, 1].map(|k: usize| self.largest(|i, _| px[i][k]));
         (px, largest)

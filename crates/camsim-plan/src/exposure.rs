@@ -10,8 +10,8 @@ use camsim_core::{
     temporal::path::Curve,
 };
 
-/// A path shorter than this is no blur, ideal pixels: it takes 0.4 % from the finest wave that the frame holds (1 - sinc(pi / 20)). How much
-/// the picture may be off is not for `quality.max_error_px` to say.
+/// A path shorter than this is no blur, ideal pixels: it takes 0.4 % from the finest wave that the frame
+/// holds (1 - sinc(pi / 20)). How much the picture may be off is not for `quality.max_error_px` to say.
 const SHARP_PX: f64 = 0.1;
 /// Part of the tolerance that the path between nodes may miss.
 const SHARE: f64 = 0.5;
@@ -19,7 +19,8 @@ const SHARE: f64 = 0.5;
 pub(super) const MOST_STEPS: u32 = 256;
 /// Most steps of the straight lines that rays at silhouettes take.
 const MOST_STRAIGHT_STEPS: u32 = 64;
-/// Nodes for each period of the fastest vibration: straight lines take that many to be near it, and fewer than the other would not tell it from stillness.
+/// Nodes for each period of the fastest vibration: straight lines take that many to be near it, and fewer
+/// than the other would not tell it from stillness.
 const STRAIGHT_PER_PERIOD: f64 = 8.0;
 const LEAST_PER_PERIOD: f64 = 4.0;
 /// Polynomials of a path that are compared with it.
@@ -41,14 +42,15 @@ impl ExposurePath {
     /// From end to end.
     pub const STRAIGHT: Self = Self { path: PathStage::Straight, stretches: 1, stride: 1 };
 
-    /// With more nodes; `None` where the path is missed by no more than its share of the tolerance, and where there are as many as there may be.
+    /// With more nodes; `None` where the path is missed by no more than its share of the tolerance, and where
+    /// there are as many as there may be.
     pub fn finer(self, miss_px: f64, max_error_px: f64) -> Option<Self> {
         let path = PathStage::Quartic;
         let (allowed_px, steps) = (SHARE * max_error_px, path.steps());
         let stretches = match self.path {
-            PathStage::Quartic => {
-                (f64::from(self.stretches) * more_for(miss_px, allowed_px, steps)).ceil().min(f64::from(MOST_STEPS / steps)) as u32
-            }
+            PathStage::Quartic => (f64::from(self.stretches) * more_for(miss_px, allowed_px, steps))
+                .ceil()
+                .min(f64::from(MOST_STEPS / steps)) as u32,
             PathStage::Straight | PathStage::Parabola => self.stretches,
         };
         let finer = Self { path, stretches, stride: 1 };
@@ -79,7 +81,8 @@ pub(super) struct Exposed<'a> {
 }
 
 impl Exposed<'_> {
-    /// The path with the fewest nodes that is missed by no more than its share of the tolerance; `None` where the exposure does not show.
+    /// The path with the fewest nodes that is missed by no more than its share of the tolerance; `None` where
+    /// the exposure does not show.
     pub fn path(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<ExposurePath> {
         self.shows(quality, skipped).then(|| self.path_within(quality.max_error_px))
     }
@@ -92,7 +95,10 @@ impl Exposed<'_> {
         }
         let blur_px = self.motion.blur_px;
         if blur_px <= quality.max_error_px.min(SHARP_PX) && quality.blur_samples == Auto::Auto {
-            skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {blur_px:.2e} px") });
+            skipped.push(Skip {
+                what: "motion blur",
+                reason: format!("no path over the exposure is longer than {blur_px:.2e} px"),
+            });
             return false;
         }
         true
@@ -112,7 +118,8 @@ impl Exposed<'_> {
         ExposurePath { path, stretches: self.stretches(path, LEAST_PER_PERIOD, allowed_px), stride: 1 }
     }
 
-    /// With poses so near to each other that straight lines between them miss no more than the path does: rays at silhouettes take those.
+    /// With poses so near to each other that straight lines between them miss no more than the path does:
+    /// rays at silhouettes take those.
     pub fn with_poses_for_rays(&self, exposure: ExposurePath, quality: &QualitySpec) -> ExposurePath {
         let wanted = self.stretches(PathStage::Straight, STRAIGHT_PER_PERIOD, SHARE * quality.max_error_px);
         let steps = exposure.stretches * exposure.path.steps();
@@ -138,7 +145,8 @@ impl Exposed<'_> {
             if miss_px <= allowed_px || stretches >= most {
                 break;
             }
-            stretches = (stretches * more_for(miss_px, allowed_px, path.steps())).ceil().clamp(stretches + 1.0, most);
+            stretches =
+                (stretches * more_for(miss_px, allowed_px, path.steps())).ceil().clamp(stretches + 1.0, most);
         }
         stretches as u32
     }
@@ -176,13 +184,20 @@ fn more_for(miss_px: f64, allowed_px: f64, steps: u32) -> f64 {
     (1.05 * miss_px / allowed_px).powf(f64::from(steps + 1).recip())
 }
 
-/// Whether nodes that are so many steps apart over an exposure of so many periods of the fastest vibration may all meet it alike.
+/// Whether nodes that are so many steps apart over an exposure of so many periods of the fastest vibration
+/// may all meet it alike.
 pub(super) fn may_alias(steps: u32, periods: f64) -> bool {
     f64::from(steps) < LEAST_PER_PERIOD * periods
 }
 
-/// How far the path over the exposure is from its polynomials, given where it is at a share of the exposure (0 to 1): at one such share.
-pub(super) fn miss_at_px(path: PathStage, stretches: u32, share: f64, mut place: impl FnMut(f64) -> DVec2) -> f64 {
+/// How far the path over the exposure is from its polynomials, given where it is at a share of the exposure
+/// (0 to 1): at one such share.
+pub(super) fn miss_at_px(
+    path: PathStage,
+    stretches: u32,
+    share: f64,
+    mut place: impl FnMut(f64) -> DVec2,
+) -> f64 {
     let along = share * f64::from(stretches);
     let k = along.floor().min(f64::from(stretches) - 1.0);
     let node = |j: u32| (k + f64::from(j) / f64::from(path.steps())) / f64::from(stretches);
@@ -191,7 +206,8 @@ pub(super) fn miss_at_px(path: PathStage, stretches: u32, share: f64, mut place:
     if px.is_finite() { px } else { 0.0 }
 }
 
-/// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a share of the exposure (0 to 1).
+/// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a
+/// share of the exposure (0 to 1).
 pub(super) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl FnMut(f64) -> DVec2) -> f64 {
     let halves = 2 * path.steps();
     let share = |half: u32| (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
@@ -200,8 +216,8 @@ pub(super) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl FnMut
     if miss_px.is_finite() { miss_px } else { 0.0 }
 }
 
-/// How far the polynomial through every second place is from the places between them, where it is off by at least nine tenths of the most
-/// that it is.
+/// How far the polynomial through every second place is from the places between them, where it is off by at
+/// least nine tenths of the most that it is.
 fn miss_of(places: &[DVec2]) -> f64 {
     let nodes: Vec<DVec2> = places.iter().copied().step_by(2).collect();
     let curve = Curve::through(&nodes);
@@ -220,7 +236,8 @@ mod tests {
         let quartic = ExposurePath { path: PathStage::Quartic, stretches: 1, stride: 1 };
         assert_eq!(finer(ExposurePath::STRAIGHT, 1.0), Some(quartic));
         assert_eq!(finer(ExposurePath { path: PathStage::Parabola, ..quartic }, 1.0), Some(quartic));
-        // 0.8 px are 32 times what is allowed, and the miss falls with the fifth power of the stretches: 2 would do, but for a margin.
+        // 0.8 px are 32 times what is allowed, and the miss falls with the fifth power of the stretches: 2
+        // would do, but for a margin.
         assert_eq!(finer(quartic, 32.0 * SHARE * 0.05), Some(ExposurePath { stretches: 3, ..quartic }));
         let most = ExposurePath { stretches: MOST_STEPS / 4, ..quartic };
         assert_eq!((finer(quartic, 1e12), finer(most, 1e12)), (Some(most), None));
@@ -230,13 +247,26 @@ mod tests {
     fn what_nodes_in_step_with_a_swing_miss_is_found_at_other_instants() {
         // Thirty periods: both ends, and the middle between them, are at rest.
         let swing = |share: f64| DVec2::new(2.0 * share, 0.7 * (30.0 * std::f64::consts::TAU * share).sin());
-        assert!(miss_px(PathStage::Straight, 1, 0, swing) < 1e-12 && may_alias(1, 30.0) && !may_alias(120, 30.0));
-        let misses: Vec<f64> =
-            (1..=128).map(|i| miss_at_px(PathStage::Straight, 1, (0.618_033_988_749_895 * f64::from(i)).fract(), swing)).collect();
-        let (most, mean2) = (misses.iter().copied().fold(0.0, f64::max), misses.iter().map(|px| px * px).sum::<f64>() / 128.0);
-        assert!((most / 0.7 - 1.0).abs() < 0.01 && (mean2.sqrt() / (0.7 * 0.5_f64.sqrt()) - 1.0).abs() < 0.02, "{most} {mean2}");
+        assert!(
+            miss_px(PathStage::Straight, 1, 0, swing) < 1e-12 && may_alias(1, 30.0) && !may_alias(120, 30.0)
+        );
+        let misses: Vec<f64> = (1..=128)
+            .map(|i| {
+                miss_at_px(PathStage::Straight, 1, (0.618_033_988_749_895 * f64::from(i)).fract(), swing)
+            })
+            .collect();
+        let (most, mean2) = (
+            misses.iter().copied().fold(0.0, f64::max),
+            misses.iter().map(|px| px * px).sum::<f64>() / 128.0,
+        );
+        assert!(
+            (most / 0.7 - 1.0).abs() < 0.01 && (mean2.sqrt() / (0.7 * 0.5_f64.sqrt()) - 1.0).abs() < 0.02,
+            "{most} {mean2}"
+        );
         // With nodes enough it is that of the polynomials, wherever one looks.
-        let fine = (0..=200).map(|i| miss_at_px(PathStage::Quartic, 60, f64::from(i) / 200.0, swing)).fold(0.0, f64::max);
+        let fine = (0..=200)
+            .map(|i| miss_at_px(PathStage::Quartic, 60, f64::from(i) / 200.0, swing))
+            .fold(0.0, f64::max);
         let known = (0..60).map(|k| miss_px(PathStage::Quartic, 60, k, swing)).fold(0.0, f64::max);
         assert!(fine > 0.5 * known && fine < 1.2 * known, "{fine:.2e} {known:.2e}");
     }

@@ -1,4 +1,5 @@
-//! What `quality.preset`, `quality.solver` and `quality.iterations` demand instead of leaving it to the planner.
+//! What `quality.preset`, `quality.solver` and `quality.iterations` demand instead of leaving it to the
+//! planner.
 
 use glam::DVec2;
 
@@ -10,7 +11,8 @@ use camsim_core::{
 
 /// The temporal stage that the scenario asks for by name, or `None` where the planner chooses.
 ///
-/// `reproject` alone still leaves out what a frame does not need (rotation only, nothing moves); a number of iterations does not.
+/// `reproject` alone still leaves out what a frame does not need (rotation only, nothing moves); a number of
+/// iterations does not.
 pub(super) fn temporal_stage(quality: &QualitySpec) -> Option<TemporalStage> {
     if quality.preset == Preset::Paper {
         return Some(TemporalStage::Rk2);
@@ -29,8 +31,8 @@ pub(super) fn exposure_path(demanded: Option<TemporalStage>, exposure: ExposureP
 }
 
 impl TemporalStage {
-    /// Ideal ray where a constant-twist solver looks for what the ray `uv` sees `dt_s` after the key instant; `None` for the others,
-    /// which look where the point really is.
+    /// Ideal ray where a constant-twist solver looks for what the ray `uv` sees `dt_s` after the key instant;
+    /// `None` for the others, which look where the point really is.
     pub(super) fn displaced(self, uv: DVec2, inverse_depth: f64, twist: &Twist, dt_s: f64) -> Option<DVec2> {
         match self {
             Self::Linear => Some(displacement::linear(uv, inverse_depth, twist, dt_s)),
@@ -56,7 +58,10 @@ mod tests {
         assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Reproject)), None);
         assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Linear)), Some(TemporalStage::Linear));
         assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Rk2)), Some(TemporalStage::Rk2));
-        assert_eq!(stage(|q| q.iterations = Auto::Value(3)), Some(TemporalStage::Reproject { iterations: 3 }));
+        assert_eq!(
+            stage(|q| q.iterations = Auto::Value(3)),
+            Some(TemporalStage::Reproject { iterations: 3 })
+        );
         assert_eq!(stage(|q| q.preset = Preset::Paper), Some(TemporalStage::Rk2));
     }
 
@@ -67,7 +72,8 @@ mod tests {
         let at = |stage: TemporalStage| stage.displaced(uv, 0.0, &twist, 0.1);
         assert_eq!(at(TemporalStage::Rotation), None);
         assert_eq!(at(TemporalStage::Reproject { iterations: 2 }), None);
-        // Turning to the right about the optical axis, the point was 0.1 rad further clockwise before: u' = u, v' = v + 0.05.
+        // Turning to the right about the optical axis, the point was 0.1 rad further clockwise before: u' =
+        // u, v' = v + 0.05.
         let linear = at(TemporalStage::Linear).unwrap_or_default();
         assert!(linear.distance(DVec2::new(0.5, 0.05)) < 1e-12, "{linear}");
         let rk2 = at(TemporalStage::Rk2).unwrap_or_default();

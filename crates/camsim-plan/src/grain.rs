@@ -1,9 +1,11 @@
-//! How much pictures change, by the size of what changes: what resampling and too few blur samples cost, in grey levels, depends on it.
+//! How much pictures change, by the size of what changes: what resampling and too few blur samples cost, in
+//! grey levels, depends on it.
 //!
-//! A texture's grain is its power spectrum, mean over directions and channels: variance for each square cycle a texel, in linear light. It
-//! is found from the variances that go when 2x2, 4x4, ... texels become one, which needs no transform: a spectrum is fitted to them.
-//! Pictures of real ground are not equally grainy everywhere, a lawn beside parked cars, and often empty in their corners, so that each piece
-//! of a texture has a spectrum of its own, found when first looked at.
+//! A texture's grain is its power spectrum, mean over directions and channels: variance for each square cycle
+//! a texel, in linear light. It is found from the variances that go when 2x2, 4x4, ... texels become one,
+//! which needs no transform: a spectrum is fitted to them. Pictures of real ground are not equally grainy
+//! everywhere, a lawn beside parked cars, and often empty in their corners, so that each piece of a texture
+//! has a spectrum of its own, found when first looked at.
 
 use std::sync::{Arc, OnceLock};
 
@@ -16,10 +18,12 @@ use camsim_core::waves::mean_of;
 const PIECE_PX: u32 = 128;
 /// Texels along each side of a block that stand for it, where the whole of a large texture is looked at.
 const OF_BLOCK: u32 = 4;
-/// Where blocks of texels begin, beside the first texel of a piece: what a person drew mostly has its edges between blocks that begin there, as a chessboard's are, and loses nothing to them.
-/// Each of these is another place in blocks of 2, 4, 8 and 16.
+/// Where blocks of texels begin, beside the first texel of a piece: what a person drew mostly has its edges
+/// between blocks that begin there, as a chessboard's are, and loses nothing to them. Each of these is
+/// another place in blocks of 2, 4, 8 and 16.
 const BEGINNINGS: [[u32; 2]; 4] = [[0, 0], [5, 15], [10, 5], [15, 10]];
-/// Frequency that the loss of the finest detail tells most about, cycles a texel; each further level is an octave lower.
+/// Frequency that the loss of the finest detail tells most about, cycles a texel; each further level is an
+/// octave lower.
 const FINEST: f64 = 0.4;
 /// Rounds of the fit: with many more, levels that are known but roughly make spectra that go up and down.
 const ROUNDS: u32 = 8;
@@ -47,7 +51,8 @@ pub(super) struct Grain {
 /// Power spectrum of a piece of a texture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Spectrum {
-    /// Natural logarithms at [`FINEST`] and the octaves below it; straight lines between them. Empty for a texture of one colour.
+    /// Natural logarithms at [`FINEST`] and the octaves below it; straight lines between them. Empty for a
+    /// texture of one colour.
     log_density: Vec<f64>,
 }
 
@@ -77,13 +82,20 @@ impl SceneGrain {
 impl Grain {
     fn new(texture: Arc<Texture>) -> Self {
         let [columns, rows] = texture.size_px.map(|side| side.div_ceil(PIECE_PX).max(1) as usize);
-        Self { texture, pieces: (0..columns * rows).map(|_| OnceLock::new()).collect(), whole: OnceLock::new() }
+        Self {
+            texture,
+            pieces: (0..columns * rows).map(|_| OnceLock::new()).collect(),
+            whole: OnceLock::new(),
+        }
     }
 
     /// About a place of the texture, texels; textures repeat.
     pub fn at(&self, texel: DVec2) -> &Spectrum {
         let size_px = self.texture.size_px;
-        let piece = [0, 1].map(|k| (texel[k].rem_euclid(f64::from(size_px[k].max(1))) as u32).min(size_px[k].saturating_sub(1)) / PIECE_PX);
+        let piece = [0, 1].map(|k| {
+            (texel[k].rem_euclid(f64::from(size_px[k].max(1))) as u32).min(size_px[k].saturating_sub(1))
+                / PIECE_PX
+        });
         let columns = size_px[0].div_ceil(PIECE_PX).max(1);
         self.pieces[(piece[1] * columns + piece[0]) as usize].get_or_init(|| self.spectrum(piece))
     }
@@ -94,9 +106,11 @@ impl Grain {
         let side = texture.size_px.map(|side| side.min(PIECE_PX));
         let [x0, y0] = [0, 1].map(|k: usize| (piece[k] * PIECE_PX).min(texture.size_px[k] - side[k]));
         let lost_from = |beside: [u32; 2]| {
-            let [x0, y0] = [(x0, 0), (y0, 1)].map(|(first, k): (u32, usize)| moved(first, beside[k], side[k], texture.size_px[k]));
+            let [x0, y0] = [(x0, 0), (y0, 1)]
+                .map(|(first, k): (u32, usize)| moved(first, beside[k], side[k], texture.size_px[k]));
             let [width, height] = texture.size_px;
-            let values = (0..side[0] * side[1]).map(|i| color(texture, &decode, (x0 + i % side[0]) % width, (y0 + i / side[0]) % height));
+            let values = (0..side[0] * side[1])
+                .map(|i| color(texture, &decode, (x0 + i % side[0]) % width, (y0 + i / side[0]) % height));
             losses(Piece { size_px: side.map(|n| n as usize), values: values.collect() })
         };
         let mut lost = mean(BEGINNINGS.map(lost_from));
@@ -122,8 +136,13 @@ impl Spectrum {
     fn fitted(lost: &[f64]) -> Self {
         let detail = lost.iter().rposition(|&variance| variance > 0.0).map_or(0, |last| last + 1);
         let lost = &lost[..detail];
-        let mut spectrum =
-            Self { log_density: lost.iter().enumerate().map(|(level, v)| v.max(1e-12).ln() + 4_f64.powi(level as i32).ln()).collect() };
+        let mut spectrum = Self {
+            log_density: lost
+                .iter()
+                .enumerate()
+                .map(|(level, v)| v.max(1e-12).ln() + 4_f64.powi(level as i32).ln())
+                .collect(),
+        };
         let places = places(detail);
         for _ in 0..ROUNDS {
             let mut found = vec![0.0; detail];
@@ -138,7 +157,8 @@ impl Spectrum {
         spectrum
     }
 
-    /// Variance for each square cycle a texel at a frequency, cycles a texel, of the texture's texels: it repeats with every whole cycle.
+    /// Variance for each square cycle a texel at a frequency, cycles a texel, of the texture's texels: it
+    /// repeats with every whole cycle.
     pub fn density_at(&self, cycles: DVec2) -> f64 {
         self.density((cycles - cycles.round()).length())
     }
@@ -152,7 +172,8 @@ impl Spectrum {
     }
 }
 
-/// The first texel of so many, moved by some: forwards, where the texture ends backwards, and where it has no more it begins again.
+/// The first texel of so many, moved by some: forwards, where the texture ends backwards, and where it has no
+/// more it begins again.
 fn moved(first: u32, by: u32, side: u32, size: u32) -> u32 {
     if first + by + side > size && first >= by { first - by } else { first + by }
 }
@@ -160,10 +181,13 @@ fn moved(first: u32, by: u32, side: u32, size: u32) -> u32 {
 /// Of several, level by level.
 fn mean(of: [Vec<f64>; BEGINNINGS.len()]) -> Vec<f64> {
     let levels = of[0].len();
-    (0..levels).map(|level| of.iter().map(|lost| lost[level]).sum::<f64>() / BEGINNINGS.len() as f64).collect()
+    (0..levels)
+        .map(|level| of.iter().map(|lost| lost[level]).sum::<f64>() / BEGINNINGS.len() as f64)
+        .collect()
 }
 
-/// Frequencies of a quadrant, the area that each stands for in all four, and the share of its power that goes with each level.
+/// Frequencies of a quadrant, the area that each stands for in all four, and the share of its power that goes
+/// with each level.
 fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
     let octaves = levels as u32 + 2;
     let mut places = Vec::new();
@@ -175,8 +199,9 @@ fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
             if cycles.max_element() > 0.5 {
                 continue;
             }
-            let area =
-                frequency * frequency * std::f64::consts::LN_2 / f64::from(AN_OCTAVE) * std::f64::consts::TAU / f64::from(DIRECTIONS);
+            let area = frequency * frequency * std::f64::consts::LN_2 / f64::from(AN_OCTAVE)
+                * std::f64::consts::TAU
+                / f64::from(DIRECTIONS);
             let left = |level: usize| (mean_of(1 << level, cycles.x) * mean_of(1 << level, cycles.y)).powi(2);
             places.push((frequency, area, (0..levels).map(|level| left(level) - left(level + 1)).collect()));
         }
@@ -203,8 +228,16 @@ fn thinned(texture: &Texture, block: u32) -> Piece {
     let values = (0..width * height).map(|i| {
         let [x0, y0] = [i % width, i / width].map(|k| k * block + step / 2);
         let (mut sum, mut count) = ([0.0; 3], 0.0_f32);
-        for (dx, dy) in (0..block).step_by(step as usize).flat_map(|dy| (0..block).step_by(step as usize).map(move |dx| (dx, dy))) {
-            let here = color(texture, &decode, (x0 + dx).min(texture.size_px[0] - 1), (y0 + dy).min(texture.size_px[1] - 1));
+        for (dx, dy) in (0..block)
+            .step_by(step as usize)
+            .flat_map(|dy| (0..block).step_by(step as usize).map(move |dx| (dx, dy)))
+        {
+            let here = color(
+                texture,
+                &decode,
+                (x0 + dx).min(texture.size_px[0] - 1),
+                (y0 + dy).min(texture.size_px[1] - 1),
+            );
             sum.iter_mut().zip(here).for_each(|(sum, value)| *sum += value);
             count += 1.0;
         }
@@ -222,9 +255,12 @@ fn losses(mut piece: Piece) -> Vec<f64> {
         for y in 0..height {
             for x in 0..width {
                 let at = 2 * y * piece.size_px[0] + 2 * x;
-                let four = [at, at + 1, at + piece.size_px[0], at + piece.size_px[0] + 1].map(|i| piece.values[i]);
+                let four =
+                    [at, at + 1, at + piece.size_px[0], at + piece.size_px[0] + 1].map(|i| piece.values[i]);
                 let mean = [0, 1, 2].map(|c: usize| 0.25 * four.iter().map(|value| value[c]).sum::<f32>());
-                let square = |value: &[f32; 3]| value.iter().zip(mean).map(|(v, m)| f64::from(v - m).powi(2)).sum::<f64>();
+                let square = |value: &[f32; 3]| {
+                    value.iter().zip(mean).map(|(v, m)| f64::from(v - m).powi(2)).sum::<f64>()
+                };
                 sum += four.iter().map(square).sum::<f64>() / 12.0;
                 means.push(mean);
             }
@@ -241,8 +277,9 @@ mod tests {
     use camsim_core::{noise::pcg4d, scene::Encoding};
 
     fn picture(side: u32, value: &dyn Fn(u32, u32) -> f64) -> Texture {
-        let rgba8 =
-            (0..side * side).flat_map(|i| [(255.0 * value(i % side, i / side)).round() as u8; 3].into_iter().chain([255])).collect();
+        let rgba8 = (0..side * side)
+            .flat_map(|i| [(255.0 * value(i % side, i / side)).round() as u8; 3].into_iter().chain([255]))
+            .collect();
         Texture { size_px: [side, side], rgba8, encoding: Encoding::Linear }
     }
 
@@ -261,7 +298,8 @@ mod tests {
         let grain = Grain::new(Arc::new(picture(512, &noise)));
         // A uniform value has a variance of 1/12, over one square cycle. Of the slow waves a piece has few.
         for frequency in [0.03, 0.1, 0.2, 0.4] {
-            let of_piece = |i: u32| grain.at(DVec2::new(f64::from(i % 4), f64::from(i / 4)) * 128.0).density(frequency);
+            let of_piece =
+                |i: u32| grain.at(DVec2::new(f64::from(i % 4), f64::from(i / 4)) * 128.0).density(frequency);
             let found = 12.0 * (0..16).map(of_piece).sum::<f64>() / 16.0;
             assert!((0.8..1.25).contains(&found), "{frequency}: {found}");
         }
@@ -277,7 +315,10 @@ mod tests {
             assert!(ratio(5.0) < 0.1 && ratio(0.2) < 1.0, "{cycles}: {} {}", ratio(5.0), ratio(0.2));
             // Its variance is 0.08; an octave and a half holds most of it.
             let area = |f: f64| std::f64::consts::TAU * f * f * 0.25 * std::f64::consts::LN_2;
-            let held: f64 = (-3..=3).map(|k| cycles * (0.25 * f64::from(k)).exp2()).map(|f| spectrum.density(f) * area(f)).sum();
+            let held: f64 = (-3..=3)
+                .map(|k| cycles * (0.25 * f64::from(k)).exp2())
+                .map(|f| spectrum.density(f) * area(f))
+                .sum();
             assert!((0.04..0.12).contains(&held), "{cycles}: {held}");
         }
     }
@@ -291,17 +332,26 @@ mod tests {
         assert!((0.4..0.6).contains(&density(200.0)), "{}", density(200.0));
         // Of the last one 20 to 35 of 128 columns, by where its blocks begin.
         assert!((0.15..0.28).contains(&density(299.9)), "{}", density(299.9));
-        assert_eq!([density(-295.0), density(600.5), density(-0.1)], [density(5.0), density(0.5), density(299.9)]);
+        assert_eq!(
+            [density(-295.0), density(600.5), density(-0.1)],
+            [density(5.0), density(0.5), density(299.9)]
+        );
     }
 
     #[test]
     fn edges_between_blocks_are_as_grainy_as_edges_within_them() {
         // Squares of 32 texels from the first one on, and from the 13th.
-        let squares = |beside: u32| spectrum(picture(512, &|x, y| f64::from(((x + beside) / 32 + (y + beside) / 32) % 2)));
-        for (spectrum, frequency) in [0, 13].map(squares).iter().flat_map(|of| [0.05, 0.1, 0.2, 0.4].map(|frequency| (of, frequency))) {
-            // Of edges of a contrast of 1, as long along each axis as is an edge in 32 texels, spread over all directions: 2 / 32 / (4 pi^3 f^3).
+        let squares = |beside: u32| {
+            spectrum(picture(512, &|x, y| f64::from(((x + beside) / 32 + (y + beside) / 32) % 2)))
+        };
+        for (spectrum, frequency) in
+            [0, 13].map(squares).iter().flat_map(|of| [0.05, 0.1, 0.2, 0.4].map(|frequency| (of, frequency)))
+        {
+            // Of edges of a contrast of 1, as long along each axis as is an edge in 32 texels, spread over
+            // all directions: 2 / 32 / (4 pi^3 f^3).
             let exact = 2.0 / 32.0 / (4.0 * (std::f64::consts::PI * frequency).powi(3));
-            // Found: 0.3 to 2.6 times, since it is straight lines from octave to octave, and squares are not edges at random. Blocks that begin with the squares alone find nothing here.
+            // Found: 0.3 to 2.6 times, since it is straight lines from octave to octave, and squares are not
+            // edges at random. Blocks that begin with the squares alone find nothing here.
             let off = spectrum.density(frequency) / exact;
             assert!((0.25..3.0).contains(&off), "{frequency}: {off}");
         }

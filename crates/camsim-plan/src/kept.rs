@@ -1,4 +1,5 @@
-//! What was found out last: whoever looks at a frame from several ideal frames, or at a group frame by frame, asks for it again.
+//! What was found out last: whoever looks at a frame from several ideal frames, or at a group frame by frame,
+//! asks for it again.
 
 use std::{
     collections::VecDeque,
@@ -19,7 +20,8 @@ impl<T> Kept<T> {
         Self { found: Mutex::default(), most }
     }
 
-    /// What is known of a number, or what is found now. Nobody waits for it meanwhile: two that ask at once find the same.
+    /// What is known of a number, or what is found now. Nobody waits for it meanwhile: two that ask at once
+    /// find the same.
     pub fn of(&self, number: u64, find: impl FnOnce() -> T) -> Arc<T> {
         let Ok(found) = self.try_of(number, || Ok::<_, Infallible>(find()));
         found
@@ -60,7 +62,11 @@ mod tests {
         assert_eq!([*kept.of(5, || 50), *kept.of(6, || 60), *kept.of(4, || 41)], [50, 60, 40]);
         assert_eq!(*kept.of(3, || 31), 31, "the oldest makes room");
         assert_eq!(kept.try_of(7, || Err("none")), Err("none"));
-        assert_eq!(kept.try_of(7, || Ok::<_, &str>(70)).as_deref(), Ok(&70), "what was not found is looked for again");
+        assert_eq!(
+            kept.try_of(7, || Ok::<_, &str>(70)).as_deref(),
+            Ok(&70),
+            "what was not found is looked for again"
+        );
         kept.forget();
         assert_eq!(*kept.of(3, || 32), 32);
     }

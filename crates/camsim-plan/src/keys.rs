@@ -1,5 +1,5 @@
-//! How many ideal frames an output frame is made of, and when. One camera does not see what other lines of the frame see behind a
-//! silhouette; a second one, at another instant, sees most of it.
+//! How many ideal frames an output frame is made of, and when. One camera does not see what other lines of
+//! the frame see behind a silhouette; a second one, at another instant, sees most of it.
 
 use super::{
     EdgeStage, Holes, MAX_IDEAL_PX, Skip, TemporalStage,
@@ -42,7 +42,8 @@ pub(super) fn spread(path: &CameraPath, [first_s, last_s]: [f64; 2], count: u32)
     (0..count.max(1)).map(at).map(|t_s| KeyFrame { t_s, pose: path.pose(t_s) }).collect()
 }
 
-/// In the order of their distance from an instant: a line's own key, the one that fills its holes first, and so on.
+/// In the order of their distance from an instant: a line's own key, the one that fills its holes first, and
+/// so on.
 pub(super) fn nearest_first(keys: &[KeyFrame], t_s: f64) -> Vec<&KeyFrame> {
     let mut order: Vec<&KeyFrame> = keys.iter().collect();
     order.sort_by(|a, b| (a.t_s - t_s).abs().total_cmp(&(b.t_s - t_s).abs()));
@@ -51,9 +52,10 @@ pub(super) fn nearest_first(keys: &[KeyFrame], t_s: f64) -> Vec<&KeyFrame> {
 
 /// Number of ideal frames that the frame asks for; `holes` is what a single one does not see.
 ///
-/// A second one mends most of the holes: only lines near the ends of the window see strips then, and half as wide ones. It takes as long as
-/// the first, so it is for holes that would be a large part of either tolerance: of `quality.max_error_dn` by their colours, which is an RMS
-/// over the picture, or of `quality.max_error_px` by the places that these are read from, which are off by as much as the strips are
+/// A second one mends most of the holes: only lines near the ends of the window see strips then, and half as
+/// wide ones. It takes as long as the first, so it is for holes that would be a large part of either
+/// tolerance: of `quality.max_error_dn` by their colours, which is an RMS over the picture, or of
+/// `quality.max_error_px` by the places that these are read from, which are off by as much as the strips are
 /// wide, and may be so in a hundredth of the pixels.
 pub(super) fn wanted(
     holes: Option<&Holes>,
@@ -68,9 +70,17 @@ pub(super) fn wanted(
     };
     match temporal {
         TemporalStage::Reproject { .. } => {}
-        TemporalStage::Identity => return one("nothing moves within the frame, or by too little for quality.max_error_px".into()),
-        TemporalStage::Rotation => return one("there is no parallax within the frame, or too little for quality.max_error_px".into()),
-        TemporalStage::Linear | TemporalStage::Rk2 => return one("solvers of a constant twist look into a single one".into()),
+        TemporalStage::Identity => {
+            return one("nothing moves within the frame, or by too little for quality.max_error_px".into());
+        }
+        TemporalStage::Rotation => {
+            return one(
+                "there is no parallax within the frame, or too little for quality.max_error_px".into()
+            );
+        }
+        TemporalStage::Linear | TemporalStage::Rk2 => {
+            return one("solvers of a constant twist look into a single one".into());
+        }
     }
     if let Some(count) = quality.key_frames.value() {
         return if count <= 1 { one("quality.key_frames is 1".into()) } else { count.min(MAX_KEYS) };
@@ -87,16 +97,21 @@ pub(super) fn wanted(
     if *share == 0.0 {
         return one("no hole was found behind silhouettes".into());
     }
-    one(format!("holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
+    one(format!(
+        "holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture",
+        100.0 * share
+    ))
 }
 
-/// Number of ideal frames that mixed light asks for: each line is then nearer in time to its own, and the layers are displaced by less. As many as keep
-/// `quality.max_error_dn`, or come near to the least error there is. `layers_dn` is what mixed light costs with a number of them, `rest_dn` what else there is.
+/// Number of ideal frames that mixed light asks for: each line is then nearer in time to its own, and the
+/// layers are displaced by less. As many as keep `quality.max_error_dn`, or come near to the least error
+/// there is. `layers_dn` is what mixed light costs with a number of them, `rest_dn` what else there is.
 pub(super) fn for_layers(layers_dn: impl Fn(u32) -> f64, rest_dn: f64, max_error_dn: f64) -> u32 {
     if rest_dn.hypot(layers_dn(1)) <= max_error_dn {
         return 1;
     }
-    let with: Vec<(u32, f64)> = (1..=MAX_KEYS).map(|count| (count, rest_dn.hypot(layers_dn(count)))).collect();
+    let with: Vec<(u32, f64)> =
+        (1..=MAX_KEYS).map(|count| (count, rest_dn.hypot(layers_dn(count)))).collect();
     let enough_dn = max_error_dn.max(NEARLY * with.iter().map(|(_, dn)| *dn).fold(f64::INFINITY, f64::min));
     with.into_iter().find(|(_, dn)| *dn <= enough_dn).map_or(1, |(count, _)| count)
 }
@@ -116,11 +131,20 @@ pub(super) fn fitting(
         let fine_bytes = if edges == EdgeStage::None { 0 } else { scale * scale * FINE_PIXEL_BYTES };
         let bytes = width * height * u64::from(count) * (PIXEL_BYTES + fine_bytes);
         let reason = if width.max(height * u64::from(count)) * scale > u64::from(max_side_px) {
-            format!("{count} of {width}x{height} px are more than the {max_side_px} px a side that the adapter has; reduce camera.size_px")
+            format!(
+                "{count} of {width}x{height} px are more than the {max_side_px} px a side that the adapter has; reduce camera.size_px"
+            )
         } else if width * height * u64::from(count) > MAX_IDEAL_PX {
-            format!("{count} of {width}x{height} px are more than {} million px; reduce the field of view", MAX_IDEAL_PX / 1_000_000)
+            format!(
+                "{count} of {width}x{height} px are more than {} million px; reduce the field of view",
+                MAX_IDEAL_PX / 1_000_000
+            )
         } else if bytes > MAX_BYTES {
-            format!("{count} of {width}x{height} px take {} MiB, more than {}; reduce the field of view", bytes >> 20, MAX_BYTES >> 20)
+            format!(
+                "{count} of {width}x{height} px take {} MiB, more than {}; reduce the field of view",
+                bytes >> 20,
+                MAX_BYTES >> 20
+            )
         } else {
             return Some((keys, ideal));
         };
@@ -179,17 +203,29 @@ mod tests {
         assert_eq!(count(2, 1300), (1, 1));
         assert_eq!(count(1, 64), (1, 0));
         // Their pixels add up, whether there are silhouettes or not.
-        let large =
-            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [6400, 6400], ..ideal });
+        let large = |count: u32| {
+            (
+                (0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(),
+                IdealGeometry { size_px: [6400, 6400], ..ideal },
+            )
+        };
         let mut skipped = Vec::new();
         assert!(
-            fitting(2, EdgeStage::None, 16_384, &mut skipped, large).is_none() && skipped[0].reason.contains("67 million px"),
+            fitting(2, EdgeStage::None, 16_384, &mut skipped, large).is_none()
+                && skipped[0].reason.contains("67 million px"),
             "{skipped:?}"
         );
         // Their samples at silhouettes take more than the pixels do.
-        let wide =
-            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [5000, 5000], ..ideal });
+        let wide = |count: u32| {
+            (
+                (0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(),
+                IdealGeometry { size_px: [5000, 5000], ..ideal },
+            )
+        };
         let mut skipped = Vec::new();
-        assert!(fitting(2, edges, 65_536, &mut skipped, wide).is_none() && skipped[0].reason.contains("MiB"), "{skipped:?}");
+        assert!(
+            fitting(2, edges, 65_536, &mut skipped, wide).is_none() && skipped[0].reason.contains("MiB"),
+            "{skipped:?}"
+        );
     }
 }

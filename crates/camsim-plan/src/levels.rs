@@ -1,11 +1,14 @@
-//! What resampling and the samples of the exposure cost in grey levels, and the cheapest of them that keep `quality.max_error_dn`.
+//! What resampling and the samples of the exposure cost in grey levels, and the cheapest of them that keep
+//! `quality.max_error_dn`.
 //!
-//! At a few places of the image (`prospect.rs`) the surface in view, its texture's power spectrum (`grain.rs`) and the two maps from the texture over the
-//! ideal frame to the output pixel are known. What each stage leaves of a wave of the texture has a closed form (`transfer.rs`): the filter
-//! of the ideal frame's surfaces, the reads between its pixels with what they alias, the grid of reads, the samples over the exposure. The
-//! exact pixel is the mean over its area and over the exposure. The squared difference of the two, weighed by the spectrum, is the
-//! expected squared error. Not a bound: textures are taken to be equally grainy in all directions, and silhouettes are not in it.
-//! Measured against the oracle's pictures away from silhouettes: docs/ACCURACY.md.
+//! At a few places of the image (`prospect.rs`) the surface in view, its texture's power spectrum
+//! (`grain.rs`) and the two maps from the texture over the ideal frame to the output pixel are known. What
+//! each stage leaves of a wave of the texture has a closed form (`transfer.rs`): the filter of the ideal
+//! frame's surfaces, the reads between its pixels with what they alias, the grid of reads, the samples over
+//! the exposure. The exact pixel is the mean over its area and over the exposure. The squared difference of
+//! the two, weighed by the spectrum, is the expected squared error. Not a bound: textures are taken to be
+//! equally grainy in all directions, and silhouettes are not in it. Measured against the oracle's pictures
+//! away from silhouettes: docs/ACCURACY.md.
 
 use rayon::prelude::*;
 
@@ -33,15 +36,17 @@ pub(super) const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
-const SCALES: [f64; 14] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, 4.0, 4.5, FINEST_SCALE];
+const SCALES: [f64; 14] =
+    [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, 4.0, 4.5, FINEST_SCALE];
 /// Beyond it only for silhouettes.
 pub(super) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 14] = [0.25, 0.33, 0.4, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
-/// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may take 0.995 of it; with a terrain for its level of detail too, so that all else may take
-/// 0.954; and of an error that is above it anyway the part that these may be.
+/// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may
+/// take 0.995 of it; with a terrain for its level of detail too, so that all else may take 0.954; and of an
+/// error that is above it anyway the part that these may be.
 const LEFT_FOR_DISPLACED: f64 = 0.1;
 const LEFT_WITH_GROUND: f64 = 0.3;
 const OF_BROKEN: f64 = 0.3;
@@ -51,14 +56,16 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 5;
-/// How far pixels may be from rectangles along the axes that are read by such: what is told of borders is of squares. Of pixels 1.2 times as
-/// long along a diagonal as across it 1.03 to 1.19 times that is left, the more the wider they are (RMS, four samples an ideal pixel), which the safety of borders has room for.
+/// How far pixels may be from rectangles along the axes that are read by such: what is told of borders is of
+/// squares. Of pixels 1.2 times as long along a diagonal as across it 1.03 to 1.19 times that is left, the
+/// more the wider they are (RMS, four samples an ideal pixel), which the safety of borders has room for.
 const MOST_LEAN: f64 = 0.2;
 /// Those that are tried.
 const CAPS: [u32; 4] = [2, 3, 4, MOST_TAPS];
 /// Where no way keeps a tolerance: times the least error there is.
 pub(super) const NEARLY: f64 = 1.15;
-/// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.
+/// By how much a way may cost more because it leaves no error: costs are not known better, and of two that
+/// are alike the more exact one wins.
 const WORTH: f64 = 0.2;
 
 /// What is expected of one way of sampling, RMS over the picture, 1/255 of the linear range.
@@ -104,7 +111,8 @@ pub(super) struct Task<'a> {
     pub exposure: Option<ExposurePath>,
 }
 
-/// What comes to the error of a way of sampling over the picture, 1/255 of the linear range; `None` where that is not to be.
+/// What comes to the error of a way of sampling over the picture, 1/255 of the linear range; `None` where
+/// that is not to be.
 pub(super) type Beside<'a> = dyn Fn(&Sampling, Option<BlurStage>) -> Option<f64> + 'a;
 
 impl Task<'_> {
@@ -122,7 +130,8 @@ impl Task<'_> {
 pub(super) struct Choice {
     pub sampling: Sampling,
     pub price: Price,
-    /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the tolerance.
+    /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the
+    /// tolerance.
     pub total_dn: f64,
     pub within: bool,
     /// Where it is not: the least that any way of its kind has.
@@ -143,12 +152,22 @@ impl Prospect<'_> {
     }
 
     /// Mean squared error with the exposure exact.
-    fn exact2(&self, every: usize, &Sampling { scale, surface_reads, taps, .. }: &Sampling, exposed: bool) -> f64 {
+    fn exact2(
+        &self,
+        every: usize,
+        &Sampling { scale, surface_reads, taps, .. }: &Sampling,
+        exposed: bool,
+    ) -> f64 {
         self.mean_square(every, |sight| sight.exact2(scale, surface_reads, taps, exposed, self.principal_px))
     }
 
     /// The same with its samples.
-    fn sampled2(&self, every: usize, &Sampling { scale, surface_reads, taps, .. }: &Sampling, blur: BlurStage) -> f64 {
+    fn sampled2(
+        &self,
+        every: usize,
+        &Sampling { scale, surface_reads, taps, .. }: &Sampling,
+        blur: BlurStage,
+    ) -> f64 {
         self.mean_square(every, |sight| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
@@ -161,13 +180,22 @@ impl Prospect<'_> {
     fn mean_square(&self, every: usize, square: impl Fn(&Sight<'_>) -> f64 + Sync) -> f64 {
         let of = |sight: &Sight<'_>| [sight.weight, sight.weight * sight.gain * sight.gain * square(sight)];
         // Summed in their order: a plan does not depend on how threads share work.
-        let squares: Vec<[f64; 2]> = self.sights.par_iter().step_by(every).with_min_len(AT_ONCE).map(of).collect();
-        let [weight, square] = squares.iter().fold([0.0; 2], |sum, square| [0, 1].map(|k: usize| sum[k] + square[k]));
+        let squares: Vec<[f64; 2]> =
+            self.sights.par_iter().step_by(every).with_min_len(AT_ONCE).map(of).collect();
+        let [weight, square] =
+            squares.iter().fold([0.0; 2], |sum, square| [0, 1].map(|k: usize| sum[k] + square[k]));
         square / (weight / self.weight() * self.counted as f64).max(1.0)
     }
 
-    /// The least that may be expected with all that comes to it, 1/255, as a few places tell; where that is far from a tolerance the rest is not looked at.
-    fn roughly_dn(&self, sampling: &Sampling, blur: Option<BlurStage>, beside_dn: f64, max_error_dn: f64) -> f64 {
+    /// The least that may be expected with all that comes to it, 1/255, as a few places tell; where that is
+    /// far from a tolerance the rest is not looked at.
+    fn roughly_dn(
+        &self,
+        sampling: &Sampling,
+        blur: Option<BlurStage>,
+        beside_dn: f64,
+        max_error_dn: f64,
+    ) -> f64 {
         let exact_dn = dn(self.exact2(FEW, sampling, blur.is_some())).hypot(beside_dn);
         let is_far = exact_dn > FAR * max_error_dn;
         if is_far { exact_dn } else { self.expected_at(FEW, sampling, blur).total_dn().hypot(beside_dn) }
@@ -178,13 +206,16 @@ impl Prospect<'_> {
         self.sights.iter().map(|sight| sight.weight).sum::<f64>().max(1e-9)
     }
 
-    /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is what comes to it over the picture with a way of
-    /// sampling, 1/255; `None` where that is not to be.
+    /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is
+    /// what comes to it over the picture with a way of sampling, 1/255; `None` where that is not to be.
     pub fn choose(&self, task: &Task<'_>, beside_dn: &Beside<'_>) -> Choice {
         let &Task { quality, max_error_dn, least_scale, most_scale, ideal_share, exposure, .. } = task;
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && scale < most_scale);
-        let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
+        let scales: Vec<f64> = forced.map_or_else(
+            || std::iter::once(least_scale).chain(scales.copied()).collect(),
+            |scale| vec![scale],
+        );
         let per_px = |scale: f64| match quality.blur_samples.value() {
             Some(samples) => vec![f64::from(samples)],
             None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
@@ -194,17 +225,26 @@ impl Prospect<'_> {
             (sampling, sampling.tried(quality, exposure))
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
-        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.price(sampling, *blur, ideal_share).ms;
+        let cost =
+            |(sampling, blur): &(Sampling, Option<BlurStage>)| self.price(sampling, *blur, ideal_share).ms;
         // Each with the fewest samples first: it may not be cheaper than that, and without any error.
-        let fewest = |sampling: Sampling| way(sampling, choices(sampling.scale).first().copied().unwrap_or(0.0)).1;
+        let fewest =
+            |sampling: Sampling| way(sampling, choices(sampling.scale).first().copied().unwrap_or(0.0)).1;
         let mut ways: Vec<(f64, Sampling)> = Vec::new();
         for &scale in &scales {
-            let ideals = SurfaceReads::ALL.into_iter().flat_map(|reads| task.samples().iter().map(move |&samples| (reads, samples)));
-            let ideals: Vec<Sampling> = ideals.map(|(reads, samples)| Sampling::of_ideal(scale, reads, samples)).collect();
-            let ideals: Vec<(f64, Sampling)> = ideals.into_iter().map(|ideal| (self.ideal_ms(&ideal, ideal_share), ideal)).collect();
+            let ideals = SurfaceReads::ALL
+                .into_iter()
+                .flat_map(|reads| task.samples().iter().map(move |&samples| (reads, samples)));
+            let ideals: Vec<Sampling> =
+                ideals.map(|(reads, samples)| Sampling::of_ideal(scale, reads, samples)).collect();
+            let ideals: Vec<(f64, Sampling)> =
+                ideals.into_iter().map(|ideal| (self.ideal_ms(&ideal, ideal_share), ideal)).collect();
             for taps in self.stages(quality, scale) {
-                let read_ms = self.read_ms(scale, taps, fewest(Sampling::new(scale, SurfaceReads::One, taps)));
-                ways.extend(ideals.iter().map(|&(ideal_ms, ideal)| (ideal_ms + read_ms, Sampling { taps, ..ideal })));
+                let read_ms =
+                    self.read_ms(scale, taps, fewest(Sampling::new(scale, SurfaceReads::One, taps)));
+                ways.extend(
+                    ideals.iter().map(|&(ideal_ms, ideal)| (ideal_ms + read_ms, Sampling { taps, ..ideal })),
+                );
             }
         }
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -230,18 +270,28 @@ impl Prospect<'_> {
                 continue;
             }
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
-            let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
+            let total_dn = tried
+                .as_ref()
+                .map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
-                None => {
-                    failed.push(Failed { sampling, beside_dn: beside_most_dn, roughly_dn: rough_dn, known_dn: tried.map(|_| total_dn) })
-                }
+                None => failed.push(Failed {
+                    sampling,
+                    beside_dn: beside_most_dn,
+                    roughly_dn: rough_dn,
+                    known_dn: tried.map(|_| total_dn),
+                }),
                 Some(tried) => {
                     let priced = |samples: f64, dn: f64| price(cost(&way(sampling, samples)), dn);
                     // Fewer samples leave no less than the most.
                     let cheaper = fewer.partition_point(|&samples| priced(samples, total_dn) < below);
-                    let enough = self.with_fewer(&sampling, &fewer[..cheaper], task, beside_dn).into_iter().chain([(total_dn, tried)]);
-                    let priced = enough.map(|(dn, sampling)| (priced(sampling.samples_per_px, dn), dn, sampling));
-                    let found = priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
+                    let enough = self
+                        .with_fewer(&sampling, &fewer[..cheaper], task, beside_dn)
+                        .into_iter()
+                        .chain([(total_dn, tried)]);
+                    let priced =
+                        enough.map(|(dn, sampling)| (priced(sampling.samples_per_px, dn), dn, sampling));
+                    let found =
+                        priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }
             }
@@ -260,7 +310,9 @@ impl Prospect<'_> {
         };
         let least_dn = least_dn(&mut failed, &exactly_dn);
         let enough_dn = NEARLY * least_dn;
-        let is_near = |failed: &mut Failed| failed.at_least_dn() <= enough_dn && failed.found_dn(&exactly_dn) <= enough_dn;
+        let is_near = |failed: &mut Failed| {
+            failed.at_least_dn() <= enough_dn && failed.found_dn(&exactly_dn) <= enough_dn
+        };
         let nearest = failed.iter_mut().find_map(|failed| is_near(failed).then_some(failed.sampling));
         let sampling = nearest.unwrap_or(Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
         let of = |way: (Sampling, Option<BlurStage>)| {
@@ -268,13 +320,25 @@ impl Prospect<'_> {
             let beside_dn = beside_dn(&way.0, way.1).unwrap_or(f64::INFINITY);
             choice(sampling, sampling.expected.total_dn().hypot(beside_dn), false, least_dn)
         };
-        let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
+        let tried: Vec<Choice> =
+            choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
         let most = tried.last().copied();
-        tried.into_iter().find(|choice| choice.total_dn <= enough_dn).or(most).unwrap_or_else(|| of(way(sampling, 0.0)))
+        tried
+            .into_iter()
+            .find(|choice| choice.total_dn <= enough_dn)
+            .or(most)
+            .unwrap_or_else(|| of(way(sampling, 0.0)))
     }
 
-    /// The same with fewer samples, in ascending order, as far as that keeps the tolerance: halving finds the fewest that do.
-    fn with_fewer(&self, sampling: &Sampling, fewer: &[f64], task: &Task<'_>, beside_dn: &Beside<'_>) -> Vec<(f64, Sampling)> {
+    /// The same with fewer samples, in ascending order, as far as that keeps the tolerance: halving finds the
+    /// fewest that do.
+    fn with_fewer(
+        &self,
+        sampling: &Sampling,
+        fewer: &[f64],
+        task: &Task<'_>,
+        beside_dn: &Beside<'_>,
+    ) -> Vec<(f64, Sampling)> {
         let mut found = Vec::new();
         let mut untried = fewer;
         while let Some(&samples_per_px) = untried.get(untried.len() / 2) {
@@ -287,8 +351,14 @@ impl Prospect<'_> {
         found
     }
 
-    /// A way and its error with all that comes to it, 1/255, if that is within the tolerance. A few places tell what is far from it.
-    fn within(&self, (sampling, blur): (Sampling, Option<BlurStage>), task: &Task<'_>, beside_dn: &Beside<'_>) -> Option<(f64, Sampling)> {
+    /// A way and its error with all that comes to it, 1/255, if that is within the tolerance. A few places
+    /// tell what is far from it.
+    fn within(
+        &self,
+        (sampling, blur): (Sampling, Option<BlurStage>),
+        task: &Task<'_>,
+        beside_dn: &Beside<'_>,
+    ) -> Option<(f64, Sampling)> {
         let beside_dn = beside_dn(&sampling, blur)?;
         if self.roughly_dn(&sampling, blur, beside_dn, task.max_error_dn) > FAR * task.max_error_dn {
             return None;
@@ -311,7 +381,8 @@ impl Prospect<'_> {
     /// Ways of reading the ideal frame at a scale.
     fn stages(&self, quality: &QualitySpec, scale: f64) -> Vec<TapStage> {
         // By their longer sides: whether any pixel has one read, and whether any has several.
-        let [is_any_narrow, is_any_wide] = [scale * self.widths[0] <= TENT_PX2.sqrt(), scale * self.widths[1] > TENT_PX2.sqrt()];
+        let [is_any_narrow, is_any_wide] =
+            [scale * self.widths[0] <= TENT_PX2.sqrt(), scale * self.widths[1] > TENT_PX2.sqrt()];
         let most = |cap: u32| cap.min((scale * self.widths[1]).ceil() as u32);
         let most_of = |cap: u32| match (is_any_narrow, is_any_wide) {
             (_, false) => TapStage::Spline,
@@ -326,7 +397,8 @@ impl Prospect<'_> {
                 let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
                 stages.extend(CAPS.map(most_of));
                 stages.dedup();
-                // Narrower ones are splines, and of wider or slanted ones areas along the axes are not what they cover.
+                // Narrower ones are splines, and of wider or slanted ones areas along the axes are not what
+                // they cover.
                 let width = scale * self.widths[1];
                 let fits = width > 2.0_f64.sqrt() && width <= WIDEST_AREA_PX && self.lean <= MOST_LEAN;
                 stages.extend(Some(TapStage::Area).filter(|_| fits));
@@ -358,7 +430,8 @@ impl Failed {
     }
 }
 
-/// The least error of all: those that may be better than the best known are looked at, the most promising first.
+/// The least error of all: those that may be better than the best known are looked at, the most promising
+/// first.
 fn least_dn(failed: &mut [Failed], exactly_dn: &dyn Fn(&Failed) -> f64) -> f64 {
     let mut order: Vec<&mut Failed> = failed.iter_mut().collect();
     order.sort_by(|a, b| a.at_least_dn().total_cmp(&b.at_least_dn()));
@@ -383,13 +456,15 @@ fn dn(square: f64) -> f64 {
     (SAFETY * 255.0 * square.sqrt()).hypot(FORMAT_DN)
 }
 
-/// What sampling, silhouettes and mixed light may take of `quality.max_error_dn`: the rest is kept for sources beside their place.
+/// What sampling, silhouettes and mixed light may take of `quality.max_error_dn`: the rest is kept for
+/// sources beside their place.
 pub(super) fn for_sampling_dn(quality: &QualitySpec, scene: &Scene) -> f64 {
     let left = if scene.terrain.is_some() { LEFT_WITH_GROUND } else { LEFT_FOR_DISPLACED };
     (1.0 - left * left).sqrt() * quality.max_error_dn
 }
 
-/// What the ground's level of detail and sources beside their place may cost beside all others, 1/255: what these leave of the tolerance.
+/// What the ground's level of detail and sources beside their place may cost beside all others, 1/255: what
+/// these leave of the tolerance.
 pub(super) fn for_displaced_dn(quality: &QualitySpec, scene: &Scene, others_dn: f64) -> f64 {
     if others_dn > for_sampling_dn(quality, scene) {
         return OF_BROKEN * others_dn;
@@ -398,7 +473,12 @@ pub(super) fn for_displaced_dn(quality: &QualitySpec, scene: &Scene, others_dn: 
 }
 
 /// Why the tolerance is not kept; `None` if it is.
-pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: &Predicted, is_plain: bool) -> Option<String> {
+pub(super) fn in_the_way(
+    quality: &QualitySpec,
+    sampling: &Sampling,
+    predicted: &Predicted,
+    is_plain: bool,
+) -> Option<String> {
     let total_dn = predicted.picture_dn();
     if total_dn <= ROUNDED * quality.max_error_dn {
         return None;
@@ -412,14 +492,18 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: 
     let by_layers_dn = layers.map_or(0.0, |layers| layers.error_dn);
     let by_ground_dn = ground.map_or(0.0, |ground| ground.error_dn());
     if by_ground_dn > displaced_dn.max(sampled_dn).max(at_silhouettes_dn).max(by_layers_dn) {
-        return Some(format!("the terrain's level of detail (quality.max_terrain_error_px): {by_ground_dn:.2}/255"));
+        return Some(format!(
+            "the terrain's level of detail (quality.max_terrain_error_px): {by_ground_dn:.2}/255"
+        ));
     }
     if displaced_dn > sampled_dn.max(at_silhouettes_dn).max(by_layers_dn) {
         let by = if quality.solver == Auto::Auto { "" } else { " (quality.solver is given)" };
         return Some(format!("sources beside their place{by}: {displaced_dn:.2}/255"));
     }
     if by_layers_dn > sampled_dn.max(at_silhouettes_dn) {
-        return Some(format!("what is mixed of several surfaces moves with the depth of one: {by_layers_dn:.2}/255"));
+        return Some(format!(
+            "what is mixed of several surfaces moves with the depth of one: {by_layers_dn:.2}/255"
+        ));
     }
     if at_silhouettes_dn > sampled_dn {
         let how = if is_plain { "where they are left as they are" } else { "with rays of their own" };
@@ -440,7 +524,14 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: 
 impl Sampling {
     /// Of which nothing is expected yet.
     pub fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
-        Self { scale, surface_reads, samples_a_pixel: 1, taps, samples_per_px: 0.0, expected: Expected::default() }
+        Self {
+            scale,
+            surface_reads,
+            samples_a_pixel: 1,
+            taps,
+            samples_per_px: 0.0,
+            expected: Expected::default(),
+        }
     }
 
     /// By its ideal frame.
@@ -464,7 +555,11 @@ impl Sampling {
         let stretches = exposure.stretches;
         let (samples_per_px, max_samples) = match quality.blur_samples.value() {
             Some(samples) => (f64::from(samples), samples.div_ceil(stretches)),
-            None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / stretches + 2).clamp(2, MAX_SAMPLES)),
+            None => (
+                self.samples_per_px,
+                ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / stretches + 2)
+                    .clamp(2, MAX_SAMPLES),
+            ),
         };
         exposure.with_samples(samples_per_px, max_samples)
     }

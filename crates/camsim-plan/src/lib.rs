@@ -1,7 +1,7 @@
 //! The frame plan: which passes a frame needs, how large, how many samples, and what is skipped and why.
 //!
-//! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu crate executes it, and
-//! nothing in it depends on the frame before.
+//! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu
+//! crate executes it, and nothing in it depends on the frame before.
 
 use std::sync::Arc;
 
@@ -77,7 +77,8 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
-/// Frames and groups of which what was found is remembered: so many, and more for each group that is looked at at once.
+/// Frames and groups of which what was found is remembered: so many, and more for each group that is looked
+/// at at once.
 const FRAMES_KEPT: usize = 48;
 const FRAMES_OF_GROUP_KEPT: usize = 16;
 const GROUPS_KEPT: usize = 2;
@@ -92,7 +93,8 @@ pub struct Planner {
     shutter: Shutter,
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
-    /// The same with half of its probes, for even frames and odd ones of a group; and with half of those, for every second of these frames.
+    /// The same with half of its probes, for even frames and odd ones of a group; and with half of those, for
+    /// every second of these frames.
     halves: Option<[Arc<LensReach>; 2]>,
     quarters: Option<[[Arc<LensReach>; 2]; 2]>,
     outline: Arc<edges::SceneOutline>,
@@ -111,7 +113,8 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Prepares for the frames of `sequence`; `max_side_px` is the largest texture side that the renderer has.
+    /// Prepares for the frames of `sequence`; `max_side_px` is the largest texture side that the renderer
+    /// has.
     ///
     /// # Errors
     /// A camera or shutter that cannot be used.
@@ -122,8 +125,8 @@ impl Planner {
         Self::of_scene(sequence, channels, max_side_px, outline, grain, surfaces)
     }
 
-    /// A planner for the frames of another sequence. Where its scene is this one's (the same [`Arc`]), what is known of the scene is taken
-    /// over: finding it anew takes longer than a plan. No plan changes by it.
+    /// A planner for the frames of another sequence. Where its scene is this one's (the same [`Arc`]), what
+    /// is known of the scene is taken over: finding it anew takes longer than a plan. No plan changes by it.
     ///
     /// # Errors
     /// As [`Planner::new`].
@@ -148,12 +151,17 @@ impl Planner {
         let zoom = ZoomTable::from_spec(camera)?;
         let fixed = match zoom {
             Some(_) => None,
-            None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
+            None => Some(Arc::new(
+                LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?,
+            )),
         };
-        let halves = fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
-        let quarters = halves
-            .as_ref()
-            .map(|halves| halves.each_ref().map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low)))));
+        let halves =
+            fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
+        let quarters = halves.as_ref().map(|halves| {
+            halves
+                .each_ref()
+                .map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low))))
+        });
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let max_ideal_px = MAX_IDEAL_PX;
         let frames_kept = FRAMES_KEPT + FRAMES_OF_GROUP_KEPT * Self::groups_at_once();
@@ -178,7 +186,8 @@ impl Planner {
         })
     }
 
-    /// For renderers that only want to know the geometry of the ideal frame and never make it: any number of pixels will do.
+    /// For renderers that only want to know the geometry of the ideal frame and never make it: any number of
+    /// pixels will do.
     #[must_use]
     pub fn with_ideals_of_any_area(self) -> Self {
         Self { max_ideal_px: u64::MAX, ..self }
@@ -243,17 +252,24 @@ impl Planner {
         refusal::check_size(frame, ideal.size_px, self.max_side_px, self.max_ideal_px)?;
         let mut skipped = Vec::new();
         if sampling.samples_a_pixel == 1 && !look.is_paper() {
-            skipped
-                .push(Skip { what: "several samples an ideal pixel", reason: picture::why_one_sample(scenery, &picture, quality).into() });
+            skipped.push(Skip {
+                what: "several samples an ideal pixel",
+                reason: picture::why_one_sample(scenery, &picture, quality).into(),
+            });
         }
         let camera = &look.reach.camera;
-        let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
+        let ray =
+            if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
         let (mut exposure, blur, edges) = if look.is_paper() {
-            skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
+            skipped.push(Skip {
+                what: "silhouette supersampling",
+                reason: "quality.preset \"paper\" takes one sample a pixel".into(),
+            });
             (None, paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
             let exposed = look.exposed(motion, &ideal);
-            let exposure = exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
+            let exposure =
+                exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
             let case = edges::EdgeCase {
                 outline: &self.outline,
                 pose: &key_pose,
@@ -267,7 +283,11 @@ impl Planner {
                 rays: picture.rays,
             };
             let edges = edges::edge_stage(&case, &mut skipped);
-            (exposure, exposure.map(|exposure| look.blur_stage(exposure, edges, &sampling, motion, &ideal)), edges)
+            (
+                exposure,
+                exposure.map(|exposure| look.blur_stage(exposure, edges, &sampling, motion, &ideal)),
+                edges,
+            )
         };
         let expected = scenery.prospect.expected(&sampling, blur);
         let shown = scenery.shown(blur.is_some());
@@ -284,7 +304,8 @@ impl Planner {
             demanded,
             ray,
             blur,
-            straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
+            straight_blur: blur
+                .map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
             shown: &shown,
             most_displaced_dn: levels::for_displaced_dn(
@@ -304,9 +325,10 @@ impl Planner {
             let missed = choice.missed_px.filter(|_| demanded != Some(TemporalStage::Linear));
             let Some((before, [px, most_px])) = exposure.zip(missed) else { break };
             // A vibration that the nodes were blind to asks for as many as it has periods.
-            let by_rule =
-                Some(look.exposed(motion, &tried).path_within(most_px)).filter(|rule| px > most_px && rule.steps() > before.steps());
-            let finer = by_rule.into_iter().chain(before.finer(px, most_px)).max_by_key(|finer| finer.steps());
+            let by_rule = Some(look.exposed(motion, &tried).path_within(most_px))
+                .filter(|rule| px > most_px && rule.steps() > before.steps());
+            let finer =
+                by_rule.into_iter().chain(before.finer(px, most_px)).max_by_key(|finer| finer.steps());
             let Some(finer) = finer else { break };
             exposure = Some(finer);
             case.blur = Some(look.blur_stage(finer, edges, &sampling, motion, &tried));
@@ -327,14 +349,17 @@ impl Planner {
             None if quality.key_frames == Auto::Auto && scenery.layers.is_some() => {
                 let layers_dn = |count: u32| match count {
                     1 => scenery.layers_dn(),
-                    _ => look.layers(&keys::spread(look.path(), window_s, count)).map_or(0.0, |layers| layers.error_dn),
+                    _ => look
+                        .layers(&keys::spread(look.path(), window_s, count))
+                        .map_or(0.0, |layers| layers.error_dn),
                 };
                 keys::for_layers(layers_dn, predicted.without_layers_dn(), quality.max_error_dn)
             }
             // Each frame of a group has the one that is common to all.
             _ => 1,
         };
-        let wanted = keys::wanted(predicted.holes_of_one.as_ref(), for_layers, temporal, quality, &mut skipped);
+        let wanted =
+            keys::wanted(predicted.holes_of_one.as_ref(), for_layers, temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(look.path(), window_s, count);
             let ideal = look.geometry(&keys, sampling.scale, Some(temporal));
@@ -347,8 +372,11 @@ impl Planner {
                 keys
             },
         );
-        predicted.holes =
-            if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
+        predicted.holes = if keys.len() > 1 {
+            looks_behind.then(|| truths.holes(&keys, quality.max_error_px))
+        } else {
+            predicted.holes_of_one
+        };
         if keys.len() > 1 && scenery.layers.is_some() {
             predicted.layers = look.layers(&keys);
         }
@@ -395,7 +423,8 @@ impl Planner {
         if plan.copied_from().is_some() {
             plan.skipped.push(Skip {
                 what: "reads between ideal pixels",
-                reason: "where the host makes the picture: the camera's pixels are the ideal frame's own".into(),
+                reason: "where the host makes the picture: the camera's pixels are the ideal frame's own"
+                    .into(),
             });
         }
         Ok(plan)
@@ -459,7 +488,8 @@ pub fn table_shape(shutter: &Shutter) -> (LinesAxis, u32, u32) {
     (axis, shutter.lines(), fields)
 }
 
-/// Farthest the optical centre gets from `key_s`'s position over the window, sampled at 17 instants plus 2 per vibration period.
+/// Farthest the optical centre gets from `key_s`'s position over the window, sampled at 17 instants plus 2
+/// per vibration period.
 fn travel_m(path: &CameraPath, window_s: [f64; 2], key_s: f64) -> f64 {
     let key = path.pose(key_s).position_ned_m;
     motion::instants(path, window_s).map(|t| path.pose(t).position_ned_m.distance(key)).fold(0.0, f64::max)

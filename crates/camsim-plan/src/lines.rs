@@ -5,10 +5,11 @@ use glam::{DMat3, DVec3};
 use super::{FramePlan, table_shape};
 use camsim_core::{frame::RowRecord, mount::CameraPath, pose::CameraPose, shutter::LinesAxis};
 
-/// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`; with more than one node
-/// the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the mid-window camera's the poses `x_mid = R x_key + t` of the
-/// keys in that camera follow, and of frames with several keys then an entry for each field and line with the line's mid-exposure as a share of
-/// the window in its first number.
+/// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`;
+/// with more than one node the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the
+/// mid-window camera's the poses `x_mid = R x_key + t` of the keys in that camera follow, and of frames with
+/// several keys then an entry for each field and line with the line's mid-exposure as a share of the window
+/// in its first number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePoses {
     /// Rows of `(R | t)`.
@@ -99,8 +100,8 @@ fn rows_of(rotation: DMat3, shift: DVec3) -> [[f32; 4]; 3] {
     })
 }
 
-/// Time, pose and velocity of every line at its mid-exposure. With sideways readout and interlacing the records are those of the field
-/// that keeps the exact time.
+/// Time, pose and velocity of every line at its mid-exposure. With sideways readout and interlacing the
+/// records are those of the field that keeps the exact time.
 #[must_use]
 pub fn row_records(plan: &FramePlan, path: &CameraPath, epoch_ns: i64) -> Vec<RowRecord> {
     (0..plan.shutter.lines())

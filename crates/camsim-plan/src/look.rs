@@ -64,7 +64,11 @@ pub(super) struct Scenery<'a> {
 
 impl Planner {
     /// Looks at a frame, by itself or from an ideal frame that others are made from too.
-    pub(super) fn look<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>) -> Result<Look<'a>, PlanError> {
+    pub(super) fn look<'a>(
+        &'a self,
+        frame: u64,
+        common: Option<&'a sharing::Common>,
+    ) -> Result<Look<'a>, PlanError> {
         self.look_with(frame, common, common.is_some())
     }
 
@@ -73,23 +77,33 @@ impl Planner {
         self.look_with(frame, None, true)
     }
 
-    fn look_with<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>, has_half: bool) -> Result<Look<'a>, PlanError> {
+    fn look_with<'a>(
+        &'a self,
+        frame: u64,
+        common: Option<&'a sharing::Common>,
+        has_half: bool,
+    ) -> Result<Look<'a>, PlanError> {
         let stamp_s = self.stamp_s(frame);
         let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
         let half = if has_half { self.half_the_probes(frame) } else { None };
         let reach = match (&half.or_else(|| self.fixed.clone()), &self.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
-            (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
+            (None, Some(table), Some(value)) => {
+                Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?)
+            }
             _ => return Err(PlanError::NoRay),
         };
-        let tried = if has_half { self.quarter_of_the_probes(frame) } else { None }.unwrap_or_else(|| reach.clone());
+        let tried =
+            if has_half { self.quarter_of_the_probes(frame) } else { None }.unwrap_or_else(|| reach.clone());
         let (first, last) = self.shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
         let path = &*self.sequence.path;
         let key_s = common.map_or(0.5 * (window_s[0] + window_s[1]), |common| common.key_s);
         let key_pose = path.pose(key_s);
-        let key_twist =
-            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
+        let key_twist = Twist {
+            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
+            rate_rad_s: path.rate_camera(key_s),
+        };
         let demanded = forced::temporal_stage(&self.sequence.scenario.quality);
         let asked = sharing::Asked::default();
         Ok(Look {
@@ -129,11 +143,23 @@ impl<'a> Look<'a> {
         &self.planner.sequence.path
     }
 
-    /// Ideal frame that shows what a solver looks for in `keys`, or what all those do that are made from the common one.
+    /// Ideal frame that shows what a solver looks for in `keys`, or what all those do that are made from the
+    /// common one.
     pub fn geometry(&self, keys: &[KeyFrame], scale: f64, solver: Option<TemporalStage>) -> IdealGeometry {
         let Self { planner, reach, stamp_s, key_s, .. } = self;
         let displaced = solver.map(|stage| (stage, self.key_twist));
-        let own = || bounds::view(reach, self.path(), &planner.shutter, *stamp_s, *key_s, keys, &planner.surfaces, displaced);
+        let own = || {
+            bounds::view(
+                reach,
+                self.path(),
+                &planner.shutter,
+                *stamp_s,
+                *key_s,
+                keys,
+                &planner.surfaces,
+                displaced,
+            )
+        };
         self.common.map_or_else(own, |common| common.view).pixels(&reach.camera, scale)
     }
 
@@ -145,7 +171,14 @@ impl<'a> Look<'a> {
 
     pub fn exposed(&self, motion: Motion, ideal: &IdealGeometry) -> exposure::Exposed<'_> {
         let (path, shutter) = (self.path(), &self.planner.shutter);
-        exposure::Exposed { reach: &self.reach, path, shutter, stamp_s: self.stamp_s, focal_px: ideal.focal_px, motion }
+        exposure::Exposed {
+            reach: &self.reach,
+            path,
+            shutter,
+            stamp_s: self.stamp_s,
+            focal_px: ideal.focal_px,
+            motion,
+        }
     }
 
     /// The exposure with its samples, and with the poses that rays at silhouettes take.
@@ -159,7 +192,11 @@ impl<'a> Look<'a> {
     ) -> BlurStage {
         let quality = &self.planner.sequence.scenario.quality;
         let has_rays = edges.has_rays() && self.demanded != Some(TemporalStage::Linear);
-        let exposure = if has_rays { self.exposed(motion, ideal).with_poses_for_rays(exposure, quality) } else { exposure };
+        let exposure = if has_rays {
+            self.exposed(motion, ideal).with_poses_for_rays(exposure, quality)
+        } else {
+            exposure
+        };
         sampling.blur_stage(exposure, quality, motion.blur_px)
     }
 
@@ -171,10 +208,19 @@ impl<'a> Look<'a> {
             false => self.geometry(&[self.key()], reach.least_scale(), self.demanded),
         };
         let motion = self.motion_in(&ideal);
-        let reason_for_none = outline.reason_for_none(&sequence.scene, key_pose, ideal.tangents(), motion.travel_m);
+        let reason_for_none =
+            outline.reason_for_none(&sequence.scene, key_pose, ideal.tangents(), motion.travel_m);
         Scenery {
             // A few of all probes, whoever has the others.
-            prospect: prospect::Prospect::new(fixed.as_ref().unwrap_or(reach), sequence, surfaces, grain, shutter, *stamp_s, key_pose),
+            prospect: prospect::Prospect::new(
+                fixed.as_ref().unwrap_or(reach),
+                sequence,
+                surfaces,
+                grain,
+                shutter,
+                *stamp_s,
+                key_pose,
+            ),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
             layers: self.layers(&[self.key()]),
             may_have_samples: !self.is_paper() && sequence.scene.has_borders_of_triangles(),
@@ -210,7 +256,9 @@ impl<'a> Look<'a> {
         let own = self.surroundings(self.frame, reach);
         let least_share = truths.share_apart(|probe| own.around[probe].is_beside);
         let (plane, holes) = (truths.plane(), truths.holes(&[self.key()], quality.max_error_px));
-        let outlook = |all: &Surroundings| contours::Outlook::new(all, &reach.camera, key_pose, &plane, holes, least_share);
+        let outlook = |all: &Surroundings| {
+            contours::Outlook::new(all, &reach.camera, key_pose, &plane, holes, least_share)
+        };
         if !self.has_half {
             return Some(outlook(&own));
         }
@@ -221,19 +269,31 @@ impl<'a> Look<'a> {
     fn surroundings(&self, frame: u64, reach: &LensReach) -> Arc<Surroundings> {
         let Planner { sequence, shutter, surfaces, surroundings, surroundings_by_half, .. } = self.planner;
         let gain = &prospect::gain(sequence, &reach.camera);
-        let search = Search { reach, surfaces, path: self.path(), shutter, stamp_s: self.planner.stamp_s(frame), gain };
+        let search = Search {
+            reach,
+            surfaces,
+            path: self.path(),
+            shutter,
+            stamp_s: self.planner.stamp_s(frame),
+            gain,
+        };
         let known = if self.has_half { surroundings_by_half } else { surroundings };
         known.of(frame, || search.look_around())
     }
 
-    /// What is around the probes of the frames beside this one in a group, as its own camera would see that: borders are few, and half of the probes of one frame tell too little.
+    /// What is around the probes of the frames beside this one in a group, as its own camera would see that:
+    /// borders are few, and half of the probes of one frame tell too little.
     fn surroundings_of_neighbours(&self) -> impl Iterator<Item = Surroundings> {
         let (planner, frame) = (self.planner, self.frame);
         let first = frame / TOGETHER * TOGETHER;
         // The one beside it has the other half, whatever its group is.
-        let is_beside = move |other: u64| other == frame ^ 1 || other != frame && planner.group_of(other) == planner.group_of(frame);
-        let others = (first..first + TOGETHER).filter(move |&other| other < planner.sequence.frames && is_beside(other));
-        let own_pose = |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(x, y));
+        let is_beside = move |other: u64| {
+            other == frame ^ 1 || other != frame && planner.group_of(other) == planner.group_of(frame)
+        };
+        let others = (first..first + TOGETHER)
+            .filter(move |&other| other < planner.sequence.frames && is_beside(other));
+        let own_pose =
+            |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(x, y));
         others.filter_map(move |other| {
             let reach = self.planner.half_the_probes(other)?;
             Some(self.surroundings(other, &reach).seen_from(&reach.probes, own_pose))
@@ -265,11 +325,13 @@ impl Scenery<'_> {
         self.layers.map_or(0.0, |layers| layers.error_dn)
     }
 
-    /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
+    /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than
+    /// rays could make up for.
     pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
         let is_auto = quality.silhouettes == Silhouettes::Auto;
-        self.outlook
-            .as_ref()
-            .is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale, self.may_have_samples).are_affordable(quality.max_error_dn))
+        self.outlook.as_ref().is_none_or(|outlook| {
+            !is_auto
+                || outlook.plain_at_best(scale, self.may_have_samples).are_affordable(quality.max_error_dn)
+        })
     }
 }

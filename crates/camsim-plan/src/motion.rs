@@ -11,7 +11,9 @@ const INSTANTS_PER_PERIOD: f64 = 8.0;
 /// Instants that cover a window: 17, and at least 8 a vibration period.
 pub(super) fn instants(path: &CameraPath, window_s: [f64; 2]) -> impl Iterator<Item = f64> {
     let [first, last] = window_s;
-    let steps = (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * (last - first)).ceil().clamp(16.0, 4096.0) as u32;
+    let steps = (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * (last - first))
+        .ceil()
+        .clamp(16.0, 4096.0) as u32;
     (0..=steps).map(move |k| first + (last - first) * f64::from(k) / f64::from(steps))
 }
 
@@ -29,8 +31,9 @@ pub(super) fn measure(
     let (first, last) = shutter.window_s();
     let window_s = [stamp_s + first, stamp_s + last];
     let travel_m = super::travel_m(path, window_s, key_s);
-    let rotation_rad =
-        instants(path, window_s).map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera)).fold(0.0, f64::max);
+    let rotation_rad = instants(path, window_s)
+        .map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera))
+        .fold(0.0, f64::max);
     let nearest_m = surfaces.nearest_m(&key, ideal.tangents(), travel_m);
     let slant = reach.slant();
     let focal_px = ideal.focal_px.max_element();
@@ -39,7 +42,8 @@ pub(super) fn measure(
         nearest_m,
         travel_m,
         rotation_rad,
-        // d(h)/d(t): at most f |t| w sqrt(1 + r^2) for a unit w; rotation moves a ray by at most f theta (1 + r^2).
+        // d(h)/d(t): at most f |t| w sqrt(1 + r^2) for a unit w; rotation moves a ray by at most f theta (1 +
+        // r^2).
         parallax_px: focal_px * travel_m / nearest_m * slant,
         rotation_px: focal_px * rotation_rad * slant * slant,
         blur_px,
@@ -47,7 +51,8 @@ pub(super) fn measure(
     }
 }
 
-/// Longest path over the exposure, and the largest miss of its chord, over a few lines, rays and both depth extremes.
+/// Longest path over the exposure, and the largest miss of its chord, over a few lines, rays and both depth
+/// extremes.
 fn blur_path(
     reach: &LensReach,
     path: &CameraPath,
@@ -60,7 +65,8 @@ fn blur_path(
     if exposure_s <= 0.0 {
         return (0.0, 0.0);
     }
-    let steps = (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
+    let steps =
+        (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
     let (mut longest, mut sagitta) = (0.0_f64, 0.0_f64);
     let every = (reach.rays.len() / 24).max(1);
     for &(uv, [x, y]) in reach.rays.iter().step_by(every) {
@@ -78,7 +84,11 @@ fn blur_path(
             longest = longest.max(at.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
             if let (Some(&a), Some(&b)) = (at.first(), at.last()) {
                 let last = (at.len() - 1).max(1) as f64;
-                let miss = at.iter().enumerate().map(|(k, p)| p.distance(a.lerp(b, k as f64 / last))).fold(0.0, f64::max);
+                let miss = at
+                    .iter()
+                    .enumerate()
+                    .map(|(k, p)| p.distance(a.lerp(b, k as f64 / last)))
+                    .fold(0.0, f64::max);
                 sagitta = sagitta.max(miss);
             }
         }
@@ -97,7 +107,10 @@ pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut
     if temporal == TemporalStage::Identity {
         skipped.push(Skip {
             what: "temporal inverse",
-            reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
+            reason: format!(
+                "rotation within the frame moves no pixel by more than {:.2e} px",
+                motion.rotation_px
+            ),
         });
     }
 }

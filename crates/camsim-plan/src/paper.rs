@@ -47,7 +47,11 @@ pub(super) fn ray_stage(camera: &CameraModel) -> RayStage {
     if camera.lens.is_identity() { RayStage::Pinhole } else { RayStage::GaussNewton }
 }
 
-pub(super) fn blur_stage(shutter: &Shutter, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<BlurStage> {
+pub(super) fn blur_stage(
+    shutter: &Shutter,
+    quality: &QualitySpec,
+    skipped: &mut Vec<Skip>,
+) -> Option<BlurStage> {
     if shutter.exposure_s() <= 0.0 {
         skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
         return None;
@@ -64,7 +68,9 @@ pub(super) fn blur_stage(shutter: &Shutter, quality: &QualitySpec, skipped: &mut
 }
 
 pub(super) fn fog(scene: &Scene) -> Option<LinearFog> {
-    scene.fog_visibility_m.map(|end_m| LinearFog { sky_stored: scene.sky_linear.map(srgb_from_linear), end_m })
+    scene
+        .fog_visibility_m
+        .map(|end_m| LinearFog { sky_stored: scene.sky_linear.map(srgb_from_linear), end_m })
 }
 
 #[cfg(test)]
@@ -84,10 +90,14 @@ mod tests {
 
     #[test]
     fn an_exposure_takes_a_hundred_samples_or_as_many_as_asked_for() {
-        let shutter = |exposure_ms| Shutter::from_spec(&ShutterSpec { exposure_ms, ..ShutterSpec::default() }, 30.0, [640, 480]).unwrap();
+        let shutter = |exposure_ms| {
+            Shutter::from_spec(&ShutterSpec { exposure_ms, ..ShutterSpec::default() }, 30.0, [640, 480])
+                .unwrap()
+        };
         let samples = |blur_samples, exposure_ms| {
             let quality = QualitySpec { blur_samples, ..QualitySpec::default() };
-            blur_stage(&shutter(exposure_ms), &quality, &mut Vec::new()).map(|blur| (blur.nodes, blur.max_samples))
+            blur_stage(&shutter(exposure_ms), &quality, &mut Vec::new())
+                .map(|blur| (blur.nodes, blur.max_samples))
         };
         assert_eq!(samples(Auto::Auto, 8.0), Some((2, 100)));
         assert_eq!(samples(Auto::Value(10), 8.0), Some((2, 10)));

@@ -1,4 +1,5 @@
-//! How a frame's picture is made: what reads the ideal frame and how fine that is, and whether pixels at silhouettes have rays of their own.
+//! How a frame's picture is made: what reads the ideal frame and how fine that is, and whether pixels at
+//! silhouettes have rays of their own.
 
 use super::{
     contours::{Contours, Outlook},
@@ -13,10 +14,12 @@ use camsim_core::{
     temporal::SAMPLES,
 };
 
-/// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost less than finer ones.
+/// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost
+/// less than finer ones.
 const MOST_SCALE_WITH_RAYS: f64 = 2.83;
 
-/// Pixels of the largest ideal frame with several samples a pixel, of 12 bytes each on a device, and those along a side: the host draws twice as many there, whose places it knows up to 32 768.
+/// Pixels of the largest ideal frame with several samples a pixel, of 12 bytes each on a device, and those
+/// along a side: the host draws twice as many there, whose places it knows up to 32 768.
 const MOST_SAMPLED_PX: u64 = 1 << 24;
 const MOST_SAMPLED_SIDE_PX: u32 = 16_000;
 
@@ -24,7 +27,8 @@ const MOST_SAMPLED_SIDE_PX: u32 = 16_000;
 const LEAST_RAYS_BY_HAND: u32 = 32;
 const MOST_RAYS_BY_HAND: u32 = 256;
 
-/// Part of what samples leave of borders, squared, that their rays may add: where that does, and where it does not.
+/// Part of what samples leave of borders, squared, that their rays may add: where that does, and where it
+/// does not.
 const FEW_ADD: f64 = 0.3;
 const MANY_ADD: f64 = 0.03;
 
@@ -49,7 +53,15 @@ impl Picture {
     }
 
     fn of(choice: &Choice, silhouettes: Option<Contours>, is_plain: bool, [fine, rays]: [u32; 2]) -> Self {
-        Self { sampling: choice.sampling, silhouettes, is_plain, fine, rays, price: choice.price, total_dn: choice.total_dn }
+        Self {
+            sampling: choice.sampling,
+            silhouettes,
+            is_plain,
+            fine,
+            rays,
+            price: choice.price,
+            total_dn: choice.total_dn,
+        }
     }
 }
 
@@ -84,40 +96,54 @@ impl Look<'_> {
         let layers_dn = scenery.layers_dn();
         let given = self.asked.given;
         let Some(outlook) = outlook else {
-            let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
-            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
+            let usual =
+                |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
+            let choice = given.map_or_else(
+                || prospect.choose(&task, &usual),
+                |given| prospect.given(&given, &task, &usual),
+            );
             return Picture::of(&choice, None, false, [1, 0]);
         };
         let of_plain = Task { may_have_samples: scenery.may_have_samples, ..task };
-        let most_sampled_scale = self.scale_of(scenery, MOST_SAMPLED_PX, MOST_SAMPLED_SIDE_PX.min(self.planner.max_side_px));
+        let most_sampled_scale =
+            self.scale_of(scenery, MOST_SAMPLED_PX, MOST_SAMPLED_SIDE_PX.min(self.planner.max_side_px));
         let may_be_plain = |sampling: &Sampling| {
             let (is_one, is_small) = (sampling.samples_a_pixel == 1, sampling.scale <= most_sampled_scale);
             // Several that are asked for are taken wherever they can be.
-            let is_asked = is_small != is_one || quality.ideal_samples != Auto::Value(SAMPLES) || !scenery.may_have_samples;
+            let is_asked = is_small != is_one
+                || quality.ideal_samples != Auto::Value(SAMPLES)
+                || !scenery.may_have_samples;
             (is_one || is_small) && is_asked && is_up_to(FINEST_SCALE, sampling.scale, &of_plain)
         };
         // Samples that are asked for are for silhouettes that are left as they are.
-        let is_plain_by_hand = quality.silhouettes == Silhouettes::Plain || quality.ideal_samples == Auto::Value(SAMPLES);
+        let is_plain_by_hand =
+            quality.silhouettes == Silhouettes::Plain || quality.ideal_samples == Auto::Value(SAMPLES);
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
-            Some(given) => {
-                prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn)))
-            }
+            Some(given) => prospect.given(&given, &of_plain, &|sampling, blur| {
+                Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))
+            }),
             None => prospect.choose(&of_plain, &|sampling, blur| {
-                let plain = may_be_plain(sampling).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
+                let plain =
+                    may_be_plain(sampling).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
                 Some(plain.error_dn.hypot(layers_dn))
             }),
         };
         let plain = || plain_if(&|plain| is_plain_by_hand || plain.are_affordable(max_error_dn));
-        let rays = |scale: f64, &Rays { fine, most_part }: &Rays| match (quality.blur_samples, task.exposure) {
-            (Auto::Value(samples), Some(_)) => samples.clamp(LEAST_RAYS_BY_HAND * fine, MOST_RAYS_BY_HAND).next_power_of_two(),
+        let rays = |scale: f64, &Rays { fine, most_part }: &Rays| match (quality.blur_samples, task.exposure)
+        {
+            (Auto::Value(samples), Some(_)) => {
+                samples.clamp(LEAST_RAYS_BY_HAND * fine, MOST_RAYS_BY_HAND).next_power_of_two()
+            }
             _ => outlook.rays(scale, fine, most_part),
         };
         let with_rays = || {
             let most_fine = |scale: f64| {
-                let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
+                let size_px =
+                    scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
                 edges::most_fine(size_px, self.planner.max_side_px)
             };
-            WithRays { prospect, task: &task, outlook, layers_dn, most_fine: &most_fine, count: &rays }.choose()
+            WithRays { prospect, task: &task, outlook, layers_dn, most_fine: &most_fine, count: &rays }
+                .choose()
         };
         let (choice, kind) = match quality.silhouettes {
             Silhouettes::Plain => (plain(), None),
@@ -127,7 +153,10 @@ impl Look<'_> {
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
                 let fewest = rays(task.least_scale, &Rays::FEWEST);
-                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, fewest, task.ideal_share) {
+                if plain.within
+                    && plain.price.ms
+                        < prospect.rays_ms(outlook.share, task.least_scale, 1, fewest, task.ideal_share)
+                {
                     (plain, None)
                 } else {
                     let (with_rays, kind) = with_rays();
@@ -143,7 +172,11 @@ impl Look<'_> {
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
         let (fine, rays) = kind.map_or((1, 0), |kind| (kind.fine, rays(sampling.scale, &kind)));
-        let silhouettes = Some(if rays == 0 { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine, rays) });
+        let silhouettes = Some(if rays == 0 {
+            outlook.plain(sampling, blur)
+        } else {
+            outlook.with_rays(sampling, blur, fine, rays)
+        });
         Picture::of(&choice, silhouettes, rays == 0, [fine, rays])
     }
 
@@ -158,14 +191,18 @@ impl Look<'_> {
     fn ideal_share(&self, scenery: &Scenery<'_>) -> f64 {
         let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
         let frames = self.common.map_or(1.0, |common| common.count() as f64);
-        pixels(scenery.ideal.size_px) / (pixels(self.reach.camera.size_px) * self.reach.least_scale().powi(2) * frames)
+        pixels(scenery.ideal.size_px)
+            / (pixels(self.reach.camera.size_px) * self.reach.least_scale().powi(2) * frames)
     }
 }
 
-/// Whether one is the better choice: within the tolerance, or where neither is, near the least error that there is; and of two that are, the cheaper one.
+/// Whether one is the better choice: within the tolerance, or where neither is, near the least error that
+/// there is; and of two that are, the cheaper one.
 fn is_better(one: &Choice, other: &Choice) -> bool {
     let least_dn = one.least_dn.min(other.least_dn);
-    let is_good = |choice: &Choice| if one.within || other.within { choice.within } else { choice.total_dn <= NEARLY * least_dn };
+    let is_good = |choice: &Choice| {
+        if one.within || other.within { choice.within } else { choice.total_dn <= NEARLY * least_dn }
+    };
     is_good(one) && (!is_good(other) || one.price.ms < other.price.ms)
 }
 
@@ -186,11 +223,12 @@ struct Rays {
 impl Rays {
     const FEWEST: Self = Self { fine: 1, most_part: FEW_ADD };
 
-    /// In the order in which they are tried: more pixels cost less than finer ones, so that these are for what the finest ideal frame does not do.
-    /// Where nothing moves the fewest add nothing.
+    /// In the order in which they are tried: more pixels cost less than finer ones, so that these are for
+    /// what the finest ideal frame does not do. Where nothing moves the fewest add nothing.
     fn all(moves: bool) -> impl Iterator<Item = Self> {
         let parts: &[f64] = if moves { &[FEW_ADD, MANY_ADD] } else { &[FEW_ADD] };
-        (1..=edges::MOST_FINE).flat_map(move |fine| parts.iter().map(move |&most_part| Self { fine, most_part }))
+        (1..=edges::MOST_FINE)
+            .flat_map(move |fine| parts.iter().map(move |&most_part| Self { fine, most_part }))
     }
 }
 
@@ -218,7 +256,10 @@ impl WithRays<'_> {
         }
         let least_dn = failed.iter().map(|(choice, _)| choice.least_dn).fold(f64::INFINITY, f64::min);
         let near = failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn);
-        near.map_or_else(|| (self.choose_of(Rays::FEWEST), Rays::FEWEST), |(choice, rays)| (Choice { least_dn, ..choice }, rays))
+        near.map_or_else(
+            || (self.choose_of(Rays::FEWEST), Rays::FEWEST),
+            |(choice, rays)| (Choice { least_dn, ..choice }, rays),
+        )
     }
 
     fn choose_of(&self, rays: Rays) -> Choice {
@@ -228,7 +269,8 @@ impl WithRays<'_> {
         let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
         let choice = prospect.choose(task, &|sampling, blur| {
             let count = count(sampling.scale, &rays);
-            may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine, count).error_dn.hypot(layers_dn))
+            may(sampling.scale)
+                .then(|| outlook.with_rays(sampling, blur, fine, count).error_dn.hypot(layers_dn))
         });
         let scale = choice.sampling.scale;
         let rays_ms = prospect.rays_ms(outlook.share, scale, fine, count(scale, &rays), task.ideal_share);
@@ -237,7 +279,11 @@ impl WithRays<'_> {
 }
 
 /// Why pixels of the ideal frame have one sample.
-pub(super) fn why_one_sample(scenery: &Scenery<'_>, picture: &Picture, quality: &QualitySpec) -> &'static str {
+pub(super) fn why_one_sample(
+    scenery: &Scenery<'_>,
+    picture: &Picture,
+    quality: &QualitySpec,
+) -> &'static str {
     match (&scenery.outlook, quality.ideal_samples) {
         _ if !scenery.may_have_samples => {
             "surfaces have holes by their pictures, or are mixed with what is behind them: samples do not show such borders"

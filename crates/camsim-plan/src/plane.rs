@@ -1,7 +1,9 @@
-//! The plane that is nearest to what a camera sees: look-ups of depth begin there, and so find what they look for with fewer of them.
+//! The plane that is nearest to what a camera sees: look-ups of depth begin there, and so find what they look
+//! for with fewer of them.
 //!
-//! In the camera's axes a point X is on the plane if `n . X = 1`. Towards (u, v, 1) the plane has the inverse planar depth `n . (u, v, 1)`: it is linear in
-//! the picture, and an ideal frame over flat ground needs no second look-up whatever the parallax.
+//! In the camera's axes a point X is on the plane if `n . X = 1`. Towards (u, v, 1) the plane has the inverse
+//! planar depth `n . (u, v, 1)`: it is linear in the picture, and an ideal frame over flat ground needs no
+//! second look-up whatever the parallax.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -20,8 +22,9 @@ pub struct SeenPlane {
 }
 
 impl SeenPlane {
-    /// The plane of the least squared difference of inverse planar depths (1/m), seen along (u, v, 1). The sky is not to be among them: beyond the horizon a plane
-    /// has none either. Infinitely far where they do not tell.
+    /// The plane of the least squared difference of inverse planar depths (1/m), seen along (u, v, 1). The
+    /// sky is not to be among them: beyond the horizon a plane has none either. Infinitely far where they do
+    /// not tell.
     pub(super) fn fitted(camera: CameraPose, seen: impl Iterator<Item = (DVec2, f64)>) -> Self {
         let (mut squares, mut sum) = (DMat3::ZERO, DVec3::ZERO);
         for (uv, inverse_depth) in seen {
@@ -54,7 +57,10 @@ mod tests {
 
     #[test]
     fn a_plane_is_found_and_is_the_same_from_elsewhere() {
-        let camera = CameraPose { position_ned_m: DVec3::new(3e4, -2e4, -900.0), ned_from_camera: DQuat::from_rotation_x(0.3) };
+        let camera = CameraPose {
+            position_ned_m: DVec3::new(3e4, -2e4, -900.0),
+            ned_from_camera: DQuat::from_rotation_x(0.3),
+        };
         let normal = DVec3::new(2e-4, -3e-4, 1e-3);
         let plane = SeenPlane::fitted(camera, places().map(|uv| (uv, normal.dot(uv.extend(1.0)))));
         assert!((plane.normal_per_m - normal).length() < 1e-15, "{plane:?}");

@@ -1,4 +1,5 @@
-//! Probes: a few hundred output pixels at which the reverse pipeline is run dry, in f64 and against exact rays, before a frame is rendered.
+//! Probes: a few hundred output pixels at which the reverse pipeline is run dry, in f64 and against exact
+//! rays, before a frame is rendered.
 
 use glam::{DMat2, DVec2};
 
@@ -6,7 +7,8 @@ use camsim_core::camera::CameraModel;
 
 /// Probes along the width and the height of the image.
 const GRID: [u32; 2] = [24, 18];
-/// Irrational steps of a sequence that is even over a square: the cells' probes do not line up with anything in the scene.
+/// Irrational steps of a sequence that is even over a square: the cells' probes do not line up with anything
+/// in the scene.
 const SPREAD: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
 
 /// A pixel that stands for those around it.
@@ -20,20 +22,25 @@ pub(super) struct Probe {
     pub distorted: DVec2,
     /// d(uv)/d(output pixel), one column an axis.
     pub uv_from_px: DMat2,
-    /// Of two kinds of them, which lie like the fields of a chessboard, the second; and whether its row is the second of two.
+    /// Of two kinds of them, which lie like the fields of a chessboard, the second; and whether its row is
+    /// the second of two.
     pub is_odd: bool,
     pub is_low: bool,
 }
 
-/// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only pixels that have a ray.
+/// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only
+/// pixels that have a ray.
 pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
     let [width, height] = camera.size_px;
     let [columns, rows] = grid(camera);
     let inside = (0..rows).flat_map(|j| {
         (0..columns).map(move |i| {
             let k = f64::from(j * columns + i) + 0.5;
-            let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])]
-                .map(|(cell, cells, side, spread)| ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32);
+            let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])].map(
+                |(cell, cells, side, spread)| {
+                    ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32
+                },
+            );
             ([x.min(width - 1), y.min(height - 1)], [(i + j) % 2 == 1, j % 2 == 1])
         })
     });
@@ -53,7 +60,8 @@ pub(super) fn grid(camera: &CameraModel) -> [u32; 2] {
 
 /// Side of the part of the image that a probe stands for, pixels.
 pub(super) fn spacing_px(camera: &CameraModel) -> f64 {
-    let [width, height] = [0, 1].map(|axis: usize| (f64::from(camera.size_px[axis]) / f64::from(GRID[axis])).max(1.0));
+    let [width, height] =
+        [0, 1].map(|axis: usize| (f64::from(camera.size_px[axis]) / f64::from(GRID[axis])).max(1.0));
     (width * height).sqrt()
 }
 
@@ -77,11 +85,15 @@ mod tests {
     #[test]
     fn probes_cover_the_image_and_know_how_the_ray_changes() {
         let coefficients = [-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63];
-        let camera = CameraModel::new([640, 480], [307.6, 300.0], None, LensModel::BrownConrady, &coefficients).unwrap();
+        let camera =
+            CameraModel::new([640, 480], [307.6, 300.0], None, LensModel::BrownConrady, &coefficients)
+                .unwrap();
         let all = probes(&camera);
         assert!(all.len() > 400, "{}", all.len());
         for quarter in 0..4 {
-            let of_quarter = all.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
+            let of_quarter = all
+                .iter()
+                .filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
             assert!(of_quarter.count() > 90);
         }
         for probe in &all {
@@ -101,11 +113,18 @@ mod tests {
         let halves = [false, true].map(|odd| reach.with_half_the_probes(odd));
         let pixels = |reach: &LensReach| reach.probes.iter().map(|probe| probe.pixel).collect::<HashSet<_>>();
         let [even, odd] = halves.each_ref().map(pixels);
-        assert!(even.is_disjoint(&odd) && even.union(&odd).count() == reach.probes.len() && even.len() == odd.len());
+        assert!(
+            even.is_disjoint(&odd)
+                && even.union(&odd).count() == reach.probes.len()
+                && even.len() == odd.len()
+        );
         for half in &halves {
             assert!((half.probe_px.powi(2) / reach.probe_px.powi(2) - 2.0).abs() < 1e-9);
             for quarter in 0..4 {
-                let of_quarter = half.probes.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
+                let of_quarter = half
+                    .probes
+                    .iter()
+                    .filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
                 assert!((53..57).contains(&of_quarter.count()));
             }
         }
@@ -122,12 +141,16 @@ mod tests {
                 [false, true].map(|low| half.with_half_of_these(low))
             })
             .collect();
-        let all: HashSet<[u32; 2]> = quarters.iter().flat_map(|quarter| quarter.probes.iter().map(|probe| probe.pixel)).collect();
+        let all: HashSet<[u32; 2]> =
+            quarters.iter().flat_map(|quarter| quarter.probes.iter().map(|probe| probe.pixel)).collect();
         assert_eq!(all.len(), reach.probes.len());
         for quarter in &quarters {
             assert!((quarter.probe_px / reach.probe_px - 2.0).abs() < 1e-9);
             for corner in 0..4 {
-                let there = quarter.probes.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == corner);
+                let there = quarter
+                    .probes
+                    .iter()
+                    .filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == corner);
                 assert!((22..33).contains(&there.count()));
             }
         }

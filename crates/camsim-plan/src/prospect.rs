@@ -1,5 +1,5 @@
-//! A few places of the image, and all that resampling there depends on: the surface in view, its texture's grain, and the two maps from the
-//! texture over the ideal frame to the output pixel.
+//! A few places of the image, and all that resampling there depends on: the surface in view, its texture's
+//! grain, and the two maps from the texture over the ideal frame to the output pixel.
 
 use camsim_core::waves::sinc;
 use glam::{DMat2, DVec2};
@@ -14,22 +14,25 @@ use super::{
     surfaces::{FOG_AT_VISIBILITY, Met, Surfaces},
 };
 use camsim_core::{
-    camera::CameraModel, mount::CameraPath, photometric::vignette_weight, pose::CameraPose, sequence::Sequence, shutter::Shutter,
+    camera::CameraModel, mount::CameraPath, photometric::vignette_weight, pose::CameraPose,
+    sequence::Sequence, shutter::Shutter,
 };
 
-/// One probe in so many is looked at, not in step with the grid of 24 columns, and so many of these are taken at most.
+/// One probe in so many is looked at, not in step with the grid of 24 columns, and so many of these are taken
+/// at most.
 const PROBE_STEP: usize = 5;
 const SIGHTS: usize = 32;
 
-/// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
+/// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at
+/// mid-exposure.
 pub(super) struct Sight<'a> {
     /// Probes that it stands for.
     pub weight: f64,
     pub spectrum: &'a Spectrum,
     /// Of the linear range, for each unit of texture.
     pub gain: f64,
-    /// d(camera px)/d(output px), d(key px)/d(camera px), d(texel)/d(key px): from the line's camera to that of the ideal frame the same
-    /// pixel may grow or turn.
+    /// d(camera px)/d(output px), d(key px)/d(camera px), d(texel)/d(key px): from the line's camera to that
+    /// of the ideal frame the same pixel may grow or turn.
     pub camera_from_px: DMat2,
     pub key_from_camera: DMat2,
     pub texel_from_key: DMat2,
@@ -78,12 +81,20 @@ impl<'a> Prospect<'a> {
                 let in_key = rotation * uv.extend(1.0) + inverse_depth * shift;
                 focal_px * in_key.truncate() / in_key.z
             };
-            let Some(here) = surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0)) else { return Seen::Sky };
-            let Some(shown) = Shown::new(surfaces, &pose, &here, probe.uv, focal_px, key_px) else { return Seen::Several };
+            let Some(here) = surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0))
+            else {
+                return Seen::Sky;
+            };
+            let Some(shown) = Shown::new(surfaces, &pose, &here, probe.uv, focal_px, key_px) else {
+                return Seen::Several;
+            };
             let Some(grain) = grain.of(shown.surface) else { return Seen::Several };
-            let path = path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
-            let clear =
-                sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
+            let path =
+                path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
+            let clear = sequence
+                .scene
+                .fog_visibility_m
+                .map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
             Seen::Surface(Sight {
                 weight: 1.0,
                 spectrum: grain.at(shown.texel),
@@ -99,7 +110,10 @@ impl<'a> Prospect<'a> {
         };
         let seen: Vec<Seen<'_>> = probes.par_iter().step_by(PROBE_STEP).map(sight).collect();
         let counted = seen.iter().filter(|seen| !matches!(seen, Seen::Several)).count();
-        let sights = seen.into_iter().filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None }).collect();
+        let sights = seen
+            .into_iter()
+            .filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None })
+            .collect();
         let sides = |probe: &Probe| DMat2::from_diagonal(focal_px) * probe.uv_from_px;
         let width = |sides: DMat2| sides.x_axis.length().max(sides.y_axis.length());
         let lean = probes.iter().map(|probe| lean(sides(probe))).fold(0.0, f64::max);
@@ -108,11 +122,20 @@ impl<'a> Prospect<'a> {
             .map(|probe| width(sides(probe)))
             .fold([f64::INFINITY, 0.0], |[least, most], width| [width.min(least), width.max(most)]);
         let (is_bent, drawn) = (!reach.camera.lens.is_identity(), Drawn::new(&sequence.scene));
-        Self { sights: few_of(sights), is_bent, drawn, counted, principal_px: reach.camera.principal_point_px, widths, lean }
+        Self {
+            sights: few_of(sights),
+            is_bent,
+            drawn,
+            counted,
+            principal_px: reach.camera.principal_point_px,
+            widths,
+            lean,
+        }
     }
 }
 
-/// How far the parallelogram with these sides is from one that is as wide along x whatever its y: 0 of a square however it is turned and of a rectangle along the axes, 1 of a line across both.
+/// How far the parallelogram with these sides is from one that is as wide along x whatever its y: 0 of a
+/// square however it is turned and of a rectangle along the axes, 1 of a line across both.
 fn lean(sides: DMat2) -> f64 {
     let variance = sides * sides.transpose();
     variance.x_axis.y.abs() / (variance.x_axis.x * variance.y_axis.y).sqrt().max(f64::MIN_POSITIVE)
@@ -126,8 +149,9 @@ enum Seen<'a> {
     Surface(Sight<'a>),
 }
 
-/// Some of the places, each standing for as many as it is taken for. Half of them are taken evenly, and half by how much of what is hard to
-/// resample they show: the few houses on a lawn, or the few pixels that are much wider than the rest, may be most of the error.
+/// Some of the places, each standing for as many as it is taken for. Half of them are taken evenly, and half
+/// by how much of what is hard to resample they show: the few houses on a lawn, or the few pixels that are
+/// much wider than the rest, may be most of the error.
 fn few_of(sights: Vec<Sight<'_>>) -> Vec<Sight<'_>> {
     let hard: Vec<f64> = sights.iter().map(Sight::hard_to_resample).collect();
     let mean = hard.iter().sum::<f64>() / hard.len().max(1) as f64;
@@ -154,7 +178,10 @@ pub(super) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2
     move |[x, y]: [u32; 2]| {
         let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
             let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / size_px[k]) as usize);
-            f64::from(vignette_weight(map.values[row * map.size_px[0] as usize + column], photometric.vignette_thresholds))
+            f64::from(vignette_weight(
+                map.values[row * map.size_px[0] as usize + column],
+                photometric.vignette_thresholds,
+            ))
         });
         vignette * photometric.light
     }
@@ -172,11 +199,16 @@ impl Sight<'_> {
         const DIRECTIONS: u32 = 3;
         let cycles_from_key = self.texel_from_key.inverse().transpose();
         let power = |length: f64, direction: u32| {
-            let f = length * DVec2::from_angle(std::f64::consts::PI * (f64::from(direction) + 0.5) / f64::from(DIRECTIONS));
+            let f = length
+                * DVec2::from_angle(
+                    std::f64::consts::PI * (f64::from(direction) + 0.5) / f64::from(DIRECTIONS),
+                );
             let cycles = cycles_from_key * f;
             length * length * self.spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4)
         };
-        let powers = [0.25, 0.5].into_iter().flat_map(|length| (0..DIRECTIONS).map(move |direction| power(length, direction)));
+        let powers = [0.25, 0.5]
+            .into_iter()
+            .flat_map(|length| (0..DIRECTIONS).map(move |direction| power(length, direction)));
         self.gain * self.gain / self.texel_from_key.determinant().abs() * powers.sum::<f64>()
     }
 }
@@ -194,7 +226,8 @@ struct Shown {
 }
 
 impl Shown {
-    /// By what the ray itself meets and two beside it; `None` for a texture of one colour, and where the three meet different surfaces.
+    /// By what the ray itself meets and two beside it; `None` for a texture of one colour, and where the
+    /// three meet different surfaces.
     fn new(
         surfaces: &Surfaces,
         pose: &CameraPose,
@@ -204,13 +237,20 @@ impl Shown {
         key_px: impl Fn(DVec2, f64) -> DVec2,
     ) -> Option<Self> {
         const BESIDE_PX: f64 = 0.5;
-        let look = |offset_px: DVec2| surfaces.meet(pose.position_ned_m, pose.ned_from_camera * (uv + offset_px / focal_px).extend(1.0));
-        let beside = [DVec2::X, DVec2::Y].map(|axis| look(BESIDE_PX * axis).filter(|beside| beside.surface == here.surface));
+        let look = |offset_px: DVec2| {
+            surfaces.meet(pose.position_ned_m, pose.ned_from_camera * (uv + offset_px / focal_px).extend(1.0))
+        };
+        let beside = [DVec2::X, DVec2::Y]
+            .map(|axis| look(BESIDE_PX * axis).filter(|beside| beside.surface == here.surface));
         let [x, y] = [beside[0].as_ref()?, beside[1].as_ref()?];
-        let texel_from_camera =
-            DMat2::from_cols(surfaces.texel(x) - surfaces.texel(here), surfaces.texel(y) - surfaces.texel(here)) * BESIDE_PX.recip();
+        let texel_from_camera = DMat2::from_cols(
+            surfaces.texel(x) - surfaces.texel(here),
+            surfaces.texel(y) - surfaces.texel(here),
+        ) * BESIDE_PX.recip();
         let own_key_px = key_px(uv, here.depth_m.recip());
-        let moved = |axis: DVec2, beside: &Met| key_px(uv + BESIDE_PX * axis / focal_px, beside.depth_m.recip()) - own_key_px;
+        let moved = |axis: DVec2, beside: &Met| {
+            key_px(uv + BESIDE_PX * axis / focal_px, beside.depth_m.recip()) - own_key_px
+        };
         let key_from_camera = DMat2::from_cols(moved(DVec2::X, x), moved(DVec2::Y, y)) * BESIDE_PX.recip();
         let regular = |map: &DMat2| map.determinant().abs() > 1e-12 && map.is_finite();
         (regular(&texel_from_camera) && regular(&key_from_camera)).then_some(Self {
@@ -225,8 +265,16 @@ impl Shown {
     }
 }
 
-/// Path of the source over the exposure, camera px: between its places that are farthest apart, and its length.
-pub(super) fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_depth: f64, focal_px: DVec2) -> (DVec2, f64) {
+/// Path of the source over the exposure, camera px: between its places that are farthest apart, and its
+/// length.
+pub(super) fn path_px(
+    path: &CameraPath,
+    mid_s: f64,
+    exposure_s: f64,
+    uv: DVec2,
+    inverse_depth: f64,
+    focal_px: DVec2,
+) -> (DVec2, f64) {
     const STRETCHES: u32 = 8;
     if exposure_s <= 0.0 {
         return (DVec2::ZERO, 0.0);
@@ -240,7 +288,8 @@ pub(super) fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2,
     };
     let places: Vec<DVec2> = (0..=STRETCHES).map(place).filter(|at| at.is_finite()).collect();
     let length_px = places.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-    let apart = places.iter().enumerate().flat_map(|(k, from)| places[k + 1..].iter().map(move |to| *to - *from));
+    let apart =
+        places.iter().enumerate().flat_map(|(k, from)| places[k + 1..].iter().map(move |to| *to - *from));
     let widest = apart.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
     (widest.unwrap_or_default(), length_px)
 }

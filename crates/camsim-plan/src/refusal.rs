@@ -2,7 +2,8 @@
 
 use camsim_core::{camera::CameraError, shutter::ShutterError};
 
-/// Most pixels of the ideal frames of one output frame: at 12 bytes a pixel, for colour and depth, 0.8 GB. What silhouettes take besides has a bound of its own.
+/// Most pixels of the ideal frames of one output frame: at 12 bytes a pixel, for colour and depth, 0.8 GB.
+/// What silhouettes take besides has a bound of its own.
 pub const MAX_IDEAL_PX: u64 = 1 << 26;
 
 /// Errors of planning.
@@ -50,7 +51,12 @@ pub enum PlanError {
 }
 
 /// Refuses an ideal frame that no renderer could hold.
-pub(super) fn check_size(frame: u64, size_px: [u32; 2], max_side_px: u32, max_ideal_px: u64) -> Result<(), PlanError> {
+pub(super) fn check_size(
+    frame: u64,
+    size_px: [u32; 2],
+    max_side_px: u32,
+    max_ideal_px: u64,
+) -> Result<(), PlanError> {
     let [width, height] = size_px.map(u64::from);
     if width.max(height) > u64::from(max_side_px) {
         return Err(PlanError::IdealTooLarge { frame, width, height, limit: max_side_px });

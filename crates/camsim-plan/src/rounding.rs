@@ -4,17 +4,20 @@ use super::{RayStage, TemporalStage, probes::Probe};
 use camsim_core::{camera::CameraModel, temporal::IdealGeometry};
 use glam::{DMat2, DVec2};
 
-/// Half a unit in the last place of a number of size 1: a rounding moves it by at most twice this, and by about this in the mean square.
+/// Half a unit in the last place of a number of size 1: a rounding moves it by at most twice this, and by
+/// about this in the mean square.
 const UNIT: f64 = 2.980_232_238_769_531_3e-8;
-/// 99th percentile of the length of a vector of two equal normal components, in their standard deviations: `sqrt(-2 ln 0.01)`.
+/// 99th percentile of the length of a vector of two equal normal components, in their standard deviations:
+/// `sqrt(-2 ln 0.01)`.
 const P99: f64 = 3.035;
-/// Roundings, of the size of the distorted radius each, that the residual of the lens inverse takes: the square of the radius, two
-/// polynomials, their product with u and v, the tangential terms and the difference, in quadrature.
+/// Roundings, of the size of the distorted radius each, that the residual of the lens inverse takes: the
+/// square of the radius, two polynomials, their product with u and v, the tangential terms and the
+/// difference, in quadrature.
 const LENS_ROUNDINGS: f64 = 4.0;
 /// Roundings of a component of `R d + w t`: three entries of R, three products, three sums, in quadrature.
 const ROTATION_ROUNDINGS: f64 = 3.0;
-/// Squared roundings of a place from the principal point: 1 / z, its product with x, with 1 - t_z w and with f, that factor itself, and the sum with w t
-/// (`source_of_depth` of the shader, which has the most).
+/// Squared roundings of a place from the principal point: 1 / z, its product with x, with 1 - t_z w and with
+/// f, that factor itself, and the sum with w t (`source_of_depth` of the shader, which has the most).
 const PLACE_ROUNDINGS2: f64 = 6.0;
 /// Relative roundings of an inverse depth: rasterised, blended, and solved for.
 const DEPTH_ROUNDINGS: f64 = 8.0;
@@ -47,7 +50,8 @@ impl Rounding {
         let lens_px = match ray {
             RayStage::Pinhole => P99 * UNIT * probe.uv.length() * focal_px,
             RayStage::LensMap => {
-                let residual_px = UNIT * LENS_ROUNDINGS * probe.distorted.length().max(0.1) * camera.focal_px.max_element();
+                let residual_px =
+                    UNIT * LENS_ROUNDINGS * probe.distorted.length().max(0.1) * camera.focal_px.max_element();
                 P99 * residual_px * stretch()
             }
             // Not rounding: it stops there. Roots that are false are beyond any prediction.

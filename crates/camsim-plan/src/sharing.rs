@@ -1,10 +1,14 @@
-//! One ideal frame for several output frames. A key frame may be taken at any instant that shows what the pixels look for: from one frame to the
-//! next the camera turns and moves little, and what the temporal inverse does for the lines of one frame it does for those of the next.
+//! One ideal frame for several output frames. A key frame may be taken at any instant that shows what the
+//! pixels look for: from one frame to the next the camera turns and moves little, and what the temporal
+//! inverse does for the lines of one frame it does for those of the next.
 //!
-//! Frames are looked at in groups that begin at multiples of `quality.frames_per_ideal`, so that which of them share depends on the scenario alone. The
-//! ideal frame is taken in the middle of their time, wide and fine enough for all of them. Each of them is then planned as any other: from this one key frame,
-//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise, or where halves could save more, each of its halves
-//! is tried, and so on. Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind them.
+//! Frames are looked at in groups that begin at multiples of `quality.frames_per_ideal`, so that which of
+//! them share depends on the scenario alone. The ideal frame is taken in the middle of their time, wide and
+//! fine enough for all of them. Each of them is then planned as any other: from this one key frame, with the
+//! same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time,
+//! the group shares; otherwise, or where halves could save more, each of its halves is tried, and so on.
+//! Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind
+//! them.
 
 use std::{
     ops::Range,
@@ -26,7 +30,8 @@ use camsim_core::scenario::{Auto, Preset, Silhouettes};
 const WORTH: f64 = 0.1;
 /// Largest ideal frame for several, in pixels of one for a single frame.
 const MOST_AREA: f64 = 4.0;
-/// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it. Neighbours differ by a few percent.
+/// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep
+/// all of it. Neighbours differ by a few percent.
 const SHARES: [f64; 3] = [0.95, 1.0, 0.85];
 /// Threads for each group that is looked at at once, and such groups at most.
 const THREADS_A_GROUP: usize = 2;
@@ -57,7 +62,8 @@ impl Default for Asked {
     }
 }
 
-/// Frames that may be made from one ideal frame. What each of them sees is looked at once, however often it is planned.
+/// Frames that may be made from one ideal frame. What each of them sees is looked at once, however often it
+/// is planned.
 struct Candidates<'a> {
     planner: &'a Planner,
     common: &'a Common,
@@ -69,7 +75,8 @@ impl<'a> Candidates<'a> {
         Self { planner, common, seen: common.frames.clone().map(|_| OnceLock::new()).collect() }
     }
 
-    /// What a frame sees from the common ideal frame; `None` where silhouettes would cost too much with such a sampling, and for a fault.
+    /// What a frame sees from the common ideal frame; `None` where silhouettes would cost too much with such
+    /// a sampling, and for a fault.
     fn see(&self, frame: u64, given: Option<Sampling>) -> Option<(Look<'a>, &Scenery<'a>)> {
         let place = self.seen.get((frame - self.common.frames.start) as usize)?;
         let see = || {
@@ -80,7 +87,8 @@ impl<'a> Candidates<'a> {
         let seen = if let Some(seen) = place.get() {
             seen
         } else {
-            // Looking is parallel in itself: nobody waits for it, as whoever does may have a part of it to do.
+            // Looking is parallel in itself: nobody waits for it, as whoever does may have a part of it to
+            // do.
             let seen = see();
             place.get_or_init(|| seen)
         };
@@ -89,7 +97,8 @@ impl<'a> Candidates<'a> {
         scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale).then(|| (look.clone(), scenery))
     }
 
-    /// How a frame's picture would be made from the common ideal frame, sampled as it needs for a part of `quality.max_error_dn`.
+    /// How a frame's picture would be made from the common ideal frame, sampled as it needs for a part of
+    /// `quality.max_error_dn`.
     fn picture(&self, frame: u64, share_of_dn: f64) -> Option<Picture> {
         let (look, scenery) = self.see(frame, None)?;
         Some(look.asking(Asked { share_of_dn, given: None }).picture(scenery))
@@ -101,14 +110,16 @@ impl<'a> Candidates<'a> {
         self.planner.plan_of(&look.asking(Asked { given: Some(sampling), ..Asked::default() }), scenery).ok()
     }
 
-    /// The frame that is sampled most too coarsely so, by its picture alone. `Err` where one may not be sampled so at all.
+    /// The frame that is sampled most too coarsely so, by its picture alone. `Err` where one may not be
+    /// sampled so at all.
     fn too_coarse(&self, sampling: Sampling, own: &FramePlan) -> Result<Option<u64>, CannotShare> {
         let asked = Asked { given: Some(sampling), ..Asked::default() };
         let picture_dn = |frame: u64| {
             let (look, scenery) = self.see(frame, Some(sampling)).ok_or(CannotShare)?;
             Ok((frame, look.asking(asked).picture(scenery).total_dn))
         };
-        let all: Vec<(u64, f64)> = self.common.frames.clone().into_par_iter().map(picture_dn).collect::<Result<_, _>>()?;
+        let all: Vec<(u64, f64)> =
+            self.common.frames.clone().into_par_iter().map(picture_dn).collect::<Result<_, _>>()?;
         let sequence = &self.planner.sequence;
         let most_dn = if own.predicted.levels_kept {
             for_sampling_dn(&sequence.scenario.quality, &sequence.scene)
@@ -119,7 +130,8 @@ impl<'a> Candidates<'a> {
         Ok(worst.filter(|(_, dn)| *dn > most_dn).map(|(frame, _)| frame))
     }
 
-    /// The plans of all, in order, sampled as the plan of the first is; `None` where one of them does not keep `quality.max_error_px`.
+    /// The plans of all, in order, sampled as the plan of the first is; `None` where one of them does not
+    /// keep `quality.max_error_px`.
     fn plan_others(&self, first: FramePlan, sampling: Sampling, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let frames = &self.common.frames;
         let plan = |frame: u64| self.plan(frame, sampling).filter(|plan| keeps_px(plan, own));
@@ -150,19 +162,26 @@ pub(super) struct Group {
 }
 
 impl Planner {
-    /// Number of the group of a frame: frames of one are best planned one after the other, by the same thread.
+    /// Number of the group of a frame: frames of one are best planned one after the other, by the same
+    /// thread.
     #[must_use]
     pub fn group_of(&self, frame: u64) -> u64 {
-        if self.may_share() { frame / u64::from(self.sequence.scenario.quality.frames_per_ideal) } else { frame }
+        if self.may_share() {
+            frame / u64::from(self.sequence.scenario.quality.frames_per_ideal)
+        } else {
+            frame
+        }
     }
 
-    /// Groups that are best planned at once, each by a thread of its own: looking at one is parallel in itself, but not all of it.
+    /// Groups that are best planned at once, each by a thread of its own: looking at one is parallel in
+    /// itself, but not all of it.
     #[must_use]
     pub fn groups_at_once() -> usize {
         (rayon::current_num_threads() / THREADS_A_GROUP).clamp(1, MOST_AT_ONCE)
     }
 
-    /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
+    /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames
+    /// over and over.
     pub fn forget(&self) {
         self.surroundings.forget();
         self.surroundings_by_half.forget();
@@ -172,12 +191,17 @@ impl Planner {
 
     /// What frames of a group look at: neighbours in time are nearly alike, and have other probes each.
     pub(super) fn half_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
-        self.halves.as_ref().map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
+        self.halves
+            .as_ref()
+            .map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
     }
 
-    /// What they are run dry at: their neighbours are made the same way, or nearly, from the same ideal frame.
+    /// What they are run dry at: their neighbours are made the same way, or nearly, from the same ideal
+    /// frame.
     pub(super) fn quarter_of_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
-        self.quarters.as_ref().map(|quarters| quarters[(frame % 2) as usize][(frame / 2 % 2) as usize].clone())
+        self.quarters
+            .as_ref()
+            .map(|quarters| quarters[(frame % 2) as usize][(frame / 2 % 2) as usize].clone())
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -213,13 +237,18 @@ impl Planner {
     pub(super) fn why_alone(&self, plan: &FramePlan) -> &'static str {
         match self.forbids_sharing() {
             Some(reason) => reason,
-            None if plan.edges.has_rays() => "rays at its silhouettes: another instant sees more of what is behind them",
+            None if plan.edges.has_rays() => {
+                "rays at its silhouettes: another instant sees more of what is behind them"
+            }
             None if self.sequence.frames == 1 => "there is no other",
-            None => "from a common one it or its neighbours would not keep the tolerances, or not for less time",
+            None => {
+                "from a common one it or its neighbours would not keep the tolerances, or not for less time"
+            }
         }
     }
 
-    /// Sharing is compared with what the middle frame would do by itself. A fault of that frame is its own: the others are then planned by themselves, and so is it, when it is asked for.
+    /// Sharing is compared with what the middle frame would do by itself. A fault of that frame is its own:
+    /// the others are then planned by themselves, and so is it, when it is asked for.
     fn group(&self, number: u64) -> Group {
         let size = u64::from(self.sequence.scenario.quality.frames_per_ideal);
         let first = number * size;
@@ -235,16 +264,20 @@ impl Planner {
         Group { first, plans }
     }
 
-    /// Plans of `frames` from one ideal frame, or from those of its halves, whichever takes less time; `None` for those that do not share.
+    /// Plans of `frames` from one ideal frame, or from those of its halves, whichever takes less time; `None`
+    /// for those that do not share.
     fn share(&self, frames: Range<u64>, own: &FramePlan) -> Vec<Option<FramePlan>> {
         let count = (frames.end - frames.start) as usize;
-        let whole: Option<Vec<_>> = self.shared(frames.clone(), own).map(|plans| plans.into_iter().map(Some).collect());
+        let whole: Option<Vec<_>> =
+            self.shared(frames.clone(), own).map(|plans| plans.into_iter().map(Some).collect());
         let price = |plans: &[Option<FramePlan>]| -> f64 {
             plans.iter().map(|plan| plan.as_ref().map_or(own.price_ms, |plan| plan.price_ms)).sum()
         };
         let half = count as u64 / 2;
-        // Halves are sampled no more coarsely than a frame by itself is, and save as much of its ideal frame as so many can.
-        let least_of_halves = count as f64 * (own.price_ms - own.ideal_price_ms * (1.0 - 1.0 / half.max(1) as f64));
+        // Halves are sampled no more coarsely than a frame by itself is, and save as much of its ideal frame
+        // as so many can.
+        let least_of_halves =
+            count as f64 * (own.price_ms - own.ideal_price_ms * (1.0 - 1.0 / half.max(1) as f64));
         if half < 2 || whole.as_ref().is_some_and(|whole| price(whole) <= least_of_halves) {
             return whole.unwrap_or_else(|| vec![None; count]);
         }
@@ -252,22 +285,30 @@ impl Planner {
         let mut halves = self.share(frames.start..middle, own);
         // What the first half cannot do the second hardly can, unless it is far away.
         let is_worth_a_try = halves.iter().any(Option::is_some) || half >= FAR;
-        halves.extend(if is_worth_a_try { self.share(middle..frames.end, own) } else { vec![None; count - halves.len()] });
+        halves.extend(if is_worth_a_try {
+            self.share(middle..frames.end, own)
+        } else {
+            vec![None; count - halves.len()]
+        });
         whole.filter(|whole| price(whole) <= price(&halves)).unwrap_or(halves)
     }
 
-    /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
+    /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such
+    /// a one.
     fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let common = self.common(frames.clone(), own)?;
         let candidates = Candidates::new(self, &common);
         let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price_ms * count as f64;
-        // The outermost have the most silhouettes elsewhere: what even the finest of ideal frames cannot show them needs no sampling.
+        // The outermost have the most silhouettes elsewhere: what even the finest of ideal frames cannot show
+        // them needs no sampling.
         candidates.see(frames.end - 1, None)?;
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
             // What is dearer than frames by themselves already is no cheaper with its solver.
-            let picture = candidates.picture(coarsest, share_of_dn).filter(|picture| is_worth_it(picture.price.ms, 1))?;
+            let picture = candidates
+                .picture(coarsest, share_of_dn)
+                .filter(|picture| is_worth_it(picture.price.ms, 1))?;
             let sampling = picture.sampling;
             candidates.see(frames.end - 1, Some(sampling))?;
             // Pictures take less than plans, and more often tell that it does not do.
@@ -292,14 +333,17 @@ impl Planner {
         None
     }
 
-    /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth it.
+    /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth
+    /// it.
     fn common(&self, frames: Range<u64>, own: &FramePlan) -> Option<Common> {
         let reach: &LensReach = self.fixed.as_ref()?;
         let path = &*self.sequence.path;
         let (begin_s, end_s) = self.shutter.window_s();
         let key_s = 0.5 * (self.stamp_s(frames.start) + begin_s + self.stamp_s(frames.end - 1) + end_s);
         let keys = [KeyFrame { t_s: key_s, pose: path.pose(key_s) }];
-        let view = |frame: u64| bounds::view(reach, path, &self.shutter, self.stamp_s(frame), key_s, &keys, &self.surfaces, None);
+        let view = |frame: u64| {
+            bounds::view(reach, path, &self.shutter, self.stamp_s(frame), key_s, &keys, &self.surfaces, None)
+        };
         let view = frames.clone().map(view).reduce(View::and)?;
         let scale = own.ideal.scale(&own.camera);
         let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
@@ -309,13 +353,15 @@ impl Planner {
     }
 }
 
-/// Whether a frame from a common ideal frame keeps `quality.max_error_px`, or comes as near as one from its own does.
+/// Whether a frame from a common ideal frame keeps `quality.max_error_px`, or comes as near as one from its
+/// own does.
 fn keeps_px(plan: &FramePlan, own: &FramePlan) -> bool {
     let (here, there) = (&plan.predicted, &own.predicted);
     !plan.edges.has_rays() && (here.kept || !there.kept && here.total_px <= NEARLY * there.total_px)
 }
 
-/// The frame that is farthest from keeping `quality.max_error_dn`, or from coming as near as one from its own ideal frame does; `None` if all do.
+/// The frame that is farthest from keeping `quality.max_error_dn`, or from coming as near as one from its own
+/// ideal frame does; `None` if all do.
 fn most_wrong(plans: &[FramePlan], own: &FramePlan) -> Option<u64> {
     let keeps = |plan: &FramePlan| {
         let (here, there) = (&plan.predicted, &own.predicted);
@@ -327,23 +373,32 @@ fn most_wrong(plans: &[FramePlan], own: &FramePlan) -> Option<u64> {
 
 /// Plans from one ideal frame: what that is made by is the strictest of all.
 fn together(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
-    let (Some(first), Some(last)) = (plans.first().map(|plan| plan.frame), plans.last().map(|plan| plan.frame)) else { return plans };
+    let (Some(first), Some(last)) =
+        (plans.first().map(|plan| plan.frame), plans.last().map(|plan| plan.frame))
+    else {
+        return plans;
+    };
     let terrain_error_px = plans.iter().map(|plan| plan.terrain_error_px).fold(f64::INFINITY, f64::min);
     let motion = plans.iter().map(|plan| plan.motion).reduce(Motion::and).unwrap_or_default();
     let sources: Vec<OfSources> = plans.iter().map(|plan| OfSources::of(plan, &plans)).collect();
     for (plan, sources) in plans.iter_mut().zip(sources) {
         sources.write(&mut plan.predicted);
         plan.shared_by = Some([first, last]);
-        plan.predicted.ground = plan.predicted.ground.map(|ground| ground.times(terrain_error_px / plan.terrain_error_px));
+        plan.predicted.ground =
+            plan.predicted.ground.map(|ground| ground.times(terrain_error_px / plan.terrain_error_px));
         plan.terrain_error_px = terrain_error_px;
         plan.motion = motion;
-        plan.skipped.push(Skip { what: "ideal frame of its own", reason: format!("frames {first} to {last} are made from one") });
+        plan.skipped.push(Skip {
+            what: "ideal frame of its own",
+            reason: format!("frames {first} to {last} are made from one"),
+        });
     }
     plans
 }
 
-/// How far sources are off in frames from one ideal frame that are solved in the same way: each has been run dry at a part of the probes, and they are alike, so that all answer for the
-/// largest error that any has found.
+/// How far sources are off in frames from one ideal frame that are solved in the same way: each has been run
+/// dry at a part of the probes, and they are alike, so that all answer for the largest error that any has
+/// found.
 struct OfSources {
     most: Predicted,
     probes: u32,
@@ -375,10 +430,22 @@ impl OfSources {
     }
 
     fn write(self, into: &mut Predicted) {
-        let Predicted { lens_px, temporal_px, depth_px, level_of_detail_px, nodes_px, format_px, total_px, void_share, in_the_way, .. } =
-            self.most;
-        (into.lens_px, into.temporal_px, into.depth_px, into.level_of_detail_px) = (lens_px, temporal_px, depth_px, level_of_detail_px);
-        (into.nodes_px, into.format_px, into.total_px, into.void_share) = (nodes_px, format_px, total_px, void_share);
+        let Predicted {
+            lens_px,
+            temporal_px,
+            depth_px,
+            level_of_detail_px,
+            nodes_px,
+            format_px,
+            total_px,
+            void_share,
+            in_the_way,
+            ..
+        } = self.most;
+        (into.lens_px, into.temporal_px, into.depth_px, into.level_of_detail_px) =
+            (lens_px, temporal_px, depth_px, level_of_detail_px);
+        (into.nodes_px, into.format_px, into.total_px, into.void_share) =
+            (nodes_px, format_px, total_px, void_share);
         (into.in_the_way, into.probes, into.kept) = (in_the_way, self.probes, self.kept);
     }
 }

@@ -41,7 +41,8 @@ pub enum TemporalStage {
 /// Motion blur.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlurStage {
-    /// Exactly known poses over the exposure, equally far apart in time. Rays of their own at silhouettes take poses linear between them.
+    /// Exactly known poses over the exposure, equally far apart in time. Rays of their own at silhouettes
+    /// take poses linear between them.
     pub nodes: u32,
     /// The path of a source goes through every so many of them.
     pub stride: u32,

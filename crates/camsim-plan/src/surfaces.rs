@@ -8,8 +8,8 @@ use super::NEAR_M;
 use camsim_core::{
     pose::CameraPose,
     scene::{
-        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, Wrap, box_tree::BoxTree, ray_tree::RayTree, terrain::Frustum,
-        terrain::intersect_triangle,
+        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, Wrap, box_tree::BoxTree,
+        ray_tree::RayTree, terrain::Frustum, terrain::intersect_triangle,
     },
 };
 
@@ -20,8 +20,8 @@ pub(super) const FOG_AT_VISIBILITY: f64 = 3.912;
 #[derive(Debug)]
 pub(super) struct Surfaces {
     scene: Arc<Scene>,
-    /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them, and of those that are mixed with it. A ray
-    /// passes through thousands of panes to what is behind them.
+    /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them,
+    /// and of those that are mixed with it. A ray passes through thousands of panes to what is behind them.
     tree: BoxTree,
     /// Around each mesh.
     bounds: Vec<Aabb>,
@@ -110,7 +110,8 @@ struct ShapeTrees {
     boxes: BoxTree,
 }
 
-/// Whether alpha reaches the cut-off anywhere on a mesh. `of_pictures` remembers the largest alpha of each picture.
+/// Whether alpha reaches the cut-off anywhere on a mesh. `of_pictures` remembers the largest alpha of each
+/// picture.
 fn may_have_depth(mesh: &Mesh, of_pictures: &mut HashMap<*const Texture, u8>) -> bool {
     /// Between corners alpha is rounded.
     const HAIR: f64 = 1e-6;
@@ -127,7 +128,12 @@ impl Surfaces {
         let tree_of = |shape: &Shape| {
             let triangle = |of: &[u32]| {
                 let mut bounds = Aabb::EMPTY;
-                let at = |&v: &u32| shape.vertices.get(v as usize).map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)));
+                let at = |&v: &u32| {
+                    shape
+                        .vertices
+                        .get(v as usize)
+                        .map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)))
+                };
                 of.iter().filter_map(at).for_each(|corner| bounds.include(corner));
                 // A ray in the shape's axes is rounded.
                 let hair = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
@@ -136,15 +142,21 @@ impl Surfaces {
             let boxes: Vec<Aabb> = shape.indices.chunks_exact(3).map(triangle).collect();
             Arc::new(ShapeTrees { for_rays: RayTree::new(&boxes), boxes: BoxTree::new(&boxes) })
         };
-        let shapes = scene.meshes.iter().map(|mesh| known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| tree_of(&mesh.shape)).clone());
+        let shapes = scene.meshes.iter().map(|mesh| {
+            known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| tree_of(&mesh.shape)).clone()
+        });
         let shapes = shapes.collect();
         let bounds = scene.mesh_bounds();
         let tree_if = |counts: &dyn Fn(&Mesh) -> bool| {
-            let counted = bounds.iter().zip(&scene.meshes).map(|(of, mesh)| if counts(mesh) { *of } else { Aabb::EMPTY });
+            let counted = bounds
+                .iter()
+                .zip(&scene.meshes)
+                .map(|(of, mesh)| if counts(mesh) { *of } else { Aabb::EMPTY });
             RayTree::new(&counted.collect::<Vec<_>>())
         };
         let of_pictures = RefCell::new(HashMap::new());
-        let deep = tree_if(&|mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut()));
+        let deep =
+            tree_if(&|mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut()));
         let (solid, mixed) = (tree_if(&|mesh| !mesh.material.blends), tree_if(&|mesh| mesh.material.blends));
         let tree = BoxTree::new(&bounds);
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
@@ -157,10 +169,13 @@ impl Surfaces {
         self.scene.terrain.as_ref()
     }
 
-    /// Whether a camera may see anything but ground within `tangents` = [u_min, u_max, v_min, v_max] and so far away.
+    /// Whether a camera may see anything but ground within `tangents` = [u_min, u_max, v_min, v_max] and so
+    /// far away.
     pub fn may_show_models(&self, pose: &CameraPose, tangents: [f64; 4], range_m: f64) -> bool {
         let frustum = Frustum::new(pose, tangents);
-        let measure = |bounds: &Aabb| (bounds.distance_m(pose.position_ned_m) <= range_m && frustum.may_see(bounds)).then_some(0.0);
+        let measure = |bounds: &Aabb| {
+            (bounds.distance_m(pose.position_ned_m) <= range_m && frustum.may_see(bounds)).then_some(0.0)
+        };
         let of_mesh = |i: u32| measure(&self.bounds[i as usize]).unwrap_or(f64::INFINITY);
         self.tree.nearest_thing_m(measure, of_mesh) == 0.0
     }
@@ -181,20 +196,31 @@ impl Surfaces {
     }
 
     fn meet_in(&self, tree: &RayTree, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
-        let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
+        let ground =
+            self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         let on_mesh = tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
             self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit).map(|met| (met.depth_m, met))
         });
-        let on_ground = || ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, tint: DVec3::ONE, terrain: Some(hit) });
+        let on_ground = || {
+            ground.map(|hit| Met {
+                depth_m: hit.t,
+                surface: 0,
+                uv: hit.uv,
+                tint: DVec3::ONE,
+                terrain: Some(hit),
+            })
+        };
         on_mesh.map(|(_, met)| met).or_else(on_ground)
     }
 
-    /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the same for every way of storing it.
+    /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the
+    /// same for every way of storing it.
     fn meet_mesh(&self, i: usize, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Option<Met> {
         let mesh = &self.scene.meshes[i];
         let shape_from_ned = self.shape_from_ned[i];
-        let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
+        let (origin, direction) =
+            (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
         let meet = |triangle: u32, limit: f64| {
             let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
             let points = corners.map(|corner| mesh.position_ned_m(corner));
@@ -208,30 +234,51 @@ impl Surfaces {
     fn met(&self, i: usize, depth_m: f64, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> Met {
         let mesh = &self.scene.meshes[i];
         let [r, g, b, _] = mesh.tint_at(corners, weights);
-        let light = self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
-        Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: light * DVec3::new(r, g, b), terrain: None }
+        let light =
+            self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
+        Met {
+            depth_m,
+            surface: 1 + i,
+            uv: mesh.uv_at(corners, weights),
+            tint: light * DVec3::new(r, g, b),
+            terrain: None,
+        }
     }
 
-    /// Linear light that arrives along a ray: of `met`, what it first meets, or where surfaces are mixed of all of those.
-    pub fn light(&self, origin_ned_m: DVec3, direction_ned: DVec3, met: Option<&Met>, range_per_depth: f64) -> Light {
+    /// Linear light that arrives along a ray: of `met`, what it first meets, or where surfaces are mixed of
+    /// all of those.
+    pub fn light(
+        &self,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        met: Option<&Met>,
+        range_per_depth: f64,
+    ) -> Light {
         if !self.blends {
             return Light { color: self.color(met, range_per_depth), panes: Vec::new() };
         }
         let solid = self.meet_in(&self.solid, origin_ned_m, direction_ned);
         let panes = self.panes(origin_ned_m, direction_ned, solid.map_or(f64::INFINITY, |met| met.depth_m));
         let behind = self.smooth_color(solid.as_ref(), range_per_depth);
-        let over = |behind: DVec3, (met, alpha): &(Met, f64)| behind.lerp(self.smooth_color(Some(met), range_per_depth), *alpha);
-        Light { color: panes.iter().rev().fold(behind, over), panes: panes.iter().map(|(met, _)| met.surface).collect() }
+        let over = |behind: DVec3, (met, alpha): &(Met, f64)| {
+            behind.lerp(self.smooth_color(Some(met), range_per_depth), *alpha)
+        };
+        Light {
+            color: panes.iter().rev().fold(behind, over),
+            panes: panes.iter().map(|(met, _)| met.surface).collect(),
+        }
     }
 
-    /// What is mixed along a ray before `limit`, from the eye on, with its alpha; without what next to nothing is left of behind the others.
+    /// What is mixed along a ray before `limit`, from the eye on, with its alpha; without what next to
+    /// nothing is left of behind the others.
     fn panes(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Vec<(Met, f64)> {
         let found = RefCell::new(Panes::default());
         self.mixed.first(origin_ned_m, direction_ned, limit, |i, limit| -> Option<(f64, ())> {
             let i = i as usize;
             let mesh = self.scene.meshes.get(i)?;
             let shape_from_ned = self.shape_from_ned[i];
-            let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
+            let (origin, direction) =
+                (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
             self.shapes[i].for_rays.first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
                 let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
                 let points = corners.map(|corner| mesh.position_ned_m(corner));
@@ -243,18 +290,21 @@ impl Surfaces {
                 found.borrow().limit().map(|t| (t, ()))
             })
         });
-        let met = |pane: Pane| (self.met(pane.mesh, pane.t, pane.corners, pane.weights, direction_ned), pane.alpha);
+        let met =
+            |pane: Pane| (self.met(pane.mesh, pane.t, pane.corners, pane.weights, direction_ned), pane.alpha);
         found.into_inner().nearest_first.into_iter().map(met).collect()
     }
 
     /// Place in the picture on what a ray met, texels.
     pub fn texel(&self, met: &Met) -> DVec2 {
         let texture = self.texture(met);
-        texture.map_or(DVec2::ZERO, |texture| DVec2::from_array(met.uv) * DVec2::from_array(texture.size_px.map(f64::from)))
+        texture.map_or(DVec2::ZERO, |texture| {
+            DVec2::from_array(met.uv) * DVec2::from_array(texture.size_px.map(f64::from))
+        })
     }
 
-    /// Linear light that arrives along a ray of `range_per_depth` metres for each metre of its depth: the nearest texel of what it met, or the
-    /// sky, and fog.
+    /// Linear light that arrives along a ray of `range_per_depth` metres for each metre of its depth: the
+    /// nearest texel of what it met, or the sky, and fog.
     pub fn color(&self, met: Option<&Met>, range_per_depth: f64) -> DVec3 {
         self.color_by(met, range_per_depth, |texture, table, met| {
             let [x, y] = [0, 1].map(|axis: usize| {
@@ -262,7 +312,9 @@ impl Surfaces {
                 (met.uv[axis].rem_euclid(1.0) * side).min(side - 1.0) as usize
             });
             let first = 4 * (y * texture.size_px[0] as usize + x);
-            let light = |channel: usize| texture.rgba8.get(first + channel).map_or(0.0, |&byte| f64::from(table[usize::from(byte)]));
+            let light = |channel: usize| {
+                texture.rgba8.get(first + channel).map_or(0.0, |&byte| f64::from(table[usize::from(byte)]))
+            };
             DVec3::new(light(0), light(1), light(2))
         })
     }
@@ -271,20 +323,33 @@ impl Surfaces {
     fn smooth_color(&self, met: Option<&Met>, range_per_depth: f64) -> DVec3 {
         self.color_by(met, range_per_depth, |texture, table, met| {
             let material = self.mesh(met).map(|mesh| &mesh.material);
-            let (wrap, nearest) = material.map_or(([Wrap::Clamp; 2], false), |material| (material.wrap, material.nearest));
-            let light = |pixel: &[u8]| DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(table[usize::from(pixel[channel])])));
+            let (wrap, nearest) =
+                material.map_or(([Wrap::Clamp; 2], false), |material| (material.wrap, material.nearest));
+            let light = |pixel: &[u8]| {
+                DVec3::from_array(
+                    [0, 1, 2].map(|channel: usize| f64::from(table[usize::from(pixel[channel])])),
+                )
+            };
             texture.read_at(met.uv, wrap, nearest, light)
         })
     }
 
-    fn color_by(&self, met: Option<&Met>, range_per_depth: f64, of_picture: impl Fn(&Texture, &[f32; 256], &Met) -> DVec3) -> DVec3 {
+    fn color_by(
+        &self,
+        met: Option<&Met>,
+        range_per_depth: f64,
+        of_picture: impl Fn(&Texture, &[f32; 256], &Met) -> DVec3,
+    ) -> DVec3 {
         let sky = DVec3::from_array(self.scene.sky_linear.map(f64::from));
         let Some((met, texture)) = met.and_then(|met| Some((met, self.texture(met)?))) else { return sky };
-        let table = self.linear.iter().find(|(encoding, _)| *encoding == texture.encoding).map_or(&self.linear[0].1, |(_, table)| table);
-        let clear = self
-            .scene
-            .fog_visibility_m
-            .map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * met.depth_m * range_per_depth / visibility_m).exp());
+        let table = self
+            .linear
+            .iter()
+            .find(|(encoding, _)| *encoding == texture.encoding)
+            .map_or(&self.linear[0].1, |(_, table)| table);
+        let clear = self.scene.fog_visibility_m.map_or(1.0, |visibility_m| {
+            (-FOG_AT_VISIBILITY * met.depth_m * range_per_depth / visibility_m).exp()
+        });
         let own = self.mesh(met).map_or([0.0; 3], |mesh| mesh.material.emissive);
         let light = met.tint * of_picture(texture, table, met) + DVec3::from_array(own.map(f64::from));
         sky + clear * (light - sky)
@@ -299,17 +364,21 @@ impl Surfaces {
         of_mesh.or(self.terrain().map(|terrain| &*terrain.texture))
     }
 
-    /// Lower bound of the planar depth of anything in view from within `travel_m` of `pose`, metres; infinite with nothing in view.
-    /// `tangents` = [u_min, u_max, v_min, v_max].
+    /// Lower bound of the planar depth of anything in view from within `travel_m` of `pose`, metres; infinite
+    /// with nothing in view. `tangents` = [u_min, u_max, v_min, v_max].
     pub fn nearest_m(&self, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> f64 {
-        let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
-        let terrain = self.terrain().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
+        let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2)
+            + tangents[2].abs().max(tangents[3].abs()).powi(2);
+        let terrain =
+            self.terrain().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
         let frustum = Frustum::new(pose, tangents);
         let measure = |bounds: &Aabb| frustum.may_see(bounds).then(|| bounds.distance_m(pose.position_ned_m));
         // The boxes of a shape's triangles, as they stand.
         let of_mesh = |i: u32| {
             let mesh = &self.scene.meshes[i as usize];
-            self.shapes[i as usize].boxes.nearest_box_m(|own| measure(&own.turned(mesh.ned_from_shape, mesh.origin_ned_m)))
+            self.shapes[i as usize]
+                .boxes
+                .nearest_box_m(|own| measure(&own.turned(mesh.ned_from_shape, mesh.origin_ned_m)))
         };
         let meshes = self.tree.nearest_thing_m(measure, of_mesh);
         // Slant range to planar depth by the widest ray; the camera may come closer within the window.
@@ -328,21 +397,33 @@ mod tests {
 
     /// Waves of 30 m under three pictures at different heights, one of them tilted.
     fn scene() -> Scene {
-        let heights: Vec<f64> = (0..97 * 97).map(|i| 30.0 * (f64::from(i % 97) * 0.3).sin() * (f64::from(i / 97) * 0.2).cos()).collect();
+        let heights: Vec<f64> = (0..97 * 97)
+            .map(|i| 30.0 * (f64::from(i % 97) * 0.3).sin() * (f64::from(i / 97) * 0.2).cos())
+            .collect();
         let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-        let picture = |north_m: f64, height_m: f64| Mesh::level_picture(texture.clone(), DVec3::new(north_m, 10.0, -height_m), 60.0);
+        let picture = |north_m: f64, height_m: f64| {
+            Mesh::level_picture(texture.clone(), DVec3::new(north_m, 10.0, -height_m), 60.0)
+        };
         let mut meshes = vec![picture(-100.0, 40.0), picture(0.0, 60.0), picture(100.0, 5.0)];
         Arc::make_mut(&mut meshes[1].shape).vertices[0].position_m[2] = 25.0;
-        Scene { terrain: Some(Terrain::from_heights(97, 97, 10.0, &heights, None).unwrap()), meshes, ..Scene::default() }
+        Scene {
+            terrain: Some(Terrain::from_heights(97, 97, 10.0, &heights, None).unwrap()),
+            meshes,
+            ..Scene::default()
+        }
     }
 
     #[test]
     fn models_are_shown_only_within_sight_and_reach() {
         let surfaces = Surfaces::new(Arc::new(scene()));
-        let above = CameraPose { position_ned_m: DVec3::new(0.0, 10.0, -300.0), ned_from_camera: DQuat::IDENTITY };
+        let above =
+            CameraPose { position_ned_m: DVec3::new(0.0, 10.0, -300.0), ned_from_camera: DQuat::IDENTITY };
         let tangents = |north: f64| [north - 0.01, north + 0.01, -0.01, 0.01];
         // Straight down there is one 240 m below; between two of them, and to the side, is ground alone.
-        assert!(surfaces.may_show_models(&above, tangents(0.0), 241.0) && !surfaces.may_show_models(&above, tangents(0.0), 200.0));
+        assert!(
+            surfaces.may_show_models(&above, tangents(0.0), 241.0)
+                && !surfaces.may_show_models(&above, tangents(0.0), 200.0)
+        );
         assert!(
             !surfaces.may_show_models(&above, tangents(0.19), f64::INFINITY)
                 && !surfaces.may_show_models(&above, tangents(3.0), f64::INFINITY)
@@ -354,7 +435,11 @@ mod tests {
         let mut scene = scene();
         // A picture again, turned, as a mesh of the same shape.
         let ned_from_shape = DMat3::from_rotation_z(0.5) * DMat3::from_rotation_x(0.4) * 1.3;
-        scene.meshes.push(Mesh { ned_from_shape, origin_ned_m: DVec3::new(-40.0, -50.0, -70.0), ..scene.meshes[1].clone() });
+        scene.meshes.push(Mesh {
+            ned_from_shape,
+            origin_ned_m: DVec3::new(-40.0, -50.0, -70.0),
+            ..scene.meshes[1].clone()
+        });
         // Mirrored, and pressed flat: of that there is no way back to the shape's axes.
         let sides = [DVec3::new(-1.0, 1.2, 1.0), DVec3::new(0.6, 0.6, 0.0), DVec3::new(1.0, 0.0, 1.0)];
         scene.meshes.extend(
@@ -385,11 +470,18 @@ mod tests {
             let angle = 0.37 * f64::from(k);
             let origin = DVec3::new(3.0 * f64::from(k % 71) - 100.0, 40.0 * angle.sin(), -80.0);
             // From straight down to above the horizon.
-            let direction = DVec3::new(angle.cos(), angle.sin(), 1.6 * (0.11 * f64::from(k)).cos().abs() - 0.05);
-            let ground =
-                of_terrain.iter().filter_map(|&points| intersect_triangle(points, origin, direction, f64::INFINITY)).map(|hit| hit.0);
+            let direction =
+                DVec3::new(angle.cos(), angle.sin(), 1.6 * (0.11 * f64::from(k)).cos().abs() - 0.05);
+            let ground = of_terrain
+                .iter()
+                .filter_map(|&points| intersect_triangle(points, origin, direction, f64::INFINITY))
+                .map(|hit| hit.0);
             let ground = ground.fold(f64::INFINITY, f64::min);
-            let meshes = scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, direction, f64::INFINITY)).map(|hit| hit.0);
+            let meshes = scene
+                .meshes
+                .iter()
+                .filter_map(|mesh| mesh.intersect(origin, direction, f64::INFINITY))
+                .map(|hit| hit.0);
             let meshes = meshes.fold(f64::INFINITY, f64::min);
             let found = surfaces.meet(origin, direction);
             assert_eq!(found.map_or(f64::INFINITY, |met| met.depth_m), ground.min(meshes), "ray {k}");
@@ -420,8 +512,10 @@ mod tests {
         };
         let alpha = |k: u32| 0.02 + 0.3 * (f64::from(k) * 0.618_034).fract();
         // Each by itself in no order of height, then all of them as one shape.
-        let many: Vec<Mesh> =
-            (0..1000).map(|k| k * 389 % 1000).map(|k| pane(0.1 * f64::from(k), [0.4, 0.001 * k as f32, 0.2, alpha(k) as f32])).collect();
+        let many: Vec<Mesh> = (0..1000)
+            .map(|k| k * 389 % 1000)
+            .map(|k| pane(0.1 * f64::from(k), [0.4, 0.001 * k as f32, 0.2, alpha(k) as f32]))
+            .collect();
         let mut one = pane(0.0, [0.0; 4]);
         let shape = Arc::make_mut(&mut one.shape);
         (shape.vertices, shape.indices) = (Vec::new(), Vec::new());
@@ -438,9 +532,15 @@ mod tests {
         let over = |behind: DVec3, k: u32| behind.lerp(DVec3::new(0.4, 0.001 * f64::from(k), 0.2), alpha(k));
         let expected = (0..1000).fold(DVec3::ONE, over);
         for panes in [many, vec![one]] {
-            let surfaces = Surfaces::new(Arc::new(Scene { meshes: [panes, vec![level(-1.0, [1.0; 4])]].concat(), ..Scene::default() }));
+            let surfaces = Surfaces::new(Arc::new(Scene {
+                meshes: [panes, vec![level(-1.0, [1.0; 4])]].concat(),
+                ..Scene::default()
+            }));
             let met = surfaces.meet(eye, down);
-            assert!(met.is_some_and(|met| (met.depth_m - 121.0).abs() < 1e-9), "what has no depth anywhere is not met");
+            assert!(
+                met.is_some_and(|met| (met.depth_m - 121.0).abs() < 1e-9),
+                "what has no depth anywhere is not met"
+            );
             let light = surfaces.light(eye, down, met.as_ref(), 1.0);
             assert!((light.color - expected).abs().max_element() < 1e-6, "{} {expected}", light.color);
             assert!((40..200).contains(&light.panes.len()), "{}", light.panes.len());
@@ -458,8 +558,8 @@ mod tests {
                 * DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X)),
         };
         let view = [-0.5, 0.5, -0.5, 0.5];
-        // The middle picture is 100 m below, the corner of another 25 m nearer than its centre would be, at a slant of at most sqrt(1.5). Boxes are
-        // larger by 1e-9 of their reach of 30 m.
+        // The middle picture is 100 m below, the corner of another 25 m nearer than its centre would be, at a
+        // slant of at most sqrt(1.5). Boxes are larger by 1e-9 of their reach of 30 m.
         let down = surfaces.nearest_m(&pose(-90.0), view, 1.0);
         assert!(down <= 99.0 && down >= 99.0 / 1.5_f64.sqrt() - 3.1e-8, "{down}");
         assert_eq!(surfaces.nearest_m(&pose(60.0), view, 1.0), f64::INFINITY);

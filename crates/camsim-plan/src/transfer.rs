@@ -26,7 +26,8 @@ use camsim_core::waves::{sin_pi, sinc};
 use lanes::{Frequencies4, Sampler};
 pub(super) use waves::{Waves, error2};
 
-/// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of the wave.
+/// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of
+/// the wave.
 const UNSEEN: f64 = 1e-3;
 
 /// A wave after so many turns.
@@ -70,7 +71,8 @@ struct Alias {
     /// Whole cycles between the two, and what is left.
     away: i32,
     seen: f64,
-    /// What reads leave of it: a mean over a pixel, a bilinear one, and the two kernels that a spline is mixed of.
+    /// What reads leave of it: a mean over a pixel, a bilinear one, and the two kernels that a spline is
+    /// mixed of.
     mean: f64,
     bilinear: f64,
     sharp: f64,
@@ -119,8 +121,15 @@ impl Reads {
         Self { of: Vec::with_capacity(most), x: cycles(), y: cycles(), leaves: Vec::with_capacity(most) }
     }
 
-    /// Those of one wave, as far as they count; `turned` by where it is read, for so many whole cycles along x and y.
-    fn add(&mut self, of: usize, [along_x, along_y]: &[[Alias; 3]; 2], area: &Footprint, turned: impl Fn([usize; 2]) -> Wave) {
+    /// Those of one wave, as far as they count; `turned` by where it is read, for so many whole cycles along
+    /// x and y.
+    fn add(
+        &mut self,
+        of: usize,
+        [along_x, along_y]: &[[Alias; 3]; 2],
+        area: &Footprint,
+        turned: impl Fn([usize; 2]) -> Wave,
+    ) {
         let by_y = [0, 1, 2].map(|k: usize| along_y[k].read(area.kernel, 1));
         for (i, x) in along_x.iter().enumerate() {
             let by_x = x.read(area.kernel, 0);
@@ -147,7 +156,8 @@ impl Reads {
         for ((x, y), (of, leaves)) in fours.zip(self.of.chunks(4).zip(self.leaves.chunks(4))) {
             let sampled = sampler.leaves(Frequencies4 { x: Vec4::from_slice(x), y: Vec4::from_slice(y) });
             for (i, (&of, leaves)) in of.iter().zip(leaves).enumerate() {
-                left[of as usize] += leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
+                left[of as usize] +=
+                    leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
             }
         }
         left
@@ -165,13 +175,18 @@ impl PlacedWave {
     /// Cycles an ideal pixel, and the place beside an ideal pixel.
     pub fn new(f: DVec2, beside_px: DVec2) -> Self {
         let aliases = [Alias::all(f.x), Alias::all(f.y)];
-        let turned = [0, 1].map(|k: usize| aliases[k].map(|alias| turned_by(f64::from(alias.away) * beside_px[k])));
+        let turned =
+            [0, 1].map(|k: usize| aliases[k].map(|alias| turned_by(f64::from(alias.away) * beside_px[k])));
         Self { aliases, turned }
     }
 }
 
 /// What reading the ideal frame leaves of waves.
-pub(super) fn read_waves<'a>(waves: impl ExactSizeIterator<Item = &'a PlacedWave>, area: &Footprint, over: Over) -> Vec<Wave> {
+pub(super) fn read_waves<'a>(
+    waves: impl ExactSizeIterator<Item = &'a PlacedWave>,
+    area: &Footprint,
+    over: Over,
+) -> Vec<Wave> {
     let count = waves.len();
     let mut reads = Reads::of_waves(count);
     for (of, PlacedWave { aliases, turned }) in waves.enumerate() {
@@ -185,7 +200,8 @@ mod tests {
     use super::{exact::read, *};
     use camsim_core::temporal::ColorImage;
 
-    /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.
+    /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from
+    /// `exact` times the wave itself.
     fn measured(f: DVec2, kernel: Kernel, at: DVec2, exact: f64) -> f64 {
         let turns = 12;
         let size_px = [24, 24];
@@ -212,14 +228,19 @@ mod tests {
                     let left: DVec2 = (-40..=40)
                         .flat_map(|x| (-40..=40).map(move |y| DVec2::new(f64::from(x), f64::from(y))))
                         .map(|away| {
-                            read(kernel, 0, (f + away).x) * read(kernel, 1, (f + away).y) * DVec2::from_angle(2.0 * PI * away.dot(at))
+                            read(kernel, 0, (f + away).x)
+                                * read(kernel, 1, (f + away).y)
+                                * DVec2::from_angle(2.0 * PI * away.dot(at))
                         })
                         .sum();
                     // The mean square of a real wave is half of its squared amplitude.
                     let expected = 0.5 * (left - DVec2::new(exact, 0.0)).length_squared();
                     let found = measured(f, kernel, at, exact);
                     // Further aliases, and the four corners that the spline leaves out.
-                    assert!((found.sqrt() - expected.sqrt()).abs() < 0.01, "{kernel:?} {f} {at}: {found:.5} {expected:.5}");
+                    assert!(
+                        (found.sqrt() - expected.sqrt()).abs() < 0.01,
+                        "{kernel:?} {f} {at}: {found:.5} {expected:.5}"
+                    );
                 }
             }
         }

@@ -65,7 +65,12 @@ impl ExactKey {
 
 impl Viewer {
     /// Starts the engine; `scenario` is opened at once.
-    pub fn new(context: &egui::Context, scenario: Option<PathBuf>, settings: Settings, exporter: Option<Exporter>) -> Self {
+    pub fn new(
+        context: &egui::Context,
+        scenario: Option<PathBuf>,
+        settings: Settings,
+        exporter: Option<Exporter>,
+    ) -> Self {
         panes::tips::unhurried(context);
         fonts::install(context);
         let repaint = context.clone();
@@ -78,11 +83,18 @@ impl Viewer {
     }
 
     /// As eframe starts it, with what was remembered.
-    pub fn restored(creation: &eframe::CreationContext<'_>, scenario: Option<PathBuf>, exporter: Option<Exporter>) -> Self {
+    pub fn restored(
+        creation: &eframe::CreationContext<'_>,
+        scenario: Option<PathBuf>,
+        exporter: Option<Exporter>,
+    ) -> Self {
         if let Some(render) = &creation.wgpu_render_state {
             sheet::register(&creation.egui_ctx, render);
         }
-        let settings = creation.storage.and_then(|storage| eframe::get_value::<Settings>(storage, SETTINGS_KEY)).unwrap_or_default();
+        let settings = creation
+            .storage
+            .and_then(|storage| eframe::get_value::<Settings>(storage, SETTINGS_KEY))
+            .unwrap_or_default();
         Self::new(&creation.egui_ctx, scenario, settings, exporter)
     }
 
@@ -130,7 +142,8 @@ impl Viewer {
         }
     }
 
-    /// Changes are not lost by a wrong click: a second wish to close, out of the question about them, is obeyed.
+    /// Changes are not lost by a wrong click: a second wish to close, out of the question about them, is
+    /// obeyed.
     fn guard_close(&self, context: &egui::Context, out: &mut Outbox) {
         if context.input(|input| input.viewport().close_requested())
             && self.state.is_unsaved()
@@ -143,8 +156,12 @@ impl Viewer {
 
     /// The file's name stands in the title, for whoever has several windows.
     fn name_window(&mut self, context: &egui::Context) {
-        let name =
-            self.state.document.as_ref().and_then(|document| document.path.file_name()).map(|name| name.to_string_lossy().into_owned());
+        let name = self
+            .state
+            .document
+            .as_ref()
+            .and_then(|document| document.path.file_name())
+            .map(|name| name.to_string_lossy().into_owned());
         let mark = if self.state.is_unsaved() { "*" } else { "" };
         let title = name.map_or_else(|| "camsim".to_owned(), |name| format!("{name}{mark} - camsim"));
         if title != self.title {

@@ -31,22 +31,29 @@ pub enum Answer {
 }
 
 impl Browse {
-    /// Asks for a scenario to open, or where to save one. Some systems want the dialog made where the window is, and none wants the window to wait.
+    /// Asks for a scenario to open, or where to save one. Some systems want the dialog made where the window
+    /// is, and none wants the window to wait.
     pub fn ask(saves: bool, start: &Path, context: &Context) -> Self {
-        let (folder, name) = if start.is_dir() { (Some(start), None) } else { (start.parent(), start.file_name()) };
+        let (folder, name) =
+            if start.is_dir() { (Some(start), None) } else { (start.parent(), start.file_name()) };
         let mut dialog = rfd::AsyncFileDialog::new().add_filter("scenario", &["toml"]);
         if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
             dialog = dialog.set_directory(std::path::absolute(folder).unwrap_or_else(|_| folder.into()));
         }
         if saves {
-            dialog = dialog.set_file_name(name.map_or_else(|| "scenario.toml".into(), |name| name.to_string_lossy()));
+            dialog = dialog
+                .set_file_name(name.map_or_else(|| "scenario.toml".into(), |name| name.to_string_lossy()));
             Self::waiting(saves, dialog.save_file(), context)
         } else {
             Self::waiting(saves, dialog.pick_file(), context)
         }
     }
 
-    fn waiting(saves: bool, dialog: impl Future<Output = Option<rfd::FileHandle>> + Send + 'static, context: &Context) -> Self {
+    fn waiting(
+        saves: bool,
+        dialog: impl Future<Output = Option<rfd::FileHandle>> + Send + 'static,
+        context: &Context,
+    ) -> Self {
         let (sender, answer) = channel();
         let context = context.clone();
         let wait = move || {

@@ -1,7 +1,8 @@
 //! The scenario that is open: its values, what was changed, and the way back.
 //!
-//! Values are edited in a TOML tree, which every key of the format fits without code of its own. Whatever the tree says is checked as a file
-//! would be; as long as it is not legal, the last legal scenario stays the one that is rendered.
+//! Values are edited in a TOML tree, which every key of the format fits without code of its own. Whatever the
+//! tree says is checked as a file would be; as long as it is not legal, the last legal scenario stays the one
+//! that is rendered.
 
 use std::{
     path::{Path, PathBuf},
@@ -82,7 +83,9 @@ impl Document {
 
     /// What is wrong with a key or with something under it.
     pub fn problem(&self, key: &str) -> Option<&Problem> {
-        self.problems.iter().find(|problem| problem.key.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
+        self.problems.iter().find(|problem| {
+            problem.key.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
     }
 
     /// A path as the scenario's file has it: without the folder that it is in, if it is in it.
@@ -97,7 +100,8 @@ impl Document {
         self.path.parent().map_or_else(|| path.to_owned(), |folder| folder.join(path).display().to_string())
     }
 
-    /// Gives a key a value, or takes it away. While `ongoing` (a hand drags it), all values of the same key are one step.
+    /// Gives a key a value, or takes it away. While `ongoing` (a hand drags it), all values of the same key
+    /// are one step.
     pub fn set(&mut self, key: &str, value: Option<Value>, ongoing: bool) {
         let mut tree = self.tree.clone();
         place(&mut tree, key, value);
@@ -117,13 +121,15 @@ impl Document {
         self.set(key, value, false);
     }
 
-    /// Puts another camera in place; mount, frame rate and phase stay, since a calibration knows nothing of them.
+    /// Puts another camera in place; mount, frame rate and phase stay, since a calibration knows nothing of
+    /// them.
     ///
     /// # Errors
     /// Text for people.
     pub fn set_camera(&mut self, camera: &CameraSpec) -> Result<(), String> {
         let kept = &self.scenario.camera;
-        let camera = CameraSpec { mount: kept.mount.clone(), fps: kept.fps, phase: kept.phase, ..camera.clone() };
+        let camera =
+            CameraSpec { mount: kept.mount.clone(), fps: kept.fps, phase: kept.phase, ..camera.clone() };
         let value = Value::try_from(camera).map_err(|error| error.to_string())?;
         self.set("camera", Some(value), false);
         Ok(())
@@ -160,10 +166,13 @@ impl Document {
         let mut tree = self.tree.clone();
         for key in path_keys(&tree) {
             let Some(Value::String(path)) = find(&tree, &key) else { continue };
-            let relative = folder.and_then(|folder| Path::new(path).strip_prefix(folder).ok()).map(|path| path.display().to_string());
+            let relative = folder
+                .and_then(|folder| Path::new(path).strip_prefix(folder).ok())
+                .map(|path| path.display().to_string());
             // What is elsewhere must be found from anywhere.
-            let text =
-                relative.unwrap_or_else(|| std::path::absolute(path).map_or_else(|_| path.clone(), |path| path.display().to_string()));
+            let text = relative.unwrap_or_else(|| {
+                std::path::absolute(path).map_or_else(|_| path.clone(), |path| path.display().to_string())
+            });
             place(&mut tree, &key, Some(Value::String(text)));
         }
         toml::to_string(&tree).map_err(|error| error.to_string())
@@ -198,7 +207,8 @@ impl Document {
 
     /// The same for a folder and for the frames from the first to before the last.
     pub fn render_command(&self, folder: &Path, frames: Option<[u64; 2]>) -> String {
-        let mut words = vec!["camsim".to_owned(), "render".to_owned(), quoted(&self.path.display().to_string())];
+        let mut words =
+            vec!["camsim".to_owned(), "render".to_owned(), quoted(&self.path.display().to_string())];
         for (key, value) in self.changes() {
             words.push("--set".to_owned());
             words.push(quoted(&format!("{key}={value}")));
@@ -210,7 +220,8 @@ impl Document {
         words.join(" ")
     }
 
-    /// Keys that differ from the file as it stands on the disk, with their values. A key that was taken away cannot be said on a command line.
+    /// Keys that differ from the file as it stands on the disk, with their values. A key that was taken away
+    /// cannot be said on a command line.
     fn changes(&self) -> Vec<(String, Value)> {
         let mut changes = Vec::new();
         differences(&self.tree, &self.saved, "", &mut changes);
@@ -282,7 +293,8 @@ fn find<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     Some(value)
 }
 
-/// Tables on the way are made, and go when nothing is left in them; an index beyond the end of a list does nothing.
+/// Tables on the way are made, and go when nothing is left in them; an index beyond the end of a list does
+/// nothing.
 fn place(table: &mut Table, key: &str, value: Option<Value>) {
     match key.split_once('.') {
         None => {
@@ -346,7 +358,11 @@ fn missing(before: &Table, now: &Table, prefix: &str, into: &mut Vec<String>) {
 /// As a POSIX shell takes it for one word.
 fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
 }
 
 #[cfg(test)]

@@ -27,14 +27,15 @@ pub fn rank(path: &Path) -> u8 {
     u8::from(!is_toml || is_camera(path))
 }
 
-/// Why a path cannot be taken whatever it is, if so: else a scenario would be left with something that cannot be loaded.
+/// Why a path cannot be taken whatever it is, if so: else a scenario would be left with something that cannot
+/// be loaded.
 fn hindrance(path: &Path) -> Option<String> {
     let name = path.display();
     match std::fs::metadata(path) {
         Err(error) => Some(format!("{name}: {error}; put the file back and drop it again")),
-        Ok(what) if what.is_dir() => {
-            Some(format!("{name} is a folder: drop the scenario, log, calibration, picture or model that is in it"))
-        }
+        Ok(what) if what.is_dir() => Some(format!(
+            "{name} is a folder: drop the scenario, log, calibration, picture or model that is in it"
+        )),
         Ok(what) if what.len() == 0 => Some(format!("{name} is empty: nothing was changed")),
         Ok(_) => None,
     }
@@ -80,15 +81,19 @@ pub fn use_picture(state: &mut State, key: Option<&str>) {
     }
 }
 
-/// Whether a TOML file has a camera at its root: scenarios have `flight` and `scene`, and what cannot be read is told by who opens it.
+/// Whether a TOML file has a camera at its root: scenarios have `flight` and `scene`, and what cannot be read
+/// is told by who opens it.
 fn is_camera(path: &Path) -> bool {
     let table = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<Table>().ok());
-    table.is_some_and(|table| !table.contains_key("flight") && !table.contains_key("scene") && !table.contains_key("camera"))
+    table.is_some_and(|table| {
+        !table.contains_key("flight") && !table.contains_key("scene") && !table.contains_key("camera")
+    })
 }
 
 /// Whether a YAML file describes a calibration target, as Kalibr's do, not a camera.
 fn is_target(path: &Path) -> bool {
-    std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("target_type")))
+    std::fs::read_to_string(path)
+        .is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("target_type")))
 }
 
 /// What the pixel that is kept sees, north, east, down.
@@ -100,20 +105,24 @@ fn floats(values: [f64; 3]) -> Value {
     Value::Array(values.into_iter().map(Value::Float).collect())
 }
 
-/// A calibration board: in place of the one that is there and where that is, else where the pixel that is kept looks.
+/// A calibration board: in place of the one that is there and where that is, else where the pixel that is
+/// kept looks.
 fn target(state: &mut State, path: &Path) {
     let seen = kept_point(state);
     let told = match &mut state.document {
-        Some(document) => std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display())).and_then(|file| {
-            let at = seen.filter(|_| document.value("scene.board").is_none());
-            let mut board = document.value("scene.board").and_then(Value::as_table).cloned().unwrap_or_default();
-            board.retain(|key, _| PLACE_OF_BOARD.contains(&key));
-            if let Some(point) = at {
-                board.insert("at".into(), floats(point));
-            }
-            board.insert("target".into(), Value::String(file.display().to_string()));
-            put(document, "scene.board", Value::Table(board), path)
-        }),
+        Some(document) => std::path::absolute(path)
+            .map_err(|error| format!("{}: {error}", path.display()))
+            .and_then(|file| {
+                let at = seen.filter(|_| document.value("scene.board").is_none());
+                let mut board =
+                    document.value("scene.board").and_then(Value::as_table).cloned().unwrap_or_default();
+                board.retain(|key, _| PLACE_OF_BOARD.contains(&key));
+                if let Some(point) = at {
+                    board.insert("at".into(), floats(point));
+                }
+                board.insert("target".into(), Value::String(file.display().to_string()));
+                put(document, "scene.board", Value::Table(board), path)
+            }),
         None => Err(no_scenario(path)),
     };
     after(state, told);
@@ -123,21 +132,25 @@ fn target(state: &mut State, path: &Path) {
 fn model(state: &mut State, path: &Path) {
     let at = kept_point(state).unwrap_or_default();
     let told = match &mut state.document {
-        Some(document) => std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display())).and_then(|file| {
-            let mut entry = Table::new();
-            entry.insert("file".into(), Value::String(file.display().to_string()));
-            entry.insert("at".into(), floats(at));
-            entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
-            let mut list = document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
-            list.push(Value::Table(entry));
-            put(document, "scene.gltf", Value::Array(list), path)
-        }),
+        Some(document) => std::path::absolute(path)
+            .map_err(|error| format!("{}: {error}", path.display()))
+            .and_then(|file| {
+                let mut entry = Table::new();
+                entry.insert("file".into(), Value::String(file.display().to_string()));
+                entry.insert("at".into(), floats(at));
+                entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
+                let mut list =
+                    document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
+                list.push(Value::Table(entry));
+                put(document, "scene.gltf", Value::Array(list), path)
+            }),
         None => Err(no_scenario(path)),
     };
     after(state, told);
 }
 
-/// Another program's calibration: what it does not tell of shutter and light stays, but for the other lens's vignette. What was left out or chosen is told.
+/// Another program's calibration: what it does not tell of shutter and light stays, but for the other lens's
+/// vignette. What was left out or chosen is told.
 fn calibration(state: &mut State, path: &Path) {
     let imported = match import_camera_as(path, None) {
         Ok(imported) => imported,
@@ -154,7 +167,10 @@ fn calibration(state: &mut State, path: &Path) {
             spec.photometric = PhotometricSpec { vignette, vignette_thresholds, ..now.photometric.clone() };
         }
         // Frame rate and shutter are the scenario's here.
-        let told = imported.notes.iter().filter(|note| !note.contains("fps is 30") && !note.contains("shutter is global"));
+        let told = imported
+            .notes
+            .iter()
+            .filter(|note| !note.contains("fps is 30") && !note.contains("shutter is global"));
         told.for_each(|note| state.notice(format!("{}: {note}", path.display())));
     }
     camera(state, Ok(spec));
@@ -172,7 +188,9 @@ fn camera(state: &mut State, read: Result<CameraSpec, String>) {
 fn set(state: &mut State, key: &str, path: &Path) {
     let absolute = std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()));
     let told = match (&mut state.document, absolute) {
-        (Some(document), Ok(absolute)) => put(document, key, Value::String(absolute.display().to_string()), path),
+        (Some(document), Ok(absolute)) => {
+            put(document, key, Value::String(absolute.display().to_string()), path)
+        }
         (Some(_), Err(error)) => Err(error),
         (None, _) => Err(no_scenario(path)),
     };

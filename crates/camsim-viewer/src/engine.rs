@@ -1,9 +1,12 @@
-//! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks with them.
+//! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks
+//! with them.
 //!
-//! The window never waits, but when it closes: then for the frame that is at work. What it wants stands in a [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a
-//! channel, and a repaint is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a device has
-//! one queue, in order, and a hand that moves on must not wait for a full frame, nor the window for either. Finished pictures cross by way of
-//! the host, as `camsim render` reads them. What is loaded is shared.
+//! The window never waits, but when it closes: then for the frame that is at work. What it wants stands in a
+//! [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a channel, and a repaint
+//! is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a
+//! device has one queue, in order, and a hand that moves on must not wait for a full frame, nor the window
+//! for either. Finished pictures cross by way of the host, as `camsim render` reads them. What is loaded is
+//! shared.
 
 mod errors;
 mod exact;
@@ -30,8 +33,9 @@ pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Tr
 pub use picture::{Difference, Picture, ramp};
 pub use variants::{preview_factor, staged};
 
-/// The engine's threads as the window sees them. Dropping it ends them and waits until they have: whoever ends the program while one of them still gives its device back
-/// may do so in a driver that is just being unloaded, which is a fault of memory now and then.
+/// The engine's threads as the window sees them. Dropping it ends them and waits until they have: whoever
+/// ends the program while one of them still gives its device back may do so in a driver that is just being
+/// unloaded, which is a fault of memory now and then.
 #[derive(Debug)]
 pub struct Handle {
     previews: Arc<Mailbox<Wanted>>,
@@ -68,7 +72,8 @@ impl Handle {
     pub fn start(repaint: impl Fn() + Send + Sync + 'static) -> Self {
         let (sender, replies) = channel();
         let speaker = Speaker { replies: sender, repaint: Arc::new(repaint) };
-        let (previews, frames, exact) = (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
+        let (previews, frames, exact) =
+            (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
         let library = Arc::new(Library::default());
         let mut threads = Vec::new();
         for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &frames)] {
@@ -115,16 +120,21 @@ impl Drop for Handle {
     }
 }
 
-/// A thread that comes back after a panic, with a word about it: a fault in one frame must not leave the window with nothing behind it.
+/// A thread that comes back after a panic, with a word about it: a fault in one frame must not leave the
+/// window with nothing behind it.
 fn spawn(name: &str, speaker: Speaker, body: impl Fn() + Send + 'static) -> Option<JoinHandle<()>> {
     let voice = speaker.clone();
     let body = move || {
         while catch_unwind(AssertUnwindSafe(&body)).is_err() {
-            voice.say(Reply::Failed("the renderer stopped at a fault of its own; it goes on with the next change".into()));
+            voice.say(Reply::Failed(
+                "the renderer stopped at a fault of its own; it goes on with the next change".into(),
+            ));
         }
     };
     let no_thread = |error: &std::io::Error| {
-        speaker.say(Reply::Failed(format!("no thread for the renderer: {error}; close other programs and open the viewer again")));
+        speaker.say(Reply::Failed(format!(
+            "no thread for the renderer: {error}; close other programs and open the viewer again"
+        )));
     };
     std::thread::Builder::new().name(name.into()).spawn(body).inspect_err(no_thread).ok()
 }

@@ -1,6 +1,7 @@
 //! Rendering a range of frames to files, beside the window.
 //!
-//! How frames are written is the command line's business: it hands the viewer an [`Exporter`] that does what `camsim render` does.
+//! How frames are written is the command line's business: it hands the viewer an [`Exporter`] that does what
+//! `camsim render` does.
 
 use std::{
     path::PathBuf,
@@ -37,7 +38,8 @@ pub struct Progress {
     pub ended: Option<Result<String, String>>,
 }
 
-/// Renders a job, tells each finished frame by [`ExportJob::tick`], and stops soon after that says so. The text says what was done.
+/// Renders a job, tells each finished frame by [`ExportJob::tick`], and stops soon after that says so. The
+/// text says what was done.
 pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sync>;
 
 impl ExportJob {
@@ -59,7 +61,8 @@ impl ExportJob {
         let (exporter, of_thread) = (exporter.clone(), job.clone());
         let spawned = std::thread::Builder::new().name("camsim export".into()).spawn(move || {
             let run = std::panic::AssertUnwindSafe(|| exporter(&of_thread));
-            let ended = std::panic::catch_unwind(run).unwrap_or_else(|_| Err("the export stopped at a fault of its own".into()));
+            let ended = std::panic::catch_unwind(run)
+                .unwrap_or_else(|_| Err("the export stopped at a fault of its own".into()));
             of_thread.end(ended);
         });
         if let Err(error) = spawned {
@@ -90,7 +93,8 @@ impl ExportJob {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Seconds that the rest will take if it goes on as it went so far; `None` before the second frame: the first takes what is done once, too.
+    /// Seconds that the rest will take if it goes on as it went so far; `None` before the second frame: the
+    /// first takes what is done once, too.
     pub fn left_s(&self) -> Option<f64> {
         let done = self.progress().done;
         let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;

@@ -1,12 +1,15 @@
-//! Glyphs that egui's own fonts lack, as those of Chinese, Japanese and Korean names: from a font of the system, if there is one. None is carried
-//! along: they are larger than the whole program. Nothing is read before a character asks for it, and what cannot be read is passed over.
+//! Glyphs that egui's own fonts lack, as those of Chinese, Japanese and Korean names: from a font of the
+//! system, if there is one. None is carried along: they are larger than the whole program. Nothing is read
+//! before a character asks for it, and what cannot be read is passed over.
 
 use std::{
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
 };
 
-use eframe::egui::{Context, FallbackRequest, FontData, FontFamily, FontInsert, FontPriority, FontProvider, InsertFontFamily};
+use eframe::egui::{
+    Context, FallbackRequest, FontData, FontFamily, FontInsert, FontPriority, FontProvider, InsertFontFamily,
+};
 
 /// Fonts that are tried for a character, at most.
 const MOST: usize = 6;
@@ -30,7 +33,8 @@ enum Script {
 
 use Script::{Han, Hangul, Kana, Other};
 
-/// Beginnings of file names, small letters, with what is in those fonts. The first that is there is tried first.
+/// Beginnings of file names, small letters, with what is in those fonts. The first that is there is tried
+/// first.
 const FONTS: &[(&str, &[Script])] = &[
     ("notosanscjk", &[Han, Kana, Hangul]),
     ("sourcehansans", &[Han, Kana, Hangul]),
@@ -45,7 +49,10 @@ const FONTS: &[(&str, &[Script])] = &[
     ("pingfang", &[Han, Kana]),
     ("hiragino sans gb", &[Han, Kana]),
     ("stheiti", &[Han, Kana]),
-    ("\u{30d2}\u{30e9}\u{30ad}\u{3099}\u{30ce}\u{89d2}\u{30b3}\u{3099}\u{30b7}\u{30c3}\u{30af} w3", &[Han, Kana]),
+    (
+        "\u{30d2}\u{30e9}\u{30ad}\u{3099}\u{30ce}\u{89d2}\u{30b3}\u{3099}\u{30b7}\u{30c3}\u{30af} w3",
+        &[Han, Kana],
+    ),
     ("\u{30d2}\u{30e9}\u{30ae}\u{30ce}\u{89d2}\u{30b4}\u{30b7}\u{30c3}\u{30af} w3", &[Han, Kana]),
     ("applesdgothicneo", &[Hangul]),
     ("applegothic", &[Hangul]),
@@ -71,7 +78,8 @@ const FONTS: &[(&str, &[Script])] = &[
     ("lucidagrande", &[Other]),
 ];
 /// Cuts that are not taken where there is a plain one.
-const CUTS: &[&str] = &["bold", "black", "heavy", "light", "thin", "medium", "italic", "oblique", "mono", "condensed", "serif"];
+const CUTS: &[&str] =
+    &["bold", "black", "heavy", "light", "thin", "medium", "italic", "oblique", "mono", "condensed", "serif"];
 
 /// Lets a window find them.
 pub fn install(context: &Context) {
@@ -88,13 +96,19 @@ fn install_from(context: &Context, folders: Vec<PathBuf>) {
 
 /// Where systems have their fonts.
 fn folders() -> Vec<PathBuf> {
-    let of = |variable: &str, below: &str| std::env::var_os(variable).map(|folder| Path::new(&folder).join(below));
+    let of =
+        |variable: &str, below: &str| std::env::var_os(variable).map(|folder| Path::new(&folder).join(below));
     let fixed: &[&str] = if cfg!(target_os = "macos") {
         &["/System/Library/Fonts", "/Library/Fonts", "/System/Library/AssetsV2/com_apple_MobileAsset_Font7"]
     } else if cfg!(windows) {
         &[]
     } else {
-        &["/usr/share/fonts", "/usr/local/share/fonts", "/run/host/fonts", "/run/current-system/sw/share/X11/fonts"]
+        &[
+            "/usr/share/fonts",
+            "/usr/local/share/fonts",
+            "/run/host/fonts",
+            "/run/current-system/sw/share/X11/fonts",
+        ]
     };
     let own = if cfg!(target_os = "macos") {
         vec![of("HOME", "Library/Fonts")]
@@ -137,9 +151,11 @@ impl FontProvider for Nth {
     fn font_for(&self, request: &FallbackRequest<'_>) -> Option<FontInsert> {
         let script = script_of(request.cluster.chars().next()?)?;
         let font = self.found.nth(script, self.place)?;
-        let data = font.data.get_or_init(|| std::fs::read(&font.path).ok().map(FontData::from_owned)).clone()?;
+        let data =
+            font.data.get_or_init(|| std::fs::read(&font.path).ok().map(FontData::from_owned)).clone()?;
         let families = [FontFamily::Proportional, FontFamily::Monospace];
-        let families = families.map(|family| InsertFontFamily { family, priority: FontPriority::Lowest }).into();
+        let families =
+            families.map(|family| InsertFontFamily { family, priority: FontPriority::Lowest }).into();
         Some(FontInsert { name: font.path.display().to_string(), data, families })
     }
 }
@@ -148,11 +164,16 @@ impl FontProvider for Nth {
 fn script_of(character: char) -> Option<Script> {
     Some(match character {
         '\0'..='\u{7f}' | '\u{e000}'..='\u{f8ff}' => return None,
-        '\u{1100}'..='\u{11ff}' | '\u{3130}'..='\u{318f}' | '\u{a960}'..='\u{a97f}' | '\u{ac00}'..='\u{d7ff}' => Hangul,
+        '\u{1100}'..='\u{11ff}'
+        | '\u{3130}'..='\u{318f}'
+        | '\u{a960}'..='\u{a97f}'
+        | '\u{ac00}'..='\u{d7ff}' => Hangul,
         '\u{3040}'..='\u{30ff}' | '\u{31f0}'..='\u{31ff}' | '\u{ff66}'..='\u{ff9f}' => Kana,
-        '\u{2e80}'..='\u{303f}' | '\u{3100}'..='\u{9fff}' | '\u{f900}'..='\u{faff}' | '\u{fe30}'..='\u{fe4f}' | '\u{ff00}'..='\u{ffef}' => {
-            Han
-        }
+        '\u{2e80}'..='\u{303f}'
+        | '\u{3100}'..='\u{9fff}'
+        | '\u{f900}'..='\u{faff}'
+        | '\u{fe30}'..='\u{fe4f}'
+        | '\u{ff00}'..='\u{ffef}' => Han,
         '\u{20000}'..='\u{3ffff}' => Han,
         _ => Other,
     })
@@ -163,11 +184,14 @@ fn search(folders: &[PathBuf]) -> Vec<Font> {
     let mut files = Vec::new();
     let mut left = MOST_FILES;
     folders.iter().for_each(|folder| list(folder, DEPTH, &mut left, &mut files));
-    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let name =
+        |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
     let named: Vec<(String, PathBuf)> = files.into_iter().map(|path| (name(&path), path)).collect();
     let best = |start: &str| {
         let of_start = named.iter().filter(|(name, _)| name.starts_with(start));
-        of_start.min_by_key(|(name, path)| (CUTS.iter().filter(|cut| name[start.len()..].contains(*cut)).count(), name.len(), path))
+        of_start.min_by_key(|(name, path)| {
+            (CUTS.iter().filter(|cut| name[start.len()..].contains(*cut)).count(), name.len(), path)
+        })
     };
     let fonts = FONTS.iter().filter_map(|(start, scripts)| Some((best(start)?.1.clone(), *scripts)));
     fonts.map(|(path, scripts)| Font { path, scripts, data: OnceLock::new() }).collect()
@@ -197,7 +221,10 @@ mod tests {
     use super::*;
 
     fn names(fonts: &[Font]) -> Vec<String> {
-        fonts.iter().map(|font| font.path.file_name().expect("a name").to_string_lossy().into_owned()).collect()
+        fonts
+            .iter()
+            .map(|font| font.path.file_name().expect("a name").to_string_lossy().into_owned())
+            .collect()
     }
 
     #[test]
@@ -218,15 +245,23 @@ mod tests {
         let fonts = search(&[folder.path().join("gone"), folder.path().into()]);
         assert_eq!(names(&fonts), ["NotoSansCJK-Regular.ttc", "malgun.ttf"]);
         let found = Found { folders: vec![folder.path().into()], fonts: OnceLock::new() };
-        let nth = |script, place| found.nth(script, place).map(|font| names(std::slice::from_ref(font))[0].clone());
+        let nth =
+            |script, place| found.nth(script, place).map(|font| names(std::slice::from_ref(font))[0].clone());
         assert_eq!(nth(Hangul, 1).as_deref(), Some("malgun.ttf"));
         assert!(nth(Han, 1).is_none() && nth(Other, 0).is_none());
     }
 
     #[test]
     fn characters_are_looked_for_where_they_may_be() {
-        let expected = [('\u{98db}', Some(Han)), ('\u{3002}', Some(Han)), ('\u{30ab}', Some(Kana)), ('\u{d55c}', Some(Hangul))];
-        for (character, script) in expected.into_iter().chain([('a', None), ('\u{e000}', None), ('\u{531}', Some(Other))]) {
+        let expected = [
+            ('\u{98db}', Some(Han)),
+            ('\u{3002}', Some(Han)),
+            ('\u{30ab}', Some(Kana)),
+            ('\u{d55c}', Some(Hangul)),
+        ];
+        for (character, script) in
+            expected.into_iter().chain([('a', None), ('\u{e000}', None), ('\u{531}', Some(Other))])
+        {
             assert_eq!(script_of(character), script, "{character}");
         }
     }
@@ -260,11 +295,17 @@ mod tests {
     #[test]
     fn a_font_of_the_system_has_what_its_name_says() {
         // Of Droid's fallback there are cuts without Korean.
-        for (text, script) in [("\u{98db}\u{884c}", Han), ("\u{30ab}\u{30e1}\u{30e9}", Kana), ("\u{531}", Other)] {
+        for (text, script) in
+            [("\u{98db}\u{884c}", Han), ("\u{30ab}\u{30e1}\u{30e9}", Kana), ("\u{531}", Other)]
+        {
             let found = Found { folders: folders(), fonts: OnceLock::new() };
             // Not every machine has one.
             if found.nth(script, 0).is_some() {
-                assert!(has(folders(), text), "{text} in none of {:?}", names(found.fonts.get().expect("looked for")));
+                assert!(
+                    has(folders(), text),
+                    "{text} in none of {:?}",
+                    names(found.fonts.get().expect("looked for"))
+                );
             }
         }
     }

@@ -12,7 +12,8 @@ use crate::{
     sheet::Sheet,
 };
 
-/// Steps between two rows of the log that are marked, seconds of the log: more than one, and than what rounding makes of one.
+/// Steps between two rows of the log that are marked, seconds of the log: more than one, and than what
+/// rounding makes of one.
 const GAP_S: f64 = 1.0 + 1e-6;
 
 /// All that panes know of the engine.
@@ -125,10 +126,13 @@ impl Heard {
                 }
             }
             Reply::Exact(picture) => {
-                let (old, old_difference) = self.exact.take().map_or((None, None), |exact| (Some(exact.sheet), exact.difference));
+                let (old, old_difference) =
+                    self.exact.take().map_or((None, None), |exact| (Some(exact.sheet), exact.difference));
                 let sheet = Sheet::new(context, "oracle", picture.image.clone(), old);
-                let difference =
-                    picture.difference.as_ref().map(|d| Sheet::new(context, "oracle difference", d.image.clone(), old_difference));
+                let difference = picture
+                    .difference
+                    .as_ref()
+                    .map(|d| Sheet::new(context, "oracle difference", d.image.clone(), old_difference));
                 self.exact = Some(Exact { picture: *picture, sheet, difference });
             }
         }
@@ -145,7 +149,15 @@ impl Heard {
         if stage == Stage::Oracle {
             let Exact { picture, sheet, .. } = self.current_exact()?;
             let size_px = picture.sequence.scenario.camera.size_px;
-            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None, errors: None, depth: None });
+            return Some(Sight {
+                sheet,
+                size_px,
+                color_rgba: &picture.color_rgba,
+                stage,
+                plan: None,
+                errors: None,
+                depth: None,
+            });
         }
         let at = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
         let (picture, sheet) = (shown.reply.pictures.get(at)?, shown.sheets.get(at)?);
@@ -162,7 +174,8 @@ impl Heard {
         Some(sequence.start_s + (frame as f64 + camera.phase) / camera.fps)
     }
 
-    /// What a pixel of the frame shown sees, if that is a surface; `None` as long as there are no looks into it.
+    /// What a pixel of the frame shown sees, if that is a surface; `None` as long as there are no looks into
+    /// it.
     pub fn point_ned_m(&self, pixel: [u32; 2]) -> Option<glam::DVec3> {
         let (looks, shown) = (self.current_looks()?, self.shown.as_ref()?);
         looks.look(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
@@ -176,7 +189,8 @@ impl Heard {
     /// The oracle's picture, if it is of the frame shown.
     pub fn current_exact(&self) -> Option<&Exact> {
         let (exact, shown) = (self.exact.as_ref()?, self.shown.as_ref()?);
-        (self.is_current(&exact.picture.sequence) && exact.picture.frame == shown.reply.frame).then_some(exact)
+        (self.is_current(&exact.picture.sequence) && exact.picture.frame == shown.reply.frame)
+            .then_some(exact)
     }
 
     /// Looks into the frame shown.
@@ -201,15 +215,23 @@ impl Heard {
 
 impl Shown {
     fn new(reply: FrameReply, before: Option<Self>, context: &egui::Context) -> Self {
-        let (old, old_difference, old_depths, old_errors) =
-            before.map_or_else(Default::default, |before| (before.sheets, before.difference, before.depths, before.errors));
+        let (old, old_difference, old_depths, old_errors) = before.map_or_else(Default::default, |before| {
+            (before.sheets, before.difference, before.depths, before.errors)
+        });
         let pictures = reply.pictures.iter().map(|picture| &picture.image);
-        let difference =
-            reply.difference.as_ref().map(|difference| Sheet::new(context, "difference", difference.image.clone(), old_difference));
+        let difference = reply
+            .difference
+            .as_ref()
+            .map(|difference| Sheet::new(context, "difference", difference.image.clone(), old_difference));
         Self {
             sheets: sheets("picture", pictures, old, context),
             depths: sheets("depth", reply.truths.iter().map(|truth| &truth.image), old_depths, context),
-            errors: sheets("predicted error", reply.errors.iter().map(|errors| &errors.image), old_errors, context),
+            errors: sheets(
+                "predicted error",
+                reply.errors.iter().map(|errors| &errors.image),
+                old_errors,
+                context,
+            ),
             difference,
             reply,
         }
@@ -222,7 +244,8 @@ impl Shown {
     }
 }
 
-/// Steps of the log's clock that count as gaps, as the log's report counts them; on the timeline they are shorter by its `speed`.
+/// Steps of the log's clock that count as gaps, as the log's report counts them; on the timeline they are
+/// shorter by its `speed`.
 fn gaps_s(log: &FlightLog, speed: f64) -> Vec<[f64; 2]> {
     if log.report.gaps.count == 0 {
         return Vec::new();
@@ -232,7 +255,12 @@ fn gaps_s(log: &FlightLog, speed: f64) -> Vec<[f64; 2]> {
 }
 
 /// Pictures on the screen, in place of older ones.
-fn sheets<'a>(name: &str, images: impl Iterator<Item = &'a Arc<egui::ColorImage>>, old: Vec<Sheet>, context: &egui::Context) -> Vec<Sheet> {
+fn sheets<'a>(
+    name: &str,
+    images: impl Iterator<Item = &'a Arc<egui::ColorImage>>,
+    old: Vec<Sheet>,
+    context: &egui::Context,
+) -> Vec<Sheet> {
     let mut old = old.into_iter();
     images.map(|image| Sheet::new(context, name, image.clone(), old.next())).collect()
 }

@@ -1,5 +1,5 @@
-//! The egui viewer: scrub a flight, see what each imperfection does, and ask any pixel why it is as it is. It shows the pixels that
-//! `camsim render` writes, by the same engine and plan.
+//! The egui viewer: scrub a flight, see what each imperfection does, and ask any pixel why it is as it is. It
+//! shows the pixels that `camsim render` writes, by the same engine and plan.
 //!
 //! ```text
 //! panes (draw from State, send Messages) -> State -> Wanted -> engine threads -> Reply -> State
@@ -61,10 +61,12 @@ use anyhow::{Context, anyhow};
 pub use export::{ExportJob, Exporter, Progress};
 pub use still::{Still, still};
 
-/// Opens the viewer on a scenario, or on the built-in flight, and returns when its window is closed. `exporter` renders to files.
+/// Opens the viewer on a scenario, or on the built-in flight, and returns when its window is closed.
+/// `exporter` renders to files.
 ///
 /// # Errors
-/// No display, or nothing that a window can be drawn with. What is wrong with a scenario, or on the way, is shown in the window.
+/// No display, or nothing that a window can be drawn with. What is wrong with a scenario, or on the way, is
+/// shown in the window.
 pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Result<()> {
     if let Some(text) = no_display() {
         return Err(anyhow!(text));
@@ -73,7 +75,8 @@ pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Res
         Some(path) => path,
         None => {
             let folder = std::env::temp_dir().join(format!("camsim-builtin-{}", env!("CARGO_PKG_VERSION")));
-            camsim_io::builtin::unpack(&folder).with_context(|| format!("cannot write the built-in flight to {}", folder.display()))?
+            camsim_io::builtin::unpack(&folder)
+                .with_context(|| format!("cannot write the built-in flight to {}", folder.display()))?
         }
     };
     let options = eframe::NativeOptions {

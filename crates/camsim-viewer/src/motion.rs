@@ -31,14 +31,18 @@ pub fn paths(looks: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
     type Kept = Option<(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)>;
     static KEPT: Mutex<Kept> = Mutex::new(None);
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, _, paths)) = kept.as_ref().filter(|(of, at, _)| *at == frame && std::ptr::eq(of.as_ptr(), Arc::as_ptr(looks))) {
+    if let Some((_, _, paths)) =
+        kept.as_ref().filter(|(of, at, _)| *at == frame && std::ptr::eq(of.as_ptr(), Arc::as_ptr(looks)))
+    {
         return paths.clone();
     }
     let [width, height] = looks.sequence().scenario.camera.size_px;
-    let place = |k: u32, n: u32, side: u32| ((2 * u64::from(k) + 1) * u64::from(side) / (2 * u64::from(n))) as u32;
+    let place =
+        |k: u32, n: u32, side: u32| ((2 * u64::from(k) + 1) * u64::from(side) / (2 * u64::from(n))) as u32;
     let pixels = (0..ACROSS[1]).flat_map(|y| (0..ACROSS[0]).map(move |x| [x, y]));
-    let found: Vec<PixelPath> =
-        pixels.filter_map(|[x, y]| path(looks, frame, [place(x, ACROSS[0], width), place(y, ACROSS[1], height)])).collect();
+    let found: Vec<PixelPath> = pixels
+        .filter_map(|[x, y]| path(looks, frame, [place(x, ACROSS[0], width), place(y, ACROSS[1], height)]))
+        .collect();
     let found = Arc::new(found);
     *kept = Some((Arc::downgrade(looks), frame, found.clone()));
     found
@@ -52,11 +56,20 @@ pub fn path(looks: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
     let at = |t_s: f64| project(&camera, &sequence.path.pose(t_s), &look);
     let exposure_s = 1e-3 * sequence.scenario.camera.shutter.exposure_ms;
     let phases = (0..POINTS).map(|k| f64::from(k) / f64::from(POINTS - 1) - 0.5);
-    let exposure_px = if exposure_s > 0.0 { phases.filter_map(|phase| at(look.t_s + phase * exposure_s)).collect() } else { Vec::new() };
-    Some(PixelPath { pixel: DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])), at_stamp_px: at(looks.stamp_s(frame)), exposure_px })
+    let exposure_px = if exposure_s > 0.0 {
+        phases.filter_map(|phase| at(look.t_s + phase * exposure_s)).collect()
+    } else {
+        Vec::new()
+    };
+    Some(PixelPath {
+        pixel: DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])),
+        at_stamp_px: at(looks.stamp_s(frame)),
+        exposure_px,
+    })
 }
 
-/// A camera, made once: where its lens folds takes milliseconds to find, and panes ask with each pass. `None` for one that cannot be rendered.
+/// A camera, made once: where its lens folds takes milliseconds to find, and panes ask with each pass. `None`
+/// for one that cannot be rendered.
 pub fn camera_of(spec: &CameraSpec) -> Option<Arc<CameraModel>> {
     static KEPT: Mutex<Option<(CameraSpec, Arc<CameraModel>)>> = Mutex::new(None);
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,5 @@
-//! The eye of the 3D view, which goes around a point of the scene and looks at it: plain geometry, in north-east-down metres and points of the screen.
+//! The eye of the 3D view, which goes around a point of the scene and looks at it: plain geometry, in
+//! north-east-down metres and points of the screen.
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -53,7 +54,8 @@ impl Orbit {
 
     /// After a drag: what is near follows the hand.
     pub fn turned(self, drag: DVec2) -> Self {
-        let depression_deg = (self.depression_deg + TURN_DEG * drag.y).clamp(DEPRESSION_DEG[0], DEPRESSION_DEG[1]);
+        let depression_deg =
+            (self.depression_deg + TURN_DEG * drag.y).clamp(DEPRESSION_DEG[0], DEPRESSION_DEG[1]);
         Self { azimuth_deg: (self.azimuth_deg + TURN_DEG * drag.x).rem_euclid(360.0), depression_deg, ..self }
     }
 
@@ -117,7 +119,8 @@ impl Eye {
         DVec3::from_array(self.axes_ned.map(|axis| axis.dot(ned)))
     }
 
-    /// Whether a face across an axis of NED, through a place, is seen from the side that it looks to (1: along the axis, -1: against it).
+    /// Whether a face across an axis of NED, through a place, is seen from the side that it looks to (1:
+    /// along the axis, -1: against it).
     pub fn faces(&self, axis: usize, outward: f64, ned_m: DVec3) -> bool {
         (self.position_ned_m[axis] - ned_m[axis]) * outward > 0.0
     }
@@ -127,12 +130,14 @@ impl Eye {
         NEAR * self.distance_m
     }
 
-    /// Points to the right and down from the middle of the pane of what is at least as far away as [`Eye::near_m`].
+    /// Points to the right and down from the middle of the pane of what is at least as far away as
+    /// [`Eye::near_m`].
     pub fn place(&self, seen: DVec3) -> DVec2 {
         self.focal * seen.truncate() / seen.z
     }
 
-    /// The part of a convex face (or of a line of two ends) that is far enough away to be drawn, in the eye's axes.
+    /// The part of a convex face (or of a line of two ends) that is far enough away to be drawn, in the eye's
+    /// axes.
     pub fn clipped(&self, corners: &[DVec3]) -> Vec<DVec3> {
         let near_m = self.near_m();
         let mut kept = Vec::with_capacity(corners.len() + 1);
@@ -168,7 +173,10 @@ mod tests {
         let above = Orbit::from_above();
         assert!(place(&above, DVec3::ZERO).length() < 1e-9);
         let (north, east) = (place(&above, DVec3::X), place(&above, DVec3::Y));
-        assert!(north.x.abs() < 1e-9 && north.y < 0.0 && east.x > 0.0 && east.y.abs() < 1e-9, "{north} {east}");
+        assert!(
+            north.x.abs() < 1e-9 && north.y < 0.0 && east.x > 0.0 && east.y.abs() < 1e-9,
+            "{north} {east}"
+        );
         // 50 / sin 22.5 deg = 130.66 m away, 150 / tan 22.5 deg = 362.13 points: 2.7716 points a metre.
         assert!((east.x - 2.7716).abs() < 1e-3, "{east}");
     }
@@ -178,7 +186,10 @@ mod tests {
         for (azimuth_deg, right) in [(0.0, DVec3::Y), (90.0, DVec3::NEG_X), (180.0, DVec3::NEG_Y)] {
             let level = Orbit { azimuth_deg, depression_deg: 0.0, ..Orbit::default() };
             let (aside, up) = (place(&level, right), place(&level, DVec3::NEG_Z));
-            assert!(aside.x > 0.0 && aside.y.abs() < 1e-9 && up.x.abs() < 1e-9 && up.y < 0.0, "{azimuth_deg}: {aside} {up}");
+            assert!(
+                aside.x > 0.0 && aside.y.abs() < 1e-9 && up.x.abs() < 1e-9 && up.y < 0.0,
+                "{azimuth_deg}: {aside} {up}"
+            );
         }
     }
 
@@ -225,7 +236,10 @@ mod tests {
         let border = DVec3::new(1.0, 1.0, near_m);
         for (line, kept) in [([front, behind], [front, border]), ([behind, front], [border, front])] {
             let found = eye.clipped(&line);
-            assert!(found.len() == 2 && found.iter().zip(kept).all(|(a, b)| a.distance(b) < 1e-9), "{found:?}");
+            assert!(
+                found.len() == 2 && found.iter().zip(kept).all(|(a, b)| a.distance(b) < 1e-9),
+                "{found:?}"
+            );
         }
         assert!(eye.clipped(&[behind, behind]).is_empty());
         let face = eye.clipped(&[front, behind, front + DVec3::X]);

@@ -1,4 +1,5 @@
-//! Panes: small files that draw from the state and say what they wish. None of them touches the device or waits for anything.
+//! Panes: small files that draw from the state and say what they wish. None of them touches the device or
+//! waits for anything.
 
 mod export;
 mod image_view;
@@ -30,7 +31,8 @@ const NARROW: [f32; 2] = [640.0, 860.0];
 
 /// All panes.
 pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
-    // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass on a software adapter.
+    // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass
+    // on a software adapter.
     let style = ui.global_style();
     let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
     egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
@@ -53,11 +55,13 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             .size_range(220.0..=(0.4 * width).clamp(220.0, 700.0))
             .show(ui, |ui| pages(ui, state, out));
     }
-    egui::CentralPanel::default().frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT)).show(ui, |ui| {
-        Aside::Below(egui::Rangef::point(ui.max_rect().top())).set(ui.ctx());
-        notices::show(ui, state, out);
-        image_view::show(ui, state, out);
-    });
+    egui::CentralPanel::default()
+        .frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT))
+        .show(ui, |ui| {
+            Aside::Below(egui::Rangef::point(ui.max_rect().top())).set(ui.ctx());
+            notices::show(ui, state, out);
+            image_view::show(ui, state, out);
+        });
     menu::windows(ui.ctx(), state, out);
     hovering(ui.ctx());
     shortcuts::window(ui.ctx(), state, out);
@@ -79,9 +83,12 @@ fn hovering(context: &egui::Context) {
         egui::Color32::from_black_alpha(150),
     );
     let text = format!("drop to open or use {}", names.join(", "));
-    egui::Area::new(id).order(egui::Order::Foreground).anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO).show(context, |ui| {
-        ui.label(egui::RichText::new(text).size(20.0).color(egui::Color32::WHITE));
-    });
+    egui::Area::new(id)
+        .order(egui::Order::Foreground)
+        .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
+        .show(context, |ui| {
+            ui.label(egui::RichText::new(text).size(20.0).color(egui::Color32::WHITE));
+        });
 }
 
 fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
@@ -94,14 +101,17 @@ fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
         }
     });
     ui.separator();
-    egui::ScrollArea::vertical().id_salt(state.view.tab.label()).auto_shrink(false).show(ui, |ui| match state.view.tab {
-        Tab::Pixel => inspector::show(ui, state, out),
-        Tab::Plan => plan::show(ui, state),
-        Tab::Plots => plots::show(ui, state, out),
-        Tab::Map => map::show(ui, state, out),
-        Tab::Space => space::show(ui, state, out),
-        Tab::Export => export::show(ui, state, out),
-    });
+    egui::ScrollArea::vertical().id_salt(state.view.tab.label()).auto_shrink(false).show(
+        ui,
+        |ui| match state.view.tab {
+            Tab::Pixel => inspector::show(ui, state, out),
+            Tab::Plan => plan::show(ui, state),
+            Tab::Plots => plots::show(ui, state, out),
+            Tab::Map => map::show(ui, state, out),
+            Tab::Space => space::show(ui, state, out),
+            Tab::Export => export::show(ui, state, out),
+        },
+    );
 }
 
 /// From dark blue (0) to yellow (1).

@@ -22,7 +22,12 @@ impl Pulse {
     /// If it was asked for.
     pub fn from_env() -> Option<Self> {
         let now = Instant::now();
-        std::env::var_os("CAMSIM_VIEWER_PULSE").map(|_| Self { since: now, last: now, passes: 0, longest: Duration::ZERO })
+        std::env::var_os("CAMSIM_VIEWER_PULSE").map(|_| Self {
+            since: now,
+            last: now,
+            passes: 0,
+            longest: Duration::ZERO,
+        })
     }
 
     /// One pass.
@@ -35,9 +40,12 @@ impl Pulse {
         let elapsed = now - self.since;
         if elapsed >= EVERY {
             let rate = f64::from(self.passes) / elapsed.as_secs_f64();
-            let (preview_ms, full_ms) = (state.heard.preview_ms.unwrap_or_default(), state.heard.full_ms.unwrap_or_default());
+            let (preview_ms, full_ms) =
+                (state.heard.preview_ms.unwrap_or_default(), state.heard.full_ms.unwrap_or_default());
             let longest_ms = 1e3 * self.longest.as_secs_f64();
-            eprintln!("{rate:.1} passes/s, longest {longest_ms:.0} ms; last preview {preview_ms:.0} ms, last full frame {full_ms:.0} ms");
+            eprintln!(
+                "{rate:.1} passes/s, longest {longest_ms:.0} ms; last preview {preview_ms:.0} ms, last full frame {full_ms:.0} ms"
+            );
             (self.since, self.passes, self.longest) = (now, 0, Duration::ZERO);
         }
     }

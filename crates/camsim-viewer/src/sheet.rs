@@ -1,15 +1,19 @@
 //! Pictures on the screen.
 //!
-//! egui draws all rectangles by one shader, which computes two ways of filtering for each pixel and blends by the vertices' colours. On a software adapter that
-//! is the larger part of a pass with a picture in it. A picture needs none of it: here it has a pipeline of its own that reads a texel and is done. Where the
-//! window's format is not the one that codes can be written to as they are, or there is no such window (a test's), egui draws it after all.
+//! egui draws all rectangles by one shader, which computes two ways of filtering for each pixel and blends by
+//! the vertices' colours. On a software adapter that is the larger part of a pass with a picture in it. A
+//! picture needs none of it: here it has a pipeline of its own that reads a texel and is done. Where the
+//! window's format is not the one that codes can be written to as they are, or there is no such window (a
+//! test's), egui draws it after all.
 
 mod blit;
 
 use std::sync::Arc;
 
 use eframe::{
-    egui::{Color32, ColorImage, Context, Id, Painter, Rect, TextureFilter, TextureHandle, TextureOptions, pos2},
+    egui::{
+        Color32, ColorImage, Context, Id, Painter, Rect, TextureFilter, TextureHandle, TextureOptions, pos2,
+    },
     egui_wgpu,
 };
 
@@ -38,8 +42,11 @@ impl Sheet {
         if blits(context) {
             return Self { image, texture: None };
         }
-        let options =
-            TextureOptions { magnification: TextureFilter::Nearest, minification: TextureFilter::Linear, ..TextureOptions::LINEAR };
+        let options = TextureOptions {
+            magnification: TextureFilter::Nearest,
+            minification: TextureFilter::Linear,
+            ..TextureOptions::LINEAR
+        };
         let texture = match old.and_then(|old| old.texture) {
             Some(mut texture) => {
                 texture.set(image.clone(), options);
@@ -61,19 +68,26 @@ impl Sheet {
         if seen.is_positive() {
             let [width, height] = self.image.size.map(|side| side as f32);
             // Texels smaller than a pixel of the screen are averaged.
-            let smooth = rect.width() * painter.pixels_per_point() < width || rect.height() * painter.pixels_per_point() < height;
+            let smooth = rect.width() * painter.pixels_per_point() < width
+                || rect.height() * painter.pixels_per_point() < height;
             let blit = blit::Blit { place, image: self.image.clone(), uv, smooth };
             painter.add(egui_wgpu::Callback::new_paint_callback(seen, blit));
         }
     }
 }
 
-/// The part of `rect` within `clip`, on borders of the screen's pixels (callbacks have no others), and the part of the picture that lies there.
+/// The part of `rect` within `clip`, on borders of the screen's pixels (callbacks have no others), and the
+/// part of the picture that lies there.
 fn visible(rect: Rect, clip: Rect, pixels_per_point: f32) -> (Rect, Rect) {
     let snap = |at: f32| (at * pixels_per_point).round() / pixels_per_point;
     let seen = rect.intersect(clip);
-    let seen = Rect::from_min_max(pos2(snap(seen.left()), snap(seen.top())), pos2(snap(seen.right()), snap(seen.bottom())));
-    let share = |at: eframe::egui::Pos2| pos2((at.x - rect.left()) / rect.width(), (at.y - rect.top()) / rect.height());
+    let seen = Rect::from_min_max(
+        pos2(snap(seen.left()), snap(seen.top())),
+        pos2(snap(seen.right()), snap(seen.bottom())),
+    );
+    let share = |at: eframe::egui::Pos2| {
+        pos2((at.x - rect.left()) / rect.width(), (at.y - rect.top()) / rect.height())
+    };
     (seen, Rect::from_min_max(share(seen.min), share(seen.max)))
 }
 
@@ -98,7 +112,8 @@ mod tests {
         let (seen, uv) = visible(rect, clip, 1.0);
         assert_eq!(seen, Rect::from_min_max(pos2(0.0, 20.0), pos2(200.0, 120.0)));
         assert_eq!(uv, Rect::from_min_max(pos2(0.25, 0.0), pos2(0.75, 0.5)));
-        // Between two pixels of the screen: what lies on the snapped border is told, not what would lie on the other.
+        // Between two pixels of the screen: what lies on the snapped border is told, not what would lie on
+        // the other.
         let (seen, uv) = visible(rect.translate(vec2(0.3, 0.0)), rect.expand(1e3), 1.0);
         assert_eq!(seen.left(), -100.0);
         assert!((uv.left() + 0.3 / 400.0).abs() < 1e-6, "{uv:?}");

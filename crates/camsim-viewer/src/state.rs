@@ -156,15 +156,19 @@ impl State {
         }
     }
 
-    /// Previews and full frames come from two threads: what the hand has left behind must not take the place of what it is at.
+    /// Previews and full frames come from two threads: what the hand has left behind must not take the place
+    /// of what it is at.
     fn is_out_of_date(&self, reply: &Reply) -> bool {
         match reply {
-            Reply::Loaded(loaded) => self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario),
+            Reply::Loaded(loaded) => {
+                self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario)
+            }
             Reply::Frame(reply) => {
                 let (Some(wanted), Some(shown)) = (self.wanted(), &self.heard.shown) else { return false };
                 match reply.wanted.size {
                     Size::Full => {
-                        let at_rest = Wanted { size: Size::Full, errors: reply.wanted.errors, ..wanted.clone() };
+                        let at_rest =
+                            Wanted { size: Size::Full, errors: reply.wanted.errors, ..wanted.clone() };
                         wanted.size == Size::Preview && at_rest != reply.wanted
                     }
                     Size::Preview => shown.reply.wanted == wanted,
@@ -199,23 +203,35 @@ impl State {
         self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel
     }
 
-    /// What the oracle is to do now: once a frame in full size is on show, looks into it; and its own picture if that is on show.
+    /// What the oracle is to do now: once a frame in full size is on show, looks into it; and its own picture
+    /// if that is on show.
     pub fn wanted_exact(&self) -> Option<ExactWanted> {
         let (shown, sequence) = (self.heard.shown.as_ref()?, self.heard.sequence()?);
-        let rests = shown.reply.wanted.size == Size::Full && Some(&shown.reply.wanted) == self.wanted().as_ref();
+        let rests =
+            shown.reply.wanted.size == Size::Full && Some(&shown.reply.wanted) == self.wanted().as_ref();
         rests.then(|| {
             let other = self.view.stages().into_iter().find(|stage| *stage != Stage::Oracle);
-            let picture = other.and_then(|stage| shown.reply.pictures.iter().find(|picture: &&Arc<Picture>| picture.stage == stage));
+            let picture = other.and_then(|stage| {
+                shown.reply.pictures.iter().find(|picture: &&Arc<Picture>| picture.stage == stage)
+            });
             let compares = self.view.compare == Compare::Difference && self.view.wants_oracle();
             let against = picture.filter(|_| compares).map(|picture| (picture.clone(), self.view.gain));
-            ExactWanted { sequence: sequence.clone(), frame: self.view.wants_oracle().then_some(shown.reply.frame), against }
+            ExactWanted {
+                sequence: sequence.clone(),
+                frame: self.view.wants_oracle().then_some(shown.reply.frame),
+                against,
+            }
         })
     }
 
     /// Does what a pane wishes. What only the window can do is left to it.
     pub fn apply(&mut self, message: Message, context: &egui::Context) {
-        let of_scenario = |refusal: &Refusal| self.document.as_ref().is_some_and(|document| document.value(refusal.key()).is_some());
-        if message.edits_scenario() || message.edits_window() && !self.refused.as_ref().is_some_and(of_scenario) {
+        let of_scenario = |refusal: &Refusal| {
+            self.document.as_ref().is_some_and(|document| document.value(refusal.key()).is_some())
+        };
+        if message.edits_scenario()
+            || message.edits_window() && !self.refused.as_ref().is_some_and(of_scenario)
+        {
             self.refused = None;
         }
         if self.apply_to_document(&message, context) {
@@ -245,12 +261,14 @@ impl State {
             Message::Ask(question) => self.question = question,
             Message::Browse => {
                 let question = self.question.as_ref();
-                self.browse = question.map(|question| Browse::ask(question.saves, Path::new(&question.path), context));
+                self.browse =
+                    question.map(|question| Browse::ask(question.saves, Path::new(&question.path), context));
             }
             Message::Export(wish) => {
                 if let (Some(document), Some(exporter)) = (&self.document, &self.exporter) {
                     let scenario = (*document.scenario).clone();
-                    self.export = Some(ExportJob::start(exporter, scenario, wish.folder, wish.frames, context));
+                    self.export =
+                        Some(ExportJob::start(exporter, scenario, wish.folder, wish.frames, context));
                 }
             }
             Message::CancelExport => {
@@ -258,7 +276,9 @@ impl State {
                     job.cancel();
                 }
             }
-            Message::Open(path) if self.is_unsaved() => (self.question, self.leaving) = (None, Some(Leaving::For(path))),
+            Message::Open(path) if self.is_unsaved() => {
+                (self.question, self.leaving) = (None, Some(Leaving::For(path)))
+            }
             Message::Open(path) | Message::OpenAnyway(path) => self.open(path),
             Message::Close => self.leaving = Some(Leaving::Closing),
             Message::Stay => self.leaving = None,
@@ -311,7 +331,9 @@ impl State {
                     [] => Ok(Some("the command line is on the clipboard".into())),
                     keys => {
                         let keys = keys.join(", ");
-                        Err(format!("the command line is on the clipboard; it cannot leave out {keys}: save the scenario for that"))
+                        Err(format!(
+                            "the command line is on the clipboard; it cannot leave out {keys}: save the scenario for that"
+                        ))
                     }
                 }
             }

@@ -28,7 +28,16 @@ pub fn still(scenario: &Path, frame: u64) -> anyhow::Result<Still> {
         let _ = bell.send(());
     });
     let stages = vec![Stage::Photometric];
-    engine.want(Wanted { scenario, reading: 0, frame, stages, size: Size::Full, truth: false, errors: false, gain: None });
+    engine.want(Wanted {
+        scenario,
+        reading: 0,
+        frame,
+        stages,
+        size: Size::Full,
+        truth: false,
+        errors: false,
+        gain: None,
+    });
     loop {
         rung.recv().context("the renderer's threads have ended")?;
         for reply in engine.replies() {

@@ -26,7 +26,16 @@ pub struct Timeline {
 
 impl Default for Timeline {
     fn default() -> Self {
-        Self { frames: 0, fps: 30.0, frame: 0, playing: false, speed: 1.0, range: None, dragged: false, carry: 0.0 }
+        Self {
+            frames: 0,
+            fps: 30.0,
+            frame: 0,
+            playing: false,
+            speed: 1.0,
+            range: None,
+            dragged: false,
+            carry: 0.0,
+        }
     }
 }
 
@@ -41,7 +50,8 @@ impl Timeline {
         (self.frames, self.fps) = (frames, fps);
         self.frame = self.frame.min(self.last());
         let last = self.last();
-        self.range = self.range.map(|range| range.map(|frame| frame.min(last))).filter(|[first, end]| first < end);
+        self.range =
+            self.range.map(|range| range.map(|frame| frame.min(last))).filter(|[first, end]| first < end);
     }
 
     /// To a frame; the last one if there are fewer.
@@ -61,7 +71,8 @@ impl Timeline {
         self.range.unwrap_or([0, self.last()])
     }
 
-    /// Time goes on by `seconds` on the wall; frames for which there is no time are left out. Without a loop, play stops at the end.
+    /// Time goes on by `seconds` on the wall; frames for which there is no time are left out. Without a loop,
+    /// play stops at the end.
     pub fn advance(&mut self, seconds: f64) {
         if !self.playing || self.dragged {
             return;
@@ -115,7 +126,11 @@ mod tests {
             for _ in 0..steps {
                 timeline.advance(1.0 / f64::from(steps));
             }
-            assert!(timeline.frame.abs_diff(15) <= 1, "half a second of 30 frames a second at 0.5x in {steps}: {}", timeline.frame);
+            assert!(
+                timeline.frame.abs_diff(15) <= 1,
+                "half a second of 30 frames a second at 0.5x in {steps}: {}",
+                timeline.frame
+            );
         }
     }
 

@@ -99,9 +99,11 @@ pub struct View {
     pub gain: f32,
     /// Place of the wipe's line, 0 to 1 over the picture's width.
     pub wipe: f32,
-    /// Pixels of the screen (not points, of which one may have several) for each pixel of the camera; `None` fits the picture into the pane.
+    /// Pixels of the screen (not points, of which one may have several) for each pixel of the camera; `None`
+    /// fits the picture into the pane.
     pub zoom: Option<f32>,
-    /// Pixel of the camera in the middle of the pane, as a share of its size; of no meaning for a fitted picture.
+    /// Pixel of the camera in the middle of the pane, as a share of its size; of no meaning for a fitted
+    /// picture.
     pub centre: [f32; 2],
     /// What is drawn over it.
     pub overlays: Overlays,
@@ -142,7 +144,8 @@ impl View {
         self.stages().contains(&Stage::Oracle)
     }
 
-    /// The stages that the renderer draws: beside the oracle alone there is always one, to look at until it is done.
+    /// The stages that the renderer draws: beside the oracle alone there is always one, to look at until it
+    /// is done.
     pub fn rendered_stages(&self) -> Vec<Stage> {
         let mut stages = self.stages();
         stages.retain(|stage| *stage != Stage::Oracle);
@@ -165,7 +168,11 @@ mod tests {
                     let view = View { a, b, compare, ..View::default() };
                     let stages = view.rendered_stages();
                     assert!(!stages.is_empty() && !stages.contains(&Stage::Oracle), "{view:?}");
-                    assert_eq!(view.wants_oracle(), a == Stage::Oracle || (compare != Compare::Single && b == Stage::Oracle), "{view:?}");
+                    assert_eq!(
+                        view.wants_oracle(),
+                        a == Stage::Oracle || (compare != Compare::Single && b == Stage::Oracle),
+                        "{view:?}"
+                    );
                 }
             }
         }

@@ -1,6 +1,8 @@
-// Of four samples a pixel: the middle of those that a triangle covers. What it shows beyond its border is not on it. Twin: the host's, in ideal/host/samples.rs.
+// Of four samples a pixel: the middle of those that a triangle covers. What it shows beyond its border is not
+// on it. Twin: the host's, in ideal/host/samples.rs.
 
-// Where samples are from the pixel's middle on: camsim_core::temporal::SAMPLE_PLACES. All four of them have their middle there.
+// Where samples are from the pixel's middle on: camsim_core::temporal::SAMPLE_PLACES. All four of them have
+// their middle there.
 const SAMPLES_ACROSS = vec4<f32>(-0.125, 0.375, -0.375, 0.125);
 const SAMPLES_DOWN = vec4<f32>(-0.375, -0.125, 0.125, 0.375);
 

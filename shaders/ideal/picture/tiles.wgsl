@@ -1,4 +1,5 @@
-// A picture that is larger than a texture: tiles of its versions, as many as this frame may read. Twin: camsim_core::scene::TileGrid.
+// A picture that is larger than a texture: tiles of its versions, as many as this frame may read. Twin:
+// camsim_core::scene::TileGrid.
 
 // camsim_core::scene::TILE_TEXELS, and TILE_SIDE with one more at each end.
 const TILE_TEXELS: f32 = 254.0;

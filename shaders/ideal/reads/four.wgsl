@@ -1,5 +1,5 @@
-// Four reads: two by two where a pixel is about as wide as long, four in a row where it is longer. No loop: llvmpipe pays as much for one
-// as for a read.
+// Four reads: two by two where a pixel is about as wide as long, four in a row where it is longer. No loop:
+// llvmpipe pays as much for one as for a read.
 
 // Longer by this than wide (at least a texel), and one read across is enough.
 const IN_A_ROW: f32 = 1.6;

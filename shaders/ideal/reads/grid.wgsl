@@ -2,13 +2,13 @@
 
 // Most reads along the longer axis.
 const MAX_TAPS: f32 = 32.0;
-// Reads along the shorter axis of a pixel that is wider than half a texel: a single read of a smaller version blurs over twice the pixel,
-// and one of the picture itself not at all.
+// Reads along the shorter axis of a pixel that is wider than half a texel: a single read of a smaller version
+// blurs over twice the pixel, and one of the picture itself not at all.
 const SHORT_TAPS: f32 = 2.0;
 const ONE_TAP: f32 = 0.5;
 
-// Variance (times 12) that a version of 2^level texels adds to what the picture has between its texels: of the mean of so many, and of the
-// wider ramps.
+// Variance (times 12) that a version of 2^level texels adds to what the picture has between its texels: of
+// the mean of so many, and of the wider ramps.
 fn version_variance(level: f32) -> f32 {
     let below = floor(level);
     return 3.0 * (mix(exp2(2.0 * below), exp2(2.0 * below + 2.0), level - below) - 1.0);

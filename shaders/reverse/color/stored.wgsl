@@ -1,5 +1,5 @@
-// The paper preset: values are sRGB as stored, through gather, fog and photometric, and become linear light at the very end.
-// Twin of the fog: camsim_core::temporal::paper::linear_fog.
+// The paper preset: values are sRGB as stored, through gather, fog and photometric, and become linear light
+// at the very end. Twin of the fog: camsim_core::temporal::paper::linear_fog.
 
 fn after_gather(ray: Ray, color: vec3<f32>) -> vec3<f32> {
     if (told(u32(frame.linear_fog.w == 0.0)) == 1u) {

@@ -1,4 +1,5 @@
-// Of the pixels that the reverse pass has listed, those whose rays may meet another surface than the plain gather did. Slots as in reverse.wgsl.
+// Of the pixels that the reverse pass has listed, those whose rays may meet another surface than the plain
+// gather did. Slots as in reverse.wgsl.
 #import common/frame.wgsl
 #import reverse/ideal_frame.wgsl
 #import <slot:keys>
@@ -20,8 +21,8 @@ struct Candidates {
 
 @group(3) @binding(3) var<storage, read> candidates: Candidates;
 
-// Whether rays of this pixel may meet another surface than the plain gather did: at the ends and in the middle of the exposure, since the corner of a
-// surface may pass by in between.
+// Whether rays of this pixel may meet another surface than the plain gather did: at the ends and in the
+// middle of the exposure, since the corner of a surface may pass by in between.
 fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
     let nodes = told(frame.nodes);
     for (var node = 0u; node < nodes; node += max(nodes - 1u, 1u)) {

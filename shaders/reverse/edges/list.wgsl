@@ -1,4 +1,5 @@
-// A list of pixels for a pass after this one: they are few and lie in strips, and side by side in a list they keep a processor's lanes busy.
+// A list of pixels for a pass after this one: they are few and lie in strips, and side by side in a list they
+// keep a processor's lanes busy.
 #import common/dispatch.wgsl
 
 struct List {

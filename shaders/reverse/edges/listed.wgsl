@@ -1,4 +1,5 @@
-// Pixels that may see a silhouette, as far as a look at what is within reach tells, are listed for the passes after this one.
+// Pixels that may see a silhouette, as far as a look at what is within reach tells, are listed for the passes
+// after this one.
 #import reverse/edges/list.wgsl
 #import reverse/edges/near.wgsl
 

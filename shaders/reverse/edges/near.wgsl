@@ -1,7 +1,8 @@
 // Whether the rays of a pixel may meet several surfaces.
 
-// A word for each 8x8 ideal pixels, made by ideal/reach.wgsl: what is within reach of a ray that would come from there were it infinitely far.
-// The bits of the largest depth value, the lowest one replaced by whether there is a marked pixel.
+// A word for each 8x8 ideal pixels, made by ideal/reach.wgsl: what is within reach of a ray that would come
+// from there were it infinitely far. The bits of the largest depth value, the lowest one replaced by whether
+// there is a marked pixel.
 @group(1) @binding(8) var<storage, read> within_reach: array<u32>;
 
 // Looks along the parallax of a ray, at most.

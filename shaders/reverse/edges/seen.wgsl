@@ -12,7 +12,8 @@ fn seen_from(at_px: vec2<f32>, in_line: f32, in_key: f32) -> Seen {
     return Seen(reference_px(at_px, in_key), in_line, reference_point(at_px, in_key));
 }
 
-// Where one surface is around, the solution of the temporal inverse stands, on the very path that `gather` samples; but the sky is where it is, whatever is beside it.
+// Where one surface is around, the solution of the temporal inverse stands, on the very path that `gather`
+// samples; but the sky is where it is, whatever is beside it.
 fn smooth_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
     let reach_px = frame.sky_reach_px;
     frame.sky_reach_px = 0.0;
@@ -37,7 +38,8 @@ struct Truth {
     source_px: vec2<f32>,
     // The ray's point in NED at mid-exposure, metres; NaN-free: 0 where nothing is.
     point_ned_m: vec3<f32>,
-    // Planar depth in the line's own camera at mid-exposure, metres; 0 = nothing there; below 0: not known, the host casts a ray.
+    // Planar depth in the line's own camera at mid-exposure, metres; 0 = nothing there; below 0: not known,
+    // the host casts a ray.
     depth_m: f32,
 }
 

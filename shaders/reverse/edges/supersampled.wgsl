@@ -1,6 +1,6 @@
-// Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with its own pose and depth, and each with
-// the colour of the one surface of the ideal frame that it meets, so that surfaces never mix but by area and time.
-// Twin: camsim_core::temporal::edges.
+// Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with its own pose
+// and depth, and each with the colour of the one surface of the ideal frame that it meets, so that surfaces
+// never mix but by area and time. Twin: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
 #import reverse/edges/near.wgsl
 #import <slot:surface_color>
@@ -31,8 +31,8 @@ struct FineSample {
     index: i32,
 }
 
-// The sample that stands for a place: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine pixel,
-// one of the surface on the place's side.
+// The sample that stands for a place: the one of its quarter of the fine pixel; where a border of two
+// surfaces runs through the fine pixel, one of the surface on the place's side.
 fn fine_sample(at_px: vec2<f32>) -> FineSample {
     let last = vec2<f32>(frame.ideal_size_px) - 1e-3;
     let at = clamp(at_px + 0.5, vec2<f32>(0.0), last) * f32(frame.edge_scale);
@@ -81,7 +81,8 @@ fn is_marked(at_px: vec2<f32>) -> bool {
     return textureLoad(ideal_color, vec2<i32>(at) + vec2<i32>(0, key_row()), 0).a < 1.0;
 }
 
-// Of the surface that is seen at a place: its sample's in a marked pixel, which alone has samples; elsewhere one surface is around.
+// Of the surface that is seen at a place: its sample's in a marked pixel, which alone has samples; elsewhere
+// one surface is around.
 fn surface_inverse_depth(at_px: vec2<f32>) -> f32 {
     if (is_marked(at_px)) {
         let s = fine_sample(at_px);
@@ -90,7 +91,8 @@ fn surface_inverse_depth(at_px: vec2<f32>) -> f32 {
     return inverse_depth(at_px);
 }
 
-// Ray i of `frame.edge_samples`: place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
+// Ray i of `frame.edge_samples`: place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the
+// exposure gone by.
 fn ray_place(i: u32) -> vec3<f32> {
     let step = 1.0 / f32(frame.edge_samples);
     let x = (f32(i) + 0.5) * step;
@@ -112,8 +114,9 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
     return pose;
 }
 
-// Of a pixel whose sources pass no mark: whether nothing moves into it either. Where its parallax passes a silhouette its corners are asked: rays
-// that meet what the plain gather took saw one surface all over the pixel, and that one is better read by the spline.
+// Of a pixel whose sources pass no mark: whether nothing moves into it either. Where its parallax passes a
+// silhouette its corners are asked: rays that meet what the plain gather took saw one surface all over the
+// pixel, and that one is better read by the spline.
 fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
     // As in candidates.wgsl.
     let instants = select(1u, 3u, told(frame.nodes) > 1u);
@@ -170,7 +173,8 @@ fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
     return centre_seen(pixel, ray, 0.5);
 }
 
-// Samples know where a surface ends to a few hundredths of a pixel, and keys do not show all of it: a ray in f64 knows.
+// Samples know where a surface ends to a few hundredths of a pixel, and keys do not show all of it: a ray in
+// f64 knows.
 fn emit_centre(pixel: vec2<u32>, ray: Ray) {
     use_key_of_line(pixel);
     if (!IS_EXACT) {
@@ -189,7 +193,8 @@ struct Met {
     seen: bool,
 }
 
-// In the key that is nearest in time, or in the next that sees what the ray meets: that key is chosen afterwards.
+// In the key that is nearest in time, or in the next that sees what the ray meets: that key is chosen
+// afterwards.
 fn first_surface_of_keys(pixel: vec2<u32>, uv: vec2<f32>, share: f32) -> Met {
     use_key_of_rank(pixel, share, 0u);
     let first = first_surface(uv, pose_along(pixel, share));
@@ -218,14 +223,16 @@ fn look_at(uv: vec2<f32>, pose: Pose, w: f32) -> Look {
     return Look(at_px, line_inverse_depth(uv, pose, surface_inverse_depth(at_px)));
 }
 
-// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface within reach to infinity, lie on a line of
-// the ideal frame: as long as they are nearer than what the key shows at their places the ray is free. Where it is free no longer and
-// the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still hidden when it
-// gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last stands in.
+// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface within
+// reach to infinity, lie on a line of the ideal frame: as long as they are nearer than what the key shows at
+// their places the ray is free. Where it is free no longer and the depths to both sides are one, it meets a
+// surface. Where they are not, it passes behind something; if it is still hidden when it gets as deep as what
+// was seen last, it has met what the key camera does not see, and what was seen last stands in.
 //
-// Written as one loop with one look, whatever the look is for: neighbouring rays are rarely at the same point of the search, and the code stays
-// small. MARCHING goes on by steps; HALVING finds where the ray stops being free; ASKING looks whether a ray that is free at two looks, the
-// second deeper than what the first saw, has met that in between: it has if the surface goes on to where the ray is as deep.
+// Written as one loop with one look, whatever the look is for: neighbouring rays are rarely at the same point
+// of the search, and the code stays small. MARCHING goes on by steps; HALVING finds where the ray stops being
+// free; ASKING looks whether a ray that is free at two looks, the second deeper than what the first saw, has
+// met that in between: it has if the surface goes on to where the ray is as deep.
 fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
     let w_near = nearest_inverse_depth(uv, pose, reach_of(far_px));

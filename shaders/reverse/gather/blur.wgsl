@@ -1,7 +1,7 @@
 // Exposure: mean over the true path of the source, in linear light (paper eq. 20 without its straight line).
-// Nodes are solved one after the other (the `nodes` slot says with what depth) and joined by polynomials of time (the `path` slot says of what
-// degree, `stretches` whether there are several), each of which is sampled at uniform midpoints, as many as its length asks for.
-// Twin: camsim_core::temporal::gather.
+// Nodes are solved one after the other (the `nodes` slot says with what depth) and joined by polynomials of
+// time (the `path` slot says of what degree, `stretches` whether there are several), each of which is sampled
+// at uniform midpoints, as many as its length asks for. Twin: camsim_core::temporal::gather.
 #import reverse/gather/footprint.wgsl
 #import <slot:nodes>
 #import <slot:path>

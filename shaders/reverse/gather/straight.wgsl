@@ -1,4 +1,5 @@
-// The paper's exposure: samples on the straight segment between its two ends, both included. Twin: camsim_core::temporal::paper.
+// The paper's exposure: samples on the straight segment between its two ends, both included. Twin:
+// camsim_core::temporal::paper.
 #import reverse/gather/interface.wgsl
 #import <slot:line>
 

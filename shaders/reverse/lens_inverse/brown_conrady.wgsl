@@ -1,4 +1,5 @@
-// Brown-Conrady, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin: lens/brown_conrady.rs.
+// Brown-Conrady, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin:
+// lens/brown_conrady.rs.
 
 // Starts are kept this far inside the fold, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f32 = 0.95;
@@ -14,7 +15,8 @@ fn denominator(r2: f32) -> f32 {
     return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
 }
 
-// Where the lens images a point, less where it should. Of the factor of the radius only what it has above 1 is multiplied, so that what is rounded is small.
+// Where the lens images a point, less where it should. Of the factor of the radius only what it has above 1
+// is multiplied, so that what is rounded is small.
 fn residual_of(ideal: vec2f, distorted: vec2f) -> vec2f {
     let r2 = dot(ideal, ideal);
     let above = lens.radial - lens.rational;
@@ -45,7 +47,8 @@ fn scaled_to(ideal: vec2f, radius: f32) -> vec2f {
     return ideal * (radius / max(length(ideal), 1e-30));
 }
 
-// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `origin` and the fold.
+// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `origin`
+// and the fold.
 fn inside(origin: vec2f, to: vec2f) -> vec2f {
     let radius = length(to);
     if radius < lens.fold_min {

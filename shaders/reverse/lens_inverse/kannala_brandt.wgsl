@@ -17,7 +17,8 @@ fn theta_d_slope(theta: f32) -> f32 {
     return 1.0 + t2 * (3.0 * k.x + t2 * (5.0 * k.y + t2 * (7.0 * k.z + t2 * 9.0 * k.w)));
 }
 
-// tan on [0, pi/4]: x + x^3 P(x^2), P fitted for the smallest relative error (2e-8, 9e-8 in f32). Vulkan promises but 2^-11 of sin and cos.
+// tan on [0, pi/4]: x + x^3 P(x^2), P fitted for the smallest relative error (2e-8, 9e-8 in f32). Vulkan
+// promises but 2^-11 of sin and cos.
 fn tangent_to_quarter_pi(x: f32) -> f32 {
     let z = x * x;
     let p = 0.333331439 + z * (0.133391412 + z * (0.0533825038 + z * (0.0245344041 + z * (0.00295033063 + z * 0.00948708111))));

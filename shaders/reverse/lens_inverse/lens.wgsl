@@ -4,7 +4,8 @@
 struct LensUniform {
     size_px: vec2u,
     focal_px: vec2f,
-    // The principal point in two parts: its fraction alone keeps all of its digits next to an exact integer difference.
+    // The principal point in two parts: its fraction alone keeps all of its digits next to an exact integer
+    // difference.
     principal_point_whole_px: vec2i,
     principal_point_fraction_px: vec2f,
     // Brown-Conrady k1 k2 k3 (0); Kannala-Brandt k1 k2 k3 k4.
@@ -25,7 +26,8 @@ struct LensUniform {
 
 @group(0) @binding(0) var<uniform> lens: LensUniform;
 
-// u = v = INVALID_UV marks a pixel without an ideal ray. Finite, because shaders may assume that infinities do not occur.
+// u = v = INVALID_UV marks a pixel without an ideal ray. Finite, because shaders may assume that infinities
+// do not occur.
 const INVALID_UV: f32 = 1e30;
 
 // A solution must reproduce its pixel to this; the f32 floor is about 3e-4 px.

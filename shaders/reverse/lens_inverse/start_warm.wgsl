@@ -1,4 +1,5 @@
-// Start of the inverse: the same pixel of a lens map of nearby zoom; the radial table where that map has no answer.
+// Start of the inverse: the same pixel of a lens map of nearby zoom; the radial table where that map has no
+// answer.
 
 @group(0) @binding(3) var warm_map: texture_2d<f32>;
 

@@ -23,7 +23,8 @@ fn fold_radius(ideal: vec2f) -> f32 {
     return mix(here, next, position - floor(position));
 }
 
-// Undistorted over distorted radius (Kannala-Brandt: angle over distorted radius), uniform in s = sqrt(1 - distorted/distorted_max).
+// Undistorted over distorted radius (Kannala-Brandt: angle over distorted radius), uniform in s = sqrt(1 -
+// distorted/distorted_max).
 fn radial_ratio(distorted: f32) -> f32 {
     let s = sqrt(max(1.0 - distorted / lens.table_distorted_max, 0.0));
     let position = s * f32(RADIAL_TABLE_LEN - 1u);

@@ -1,5 +1,5 @@
-// The paper's lens inverse, for each pixel of each frame: Gauss-Newton from the distorted point, without a guard. It misses rays and accepts
-// false ones, and is here to be measured. Twin: camsim_core::lens::paper.
+// The paper's lens inverse, for each pixel of each frame: Gauss-Newton from the distorted point, without a
+// guard. It misses rays and accepts false ones, and is here to be measured. Twin: camsim_core::lens::paper.
 #import reverse/ray/interface.wgsl
 
 const GAUSS_NEWTON_STEPS: u32 = 50u;

@@ -1,5 +1,6 @@
-// The paper's displacement (eqs. 10 to 18): the camera keeps the twist that it has at the key instant, and a pixel keeps the depth that
-// the ideal frame has at its own place (the `depth` slot says how it is read). What fills the slot says how `displaced` integrates that.
+// The paper's displacement (eqs. 10 to 18): the camera keeps the twist that it has at the key instant, and a
+// pixel keeps the depth that the ideal frame has at its own place (the `depth` slot says how it is read).
+// What fills the slot says how `displaced` integrates that.
 #import reverse/temporal_inverse/interface.wgsl
 #import reverse/temporal_inverse/line_entry.wgsl
 
@@ -23,8 +24,8 @@ fn mix_pose(a: Pose, b: Pose, t: f32) -> Pose {
     return Pose(mix(a.dt_s, b.dt_s, t));
 }
 
-// d(u, v)/dt of a world point seen at uv with inverse depth w: it stands still and moves by -V - W x r in the camera.
-// Twin: camsim_core::temporal::displacement::image_rate.
+// d(u, v)/dt of a world point seen at uv with inverse depth w: it stands still and moves by -V - W x r in the
+// camera. Twin: camsim_core::temporal::displacement::image_rate.
 fn image_rate(uv: vec2<f32>, w: f32) -> vec2<f32> {
     let point_rate = -w * frame.key_velocity_m_s.xyz - cross(frame.key_rate_rad_s.xyz, vec3<f32>(uv, 1.0));
     return point_rate.xy - uv * point_rate.z;
@@ -37,8 +38,8 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     return Source(at_px, found, inside_ideal(at_px), far_px);
 }
 
-// A pixel keeps the depth of its own place only to find where it looks. The depth that it reports is what the ideal frame has there, less what the
-// camera's twist takes from it until the line's instant.
+// A pixel keeps the depth of its own place only to find where it looks. The depth that it reports is what the
+// ideal frame has there, less what the camera's twist takes from it until the line's instant.
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
     var source = temporal_inverse(uv, pose);
     let in_key = inverse_depth(source.at_px);

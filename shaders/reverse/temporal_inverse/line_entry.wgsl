@@ -1,4 +1,5 @@
-// Order of the tables that have an entry a line and exposure node; with more than one node the mid-exposure entry follows them.
+// Order of the tables that have an entry a line and exposure node; with more than one node the mid-exposure
+// entry follows them.
 
 // First entry of the pixel's line, of the chosen key.
 fn line_entry(pixel: vec2<u32>) -> u32 {

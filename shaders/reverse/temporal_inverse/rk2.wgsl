@@ -1,4 +1,5 @@
-// Heun's steps of at most `frame.rk2_step_rad` of rotation (eq. 18). Twin: camsim_core::temporal::displacement::rk2.
+// Heun's steps of at most `frame.rk2_step_rad` of rotation (eq. 18). Twin:
+// camsim_core::temporal::displacement::rk2.
 #import reverse/temporal_inverse/constant_depth.wgsl
 
 // As camsim_core::temporal::displacement::RK2_MAX_STEPS.

@@ -26,9 +26,10 @@ mod folder;
 
 /// Put an ideal RGB-D picture of any origin through a camera
 ///
-/// Takes a picture with depth from Blender, AirSim, Gazebo or a depth camera, and gives what the camera would have taken: lens, delay,
-/// rolling shutter, exposure, interlacing, vignette, light, noise. In f64 on all cores; needs no graphics adapter. What the ideal picture
-/// does not show (beyond its border) is alpha 0. A FRAME.toml that names a folder or a table of pictures gives a folder of frames.
+/// Takes a picture with depth from Blender, AirSim, Gazebo or a depth camera, and gives what the camera would
+/// have taken: lens, delay, rolling shutter, exposure, interlacing, vignette, light, noise. In f64 on all
+/// cores; needs no graphics adapter. What the ideal picture does not show (beyond its border) is alpha 0. A
+/// FRAME.toml that names a folder or a table of pictures gives a folder of frames.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 FRAME.toml (paths relative to it):
@@ -77,11 +78,12 @@ pub struct Args {
     camera: PathBuf,
     /// The ideal picture and how its camera moved
     frame: PathBuf,
-    /// Where the picture goes: .exr is linear R G B A with depth Z, .png is encoded as photometric.output says; of many frames a folder
+    /// Where the picture goes: .exr is linear R G B A with depth Z, .png is encoded as photometric.output
+    /// says; of many frames a folder
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Temporal inverse: reproject is exact, linear and rk2 are the paper's eqs. 16 and 18 [default: reproject; rk2, and no other, with
-    /// --preset paper]
+    /// Temporal inverse: reproject is exact, linear and rk2 are the paper's eqs. 16 and 18 [default:
+    /// reproject; rk2, and no other, with --preset paper]
     #[arg(long, value_enum)]
     solver: Option<SolverArg>,
     /// Methods: camsim's own, or the paper's
@@ -122,7 +124,9 @@ enum SolverArg {
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     // As a scenario does.
     if args.preset == PresetArg::Paper && args.solver.is_some_and(|solver| solver != SolverArg::Rk2) {
-        return Err(Failure::bad_input(anyhow!("--solver is rk2 with --preset paper; leave it out, or leave --preset out")));
+        return Err(Failure::bad_input(anyhow!(
+            "--solver is rk2 with --preset paper; leave it out, or leave --preset out"
+        )));
     }
     let is_picture = ends_as_picture(args);
     if !is_picture && args.output.extension().is_some() && !args.output.is_dir() {
@@ -132,9 +136,14 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         )));
     }
     let spec = read_checked_camera(&args.camera).or_bad_input()?;
-    for (present, key) in [(!spec.zoom.is_empty(), "zoom"), (!spec.mount.vibration.is_empty(), "mount.vibration")] {
+    for (present, key) in
+        [(!spec.zoom.is_empty(), "zoom"), (!spec.mount.vibration.is_empty(), "mount.vibration")]
+    {
         if present {
-            console.warn(format_args!("{}: {key} is not used: the frame has one calibration and its own motion", args.camera.display()));
+            console.warn(format_args!(
+                "{}: {key} is not used: the frame has one calibration and its own motion",
+                args.camera.display()
+            ));
         }
     }
     let set = read_frame_set(&args.frame).or_bad_input()?;
@@ -149,7 +158,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     file.notes.iter().for_each(|note| console.warn(note));
     let begin = Instant::now();
     let settings = settings(args, &file, 0);
-    let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
+    let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings)
+        .map_err(|error| in_file(args, &error))
+        .or_bad_input()?;
     let (picture, unseen) = pipeline.render_and_count(vignette.as_ref());
     let elapsed_s = begin.elapsed().as_secs_f64();
     folder::tell_gaps(args, &spec, &set, &[0], console)?;
@@ -172,14 +183,20 @@ fn ends_as_picture(args: &Args) -> bool {
 /// Of one frame there is nothing to choose or to resume.
 fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> {
     if !is_picture {
-        let message = "one frame is one picture, whose name must end in .exr or .png, which chooses the format";
+        let message =
+            "one frame is one picture, whose name must end in .exr or .png, which chooses the format";
         return Err(Failure::bad_input(anyhow!("-o {}: {message}", args.output.display())));
     }
-    let given = [("--frames", args.frames.is_some()), ("--resume", args.resume), ("--format", !args.format.is_empty())];
+    let given = [
+        ("--frames", args.frames.is_some()),
+        ("--resume", args.resume),
+        ("--format", !args.format.is_empty()),
+    ];
     match given.into_iter().find(|(_, given)| *given) {
-        Some((option, _)) => {
-            Err(Failure::bad_input(anyhow!("{option} is for many frames, and {} names one; leave it out", args.frame.display())))
-        }
+        Some((option, _)) => Err(Failure::bad_input(anyhow!(
+            "{option} is for many frames, and {} names one; leave it out",
+            args.frame.display()
+        ))),
         None => Ok(()),
     }
 }
@@ -218,19 +235,31 @@ fn tell_unseen(unseen: &UnseenCounts, pixels: f64, console: &mut Console<'_>) {
         (unseen.outside, "beyond the border of the ideal picture, which should be larger"),
         (unseen.holes, "where the ideal picture has no depth (holes = \"mark\")"),
         (unseen.unknown_flow, "where the flow is not known (not a number, or above 1e9)"),
-        (unseen.torn_flow, "where neighbours' flows have too little in common to be followed: is it a flow, in pixels, right and down?"),
+        (
+            unseen.torn_flow,
+            "where neighbours' flows have too little in common to be followed: is it a flow, in pixels, right and down?",
+        ),
     ];
-    let reasons: Vec<String> =
-        reasons.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{:.2} % {why}", percent(*count))).collect();
+    let reasons: Vec<String> = reasons
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, why)| format!("{:.2} % {why}", percent(*count)))
+        .collect();
     if unseen.all() > 0 {
-        console.warn(format_args!("{:.2} % of the picture is empty (alpha 0): {}", percent(unseen.all()), reasons.join("; ")));
+        console.warn(format_args!(
+            "{:.2} % of the picture is empty (alpha 0): {}",
+            percent(unseen.all()),
+            reasons.join("; ")
+        ));
     }
 }
 
 /// How far beyond the two instants that a flow joins it is gone on with.
 fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
     let Some([first, last]) = pipeline.flow_shares() else { return };
-    let reach = format!("the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the picture");
+    let reach = format!(
+        "the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the picture"
+    );
     if first.abs().max(last.abs()) > 1.0 + 1e-9 {
         let frame = args.frame.display();
         console.warn(format_args!(
@@ -238,7 +267,8 @@ fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
              flow over a longer time"
         ));
     } else {
-        let beyond = if first < 0.0 || last > 1.0 { ": beyond it things are taken to go straight on" } else { "" };
+        let beyond =
+            if first < 0.0 || last > 1.0 { ": beyond it things are taken to go straight on" } else { "" };
         console.detail(format_args!("{reach}{beyond}"));
     }
 }

@@ -14,12 +14,13 @@ use crate::{
 
 /// Measure run time against error on this machine: every case with every method
 ///
-/// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the exact reference: of source
-/// coordinates in pixels, and of pictures in dB. On two processor cores that do nothing else, without a GPU, the whole takes about a quarter of an hour and --quick about half a
-/// minute; beside other work it takes as much longer, and its times are worth as much less.
-/// Files are written after each case, so that an interrupted run leaves what it has measured; there is no resuming.
-/// Rows: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px, coord_max_px, psnr_db,
-/// predicted_px, and more behind them; null is what was not measured.
+/// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the
+/// exact reference: of source coordinates in pixels, and of pictures in dB. On two processor cores that do
+/// nothing else, without a GPU, the whole takes about a quarter of an hour and --quick about half a minute;
+/// beside other work it takes as much longer, and its times are worth as much less. Files are written after
+/// each case, so that an interrupted run leaves what it has measured; there is no resuming. Rows: case,
+/// preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px,
+/// coord_max_px, psnr_db, predicted_px, and more behind them; null is what was not measured.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,7 +30,8 @@ Examples:
                                               \"1 s windows\", exposure, lenses, \"all effects\"
   camsim bench --quick --check                exit code 1 if a row chosen by the plan is beaten in time and error")]
 pub struct Args {
-    /// Cases or groups of them, with commas (in quotes where they have blanks: "1 s windows"); a name that does not exist lists them all
+    /// Cases or groups of them, with commas (in quotes where they have blanks: "1 s windows"); a name that
+    /// does not exist lists them all
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     cases: Vec<String>,
     /// Few cases, pictures of 320x240, few rounds
@@ -73,17 +75,24 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.note(report.summary());
     match report.violations.len() {
-        beaten if args.check && beaten > 0 => {
-            Err(Failure::failed(anyhow!("{beaten} rows that the plan chose are beaten in both time and error; the table lists them")))
-        }
+        beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow!(
+            "{beaten} rows that the plan chose are beaten in both time and error; the table lists them"
+        ))),
         _ => Ok(()),
     }
 }
 
 /// Ten minutes of work are not for a file that cannot be written.
 fn check_files(args: &Args) -> Result<(), Failure> {
-    if let Some(plot) = args.plot.as_ref().filter(|plot| !plot.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"))) {
-        return Err(Failure::bad_input(anyhow!("--plot {}: the plot is SVG: the name must end in .svg", plot.display())));
+    if let Some(plot) = args
+        .plot
+        .as_ref()
+        .filter(|plot| !plot.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg")))
+    {
+        return Err(Failure::bad_input(anyhow!(
+            "--plot {}: the plot is SVG: the name must end in .svg",
+            plot.display()
+        )));
     }
     args.output.iter().try_for_each(|folder| check_folder(folder))?;
     [&args.csv, &args.plot].into_iter().flatten().try_for_each(|path| check_output(path))

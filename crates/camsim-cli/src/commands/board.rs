@@ -33,8 +33,8 @@ pub struct Args {
     /// Picture: .png or linear .exr
     #[arg(short, long, value_name = "PICTURE")]
     output: Option<PathBuf>,
-    /// Points as id,x_m,y_m from the board's middle, x right and y down; of a scenario also n_m,e_m,d_m. Standard output if there is no
-    /// picture either
+    /// Points as id,x_m,y_m from the board's middle, x right and y down; of a scenario also n_m,e_m,d_m.
+    /// Standard output if there is no picture either
     #[arg(long, value_name = "CSV")]
     points: Option<PathBuf>,
 }
@@ -42,13 +42,21 @@ pub struct Args {
 /// Runs `camsim board`.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     args.output.as_deref().map_or(Ok(()), check_output)?;
-    let yaml = args.board.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("yaml") || ending.eq_ignore_ascii_case("yml"));
+    let yaml = args
+        .board
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("yaml") || ending.eq_ignore_ascii_case("yml"));
     let (board, place) = if yaml {
-        (read_board(&BoardSpec { target: Some(args.board.clone()), ..BoardSpec::default() }).or_bad_input()?, None)
+        (
+            read_board(&BoardSpec { target: Some(args.board.clone()), ..BoardSpec::default() })
+                .or_bad_input()?,
+            None,
+        )
     } else {
         let scenario = read_scenario(&args.board, &[], None).or_bad_input()?;
         let spec = scenario.scene.board.as_ref();
-        let spec = spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
+        let spec =
+            spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
         let (log, _) = load_flight(&scenario).or_bad_input()?;
         let centre_ned_m = board_place(&scenario, spec, &log).or_bad_input()?;
         (read_board(spec).or_bad_input()?, Some((centre_ned_m, ned_from_board(spec.angles_deg))))
@@ -76,5 +84,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 fn picture(board: &Board) -> RenderedFrame {
     let texture = board.picture();
     let color_rgba = texture.rgba8.iter().map(|&byte| f32::from(byte) / 255.0).collect();
-    RenderedFrame { index: 0, stamp_ns: 0, size_px: texture.size_px, color_rgba, depth_m: None, coords: None, rows: Vec::new() }
+    RenderedFrame {
+        index: 0,
+        stamp_ns: 0,
+        size_px: texture.size_px,
+        color_rgba,
+        depth_m: None,
+        coords: None,
+        rows: Vec::new(),
+    }
 }

@@ -25,9 +25,11 @@ enum Command {
 
 /// Turn another program's calibration into a CAMERA.toml
 ///
-/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info (file, message, .ini), camodocal (VINS) YAML, COLMAP cameras.txt, Agisoft
-/// Metashape XML, OpenSfM and OpenDroneMap JSON, ORB-SLAM, OKVIS, Basalt, maplab, rpg_svo and ESIM files, the reference program's XML and Gyroflow lens
-/// profiles. The format is told by content; where a file leaves two readings open nothing is guessed, and --format or --camera decides.
+/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info (file, message, .ini),
+/// camodocal (VINS) YAML, COLMAP cameras.txt, Agisoft Metashape XML, OpenSfM and OpenDroneMap JSON, ORB-SLAM,
+/// OKVIS, Basalt, maplab, rpg_svo and ESIM files, the reference program's XML and Gyroflow lens profiles. The
+/// format is told by content; where a file leaves two readings open nothing is guessed, and --format or
+/// --camera decides.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim camera import camchain.yaml -o CAMERA.toml")]
 struct ImportArgs {
@@ -70,8 +72,8 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
 }
 
-/// A vignette is named relative to the calibration; the CAMERA.toml may be written elsewhere, so the path is made absolute where it leads
-/// to a file, and spoken of where it doesn't.
+/// A vignette is named relative to the calibration; the CAMERA.toml may be written elsewhere, so the path is
+/// made absolute where it leads to a file, and spoken of where it doesn't.
 fn keep_vignette_in_reach(imported: &mut ImportedCamera, calibration: &Path) {
     let Some(vignette) = &mut imported.spec.photometric.vignette else { return };
     match calibration.parent().unwrap_or(Path::new("")).join(&vignette).canonicalize() {

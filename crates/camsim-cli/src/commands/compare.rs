@@ -11,8 +11,8 @@ use crate::{
 
 /// Compare two pictures, or two folders of pictures
 ///
-/// Values are compared as stored, a code range being 0 to 1: EXR with EXR (linear), PNG with PNG (encoded). In folders, pictures of the
-/// same name are compared.
+/// Values are compared as stored, a code range being 0 to 1: EXR with EXR (linear), PNG with PNG (encoded).
+/// In folders, pictures of the same name are compared.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim compare out/color other/color --json")]
 pub struct Args {
@@ -36,14 +36,21 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             console.warn(format_args!("{} pictures are only in {}", only.len(), folder.display()));
         }
     }
-    console.line(format_args!("{:>11} {:>11} {:>9} {:>8} {:>11}", "RMSE", "max", "PSNR dB", "SSIM", "differing"))?;
+    console.line(format_args!(
+        "{:>11} {:>11} {:>9} {:>8} {:>11}",
+        "RMSE", "max", "PSNR dB", "SSIM", "differing"
+    ))?;
     for file in &report.files {
         console.line(format_args!("{} {}", row(&file.figures), file.file))?;
     }
-    let all = if report.files.is_empty() { String::new() } else { format!(" all {} pictures", report.files.len()) };
+    let all =
+        if report.files.is_empty() { String::new() } else { format!(" all {} pictures", report.files.len()) };
     console.line(row(&report.total) + &all)?;
     if report.total.non_finite > 0 {
-        console.warn(format_args!("{} pixels hold a NaN or an infinity and count only as differing", report.total.non_finite));
+        console.warn(format_args!(
+            "{} pixels hold a NaN or an infinity and count only as differing",
+            report.total.non_finite
+        ));
     }
     Ok(())
 }

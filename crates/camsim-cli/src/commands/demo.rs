@@ -27,7 +27,8 @@ const SHEET_SHRINK: u32 = 2;
 
 /// Render the built-in flight: nothing to prepare
 ///
-/// Writes EXR and PNG frames, a contact sheet, and one frame as a perfect and as the imperfect camera sees it.
+/// Writes EXR and PNG frames, a contact sheet, and one frame as a perfect and as the imperfect camera sees
+/// it.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Output folder
@@ -42,22 +43,32 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
     let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
-    let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
+    let scenario =
+        ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
     let go_on = console.command();
     let warnings = &loaded.warnings;
-    let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings, go_on: &go_on };
+    let job = Job {
+        sequence: &loaded.sequence,
+        folder,
+        frames: &frames,
+        shard: None,
+        resume: false,
+        warnings,
+        go_on: &go_on,
+    };
     let mut thumbnails = Vec::new();
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;
-    let outcome = render_run::run(&job, &mut Device::new(&engine, &loaded.sequence)?, console, &mut |finished| {
-        if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
-            thumbnails.push(finished.frame.clone());
-        }
-        seen += 1;
-        ControlFlow::Continue(())
-    })?;
+    let outcome =
+        render_run::run(&job, &mut Device::new(&engine, &loaded.sequence)?, console, &mut |finished| {
+            if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
+                thumbnails.push(finished.frame.clone());
+            }
+            seen += 1;
+            ControlFlow::Continue(())
+        })?;
     let sheet = folder.join("contact-sheet.png");
     contact_sheet(&sheet, &thumbnails, SHEET_COLUMNS, SHEET_SHRINK).or_failed()?;
     let pair = folder.join("perfect-and-real.png");
@@ -67,19 +78,26 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     contact_sheet(&pair, &both, 2, 1).or_failed()?;
 
     let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
-    console.line(format_args!("{} frames in {seconds:.2} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))?;
+    console.line(format_args!(
+        "{} frames in {seconds:.2} s, {rate:.1} frames/s, in {}",
+        outcome.frames,
+        folder.display()
+    ))?;
     console.line(format_args!("  {}/   linear EXR and sRGB PNG", folder.join("color").display()))?;
     console.line(format_args!("  {}/    time and pose of each row", folder.join("rows").display()))?;
     console.line(format_args!("  {}   the flight at a glance", sheet.display()))?;
-    console.line(format_args!("  {}   frame {middle} without and with the camera's flaws", pair.display()))?;
+    console
+        .line(format_args!("  {}   frame {middle} without and with the camera's flaws", pair.display()))?;
     console.line("next")?;
     console.line(format_args!("  camsim explain {}", scene.display()))?;
-    console.line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
+    console
+        .line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
     console.line(format_args!("  camsim viewer {}", scene.display()))?;
     Ok(())
 }
 
-/// The same flight through a pinhole with an instant global shutter on a still mount, without noise and vignette.
+/// The same flight through a pinhole with an instant global shutter on a still mount, without noise and
+/// vignette.
 fn without_flaws(sequence: &Sequence) -> Result<Sequence, Failure> {
     let mut flawless = sequence.clone();
     let camera = &mut flawless.scenario.camera;
@@ -89,7 +107,8 @@ fn without_flaws(sequence: &Sequence) -> Result<Sequence, Failure> {
     camera.photometric.noise_sigma = 0.0;
     camera.mount.vibration.clear();
     flawless.vignette = None;
-    flawless.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &camera.mount).or_bad_input()?);
+    flawless.path =
+        Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &camera.mount).or_bad_input()?);
     Ok(flawless)
 }
 

@@ -22,7 +22,8 @@ use crate::{
     render_run::source_frame,
 };
 
-/// Largest texture side that plans are made for here: every adapter of the last decade has it, and `explain` needs none.
+/// Largest texture side that plans are made for here: every adapter of the last decade has it, and `explain`
+/// needs none.
 const MAX_SIDE_PX: u32 = 16_384;
 
 /// Show what a frame takes: passes, sizes, samples, bounds, and each thing skipped with its reason
@@ -125,7 +126,8 @@ struct Models {
     tolerance_px: f64,
 }
 
-/// Memory for a terrain and its picture, bytes. Only what is in sight of a frame is on the device, but for a picture that is held whole.
+/// Memory for a terrain and its picture, bytes. Only what is in sight of a frame is on the device, but for a
+/// picture that is held whole.
 #[derive(Serialize)]
 struct Memory {
     /// On the host: heights with what the level of detail needs.
@@ -156,13 +158,18 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let loaded = inputs::load(&scenario, console)?;
     let frames = loaded.sequence.frames;
     if args.frame >= frames {
-        return Err(Failure::bad_input(FrameListError::Outside { asked_by: "--frame", frame: args.frame, frames }));
+        return Err(Failure::bad_input(FrameListError::Outside {
+            asked_by: "--frame",
+            frame: args.frame,
+            frames,
+        }));
     }
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         console
             .warn("quality.solver is \"oracle\": `render` casts every ray and needs no plan; this is the one that the engine would make");
     }
-    let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
+    let planner =
+        Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
@@ -170,7 +177,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let memory = memory(&loaded.sequence, &plan);
     let source_frame = Source::of(&source_frame(&loaded.sequence, &plan));
     let tracked = &loaded.tracked;
-    let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
+    let tracker =
+        Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
         let warnings = &loaded.warnings;
         return Ok(console.json(&Explained {
@@ -188,11 +196,18 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let [first_s, last_s] = log.span_s;
     console.line(format_args!("log {}", log.file))?;
-    console.line(format_args!("  {} rows from {first_s:.3} to {last_s:.3} s; cleaning: {}", log.rows, log.cleaning))?;
+    console.line(format_args!(
+        "  {} rows from {first_s:.3} to {last_s:.3} s; cleaning: {}",
+        log.rows, log.cleaning
+    ))?;
     console.line(format_args!("tracker at {} Hz", tracker.rate_hz))?;
     let limits = tracker.limits;
-    console.line(format_args!("  at most {:.3} m/s, {:.3} m/s^2", limits.max_speed_m_s, limits.max_acceleration_m_s2))?;
-    let angular = [limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2].map(f64::to_degrees);
+    console.line(format_args!(
+        "  at most {:.3} m/s, {:.3} m/s^2",
+        limits.max_speed_m_s, limits.max_acceleration_m_s2
+    ))?;
+    let angular =
+        [limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2].map(f64::to_degrees);
     console.line(format_args!("  at most {:.3} deg/s, {:.3} deg/s^2", angular[0], angular[1]))?;
     if let Some(terrain) = &terrain {
         print_terrain(terrain, console)?;
@@ -202,22 +217,31 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.print(&plan.to_string())?;
     print_source(&source_frame, &plan, console)?;
     if let Some(part) = part_of_host(&loaded.sequence, &plan) {
-        console.line(format_args!("on a software adapter the host {part} of this frame (`camsim info --help`)"))?;
+        console.line(format_args!(
+            "on a software adapter the host {part} of this frame (`camsim info --help`)"
+        ))?;
     }
-    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes }) = level_of_detail {
+    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes }) =
+        level_of_detail
+    {
         console.line("terrain in this frame")?;
         console.line(format_args!(
             "  {triangles} triangles, off by at most {max_error_px:.3} px of the picture, of {tolerance_px:.3} allowed"
         ))?;
-        console.line(format_args!("  the depth of what is seen from straight above is off by at most {depth_share:.1e} of it"))?;
+        console.line(format_args!(
+            "  the depth of what is seen from straight above is off by at most {depth_share:.1e} of it"
+        ))?;
         if away > 0 {
-            console.line(format_args!("  {away} more face away and are not drawn: from above they are hidden"))?;
+            console.line(format_args!(
+                "  {away} more face away and are not drawn: from above they are hidden"
+            ))?;
         }
         if let Some(memory) = memory {
             print_memory(&memory, triangle_bytes, console)?;
         }
     }
-    if let Some(Models { detail: ModelDetail { meshes, triangles, finest_triangles }, tolerance_px }) = models {
+    if let Some(Models { detail: ModelDetail { meshes, triangles, finest_triangles }, tolerance_px }) = models
+    {
         console.line("models in this frame")?;
         console.line(format_args!(
             "  {meshes} meshes of {triangles} triangles, off by at most {tolerance_px:.3} px of the picture; {finest_triangles} at the finest level"
@@ -239,14 +263,18 @@ fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
     let scene = &sequence.scene;
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
     let detail = || ModelDetail::new(scene, &SceneLevels::new(scene), &plan.ideal_pose(), &tolerance);
-    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px / plan.ideal.scale(&plan.camera) })
+    (!scene.meshes.is_empty()).then(|| Models {
+        detail: detail(),
+        tolerance_px: tolerance.error_px / plan.ideal.scale(&plan.camera),
+    })
 }
 
 /// The choice that the ideal pass makes.
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let scale = plan.ideal.scale(&plan.camera);
-    let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
+    let placed =
+        detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
     let (lod, triangle_bytes) = (placed.lod, placed.bytes());
     let depth_share = plan.terrain_error_px / plan.ideal.focal_px.max_element();
     Some(LevelOfDetail {
@@ -260,7 +288,13 @@ pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<L
 }
 
 fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a> {
-    TerrainDetail::new(terrain, &plan.ideal_pose(), plan.tangents(), plan.ideal.focal_px.max_element(), plan.terrain_error_px)
+    TerrainDetail::new(
+        terrain,
+        &plan.ideal_pose(),
+        plan.tangents(),
+        plan.ideal.focal_px.max_element(),
+        plan.terrain_error_px,
+    )
 }
 
 fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
@@ -268,7 +302,12 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let picture = terrain.texture.rgba8.len() as u64;
     let heights_on_host = terrain.host_bytes();
     if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
-        return Some(Memory { heights_on_host, picture_on_host: picture, picture_on_device: 8 * picture / 3, tiles: None });
+        return Some(Memory {
+            heights_on_host,
+            picture_on_host: picture,
+            picture_on_device: 8 * picture / 3,
+            tiles: None,
+        });
     }
     let ground = GroundTiles::new(terrain);
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
@@ -300,7 +339,12 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
     console.line(format_args!("terrain of {columns}x{rows} heights, EPSG:{epsg}"))?;
     console.line(format_args!(
         "  latitude {:.5} to {:.5}, longitude {:.5} to {:.5} deg, heights {:.1} to {:.1} m",
-        south_west_deg[0], north_east_deg[0], south_west_deg[1], north_east_deg[1], height_range_m[0], height_range_m[1]
+        south_west_deg[0],
+        north_east_deg[0],
+        south_west_deg[1],
+        north_east_deg[1],
+        height_range_m[0],
+        height_range_m[1]
     ))?;
     let (voids, outside) = (terrain.void_heights, terrain.outside_ortho);
     console.line(format_args!(
@@ -312,7 +356,16 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
 
 /// What x and y of `coords` are in.
 fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) -> Result<(), Failure> {
-    let Source { ideal_width_px, ideal_height_px, ideal_fx_px, ideal_fy_px, ideal_cx_px, ideal_cy_px, ideal_t_ns, .. } = source;
+    let Source {
+        ideal_width_px,
+        ideal_height_px,
+        ideal_fx_px,
+        ideal_fy_px,
+        ideal_cx_px,
+        ideal_cy_px,
+        ideal_t_ns,
+        ..
+    } = source;
     console.line(format_args!(
         "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
     ))?;
@@ -330,7 +383,9 @@ fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) ->
 fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
     let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
-    let from = format!("light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky {sky}");
+    let from = format!(
+        "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky {sky}"
+    );
     let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
         (Some(summary), Some(terrain)) => {
             let [width, height] = terrain.texture.size_px;
@@ -338,7 +393,9 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
                 1 => String::new(),
                 times => format!(", made {times} times finer for it"),
             };
-            format!("; in the ground's picture of {width}x{height} px{finer}, in steps of 8 bits that no error below counts")
+            format!(
+                "; in the ground's picture of {width}x{height} px{finer}, in steps of 8 bits that no error below counts"
+            )
         }
         _ => String::new(),
     };

@@ -54,7 +54,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let limits = engine.gpu().device.limits();
     let info = Info {
         version: env!("CARGO_PKG_VERSION"),
-        adapters: adapters(AdapterChoice::Best).into_iter().enumerate().map(|(i, adapter)| Adapter::of(adapter, i == 0)).collect(),
+        adapters: adapters(AdapterChoice::Best)
+            .into_iter()
+            .enumerate()
+            .map(|(i, adapter)| Adapter::of(adapter, i == 0))
+            .collect(),
         max_side_px: engine.gpu().max_side_px(),
         max_storage_buffer_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         reverse_on_host: engine.gpu().reverses_on_host(),
@@ -68,7 +72,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(format_args!("camsim {}", info.version))?;
     console.line(format_args!("used          {used}"))?;
     for adapter in info.adapters.iter().filter(|adapter| !adapter.used) {
-        console.line(format_args!("also there    {} ({}, {}, {})", adapter.name, adapter.kind, adapter.backend, adapter.driver))?;
+        console.line(format_args!(
+            "also there    {} ({}, {}, {})",
+            adapter.name, adapter.kind, adapter.backend, adapter.driver
+        ))?;
     }
     console.line(format_args!("largest side  {} px", info.max_side_px))?;
     console.line(format_args!("largest table {} MiB", info.max_storage_buffer_bytes >> 20))?;

@@ -68,7 +68,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 
 /// A camera file has its keys at the root, a scenario has them in `[camera]`.
 fn read_camera(path: &Path) -> Result<CameraModel, Failure> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display())).or_bad_input()?;
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("{}: cannot be read", path.display()))
+        .or_bad_input()?;
     // What is not TOML at all is for the reader of camera files to explain.
     let root: toml::Table = text.parse().unwrap_or_default();
     let spec = if root.contains_key("camera") || root.contains_key("flight") {
@@ -100,7 +102,10 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
         ));
     }
     if unknown > 0 {
-        console.warn(format_args!("{unknown} of {} points are not finite numbers: they have no pixels", points.len()));
+        console.warn(format_args!(
+            "{unknown} of {} points are not finite numbers: they have no pixels",
+            points.len()
+        ));
     }
     warn_of_none(&points, console);
     Ok(())
@@ -137,16 +142,23 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
     let LensCheck { valid_fraction, fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective } = check;
     console.line(format_args!("pixels with an ideal ray       {:.3} %", 100.0 * valid_fraction))?;
     match (fold_radius_min, fold_radius_max) {
-        (Some(min), Some(max)) => console.line(format_args!("folds at ideal radius |(u, v)|  {min:.6} to {max:.6}"))?,
+        (Some(min), Some(max)) => {
+            console.line(format_args!("folds at ideal radius |(u, v)|  {min:.6} to {max:.6}"))?
+        }
         _ => console.line("folds                          nowhere")?,
     }
     console.line(format_args!("worst forward-backward error   {worst_roundtrip_px:.3e} px"))?;
-    let answer = if bijective { "yes" } else { "no: some pixels have several ideal rays, so this calibration is not usable there" };
+    let answer = if bijective {
+        "yes"
+    } else {
+        "no: some pixels have several ideal rays, so this calibration is not usable there"
+    };
     console.line(format_args!("one ray a pixel                {answer}"))?;
     Ok(())
 }
 
-/// Points of a CSV by the names of their columns; two bare columns of numbers need no header. Lines that begin with `#` are comments.
+/// Points of a CSV by the names of their columns; two bare columns of numbers need no header. Lines that
+/// begin with `#` are comments.
 fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
     let (name, input): (String, Box<dyn Read>) = match path {
         Some(path) => {
@@ -160,8 +172,12 @@ fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DV
 }
 
 fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
-    let mut reader =
-        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(input);
     let mut places = None;
     let mut points = Vec::new();
     for record in reader.records() {
@@ -173,14 +189,22 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
                 continue;
             }
             if record.len() != 2 {
-                bail!("line {line}: the columns {} are missing; give a header that names them", columns.join(","));
+                bail!(
+                    "line {line}: the columns {} are missing; give a header that names them",
+                    columns.join(",")
+                );
             }
         }
         let places = *places.get_or_insert([0, 1]);
         let number = |i: usize| -> anyhow::Result<f64> {
-            let text = record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
+            let text =
+                record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
             text.parse().map_err(|_| {
-                anyhow!("line {line}: {} is `{text}`, which is no number; expected the columns {}", columns[i], columns.join(","))
+                anyhow!(
+                    "line {line}: {} is `{text}`, which is no number; expected the columns {}",
+                    columns[i],
+                    columns.join(",")
+                )
             })
         };
         points.push(DVec2::new(number(0)?, number(1)?));
@@ -190,7 +214,9 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
 
 /// Where the columns are, if the row names both. A byte-order mark may precede the first name.
 fn header(row: &csv::StringRecord, columns: [&str; 2]) -> Option<[usize; 2]> {
-    let place = |name: &str| row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name));
+    let place = |name: &str| {
+        row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
+    };
     Some([place(columns[0])?, place(columns[1])?])
 }
 

@@ -23,9 +23,11 @@ use crate::{
 
 /// Render the frames of a scenario
 ///
-/// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv (with mount and vibration), frames.csv (stamp, pose,
-/// ideal frame and files of each frame) and run.json, by which the run can be repeated: `camsim render DIR/run.json`. Paths in these files are relative to
-/// them, so that a folder can be moved together with what it names. Ctrl-C ends after the frames that are under way, and says how to go on.
+/// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv
+/// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json, by
+/// which the run can be repeated: `camsim render DIR/run.json`. Paths in these files are relative to them, so
+/// that a folder can be moved together with what it names. Ctrl-C ends after the frames that are under way,
+/// and says how to go on.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -60,7 +62,8 @@ pub struct Args {
     /// File formats instead of output.format; none renders and reads back but writes no frame (for timing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Option<Vec<Format>>,
-    /// Keep frames whose files are there already (files are written whole, so what is in them is not read again); refused if the folder is of another scenario, or a file that it names has changed
+    /// Keep frames whose files are there already (files are written whole, so what is in them is not read
+    /// again); refused if the folder is of another scenario, or a file that it names has changed
     #[arg(long)]
     resume: bool,
     /// Say at the end where the time went: on the host, and pass by pass on the device
@@ -78,8 +81,8 @@ pub struct Args {
 enum Backend {
     /// The engine on wgpu, also on a software adapter
     Gpu,
-    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as quality.solver = "oracle", so
-    /// no other solver goes with it, nor the paper's preset
+    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as
+    /// quality.solver = "oracle", so no other solver goes with it, nor the paper's preset
     Reference,
 }
 
@@ -93,8 +96,13 @@ enum Format {
     None,
 }
 
-const CHANNELS: [(&str, Channel); 5] =
-    [("color", Channel::Color), ("depth", Channel::Depth), ("valid", Channel::Valid), ("rows", Channel::Rows), ("coords", Channel::Coords)];
+const CHANNELS: [(&str, Channel); 5] = [
+    ("color", Channel::Color),
+    ("depth", Channel::Depth),
+    ("valid", Channel::Valid),
+    ("rows", Channel::Rows),
+    ("coords", Channel::Coords),
+];
 
 fn channel_parser() -> impl TypedValueParser<Value = Channel> {
     PossibleValuesParser::new(CHANNELS.map(|(name, _)| name)).try_map(|name| {
@@ -133,7 +141,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         Box::new(times.timed("scene for rays", is_quiet, || Rays::new(&loaded.sequence))?)
     } else {
         engine = times.timed("adapter", is_quiet, || Engine::new(AdapterChoice::Best))?;
-        let mut device = times.timed("scene onto the adapter", is_quiet, || Device::new(&engine, &loaded.sequence))?;
+        let mut device =
+            times.timed("scene onto the adapter", is_quiet, || Device::new(&engine, &loaded.sequence))?;
         if args.times {
             device.time_passes();
         }
@@ -146,15 +155,23 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let outcome = render_run::run(&job, &mut *source, console, &mut look).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
-            console.note(format_args!("frames that are written stay as they are; to go on with the others: {go_on}"));
+            console.note(format_args!(
+                "frames that are written stay as they are; to go on with the others: {go_on}"
+            ));
         }
     })?;
     if !console.is_quiet() {
-        let kept = if outcome.skipped > 0 { format!(" ({} were there already)", outcome.skipped) } else { String::new() };
+        let kept = if outcome.skipped > 0 {
+            format!(" ({} were there already)", outcome.skipped)
+        } else {
+            String::new()
+        };
         let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
         let size_mb = outcome.bytes as f64 * 1e-6;
         let (frames, folder) = (outcome.frames, folder.display());
-        console.line(format_args!("{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"))?;
+        console.line(format_args!(
+            "{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"
+        ))?;
     }
     if args.times {
         times.begun("plan of the first frame", outcome.first_plan);
@@ -169,7 +186,8 @@ fn default_folder(scenario: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// `--backend reference` is written into the scenario, so that frames of the two backends never mix in one folder.
+/// `--backend reference` is written into the scenario, so that frames of the two backends never mix in one
+/// folder.
 fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scenario, Failure> {
     let oracle = Auto::Value(Solver::Oracle);
     let refused = |what: &str| {
@@ -179,7 +197,9 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
         )))
     };
     match backend {
-        Some(Backend::Reference) if scenario.quality.preset == Preset::Paper => return refused("quality.preset = \"paper\""),
+        Some(Backend::Reference) if scenario.quality.preset == Preset::Paper => {
+            return refused("quality.preset = \"paper\"");
+        }
         Some(Backend::Reference) => {
             match scenario.quality.solver {
                 Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = oracle,
@@ -189,7 +209,9 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
             }
             // Keys that go with `auto` and not with the oracle.
             if let Some(problem) = validate(&scenario).first() {
-                return Err(Failure::bad_input(anyhow!("{problem} (--backend reference is quality.solver = \"oracle\")")));
+                return Err(Failure::bad_input(anyhow!(
+                    "{problem} (--backend reference is quality.solver = \"oracle\")"
+                )));
             }
         }
         Some(Backend::Gpu) if scenario.quality.solver == oracle => {
@@ -215,7 +237,9 @@ fn with_outputs(mut scenario: Scenario, args: &Args) -> Result<Scenario, Failure
         });
         scenario.output.format = without_repeats(&images.collect::<Vec<_>>());
         if formats.contains(&Format::None) && !scenario.output.format.is_empty() {
-            return Err(Failure::bad_input(anyhow!("--format none stands alone: leave it out, or the other formats")));
+            return Err(Failure::bad_input(anyhow!(
+                "--format none stands alone: leave it out, or the other formats"
+            )));
         }
     }
     Ok(scenario)

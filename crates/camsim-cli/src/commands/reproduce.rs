@@ -19,11 +19,12 @@ const WIDTHS_PX: std::ops::RangeInclusive<u32> = 96..=4096;
 
 /// Do the experiments of the paper's section 8 again
 ///
-/// Each experiment prints its tables and writes a folder of its own: tables (CSV), plots (SVG), pictures (PNG) and report.md with all of
-/// them. What came out, beside what the paper printed: docs/REPRODUCTION.md.
+/// Each experiment prints its tables and writes a folder of its own: tables (CSV), plots (SVG), pictures
+/// (PNG) and report.md with all of them. What came out, beside what the paper printed: docs/REPRODUCTION.md.
 ///
-/// The paper's flight log, camera poses and target are not part of camsim. Give their folder with --data (or the environment variable
-/// CAMSIM_DATA); without it, tracking, lens and map run on built-in substitutes and say so. The others need no file.
+/// The paper's flight log, camera poses and target are not part of camsim. Give their folder with --data (or
+/// the environment variable CAMSIM_DATA); without it, tracking, lens and map run on built-in substitutes and
+/// say so. The others need no file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Experiments:
@@ -48,10 +49,12 @@ pub struct Args {
     /// Output folder; each experiment has a folder in it
     #[arg(short, long, value_name = "DIR", default_value = "camsim-reproduce")]
     output: PathBuf,
-    /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/, terrain/
+    /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/,
+    /// terrain/
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In those of 128 px and less lens finds no circle
+    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In those of 128 px and less
+    /// lens finds no circle
     #[arg(long, value_name = "PX", default_value_t = 640)]
     width: u32,
 }
@@ -94,7 +97,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     check_folder(&args.output)?;
     // In the paper's order, whatever the order of the words.
     let asked: Vec<Experiment> = args.experiments.iter().map(|which| which.experiment()).collect();
-    let chosen: Vec<Experiment> = Experiment::ALL.into_iter().filter(|experiment| asked.is_empty() || asked.contains(experiment)).collect();
+    let chosen: Vec<Experiment> = Experiment::ALL
+        .into_iter()
+        .filter(|experiment| asked.is_empty() || asked.contains(experiment))
+        .collect();
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
     if data.is_none() {
@@ -121,12 +127,25 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     let names = failures.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    let error = anyhow!("{} of {} experiments were not done: {names}; the reasons stand above", failures.len(), chosen.len());
-    Err(if failures.iter().all(|(_, code)| *code == BAD_INPUT) { Failure::bad_input(error) } else { Failure::failed(error) })
+    let error = anyhow!(
+        "{} of {} experiments were not done: {names}; the reasons stand above",
+        failures.len(),
+        chosen.len()
+    );
+    Err(if failures.iter().all(|(_, code)| *code == BAD_INPUT) {
+        Failure::bad_input(error)
+    } else {
+        Failure::failed(error)
+    })
 }
 
 /// Does one experiment, writes its folder and prints its tables.
-fn one(experiment: Experiment, setup: &Setup<'_>, output: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
+fn one(
+    experiment: Experiment,
+    setup: &Setup<'_>,
+    output: &Path,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
     let report = experiment.run(setup).map_err(of_reproduction)?;
     let folder = output.join(experiment.name());
     report.write(&folder, experiment.title()).map_err(of_reproduction)?;
@@ -143,11 +162,12 @@ fn one(experiment: Experiment, setup: &Setup<'_>, output: &Path, console: &mut C
 
 /// The folder named by the command line or the environment; it must be there.
 fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
-    let (folder, named_by) = match (&args.data, std::env::var_os(DATA_VARIABLE).filter(|value| !value.is_empty())) {
-        (Some(folder), _) => (folder.clone(), "--data"),
-        (None, Some(value)) => (PathBuf::from(value), DATA_VARIABLE),
-        (None, None) => return Ok(None),
-    };
+    let (folder, named_by) =
+        match (&args.data, std::env::var_os(DATA_VARIABLE).filter(|value| !value.is_empty())) {
+            (Some(folder), _) => (folder.clone(), "--data"),
+            (None, Some(value)) => (PathBuf::from(value), DATA_VARIABLE),
+            (None, None) => return Ok(None),
+        };
     if folder.join("camsim").is_dir() {
         return Ok(Some(folder));
     }
@@ -163,7 +183,9 @@ fn of_reproduction(error: ReproduceError) -> Failure {
     match error {
         ReproduceError::Gpu(error) => error.into(),
         ReproduceError::Render(error) => error.into(),
-        ReproduceError::Write(_) | ReproduceError::Plot(_) | ReproduceError::NoCircle { .. } => Failure::failed(error),
+        ReproduceError::Write(_) | ReproduceError::Plot(_) | ReproduceError::NoCircle { .. } => {
+            Failure::failed(error)
+        }
         _ => Failure::bad_input(error),
     }
 }

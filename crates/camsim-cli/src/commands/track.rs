@@ -25,10 +25,12 @@ const MOST_ROWS: f64 = 10e6;
 
 /// Follow the flight log and print the motion, without pictures
 ///
-/// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz (body rates, rad/s),
-/// alphax,alphay,alphaz (rad/s^2); with --of camera t_s,n_m,e_m,d_m, vn,ve,vd, qw,qx,qy,qz (ned_from_camera), wx,wy,wz (in optical axes): the optical
-/// centre with lever arm, mount and vibration. Rows begin with the first instant of flight.window_s and follow at the rate up to its end; without a window they are of all of the log.
-/// t_s is as in the log, or as output.stamps says. The report is of the whole log.
+/// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz
+/// (body rates, rad/s), alphax,alphay,alphaz (rad/s^2); with --of camera t_s,n_m,e_m,d_m, vn,ve,vd,
+/// qw,qx,qy,qz (ned_from_camera), wx,wy,wz (in optical axes): the optical centre with lever arm, mount and
+/// vibration. Rows begin with the first instant of flight.window_s and follow at the rate up to its end;
+/// without a window they are of all of the log. t_s is as in the log, or as output.stamps says. The report is
+/// of the whole log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -47,7 +49,8 @@ pub struct Args {
     /// Where the motion goes; standard output if left out (with --report: not written then)
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
-    /// Print RMS and largest error against the interpolated log, the largest speeds and accelerations used, and which limits held the motion back and when
+    /// Print RMS and largest error against the interpolated log, the largest speeds and accelerations used,
+    /// and which limits held the motion back and when
     #[arg(long)]
     report: bool,
     /// Print the report as JSON
@@ -90,7 +93,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         let table = match args.of {
             Of::Body => trajectory_csv(instants.map(|t_s| body_at(&tracked.trajectory, epoch_ns, t_s))),
             Of::Camera => {
-                let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount).or_bad_input()?;
+                let path =
+                    CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount).or_bad_input()?;
                 warn_of_few(&path, rate_hz, console);
                 camera_trajectory_csv(instants.map(|t_s| camera_at(&path, epoch_ns, t_s)))
             }
@@ -101,7 +105,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console.note(format_args!("{rows} rows in {}", path.display()));
     }
     if args.report {
-        let measured = tracked.report(&log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
+        let measured = tracked
+            .report(&log.rows)
+            .ok_or_else(|| anyhow!("the flight log has no row to compare with"))
+            .or_bad_input()?;
         report(args.json, &tracked, &measured, log.epoch_ns, console)?;
     }
     Ok(())
@@ -131,19 +138,32 @@ fn warn_of_few(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
 fn row_count([start_s, end_s]: [f64; 2], rate_hz: f64) -> Result<u64, Failure> {
     let rows = ((end_s - start_s) * rate_hz + 1e-6).floor() + 1.0;
     if !(rate_hz > 0.0 && rate_hz.is_finite()) {
-        return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: must be a finite number of hertz above 0")));
+        return Err(Failure::bad_input(anyhow!(
+            "--rate {rate_hz}: must be a finite number of hertz above 0"
+        )));
     }
     if rows > MOST_ROWS {
-        return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: {rows:.0} rows are more than {MOST_ROWS:.0}; lower the rate")));
+        return Err(Failure::bad_input(anyhow!(
+            "--rate {rate_hz}: {rows:.0} rows are more than {MOST_ROWS:.0}; lower the rate"
+        )));
     }
     Ok(rows as u64)
 }
 
-fn report(json: bool, tracked: &Tracked, measured: &TrackReport, epoch_ns: i64, console: &mut Console<'_>) -> Result<(), Failure> {
+fn report(
+    json: bool,
+    tracked: &Tracked,
+    measured: &TrackReport,
+    epoch_ns: i64,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
     let Tracked { limits, saturation, rate_hz, .. } = *tracked;
     let on_clock = |t_s: f64| epoch_ns as f64 * 1e-9 + t_s;
-    let holds: Vec<Hold> =
-        tracked.holds.iter().map(|hold| Hold { from_s: on_clock(hold.from_s), to_s: on_clock(hold.to_s), ..*hold }).collect();
+    let holds: Vec<Hold> = tracked
+        .holds
+        .iter()
+        .map(|hold| Hold { from_s: on_clock(hold.from_s), to_s: on_clock(hold.to_s), ..*hold })
+        .collect();
     if json {
         return Ok(console.json(&Report { rate_hz, measured, limits, saturation, holds })?);
     }
@@ -153,7 +173,10 @@ fn report(json: bool, tracked: &Tracked, measured: &TrackReport, epoch_ns: i64, 
     for ((name, rms), (_, max)) in channels(rms).into_iter().zip(channels(max_error)) {
         console.line(format_args!("{name:<12} {rms:>12.5} {max:>12.5}"))?;
     }
-    console.line(format_args!("{:<28} {:>12} {:>12} {:>12}", "motion", "used at most", "limit", "held back, s"))?;
+    console.line(format_args!(
+        "{:<28} {:>12} {:>12} {:>12}",
+        "motion", "used at most", "limit", "held back, s"
+    ))?;
     for (name, used, limit, held_s) in motion(max_used, &limits, &saturation) {
         console.line(format_args!("{name:<28} {used:>12.4} {limit:>12.4} {held_s:>12.3}"))?;
     }
@@ -163,7 +186,10 @@ fn report(json: bool, tracked: &Tracked, measured: &TrackReport, epoch_ns: i64, 
     console.line("held back longest, seconds on the log's clock")?;
     for hold in holds.iter().take(SHOWN_HOLDS) {
         let (key, duration_s) = (hold.limit.key(), hold.duration_s());
-        console.line(format_args!("  {:.3} to {:.3} ({duration_s:.3} s) by tracker.{key}", hold.from_s, hold.to_s))?;
+        console.line(format_args!(
+            "  {:.3} to {:.3} ({duration_s:.3} s) by tracker.{key}",
+            hold.from_s, hold.to_s
+        ))?;
     }
     Ok(())
 }
@@ -181,11 +207,20 @@ fn channels(errors: &Channels) -> [(&'static str, f64); 7] {
     ]
 }
 
-fn motion(used: &MotionUse, limits: &ResolvedLimits, held: &Saturation) -> [(&'static str, f64, f64, f64); 4] {
+fn motion(
+    used: &MotionUse,
+    limits: &ResolvedLimits,
+    held: &Saturation,
+) -> [(&'static str, f64, f64, f64); 4] {
     [
         ("speed m/s", used.speed_m_s, limits.max_speed_m_s, held.speed_s),
         ("acceleration m/s^2", used.acceleration_m_s2, limits.max_acceleration_m_s2, held.acceleration_s),
-        ("angular rate deg/s", used.angular_rate_deg_s, limits.max_angular_rate_rad_s.to_degrees(), held.angular_rate_s),
+        (
+            "angular rate deg/s",
+            used.angular_rate_deg_s,
+            limits.max_angular_rate_rad_s.to_degrees(),
+            held.angular_rate_s,
+        ),
         (
             "angular acceleration deg/s^2",
             used.angular_acceleration_deg_s2,
@@ -221,7 +256,11 @@ mod tests {
         let span_s = <[f64; 2]>::from(trajectory.span_s());
         assert_eq!(row_count(span_s, 10.0).unwrap(), 101);
         for rate_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
-            assert_eq!(row_count(span_s, rate_hz).unwrap_err().code(), crate::failure::BAD_INPUT, "{rate_hz}");
+            assert_eq!(
+                row_count(span_s, rate_hz).unwrap_err().code(),
+                crate::failure::BAD_INPUT,
+                "{rate_hz}"
+            );
         }
     }
 }

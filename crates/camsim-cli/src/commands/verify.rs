@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     reference::{
-        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, IdealView, Judged, Oracle, RenderOptions, TruthErrors, coord_errors, holes,
-        image_errors, silhouettes, truth_errors,
+        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, IdealView, Judged, Oracle, RenderOptions,
+        TruthErrors, coord_errors, holes, image_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, Channel, Solver},
 };
@@ -28,19 +28,25 @@ use crate::{
 /// Frames that are looked at if none are named.
 const DEFAULT_FRAMES: u64 = 5;
 
-/// Render frames with their plan and with the exact oracle, and show the measured error beside the predicted one
+/// Render frames with their plan and with the exact oracle, and show the measured error beside the predicted
+/// one
 ///
-/// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its own instant the plan has looked,
-/// in pixels of the ideal frame. Pixels within 3 px of a silhouette, or whose point the ideal frame does not see, are counted apart. With an
-/// exposure several of its instants are measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is
-/// above quality.max_error_px, and with --pictures if a picture is farther off than quality.max_error_dn. Beneath stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
-/// a hundredth is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
+/// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its
+/// own instant the plan has looked, in pixels of the ideal frame. Pixels within 3 px of a silhouette, or
+/// whose point the ideal frame does not see, are counted apart. With an exposure several of its instants are
+/// measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is above
+/// quality.max_error_px, and with --pictures if a picture is farther off than quality.max_error_dn. Beneath
+/// stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than
+/// a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than a hundredth
+/// is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
 ///
-/// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
-/// errors of sources hold only what it does to parallax. What it does to the picture is in the predicted error of that and measured by --pictures.
+/// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands
+/// in a column of its own: the measured errors of sources hold only what it does to parallax. What it does to
+/// the picture is in the predicted error of that and measured by --pictures.
 ///
-/// Depth and points (north, east, down) of every pixel, at silhouettes too, are compared with the surface that the pixel's own ray meets. A depth or point that is off by more than
-/// 0.1 % of the depth, and that no surface within quality.max_error_px of the pixel's centre has, is a fault: one is enough for exit code 1.
+/// Depth and points (north, east, down) of every pixel, at silhouettes too, are compared with the surface
+/// that the pixel's own ray meets. A depth or point that is off by more than 0.1 % of the depth, and that no
+/// surface within quality.max_error_px of the pixel's centre has, is a fault: one is enough for exit code 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -50,7 +56,8 @@ Examples:
 pub struct Args {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// Which frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; five spread evenly if left out
+    /// Which frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; five spread evenly if left
+    /// out
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
     /// Compare the picture too: the oracle renders it, many rays a pixel
@@ -66,7 +73,8 @@ struct Report {
     adapter: String,
     tolerance_px: f64,
     tolerance_dn: f64,
-    /// Whether every frame keeps the tolerances: `quality.max_error_px`, and with pictures `quality.max_error_dn`.
+    /// Whether every frame keeps the tolerances: `quality.max_error_px`, and with pictures
+    /// `quality.max_error_dn`.
     kept: bool,
     frames: Vec<Verified>,
 }
@@ -80,7 +88,8 @@ struct Verified {
     truth: Option<Truth>,
     /// The terrain as drawn.
     level_of_detail: Option<LevelOfDetail>,
-    /// Whether the 99th percentile that the frame is judged by is within the tolerance, and within the prediction.
+    /// Whether the 99th percentile that the frame is judged by is within the tolerance, and within the
+    /// prediction.
     kept: bool,
     as_predicted: bool,
     picture: Option<Picture>,
@@ -94,8 +103,8 @@ struct Measured {
     smooth: Figures,
     silhouettes: Figures,
     all: Figures,
-    /// Whose 99th percentile is held to the tolerance: "smooth", "all" where hardly any pixel is smooth, or "nothing" where too many are
-    /// falsely valid or missing.
+    /// Whose 99th percentile is held to the tolerance: "smooth", "all" where hardly any pixel is smooth, or
+    /// "nothing" where too many are falsely valid or missing.
     judged_by: &'static str,
     falsely_valid: u64,
     missing: u64,
@@ -210,7 +219,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     let frames_where = |is_broken: &dyn Fn(&Verified) -> bool| {
-        let broken: Vec<String> = report.frames.iter().filter(|frame| is_broken(frame)).map(|frame| frame.frame.to_string()).collect();
+        let broken: Vec<String> = report
+            .frames
+            .iter()
+            .filter(|frame| is_broken(frame))
+            .map(|frame| frame.frame.to_string())
+            .collect();
         broken.join(", ")
     };
     let of_truth = |frame: &Verified| frame.truth.as_ref().is_some_and(|truth| !truth.kept);
@@ -222,10 +236,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let Some(first) = report.frames.iter().find(|frame| !frame.kept) else {
         let frames = frames_where(&|frame| frame.picture.as_ref().is_some_and(|picture| !picture.kept));
-        return Err(Failure::failed(anyhow!("quality.max_error_dn = {tolerance_dn} is broken in frame {frames}")));
+        return Err(Failure::failed(anyhow!(
+            "quality.max_error_dn = {tolerance_dn} is broken in frame {frames}"
+        )));
     };
     let frames = frames_where(&|frame| !frame.kept);
-    Err(Failure::failed(anyhow!("the tolerance of {tolerance_px} px is broken in frame {frames}: {}", why_broken(first))))
+    Err(Failure::failed(anyhow!(
+        "the tolerance of {tolerance_px} px is broken in frame {frames}: {}",
+        why_broken(first)
+    )))
 }
 
 /// Coordinates are asked for here whatever `output.channels` says, so that leaving them out is no way out.
@@ -243,11 +262,16 @@ fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
 
 /// Of a frame whose tolerance is broken.
 fn why_broken(frame: &Verified) -> String {
-    let more =
-        if is_more_than_predicted(frame.as_predicted, frame.measured.judged_by) { ", and the error is larger than predicted" } else { "" };
+    let more = if is_more_than_predicted(frame.as_predicted, frame.measured.judged_by) {
+        ", and the error is larger than predicted"
+    } else {
+        ""
+    };
     match (&frame.predicted.in_the_way, frame.measured.judged_by) {
         (Some(cause), _) => format!("in the way is {cause}{more}"),
-        (None, VOID) => "too many pixels have a source only in one of the two pictures, or there is none".to_owned(),
+        (None, VOID) => {
+            "too many pixels have a source only in one of the two pictures, or there is none".to_owned()
+        }
         _ => "the plan did not expect it".to_owned(),
     }
 }
@@ -263,7 +287,13 @@ fn spread(frames: u64) -> Vec<u64> {
     (0..count).map(|i| if count > 1 { i * (frames - 1) / (count - 1) } else { 0 }).collect()
 }
 
-fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: f64, pictures: bool) -> Result<Verified, Failure> {
+fn verify(
+    frame: u64,
+    session: &mut Session<'_>,
+    oracle: &Oracle,
+    tolerance_px: f64,
+    pictures: bool,
+) -> Result<Verified, Failure> {
     let first = at_phase(session, frame, 0.0)?;
     let mut errors = measure(oracle, &first, 0.0)?;
     for phase in phases(&first.plan) {
@@ -277,7 +307,9 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     let picture = pictures.then(|| picture(oracle, &first));
     let hole_share = unseen(oracle, &first.plan).share();
     let is_exact = first.plan.tells_exact_truth();
-    let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px).filter(|_| is_exact).map(Truth::from);
+    let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px)
+        .filter(|_| is_exact)
+        .map(Truth::from);
     Ok(Verified {
         frame,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
@@ -303,13 +335,16 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     })
 }
 
-/// Besides mid-exposure, which is solved for itself: the begin, the middles between two pairs of nodes, where the path is off most, and two more.
+/// Besides mid-exposure, which is solved for itself: the begin, the middles between two pairs of nodes, where
+/// the path is off most, and two more.
 fn phases(plan: &FramePlan) -> Vec<f32> {
     let Some(blur) = plan.blur else { return Vec::new() };
     let steps = f64::from(blur.solved() - 1);
     let middle_of = |share: f64| (((share * steps).floor() + 0.5) / steps - 0.5) as f32;
     // Exactly 0 would be mid-exposure. The last two are in step with no vibration.
-    [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191].map(|phase| if phase == 0.0 { 1e-4 } else { phase }).to_vec()
+    [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191]
+        .map(|phase| if phase == 0.0 { 1e-4 } else { phase })
+        .to_vec()
 }
 
 /// Over the exposure, if it shows: its middle and both ends, as the probes of the plan look.
@@ -366,13 +401,15 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
 /// Where no percentile stands for the frame.
 const VOID: &str = "nothing";
 
-const HEADER: &str =
-    " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain off |";
+const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain off |";
 
 fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
     let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, hole_share } = measured;
-    let terrain_off = verified.level_of_detail.as_ref().map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
+    let terrain_off = verified
+        .level_of_detail
+        .as_ref()
+        .map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
     let share = 100.0 * silhouettes.pixels as f64 / all.pixels.max(1) as f64;
     let verdict = verdict([verified.kept, verified.as_predicted, predicted.kept], judged_by);
     let why = match *judged_by {
@@ -385,8 +422,12 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
     let Predicted { resampling_dn, blur_dn, displaced_dn, ground, layers, holes, .. } = predicted;
-    let (surface_dn, layers_dn) = (ground.map_or(0.0, |ground| ground.surface_dn), layers.map_or(0.0, |layers| layers.error_dn));
-    let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.4} %", 100.0 * holes.share));
+    let (surface_dn, layers_dn) =
+        (ground.map_or(0.0, |ground| ground.surface_dn), layers.map_or(0.0, |layers| layers.error_dn));
+    let expected = holes.map_or_else(
+        || "nobody looks for them".to_owned(),
+        |holes| format!("predicted {:.4} %", 100.0 * holes.share),
+    );
     console.line(format_args!(
         "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
         100.0 * hole_share
@@ -394,7 +435,9 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
     if let Some(truth) = &verified.truth {
         console.line(format_args!("       | {}", describe_truth(truth)))?;
     }
-    if let Some(Picture { rms_dn, predicted_dn, kept, psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {
+    if let Some(Picture { rms_dn, predicted_dn, kept, psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) =
+        &verified.picture
+    {
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
         console.line(format_args!(
@@ -417,8 +460,11 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
 }
 
 fn describe_truth(truth: &Truth) -> String {
-    let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } = truth;
-    let largest = |error: &Option<f64>| error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.3} %", 100.0 * error));
+    let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } =
+        truth;
+    let largest = |error: &Option<f64>| {
+        error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.3} %", 100.0 * error))
+    };
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
         "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); of no surface near the pixel: {depth_faults} and {point_faults}: {}",
@@ -434,7 +480,9 @@ fn verdict([kept, as_predicted, predicted_kept]: [bool; 3], judged_by: &str) -> 
         (true, _) if as_predicted => "kept",
         (true, _) => "kept, but more than predicted",
         (false, true) => "BROKEN against the prediction",
-        (false, false) if is_more_than_predicted(as_predicted, judged_by) => "BROKEN, and more than predicted",
+        (false, false) if is_more_than_predicted(as_predicted, judged_by) => {
+            "BROKEN, and more than predicted"
+        }
         (false, false) => "BROKEN as predicted",
     }
 }
@@ -476,7 +524,12 @@ mod tests {
     fn a_picture_that_cannot_be_measured_is_refused_with_the_most_that_can() {
         assert!(check_size([2048, 2048], 4_194_304).is_ok());
         let error = check_size([4000, 3000], 4_194_304).unwrap_err().to_string();
-        assert!(error.contains("12000000 pixels") && error.contains("at most 4194304") && !error.contains("output.channels"), "{error}");
+        assert!(
+            error.contains("12000000 pixels")
+                && error.contains("at most 4194304")
+                && !error.contains("output.channels"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -23,7 +23,9 @@ pub struct Args {
 
 /// Opens the window and stays until it is closed.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let exporter = Arc::new(|job: &ExportJob| export(job).map_err(|failure| failure.to_string().trim_start_matches("error: ").to_owned()));
+    let exporter = Arc::new(|job: &ExportJob| {
+        export(job).map_err(|failure| failure.to_string().trim_start_matches("error: ").to_owned())
+    });
     camsim_viewer::run(args.scenario.clone(), Some(exporter)).or_failed()
 }
 
@@ -38,9 +40,18 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let folder = &job.folder;
     let go_on = go_on(folder);
     let warnings = &loaded.warnings;
-    let run = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings, go_on: &go_on };
+    let run = Job {
+        sequence: &loaded.sequence,
+        folder,
+        frames: &frames,
+        shard: None,
+        resume: false,
+        warnings,
+        go_on: &go_on,
+    };
     let engine;
-    let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle) {
+    let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle)
+    {
         Box::new(Rays::new(&loaded.sequence)?)
     } else {
         engine = Engine::new(AdapterChoice::Best)?;
@@ -68,7 +79,8 @@ mod tests {
             ("output.format", "[\"png\"]"),
         ];
         let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
-        read_scenario(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None).expect("legal")
+        read_scenario(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None)
+            .expect("legal")
     }
 
     #[test]

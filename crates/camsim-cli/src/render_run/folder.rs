@@ -29,7 +29,13 @@ pub enum Standing {
 }
 
 /// As [`standing`], and says what the user should know of it.
-pub fn check(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs, adapter: &str, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn check(
+    job: &Job<'_>,
+    files: &FrameFiles,
+    inputs: &Inputs,
+    adapter: &str,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
     match standing(job, files, inputs)? {
         Standing::Replaced if job.frames.iter().any(|&frame| files.exist(frame)) => {
             console.warn(format_args!(
@@ -85,16 +91,25 @@ pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<()
 }
 
 /// Refuses frames of which nobody knows what made them, unless they are to be replaced.
-pub fn refuse_unknown(folder: &Path, frames: &[u64], files: &FrameFiles, is_resumed: bool) -> Result<(), Failure> {
+pub fn refuse_unknown(
+    folder: &Path,
+    frames: &[u64],
+    files: &FrameFiles,
+    is_resumed: bool,
+) -> Result<(), Failure> {
     let unknown = format!("{} has frames and no run.json that says what made them", folder.display());
     if is_resumed && frames.iter().any(|&frame| files.exist(frame)) {
-        return Err(Failure::bad_input(anyhow!("{unknown}: render without --resume, or into another folder")));
+        return Err(Failure::bad_input(anyhow!(
+            "{unknown}: render without --resume, or into another folder"
+        )));
     }
     refuse_others(frames, files, &unknown)
 }
 
 fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
-    if let Err(ResumeError::Differs { path, .. }) = check_resume_of(job.folder, "adapter", "by another adapter", &adapter) {
+    if let Err(ResumeError::Differs { path, .. }) =
+        check_resume_of(job.folder, "adapter", "by another adapter", &adapter)
+    {
         console.warn(format_args!(
             "{} was made by another adapter than {adapter}: frames that are there stay, and differ from what this one would make by what rounding does",
             path.display()
@@ -107,7 +122,8 @@ pub fn files_of(scenario: &Scenario, folder: &Path) -> FrameFiles {
     FrameFiles::new(folder, &scenario.output, scenario.camera.photometric.output)
 }
 
-/// Holds the folder's tables against other runs in it until it is dropped. Where a file system knows no locks there is none.
+/// Holds the folder's tables against other runs in it until it is dropped. Where a file system knows no locks
+/// there is none.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "closing it unlocks")] Option<File>);
 
@@ -115,7 +131,9 @@ impl Lock {
     /// Waits for whoever has it.
     pub fn take(folder: &Path) -> Result<Self, Failure> {
         create_dir_all(folder)
-            .map_err(|error| anyhow!("{}: cannot be made: {error}; choose another folder with -o", folder.display()))
+            .map_err(|error| {
+                anyhow!("{}: cannot be made: {error}; choose another folder with -o", folder.display())
+            })
             .or_failed()?;
         let locked = |file: std::io::Result<File>| file.and_then(|file| file.lock().map(|()| file)).ok();
         // The folder itself, so that nothing is left in it; some systems lock only what can be written.

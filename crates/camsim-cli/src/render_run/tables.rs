@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 
 use anyhow::anyhow;
-use camsim_core::{mount::CameraPath, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
+use camsim_core::{
+    mount::CameraPath, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory,
+};
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, camera_trajectory_csv, frames_path,
-        trajectory_csv, write_atomic,
+        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord,
+        camera_trajectory_csv, frames_path, trajectory_csv, write_atomic,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -34,7 +36,8 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
             "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make flight.window_s shorter or tracker.rate_hz lower"
         )));
     }
-    let (first_s, last_s) = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
+    let (first_s, last_s) =
+        Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
     let seen_s = [planner.stamp_s(0) + first_s, planner.stamp_s(sequence.frames - 1) + last_s];
     let ticks = || ticks(&sequence.path.trajectory, rate_hz, seen_s);
     let body = trajectory_csv(ticks().map(|t_s| body_at(&sequence.path.trajectory, sequence.epoch_ns, t_s)));
@@ -60,16 +63,24 @@ pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
     table.write(&path).or_failed()
 }
 
-/// Brings `frames.csv` up to what is there: rows of other runs stay with their files, `made` are this run's, and frames whose run never came to write their
-/// rows get them from their plans. Without any file of frames (`format = []`) the rows are those of the frames rendered.
-pub fn end_frames(job: &Job<'_>, files: &FrameFiles, planner: &Planner, made: &BTreeMap<u64, SourceFrame>) -> Result<(), Failure> {
+/// Brings `frames.csv` up to what is there: rows of other runs stay with their files, `made` are this run's,
+/// and frames whose run never came to write their rows get them from their plans. Without any file of frames
+/// (`format = []`) the rows are those of the frames rendered.
+pub fn end_frames(
+    job: &Job<'_>,
+    files: &FrameFiles,
+    planner: &Planner,
+    made: &BTreeMap<u64, SourceFrame>,
+) -> Result<(), Failure> {
     let path = frames_path(job.folder);
     let mut table = FrameTable::read(&path);
     let writes = !job.sequence.scenario.output.format.is_empty();
     for (&frame, source) in made.iter().filter(|(frame, _)| !writes || files.exist(**frame)) {
         table.insert(&record(job.sequence, files, planner, frame, *source));
     }
-    for frame in (0..job.sequence.frames).filter(|&frame| writes && files.exist(frame) && !made.contains_key(&frame)) {
+    for frame in
+        (0..job.sequence.frames).filter(|&frame| writes && files.exist(frame) && !made.contains_key(&frame))
+    {
         if !table.has_files(frame, &files.names(frame)) {
             let plan = planner.plan(frame).or_bad_input()?;
             table.insert(&record(job.sequence, files, planner, frame, source_frame(job.sequence, &plan)));
@@ -84,7 +95,13 @@ pub fn source_frame(sequence: &Sequence, plan: &FramePlan) -> SourceFrame {
     SourceFrame::new(plan, sequence.epoch_ns)
 }
 
-fn record(sequence: &Sequence, files: &FrameFiles, planner: &Planner, frame: u64, source: SourceFrame) -> FrameRecord {
+fn record(
+    sequence: &Sequence,
+    files: &FrameFiles,
+    planner: &Planner,
+    frame: u64,
+    source: SourceFrame,
+) -> FrameRecord {
     let stamp_s = planner.stamp_s(frame);
     FrameRecord {
         frame,

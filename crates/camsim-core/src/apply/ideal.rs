@@ -31,7 +31,9 @@ pub enum ApplyError {
     )]
     Flow,
     /// A solver that needs a scene.
-    #[error("solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)")]
+    #[error(
+        "solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)"
+    )]
     Oracle,
     /// Linear fog outside of the paper's preset.
     #[error(
@@ -109,10 +111,16 @@ impl IdealFrame {
         let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });
         let [[width, height], [w, h]] = [self.geometry.size_px, flow.size_px];
         if [width, height] != [w, h] || flow.px.len() != w as usize * h as usize {
-            return frame(format!("a flow of {w}x{h} pixels beside a picture of {width}x{height}"), "flow and colour must have one size");
+            return frame(
+                format!("a flow of {w}x{h} pixels beside a picture of {width}x{height}"),
+                "flow and colour must have one size",
+            );
         }
         if !(flow.interval_s.is_finite() && flow.interval_s != 0.0) {
-            return frame(format!("a flow over {} s", flow.interval_s), "give the time between the two instants that it joins");
+            return frame(
+                format!("a flow over {} s", flow.interval_s),
+                "give the time between the two instants that it joins",
+            );
         }
         Ok(())
     }
@@ -125,21 +133,42 @@ impl IdealFrame {
             return frame("no pixel".into(), "give pictures of at least 1x1");
         }
         let holes_fit = self.holes.is_empty() || self.holes.len() == width * height;
-        if self.color_rgba.len() != 4 * width * height || self.inverse_depth.len() != width * height || !holes_fit {
+        if self.color_rgba.len() != 4 * width * height
+            || self.inverse_depth.len() != width * height
+            || !holes_fit
+        {
             return frame(
-                format!("{} colour and {} depth values for {width}x{height} pixels", self.color_rgba.len(), self.inverse_depth.len()),
+                format!(
+                    "{} colour and {} depth values for {width}x{height} pixels",
+                    self.color_rgba.len(),
+                    self.inverse_depth.len()
+                ),
                 "colour and depth must have one size",
             );
         }
         let DVec2 { x: fx, y: fy } = self.geometry.focal_px;
-        if !(fx.is_finite() && fy.is_finite() && fx > 0.0 && fy > 0.0 && self.geometry.principal_px.is_finite()) {
-            return frame(format!("focal_px [{fx}, {fy}]"), "give positive finite focal lengths and a finite principal point");
+        if !(fx.is_finite()
+            && fy.is_finite()
+            && fx > 0.0
+            && fy > 0.0
+            && self.geometry.principal_px.is_finite())
+        {
+            return frame(
+                format!("focal_px [{fx}, {fy}]"),
+                "give positive finite focal lengths and a finite principal point",
+            );
         }
         if self.inverse_depth.iter().any(|w| !(w.is_finite() && *w >= 0.0)) {
-            return frame("depths that are negative or not finite".into(), "0 stands for unknown or infinitely far");
+            return frame(
+                "depths that are negative or not finite".into(),
+                "0 stands for unknown or infinitely far",
+            );
         }
         if self.color_rgba.iter().any(|v| !v.is_finite()) {
-            return frame("colours that are not finite".into(), "clean the picture before: NaN would spread over every blur path");
+            return frame(
+                "colours that are not finite".into(),
+                "clean the picture before: NaN would spread over every blur path",
+            );
         }
         Ok(())
     }

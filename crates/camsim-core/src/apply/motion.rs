@@ -16,8 +16,8 @@ const COVER_SLACK_S: f64 = 1e-6;
 /// How the camera moves; times are seconds from the stamp.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// Constant velocity and angular rate in the camera's own axes: the screw motion `exp(xi t)` on SE(3), whose displacement field is the
-    /// paper's eq. 10.
+    /// Constant velocity and angular rate in the camera's own axes: the screw motion `exp(xi t)` on SE(3),
+    /// whose displacement field is the paper's eq. 10.
     Twist(Twist),
     /// Poses over time.
     Poses(PoseTrack),
@@ -26,7 +26,8 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// `x_key = R x_line + t` (of a flow, in which the camera's part is not known apart, as if it stood still), from the camera at `dt_s` to the camera at `instant_s`.
+    /// `x_key = R x_line + t` (of a flow, in which the camera's part is not known apart, as if it stood
+    /// still), from the camera at `dt_s` to the camera at `instant_s`.
     #[must_use]
     pub fn key_from(&self, dt_s: f64, instant_s: f64) -> (DMat3, DVec3) {
         match self {
@@ -38,7 +39,10 @@ impl Motion {
             Self::Poses(track) => {
                 let (key, line) = (track.pose(instant_s), track.pose(dt_s));
                 let camera_from_world = key.1.inverse();
-                (DMat3::from_quat((camera_from_world * line.1).normalize()), camera_from_world * (line.0 - key.0))
+                (
+                    DMat3::from_quat((camera_from_world * line.1).normalize()),
+                    camera_from_world * (line.0 - key.0),
+                )
             }
             Self::Flow(_) => (DMat3::IDENTITY, DVec3::ZERO),
         }
@@ -75,7 +79,8 @@ impl Motion {
         }
     }
 
-    /// The longest time between two rows of a table that a window, or its edge, lies between; 0 without a table.
+    /// The longest time between two rows of a table that a window, or its edge, lies between; 0 without a
+    /// table.
     #[must_use]
     pub fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
         match self {
@@ -154,7 +159,8 @@ impl PoseTrack {
             return Err(PoseTrackError::TooShort(rows.len()));
         }
         let mut before = f64::NEG_INFINITY;
-        // About the first position: a table in UTM or earth-centred coordinates keeps its last bits where they matter.
+        // About the first position: a table in UTM or earth-centred coordinates keeps its last bits where
+        // they matter.
         let origin_m = rows[0].position_m;
         for (i, row) in rows.iter_mut().enumerate() {
             let fail = |what| Err(PoseTrackError::Row { row: i + 1, what });
@@ -193,7 +199,10 @@ impl PoseTrack {
 
     fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
         let steps = self.rows.windows(2).map(|rows| [rows[0].t_s, rows[1].t_s]);
-        steps.filter(|[from_s, to_s]| *to_s > first_s && *from_s < last_s).map(|[from_s, to_s]| to_s - from_s).fold(0.0, f64::max)
+        steps
+            .filter(|[from_s, to_s]| *to_s > first_s && *from_s < last_s)
+            .map(|[from_s, to_s]| to_s - from_s)
+            .fold(0.0, f64::max)
     }
 
     fn mean_step_s(&self) -> f64 {
@@ -235,7 +244,8 @@ mod tests {
         Twist { velocity_m_s: DVec3::new(3.0, -2.0, 8.0), rate_rad_s: DVec3::new(0.3, -0.7, 1.1) }
     }
 
-    /// Points that stand still move in the camera by eq. 10: dr/dt = -V - w x r. Integrated by tiny steps, backwards.
+    /// Points that stand still move in the camera by eq. 10: dr/dt = -V - w x r. Integrated by tiny steps,
+    /// backwards.
     #[test]
     fn a_twist_is_the_flow_of_equation_10() {
         let motion = Motion::Twist(twist());
@@ -260,8 +270,16 @@ mod tests {
     #[test]
     fn the_longest_step_is_that_around_a_window() {
         let row = |t_s: f64| PoseRow { t_s, position_m: DVec3::ZERO, world_from_camera: DQuat::IDENTITY };
-        let track = Motion::Poses(PoseTrack::new([0.0, 0.1, 0.2, 3.2, 3.3].map(|t_s| row(100.0 + t_s)).to_vec(), 100.0).unwrap());
-        for (window, expected) in [([0.02, 0.08], 0.1), ([0.05, 0.15], 0.1), ([0.15, 0.25], 3.0), ([1.0, 1.1], 3.0), ([3.21, 3.25], 0.1)] {
+        let track = Motion::Poses(
+            PoseTrack::new([0.0, 0.1, 0.2, 3.2, 3.3].map(|t_s| row(100.0 + t_s)).to_vec(), 100.0).unwrap(),
+        );
+        for (window, expected) in [
+            ([0.02, 0.08], 0.1),
+            ([0.05, 0.15], 0.1),
+            ([0.15, 0.25], 3.0),
+            ([1.0, 1.1], 3.0),
+            ([3.21, 3.25], 0.1),
+        ] {
             let found = track.longest_step_s(window[0], window[1]);
             assert!((found - expected).abs() < 1e-9, "{window:?}: {found}");
         }
@@ -285,21 +303,37 @@ mod tests {
         let track = Motion::Poses(PoseTrack::new(rows, stamp_s).unwrap());
         for dt_s in [0.2, -0.15, 0.0, 0.101] {
             let (a, b) = (track.key_from(dt_s, 0.01), motion.key_from(dt_s, 0.01));
-            // Straight lines between rows: |v'| h^2 / 8 = 1e-7 m at 8 m/s and 1.3 rad/s; coordinates have 1e-9 m.
-            assert!((a.0.x_axis - b.0.x_axis).length() < 1e-9 && (a.1 - b.1).length() < 2e-7, "{dt_s}: {:?} {:?}", a.1, b.1);
+            // Straight lines between rows: |v'| h^2 / 8 = 1e-7 m at 8 m/s and 1.3 rad/s; coordinates have
+            // 1e-9 m.
+            assert!(
+                (a.0.x_axis - b.0.x_axis).length() < 1e-9 && (a.1 - b.1).length() < 2e-7,
+                "{dt_s}: {:?} {:?}",
+                a.1,
+                b.1
+            );
         }
         let found = track.twist_at(0.01);
-        assert!((found.velocity_m_s - twist().velocity_m_s).length() < 3e-3 && (found.rate_rad_s - twist().rate_rad_s).length() < 1e-9);
+        assert!(
+            (found.velocity_m_s - twist().velocity_m_s).length() < 3e-3
+                && (found.rate_rad_s - twist().rate_rad_s).length() < 1e-9
+        );
         assert_eq!(track.covers(-0.25, 0.25), Ok(()));
         assert!(matches!(track.covers(-0.26, 0.2), Err(PoseTrackError::Window { .. })));
         // The same instant is exactly no motion.
         let (rotation, shift) = track.key_from(0.1234, 0.1234);
-        assert!((rotation - DMat3::IDENTITY).to_cols_array().iter().all(|v| v.abs() < 1e-15) && shift == DVec3::ZERO);
+        assert!(
+            (rotation - DMat3::IDENTITY).to_cols_array().iter().all(|v| v.abs() < 1e-15)
+                && shift == DVec3::ZERO
+        );
     }
 
     #[test]
     fn tables_that_cannot_be_used_are_refused_by_row() {
-        let row = |t_s: f64, w: f64| PoseRow { t_s, position_m: DVec3::ZERO, world_from_camera: DQuat::from_xyzw(0.0, 0.0, 0.0, w) };
+        let row = |t_s: f64, w: f64| PoseRow {
+            t_s,
+            position_m: DVec3::ZERO,
+            world_from_camera: DQuat::from_xyzw(0.0, 0.0, 0.0, w),
+        };
         let error = |rows: &[PoseRow]| PoseTrack::new(rows.to_vec(), 0.0).unwrap_err().to_string();
         assert!(error(&[row(0.0, 1.0)]).contains("at least two"));
         assert!(error(&[row(0.0, 1.0), row(0.0, 1.0)]).contains("row 2: is not later"));

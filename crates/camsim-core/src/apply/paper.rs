@@ -1,5 +1,5 @@
-//! What the paper does with an ideal frame, for comparison: eq. 18 with the depth of one texel, a straight path over the exposure, stored
-//! values, and fog at the end.
+//! What the paper does with an ideal frame, for comparison: eq. 18 with the depth of one texel, a straight
+//! path over the exposure, stored values, and fog at the end.
 //!
 //! | step | here | camsim's own |
 //! |---|---|---|
@@ -11,8 +11,9 @@
 //! | vignette, light, noise | on stored values | on light |
 //! | fog | linear in slant range, after the blur, by the depth above | a part of the ideal frame |
 //!
-//! Row times, lens inverse, principal points and the vignette's rule are camsim's own: the paper means the same. (The scenario's preset of
-//! this name also solves the lens as the paper does, in every frame, because its time and its errors are of interest there.)
+//! Row times, lens inverse, principal points and the vignette's rule are camsim's own: the paper means the
+//! same. (The scenario's preset of this name also solves the lens as the paper does, in every frame, because
+//! its time and its errors are of interest there.)
 
 use glam::{DVec2, DVec3};
 
@@ -40,11 +41,13 @@ impl LinearFog {
 }
 
 impl Pipeline<'_> {
-    /// Mean of stored values over the exposure, with fog. An error if either end of the path is outside of the ideal frame; between them
-    /// nothing can be, because a rectangle holds the segment between any two of its points.
+    /// Mean of stored values over the exposure, with fog. An error if either end of the path is outside of
+    /// the ideal frame; between them nothing can be, because a rectangle holds the segment between any two of
+    /// its points.
     pub(super) fn gather_paper(&self, uv: DVec2, dt_s: f64) -> Result<DVec3, Unseen> {
         let half_s = 0.5 * self.shutter.exposure_s();
-        let ends_px = [self.source_of_ray(uv, dt_s - half_s)?.at_px, self.source_of_ray(uv, dt_s + half_s)?.at_px];
+        let ends_px =
+            [self.source_of_ray(uv, dt_s - half_s)?.at_px, self.source_of_ray(uv, dt_s + half_s)?.at_px];
         let samples = if half_s > 0.0 { self.settings.blur_samples.unwrap_or(BLUR_SAMPLES) } else { 1 };
         let mean = gather_straight(ends_px, samples, &self.stored());
         Ok(self.settings.fog.map_or(mean, |fog| fog.over(mean, uv, self.inverse_depth_of_ray(uv))))

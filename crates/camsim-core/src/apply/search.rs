@@ -1,4 +1,5 @@
-//! Temporal inverse with depth: fixed point where one surface is in question, a search along the ray's path where several are.
+//! Temporal inverse with depth: fixed point where one surface is in question, a search along the ray's path
+//! where several are.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -14,7 +15,8 @@ const TILE: u32 = 8;
 const LOOK_PX: f64 = 0.5;
 /// Most looks.
 const MAX_LOOKS: f64 = 1024.0;
-/// A surface gives its own depth again to within this, ideal pixels of parallax; across a jump of depth nothing does.
+/// A surface gives its own depth again to within this, ideal pixels of parallax; across a jump of depth
+/// nothing does.
 const MEETS_PX: f64 = 0.05;
 /// Parallax between the surfaces along a path below which they need not be told apart, ideal pixels.
 const ONE_SURFACE_PX: f64 = 0.02;
@@ -49,13 +51,24 @@ impl DepthEdges {
     pub(super) fn new(depth: &InverseDepthImage<'_>) -> Self {
         let [width, height] = depth.size_px;
         let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
-        let mut tiles = vec![Tile { low: f32::INFINITY, high: 0.0, broken: false }; (columns * rows) as usize];
+        let mut tiles =
+            vec![Tile { low: f32::INFINITY, high: 0.0, broken: false }; (columns * rows) as usize];
         let at = |x: u32, y: u32| f64::from(depth.values[(y * width + x) as usize]);
         for y in 0..height {
             for x in 0..width {
                 let value = depth.values[(y * width + x) as usize];
-                let across = steps(at(x.saturating_sub(1), y), f64::from(value), at((x + 1).min(width - 1), y), EDGE_STEP);
-                let down = steps(at(x, y.saturating_sub(1)), f64::from(value), at(x, (y + 1).min(height - 1)), EDGE_STEP);
+                let across = steps(
+                    at(x.saturating_sub(1), y),
+                    f64::from(value),
+                    at((x + 1).min(width - 1), y),
+                    EDGE_STEP,
+                );
+                let down = steps(
+                    at(x, y.saturating_sub(1)),
+                    f64::from(value),
+                    at(x, (y + 1).min(height - 1)),
+                    EDGE_STEP,
+                );
                 let tile = &mut tiles[(y / TILE * columns + x / TILE) as usize];
                 tile.low = tile.low.min(value);
                 tile.high = tile.high.max(value);
@@ -66,7 +79,8 @@ impl DepthEdges {
         Self { tiles, columns, rows, high }
     }
 
-    /// Where the ray `uv` of a line's camera looks in the ideal frame. `holes` says which texels' depth is unknown; empty is none.
+    /// Where the ray `uv` of a line's camera looks in the ideal frame. `holes` says which texels' depth is
+    /// unknown; empty is none.
     pub(super) fn source(
         &self,
         uv: DVec2,
@@ -96,12 +110,14 @@ impl DepthEdges {
         if path.is_hole(at_px) { Err(Unseen::Hole) } else { Ok(Source { at_px, inverse_depth }) }
     }
 
-    /// If surfaces that parallax tells apart lie along a path: the inverse depth in the line's camera that none of them exceeds.
+    /// If surfaces that parallax tells apart lie along a path: the inverse depth in the line's camera that
+    /// none of them exceeds.
     fn several(&self, path: &Path<'_>) -> Option<f64> {
         let far_px = path.place(0.0);
         let mut nearest = path.nearest(self.high);
         let mut box_high = self.high;
-        // What is nearest of all the picture is seldom near this path: its near end comes nearer, and so do the tiles that it meets.
+        // What is nearest of all the picture is seldom near this path: its near end comes nearer, and so do
+        // the tiles that it meets.
         for _ in 0..SHORTENINGS {
             let near_px = path.place(nearest);
             let length_px = far_px.distance(near_px);
@@ -133,7 +149,11 @@ impl DepthEdges {
         for row in tile(low.y, last[1])..=tile(high.y, last[1]) {
             for column in tile(low.x, last[0])..=tile(high.x, last[0]) {
                 let tile = &self.tiles[(row * self.columns + column) as usize];
-                all = Tile { low: all.low.min(tile.low), high: all.high.max(tile.high), broken: all.broken || tile.broken };
+                all = Tile {
+                    low: all.low.min(tile.low),
+                    high: all.high.max(tile.high),
+                    broken: all.broken || tile.broken,
+                };
             }
         }
         all
@@ -159,7 +179,8 @@ impl Path<'_> {
         !self.holes.is_empty() && self.holes[self.depth.nearest_index(at_px)]
     }
 
-    /// The line camera's inverse depth of a surface that the ideal frame shows at `in_key`; 0 for what lies behind the line's camera.
+    /// The line camera's inverse depth of a surface that the ideal frame shows at `in_key`; 0 for what lies
+    /// behind the line's camera.
     fn of_line(&self, in_key: f64) -> f64 {
         let scale = 1.0 - self.shift.z * in_key;
         if scale > 1e-3 { in_key * self.direction.z / scale } else { 0.0 }
@@ -172,7 +193,8 @@ impl Path<'_> {
     /// Upper end of the path: no surface is nearer, and the point stays before the ideal camera.
     fn nearest(&self, high: f64) -> f64 {
         let by_surface = high * self.direction.z / (1.0 - self.shift.z * high).max(0.02);
-        let by_camera = if self.shift.z < 0.0 { 0.95 * self.direction.z / -self.shift.z } else { f64::INFINITY };
+        let by_camera =
+            if self.shift.z < 0.0 { 0.95 * self.direction.z / -self.shift.z } else { f64::INFINITY };
         by_surface.min(by_camera)
     }
 
@@ -195,9 +217,10 @@ impl Path<'_> {
         None
     }
 
-    /// Inverse depth of the nearest surface that the ray meets. From the near end on, the ray's point is in front of what the ideal frame
-    /// shows there until it first is not: between two such looks it goes through a surface, or behind the edge of one. What the ideal
-    /// camera did not see cannot be known: then the farthest surface seen beside it stands in, which a hole is not.
+    /// Inverse depth of the nearest surface that the ray meets. From the near end on, the ray's point is in
+    /// front of what the ideal frame shows there until it first is not: between two such looks it goes
+    /// through a surface, or behind the edge of one. What the ideal camera did not see cannot be known: then
+    /// the farthest surface seen beside it stands in, which a hole is not.
     fn first_surface(&self, nearest: f64) -> Result<f64, Unseen> {
         let length_px = self.place(0.0).distance(self.place(nearest));
         let looks = (length_px / LOOK_PX).ceil().clamp(2.0, MAX_LOOKS);

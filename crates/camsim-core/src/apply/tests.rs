@@ -10,7 +10,8 @@ use crate::temporal::IdealGeometry;
 mod flow;
 mod flow_interval;
 
-/// A frame whose pixels show the surface that `look` gives for a ray (u, v, 1): inverse depth and linear colour.
+/// A frame whose pixels show the surface that `look` gives for a ray (u, v, 1): inverse depth and linear
+/// colour.
 fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3])) -> IdealFrame {
     let geometry = IdealGeometry {
         size_px,
@@ -18,7 +19,12 @@ fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3]))
         principal_px: DVec2::new(f64::from(size_px[0]) * 0.5 - 0.5, f64::from(size_px[1]) * 0.5 - 0.5),
     };
     let looks: Vec<_> = (0..size_px[0] * size_px[1])
-        .map(|i| look((DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0])) - geometry.principal_px) / geometry.focal_px))
+        .map(|i| {
+            look(
+                (DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0])) - geometry.principal_px)
+                    / geometry.focal_px,
+            )
+        })
         .collect();
     IdealFrame {
         geometry,
@@ -77,7 +83,12 @@ fn sources_over_a_plane_are_its_homography_and_the_ladder_descends() {
         ..camera(
             [160, 120],
             110.0,
-            ShutterSpec { readout_ms: 33.0, exposure_ms: 8.0, interlace_ms: FieldOr::Ms(5.0), ..ShutterSpec::default() },
+            ShutterSpec {
+                readout_ms: 33.0,
+                exposure_ms: 8.0,
+                interlace_ms: FieldOr::Ms(5.0),
+                ..ShutterSpec::default()
+            },
         )
     };
     let ideal = frame([400, 320], 130.0, tilted_plane);
@@ -94,7 +105,8 @@ fn sources_over_a_plane_are_its_homography_and_the_ladder_descends() {
 
 #[test]
 fn nothing_moving_is_the_identity() {
-    let spec = camera([97, 61], 75.5, ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() });
+    let spec =
+        camera([97, 61], 75.5, ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() });
     let color = |uv: DVec2| [(uv.x * 40.0).sin().abs() as f32, (uv.y * 55.0).cos().abs() as f32, 0.25];
     let ideal = frame([97, 61], 75.5, |uv| (if uv.x > 0.1 { 0.2 } else { 0.0 }, color(uv)));
     let motion = Motion::Twist(Twist::default());
@@ -102,24 +114,36 @@ fn nothing_moving_is_the_identity() {
         let pipeline = Pipeline::new(&spec, &ideal, &motion, &solver(which)).unwrap();
         for pixel in [[0, 0], [96, 60], [50, 31], [53, 7]] {
             let at_px = pipeline.source(pixel, 0.5).unwrap().at_px;
-            assert!(at_px.distance(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))) < 1e-10, "{which:?} {pixel:?} {at_px}");
+            assert!(
+                at_px.distance(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))) < 1e-10,
+                "{which:?} {pixel:?} {at_px}"
+            );
         }
         let rendered = pipeline.render(None);
-        let worst = rendered.color_rgba.iter().zip(&ideal.color_rgba).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let worst =
+            rendered.color_rgba.iter().zip(&ideal.color_rgba).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-6, "{which:?}: {worst}");
         let depth_m = rendered.depth_m.unwrap();
-        assert!(depth_m.iter().zip(&ideal.inverse_depth).all(|(z, w)| if *w == 0.0 { *z == 0.0 } else { (z * w - 1.0).abs() < 1e-6 }));
+        assert!(depth_m.iter().zip(&ideal.inverse_depth).all(|(z, w)| if *w == 0.0 {
+            *z == 0.0
+        } else {
+            (z * w - 1.0).abs() < 1e-6
+        }));
     }
 }
 
-/// A wall of half the picture 10 m away before a wall 40 m away; the camera moves sideways, so the near edge hides or bares the far wall.
+/// A wall of half the picture 10 m away before a wall 40 m away; the camera moves sideways, so the near edge
+/// hides or bares the far wall.
 #[test]
 fn at_a_depth_edge_each_ray_finds_the_surface_it_meets() {
     let edge_m = 0.7;
     let (near, far) = (1.0 / 10.0, 1.0 / 40.0);
-    let ideal = frame([300, 200], 200.0, |uv| if uv.x * 10.0 > edge_m { (near, [1.0, 0.0, 0.0]) } else { (far, [0.0, 0.0, 1.0]) });
+    let ideal = frame([300, 200], 200.0, |uv| {
+        if uv.x * 10.0 > edge_m { (near, [1.0, 0.0, 0.0]) } else { (far, [0.0, 0.0, 1.0]) }
+    });
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(30.0, 0.0, 0.0), ..Twist::default() });
-    // One row is one instant: 33 ms of readout over 100 rows shifts the near wall by up to 10 px, the far one by 2.5.
+    // One row is one instant: 33 ms of readout over 100 rows shifts the near wall by up to 10 px, the far one
+    // by 2.5.
     let spec = camera([200, 100], 200.0, ShutterSpec { readout_ms: 33.0, ..ShutterSpec::default() });
     let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
     let (mut wrong, mut all, mut unseen) = (0, 0, 0);
@@ -152,19 +176,26 @@ fn at_a_depth_edge_each_ray_finds_the_surface_it_meets() {
 #[test]
 fn blur_is_the_mean_along_the_path() {
     let spec = camera([120, 90], 100.0, ShutterSpec { exposure_ms: 100.0, ..ShutterSpec::default() });
-    // Seen at 20 m from 40 m/s: 20 px over the exposure, linear in time, so the mean of a ramp is its value at the middle.
-    let ideal = frame([200, 150], 100.0, |uv| (1.0 / 20.0, [(0.5 + 0.2 * uv.x) as f32, (0.5 + 0.3 * uv.y) as f32, 0.5]));
+    // Seen at 20 m from 40 m/s: 20 px over the exposure, linear in time, so the mean of a ramp is its value
+    // at the middle.
+    let ideal = frame([200, 150], 100.0, |uv| {
+        (1.0 / 20.0, [(0.5 + 0.2 * uv.x) as f32, (0.5 + 0.3 * uv.y) as f32, 0.5])
+    });
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(40.0, 10.0, 0.0), ..Twist::default() });
     let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render(None);
     let paper = Settings { preset: Preset::Paper, blur_samples: Some(10), ..Settings::default() };
     let by_paper = Pipeline::new(&spec, &ideal, &motion, &paper).unwrap().render(None);
     for (x, y) in [(60_u32, 45_u32), (30, 20), (100, 80)] {
-        let at = |frame: &RenderedFrame, channel: usize| f64::from(frame.color_rgba[4 * (y * 120 + x) as usize + channel]);
+        let at = |frame: &RenderedFrame, channel: usize| {
+            f64::from(frame.color_rgba[4 * (y * 120 + x) as usize + channel])
+        };
         let expected = 0.5 + 0.2 * (f64::from(x) - 59.5) / 100.0;
         assert!((at(&rendered, 0) - expected).abs() < 1e-5, "{} {expected}", at(&rendered, 0));
         // Stored values are averaged there: 10 samples, ends included, of the encoded ramp.
-        let samples: f64 =
-            (0..10).map(|i| f64::from(srgb_from_linear((expected + 0.2 * (f64::from(i) / 9.0 - 0.5) * 0.2) as f32))).sum::<f64>() / 10.0;
+        let samples: f64 = (0..10)
+            .map(|i| f64::from(srgb_from_linear((expected + 0.2 * (f64::from(i) / 9.0 - 0.5) * 0.2) as f32)))
+            .sum::<f64>()
+            / 10.0;
         assert!((at(&by_paper, 0) - f64::from(linear_from_srgb(samples as f32))).abs() < 2e-5);
     }
 }
@@ -173,7 +204,8 @@ fn blur_is_the_mean_along_the_path() {
 fn a_turn_within_the_exposure_is_an_arc() {
     let spec = camera([161, 161], 100.0, ShutterSpec { exposure_ms: 1000.0, ..ShutterSpec::default() });
     let ideal = frame([301, 301], 100.0, |uv| (0.0, [(0.5 + 0.2 * uv.x) as f32, 0.0, 0.0]));
-    let motion = Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 0.0, 36_f64.to_radians()), ..Twist::default() });
+    let motion =
+        Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 0.0, 36_f64.to_radians()), ..Twist::default() });
     let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
     // Sagitta of 36 deg at 113 px is 5.6 px; segments take it below 0.01 px.
     assert!(pipeline.nodes() >= 24, "{}", pipeline.nodes());
@@ -198,7 +230,9 @@ fn fog_belongs_to_the_papers_preset() {
     let motion = Motion::Twist(Twist::default());
     let settings = Settings { fog: Some(fog), ..Settings::default() };
     assert!(matches!(Pipeline::new(&spec, &ideal, &motion, &settings), Err(ApplyError::Fog)));
-    let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings { preset: Preset::Paper, ..settings }).unwrap().render(None);
+    let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings { preset: Preset::Paper, ..settings })
+        .unwrap()
+        .render(None);
     let slant = (1.0_f64 + 0.15 * 0.15 + 0.1 * 0.1).sqrt();
     assert!((f64::from(srgb_from_linear(rendered.color_rgba[2])) - 0.7 * 0.5 * slant).abs() < 1e-6);
 }
@@ -208,23 +242,34 @@ fn frames_that_cannot_be_used_are_refused() {
     let spec = camera([4, 3], 10.0, ShutterSpec::default());
     let good = frame([4, 3], 10.0, |_| (0.1, [0.5; 3]));
     let motion = Motion::Twist(Twist::default());
-    let error = |ideal: &IdealFrame, settings: &Settings| Pipeline::new(&spec, ideal, &motion, settings).unwrap_err().to_string();
+    let error = |ideal: &IdealFrame, settings: &Settings| {
+        Pipeline::new(&spec, ideal, &motion, settings).unwrap_err().to_string()
+    };
     let mut bad = good.clone();
     bad.inverse_depth[3] = f32::NAN;
     assert!(error(&bad, &Settings::default()).contains("not finite"));
     bad.inverse_depth.pop();
     assert!(error(&bad, &Settings::default()).contains("one size"));
-    assert!(error(&IdealFrame { color_rgba: vec![f32::INFINITY; 48], ..good.clone() }, &Settings::default()).contains("colours"));
+    assert!(
+        error(&IdealFrame { color_rgba: vec![f32::INFINITY; 48], ..good.clone() }, &Settings::default())
+            .contains("colours")
+    );
     assert!(error(&good, &solver(Solver::Oracle)).contains("reproject"));
     // A ray farther than 90 deg from the ideal camera's axis has no source, and no panic.
-    let about = Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 300.0, 0.0), velocity_m_s: DVec3::splat(1e9) });
-    let blurred = camera([4, 3], 10.0, ShutterSpec { readout_ms: 33.0, exposure_ms: 20.0, ..ShutterSpec::default() });
+    let about =
+        Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 300.0, 0.0), velocity_m_s: DVec3::splat(1e9) });
+    let blurred =
+        camera([4, 3], 10.0, ShutterSpec { readout_ms: 33.0, exposure_ms: 20.0, ..ShutterSpec::default() });
     for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
-        assert_eq!(Pipeline::new(&blurred, &good, &about, &solver(which)).unwrap().render(None).color_rgba, [0.0; 48]);
+        assert_eq!(
+            Pipeline::new(&blurred, &good, &about, &solver(which)).unwrap().render(None).color_rgba,
+            [0.0; 48]
+        );
     }
 }
 
-/// A far wall, a hole in the depth and a near wall side by side: what looks into the hole has no answer, with every solver, and is counted.
+/// A far wall, a hole in the depth and a near wall side by side: what looks into the hole has no answer, with
+/// every solver, and is counted.
 #[test]
 fn what_looks_into_a_marked_hole_is_empty_and_counted() {
     let spec = camera([60, 20], 50.0, ShutterSpec { exposure_ms: 10.0, ..ShutterSpec::default() });
@@ -238,10 +283,14 @@ fn what_looks_into_a_marked_hole_is_empty_and_counted() {
         let (rendered, counts) = pipeline.render_and_count(None);
         assert_eq!(counts, UnseenCounts { holes: 10 * 20, ..UnseenCounts::default() }, "{which:?}");
         let alpha = |x: usize| rendered.color_rgba[4 * (60 * 7 + x) + 3];
-        assert_eq!((24..36).map(alpha).collect::<Vec<_>>(), [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.], "{which:?}");
+        assert_eq!(
+            (24..36).map(alpha).collect::<Vec<_>>(),
+            [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.],
+            "{which:?}"
+        );
     }
-    // 0.4 m to the right, 100 ms before: the far wall by 0.4 * 0.1 * 50 = 2 px, the near one by 10. Every ray that meets neither wall where
-    // it was seen is empty, and none stands in with infinity.
+    // 0.4 m to the right, 100 ms before: the far wall by 0.4 * 0.1 * 50 = 2 px, the near one by 10. Every ray
+    // that meets neither wall where it was seen is empty, and none stands in with infinity.
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(-4.0, 0.0, 0.0), ..Twist::default() });
     let late = camera([60, 20], 50.0, ShutterSpec { delay_ms: 100.0, ..ShutterSpec::default() });
     let pipeline = Pipeline::new(&late, &ideal, &motion, &Settings::default()).unwrap();
@@ -258,7 +307,10 @@ fn what_looks_into_a_marked_hole_is_empty_and_counted() {
         };
         match (pipeline.source([x, 9], 0.0), expected) {
             (Ok(found), Some((at, w))) => {
-                assert!((found.at_px.x - f64::from(at)).abs() < 1e-4 && (found.inverse_depth - w).abs() < 1e-6, "{x}: {found:?}");
+                assert!(
+                    (found.at_px.x - f64::from(at)).abs() < 1e-4 && (found.inverse_depth - w).abs() < 1e-6,
+                    "{x}: {found:?}"
+                );
                 seen[if w > 0.2 { 0 } else { 1 }] += 1;
             }
             (Err(Unseen::Hole), None) => seen[2] += 1,

@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::CameraModel;
 use crate::lens::{FOLD_RAYS, Lens};
 
-/// Pixels that a check looks at, about; larger images are sampled on a regular grid that includes the borders.
+/// Pixels that a check looks at, about; larger images are sampled on a regular grid that includes the
+/// borders.
 const MAX_SAMPLES: f64 = 250_000.0;
 
 /// Grid over the image on which the branch is tested for being one-to-one.
@@ -18,7 +19,8 @@ const BIJECTIVITY_GRID: u32 = 33;
 pub struct LensCheck {
     /// Share of the pixels that have an ideal ray.
     pub valid_fraction: f64,
-    /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it does neither within 89 degrees.
+    /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it does neither
+    /// within 89 degrees.
     pub fold_radius_min: Option<f64>,
     /// The largest such radius over all directions.
     pub fold_radius_max: Option<f64>,
@@ -57,7 +59,8 @@ impl CameraModel {
         }
     }
 
-    /// On the branch the determinant is positive, so a distorted point has as many pre-images as the border's image winds round it.
+    /// On the branch the determinant is positive, so a distorted point has as many pre-images as the border's
+    /// image winds round it.
     fn is_bijective(&self) -> bool {
         let Some(border) = distorted_border(&self.lens) else { return true };
         let [width, height] = self.size_px.map(|size| f64::from(size - 1) / f64::from(BIJECTIVITY_GRID - 1));
@@ -70,7 +73,8 @@ impl CameraModel {
     }
 }
 
-/// Image of the fold curve, slightly inside of it (a pole itself has no image); `None` where the lens has no fold curve.
+/// Image of the fold curve, slightly inside of it (a pole itself has no image); `None` where the lens has no
+/// fold curve.
 fn distorted_border(lens: &Lens) -> Option<Vec<DVec2>> {
     let radii = lens.fold_curve()?.radii();
     let ray = |(i, radius): (usize, &f64)| {

@@ -7,7 +7,8 @@ use crate::scenario::{LensSpec, ZoomSpec};
 
 fn s3_opencv() -> CameraModel {
     let k = [-0.428129, 0.158059, 0.000245, -0.002286, -0.029194];
-    CameraModel::new([640, 480], [307.960654; 2], Some([298.485405, 226.525456]), LensModel::BrownConrady, &k).unwrap()
+    CameraModel::new([640, 480], [307.960654; 2], Some([298.485405, 226.525456]), LensModel::BrownConrady, &k)
+        .unwrap()
 }
 
 #[test]
@@ -34,7 +35,15 @@ fn checks_of_harmless_cameras_are_clean() {
     let pinhole = CameraModel::from_spec(&CameraSpec::default()).unwrap().check();
     assert_eq!((pinhole.valid_fraction, pinhole.fold_radius_min, pinhole.bijective), (1.0, None, true));
     let k = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05];
-    let euroc = CameraModel::new([752, 480], [458.654, 457.296], Some([367.215, 248.375]), LensModel::BrownConrady, &k).unwrap().check();
+    let euroc = CameraModel::new(
+        [752, 480],
+        [458.654, 457.296],
+        Some([367.215, 248.375]),
+        LensModel::BrownConrady,
+        &k,
+    )
+    .unwrap()
+    .check();
     assert_eq!(euroc.valid_fraction, 1.0);
     assert!(euroc.worst_roundtrip_px < 1e-6 && euroc.bijective);
     // One pixel, and a strip.
@@ -52,7 +61,10 @@ fn bad_cameras_are_named() {
     for bad in [0.0, -500.0, f64::NAN, f64::INFINITY, 1e-310] {
         assert!(error(CameraSpec { focal_px: [500.0, bad], ..base.clone() }).contains("focal_px"));
     }
-    assert!(error(CameraSpec { principal_point_px: Some([f64::NAN, 0.0]), ..base.clone() }).contains("principal_point_px"));
+    assert!(
+        error(CameraSpec { principal_point_px: Some([f64::NAN, 0.0]), ..base.clone() })
+            .contains("principal_point_px")
+    );
     let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![f64::NAN] };
     assert!(error(CameraSpec { lens, ..base.clone() }).contains("coefficients[0]"));
     let huge = CameraSpec { focal_px: [1e-300, 1e-300], ..base };
@@ -60,7 +72,12 @@ fn bad_cameras_are_named() {
 }
 
 fn zoom_camera() -> CameraSpec {
-    let entry = |at: f64, focal: f64, k1: f64| ZoomSpec { at, focal_px: [focal; 2], principal_point_px: None, coefficients: vec![k1] };
+    let entry = |at: f64, focal: f64, k1: f64| ZoomSpec {
+        at,
+        focal_px: [focal; 2],
+        principal_point_px: None,
+        coefficients: vec![k1],
+    };
     CameraSpec {
         lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![] },
         zoom: vec![entry(1.0, 400.0, -0.3), entry(2.0, 800.0, -0.1), entry(4.0, 1600.0, 0.0)],

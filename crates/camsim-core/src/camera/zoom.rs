@@ -3,9 +3,11 @@
 use super::{CameraError, CameraModel};
 use crate::scenario::{CameraSpec, LensModel, ZoomSpec};
 
-/// The `[[camera.zoom]]` table: every number of a calibration is linear in the zoom value between two entries and held outside.
+/// The `[[camera.zoom]]` table: every number of a calibration is linear in the zoom value between two entries
+/// and held outside.
 ///
-/// Linear interpolation cannot overshoot, so what is monotone over the table (the focal length, say) stays so.
+/// Linear interpolation cannot overshoot, so what is monotone over the table (the focal length, say) stays
+/// so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZoomTable {
     size_px: [u32; 2],
@@ -44,7 +46,8 @@ impl ZoomTable {
         let above = self.entries.partition_point(|entry| entry.at <= zoom);
         let low = &self.entries[above.saturating_sub(1)];
         let high = &self.entries[above.min(self.entries.len() - 1)];
-        let share = if high.at > low.at { ((zoom - low.at) / (high.at - low.at)).clamp(0.0, 1.0) } else { 0.0 };
+        let share =
+            if high.at > low.at { ((zoom - low.at) / (high.at - low.at)).clamp(0.0, 1.0) } else { 0.0 };
         let mix = |a: f64, b: f64| a + (b - a) * share;
         let principal_point_px = match (low.principal_point_px, high.principal_point_px) {
             (None, None) => None,
@@ -63,11 +66,16 @@ impl ZoomTable {
         camera("camera.zoom", self.size_px, self.model, &entry)
     }
 
-    /// Index of the entry whose zoom value is nearest (the lower one of two equally near): the map of that entry starts the inverse.
+    /// Index of the entry whose zoom value is nearest (the lower one of two equally near): the map of that
+    /// entry starts the inverse.
     pub fn nearest(&self, zoom: f64) -> usize {
         let above = self.entries.partition_point(|entry| entry.at <= zoom).min(self.entries.len() - 1);
         let below = above.saturating_sub(1);
-        if (zoom - self.entries[below].at).abs() <= (self.entries[above].at - zoom).abs() { below } else { above }
+        if (zoom - self.entries[below].at).abs() <= (self.entries[above].at - zoom).abs() {
+            below
+        } else {
+            above
+        }
     }
 
     /// The entries, by ascending zoom value.
@@ -76,6 +84,11 @@ impl ZoomTable {
     }
 }
 
-fn camera(key: &str, size_px: [u32; 2], model: LensModel, entry: &ZoomSpec) -> Result<CameraModel, CameraError> {
+fn camera(
+    key: &str,
+    size_px: [u32; 2],
+    model: LensModel,
+    entry: &ZoomSpec,
+) -> Result<CameraModel, CameraError> {
     CameraModel::with_key(key, size_px, entry.focal_px, entry.principal_point_px, model, &entry.coefficients)
 }

@@ -5,7 +5,8 @@ use glam::{DQuat, EulerRot};
 use super::{RawAttitude, RawRow};
 use crate::scenario::AngleKind;
 
-/// Rotation that takes body (FRD) to north-east-down, from ZYX angles (roll, pitch, yaw) in degrees: `Rz(yaw) Ry(pitch) Rx(roll)`.
+/// Rotation that takes body (FRD) to north-east-down, from ZYX angles (roll, pitch, yaw) in degrees: `Rz(yaw)
+/// Ry(pitch) Rx(roll)`.
 pub fn body_from_euler_deg([roll, pitch, yaw]: [f64; 3]) -> DQuat {
     DQuat::from_euler(EulerRot::ZYX, yaw.to_radians(), pitch.to_radians(), roll.to_radians())
 }
@@ -35,7 +36,9 @@ impl Attitude {
                 }
             }
             // Also false for NaN.
-            RawAttitude::Quaternion(rotation) if (rotation.length() - 1.0).abs() <= 0.1 => Self::Rotation(rotation.normalize()),
+            RawAttitude::Quaternion(rotation) if (rotation.length() - 1.0).abs() <= 0.1 => {
+                Self::Rotation(rotation.normalize())
+            }
             RawAttitude::EulerDeg(_) | RawAttitude::Quaternion(_) | RawAttitude::None => Self::Missing,
         }
     }
@@ -57,16 +60,21 @@ impl Attitude {
     pub(super) fn interpolate(self, other: Self, fraction: f64) -> Self {
         match (self, other) {
             (Self::Rotation(a), Self::Rotation(b)) => Self::Rotation(a.slerp(b, fraction).normalize()),
-            (Self::Turns(a), Self::Turns(b)) => Self::Turns([0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * fraction)),
+            (Self::Turns(a), Self::Turns(b)) => {
+                Self::Turns([0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * fraction))
+            }
             (Self::Missing, known) | (known, _) => known,
         }
     }
 
-    /// Angle between two attitudes, radians; the largest of the three changes where turns count. `None` where one is missing.
+    /// Angle between two attitudes, radians; the largest of the three changes where turns count. `None` where
+    /// one is missing.
     pub(super) fn distance_rad(self, other: Self) -> Option<f64> {
         match (self, other) {
             (Self::Rotation(a), Self::Rotation(b)) => Some(angle_between_rad(a, b)),
-            (Self::Turns(a), Self::Turns(b)) => Some((0..3).map(|axis| (b[axis] - a[axis]).abs()).fold(0.0, f64::max).to_radians()),
+            (Self::Turns(a), Self::Turns(b)) => {
+                Some((0..3).map(|axis| (b[axis] - a[axis]).abs()).fold(0.0, f64::max).to_radians())
+            }
             _ => None,
         }
     }
@@ -93,7 +101,8 @@ impl Attitude {
             }
         }
         match (first, count > 0.0) {
-            // Two opposite rotations average to a sum near zero only when they are 180 degrees apart; then the first stands.
+            // Two opposite rotations average to a sum near zero only when they are 180 degrees apart; then
+            // the first stands.
             (Some(first), _) => Self::Rotation(if sum.length() > 1e-3 { sum.normalize() } else { first }),
             (None, true) => Self::Turns(turns),
             (None, false) => Self::Missing,
@@ -101,7 +110,8 @@ impl Attitude {
     }
 }
 
-/// Angle of the rotation from `a` to `b` in radians, accurate for small angles (where `acos` of the dot product is not).
+/// Angle of the rotation from `a` to `b` in radians, accurate for small angles (where `acos` of the dot
+/// product is not).
 pub(super) fn angle_between_rad(a: DQuat, b: DQuat) -> f64 {
     let relative = a.inverse() * b;
     2.0 * relative.xyz().length().atan2(relative.w.abs())
@@ -109,8 +119,8 @@ pub(super) fn angle_between_rad(a: DQuat, b: DQuat) -> f64 {
 
 /// Decides `Auto`: continuous where a column leaves both [-180, 180] and [0, 360).
 ///
-/// A compass that writes 360.0 now and then leaves both by one value; such a column wraps if it also jumps by more than 270 degrees
-/// between rows while most of its steps are small. Two rows 0 and 360 are a full turn.
+/// A compass that writes 360.0 now and then leaves both by one value; such a column wraps if it also jumps by
+/// more than 270 degrees between rows while most of its steps are small. Two rows 0 and 360 are a full turn.
 pub(super) fn is_continuous(rows: &[&RawRow], kind: AngleKind) -> bool {
     match kind {
         AngleKind::Wrapped => false,
@@ -118,7 +128,9 @@ pub(super) fn is_continuous(rows: &[&RawRow], kind: AngleKind) -> bool {
         AngleKind::Auto => (0..3).any(|axis| {
             let column = || {
                 rows.iter().filter_map(move |row| match row.attitude {
-                    RawAttitude::EulerDeg(angles) if angles[axis].abs() <= MAX_ANGLE_DEG => Some(angles[axis]),
+                    RawAttitude::EulerDeg(angles) if angles[axis].abs() <= MAX_ANGLE_DEG => {
+                        Some(angles[axis])
+                    }
                     _ => None,
                 })
             };

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::{
-    CleaningReport, FlightLog, HeightConversion, LogError, LogOptions, LogRow, RawAttitude, RawPosition, RawRow,
+    CleaningReport, FlightLog, HeightConversion, LogError, LogOptions, LogRow, RawAttitude, RawPosition,
+    RawRow,
     attitude::{self, Attitude},
     null_rows,
     outliers::{self, Channel},
@@ -14,7 +15,8 @@ use crate::{
     scenario::{AngleKind, AttitudeSource},
 };
 
-/// Rows closer than this are one row written twice: their velocity would be rounding noise (the FSR2015 log has steps of 50 us).
+/// Rows closer than this are one row written twice: their velocity would be rounding noise (the FSR2015 log
+/// has steps of 50 us).
 const MERGE_NS: i128 = 1_000_000;
 const GAP_S: f64 = 1.0;
 /// No position further from the origin than this is a position.
@@ -77,12 +79,14 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
     let mut log_rows: Vec<LogRow> = rows
         .iter()
         .map(|row| {
-            let ned_from_local = tangent_frame.map(|frame| frame.ned_from_local(frame.geodetic_from_ned(row.position_ned_m)));
+            let ned_from_local =
+                tangent_frame.map(|frame| frame.ned_from_local(frame.geodetic_from_ned(row.position_ned_m)));
             let local_from_body = row.attitude.rotation();
             LogRow {
                 t_s: seconds_between(epoch_ns, row.t_ns) / options.speed,
                 position_ned_m: row.position_ned_m,
-                ned_from_body: ned_from_local.map_or(local_from_body, |rotation| (rotation * local_from_body).normalize()),
+                ned_from_body: ned_from_local
+                    .map_or(local_from_body, |rotation| (rotation * local_from_body).normalize()),
             }
         })
         .collect();
@@ -243,7 +247,8 @@ fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
         let end = start + rows[start..].iter().take_while(|row| since_start_ns(row) < MERGE_NS).count();
         let group = &rows[start..end];
         for pair in group.windows(2) {
-            let finding = if pair[0].t_ns == pair[1].t_ns { &mut report.duplicates } else { &mut report.merged };
+            let finding =
+                if pair[0].t_ns == pair[1].t_ns { &mut report.duplicates } else { &mut report.merged };
             finding.add(pair[1].line);
         }
         let count = group.len();
@@ -293,7 +298,8 @@ fn count_gaps(rows: &[Row], report: &mut CleaningReport) {
     }
 }
 
-/// Puts rows between rows whose three angles change by more than 90 degrees together, so that slerp between rows keeps the turns.
+/// Puts rows between rows whose three angles change by more than 90 degrees together, so that slerp between
+/// rows keeps the turns.
 fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, LogError> {
     let mut filled = vec![rows[0]];
     for pair in rows.windows(2) {

@@ -1,7 +1,9 @@
-//! Zeros that stand for a missing value: the fix at latitude 0, longitude 0, and the height 0 that receivers write before they know better.
+//! Zeros that stand for a missing value: the fix at latitude 0, longitude 0, and the height 0 that receivers
+//! write before they know better.
 //!
-//! A zero may also be true: flights cross the equator and take off from the sea. What tells the two apart is that a true zero has neighbours near it. So a
-//! run of zeros is left out only if the good rows on both sides (as far as there are any) are a jump away that no aircraft flies.
+//! A zero may also be true: flights cross the equator and take off from the sea. What tells the two apart is
+//! that a true zero has neighbours near it. So a run of zeros is left out only if the good rows on both sides
+//! (as far as there are any) are a jump away that no aircraft flies.
 
 use super::{CleaningReport, RawPosition, RawRow, outliers::quantile};
 use crate::geodesy::Geodetic;
@@ -19,23 +21,35 @@ const USUAL_FACTOR: f64 = 10.0;
 pub(super) fn drop(rows: &mut Vec<&RawRow>, report: &mut CleaningReport) {
     let is_null_fix = |at: Geodetic| at.lat_deg() == 0.0 || at.lon_deg() == 0.0;
     let fixes = runs(rows, is_null_fix, |null, good, _| {
-        let away = |zero: f64, other: f64| zero == 0.0 && (other - zero).abs().min(360.0 - (other - zero).abs()) > FAR_DEG;
+        let away = |zero: f64, other: f64| {
+            zero == 0.0 && (other - zero).abs().min(360.0 - (other - zero).abs()) > FAR_DEG
+        };
         away(null.lat_deg(), good.lat_deg()) || away(null.lon_deg(), good.lon_deg())
     });
     take(rows, &fixes, |line| report.null_fixes.add(line));
 
     let heights: Vec<f64> = rows.iter().filter_map(|row| geodetic(row)).map(|at| at.height_m).collect();
-    let steps: Vec<f64> =
-        heights.windows(2).filter(|pair| pair[0] != 0.0 && pair[1] != 0.0).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let steps: Vec<f64> = heights
+        .windows(2)
+        .filter(|pair| pair[0] != 0.0 && pair[1] != 0.0)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .collect();
     let floor_m = FAR_HEIGHT_M.max(USUAL_FACTOR * quantile(&steps, 0.9));
-    let nulls =
-        runs(rows, |at| at.height_m == 0.0, |_, good, step_s| good.height_m.abs() > floor_m && good.height_m.abs() > CLIMB_M_S * step_s);
+    let nulls = runs(
+        rows,
+        |at| at.height_m == 0.0,
+        |_, good, step_s| good.height_m.abs() > floor_m && good.height_m.abs() > CLIMB_M_S * step_s,
+    );
     take(rows, &nulls, |line| report.null_heights.add(line));
 }
 
-/// Marks runs of rows that are null and away from the good rows at both ends. `is_away` gets a row of the run, the good one beside it and their
-/// distance in time.
-fn runs(rows: &[&RawRow], is_null: impl Fn(Geodetic) -> bool, is_away: impl Fn(Geodetic, Geodetic, f64) -> bool) -> Vec<bool> {
+/// Marks runs of rows that are null and away from the good rows at both ends. `is_away` gets a row of the
+/// run, the good one beside it and their distance in time.
+fn runs(
+    rows: &[&RawRow],
+    is_null: impl Fn(Geodetic) -> bool,
+    is_away: impl Fn(Geodetic, Geodetic, f64) -> bool,
+) -> Vec<bool> {
     let null_at = |row: usize| geodetic(rows[row]).is_some_and(&is_null);
     let away = |null: usize, good: usize| match (geodetic(rows[null]), geodetic(rows[good])) {
         (Some(at), Some(beside)) => is_away(at, beside, step_s(rows[null], rows[good])),
@@ -52,7 +66,10 @@ fn runs(rows: &[&RawRow], is_null: impl Fn(Geodetic) -> bool, is_away: impl Fn(G
         let before = first.checked_sub(1);
         let after = (end < rows.len()).then_some(end);
         let is_alone = before.is_none() && after.is_none();
-        if !is_alone && before.is_none_or(|good| away(first, good)) && after.is_none_or(|good| away(end - 1, good)) {
+        if !is_alone
+            && before.is_none_or(|good| away(first, good))
+            && after.is_none_or(|good| away(end - 1, good))
+        {
             marks[first..end].fill(true);
         }
         first = end;

@@ -1,13 +1,16 @@
-//! Rows that leave the motion of their neighbours and come back at once: GPS spikes, angles interpolated through +-180 by a logger.
+//! Rows that leave the motion of their neighbours and come back at once: GPS spikes, angles interpolated
+//! through +-180 by a logger.
 //!
-//! A block of one to three rows is an outlier if each of its rows deviates from the interpolation between the rows around the block
+//! A block of one to three rows is an outlier if each of its rows deviates from the interpolation between the
+//! rows around the block
 //! - by more than 12 times the 90th percentile of that deviation over the whole log, and a floor;
 //! - by more than 8 times the median deviation of the rows nearby;
 //! - and the rows around the block are closer to each other than 0.3 of the deviation.
 //!
-//! The last condition is what tells a fault from motion: real motion, however violent, does not return within a row. On the
-//! FSR2015 log the faults deviate by 9.6 to 134 degrees and the next largest row by 0.46; on hand-held logs (TUM-VI, EuRoC, TUM RGB-D) no
-//! deviation above the first threshold meets the third condition.
+//! The last condition is what tells a fault from motion: real motion, however violent, does not return within
+//! a row. On the FSR2015 log the faults deviate by 9.6 to 134 degrees and the next largest row by 0.46; on
+//! hand-held logs (TUM-VI, EuRoC, TUM RGB-D) no deviation above the first threshold meets the third
+//! condition.
 
 /// Fewer rows than this are taken as they are: there is no "usual" to compare with.
 const MIN_ROWS: usize = 8;
@@ -20,8 +23,9 @@ const MAX_SINGLE_SPAN_S: f64 = 10.0;
 const MAX_BLOCK_SPAN_S: f64 = 0.5;
 const MAX_BLOCK: usize = 3;
 
-/// A column of rows that can be compared: `deviation(i, a, b, f)` is how far row i lies from the interpolation at fraction f between
-/// rows a and b, `distance(a, b)` how far two rows are apart. NaN says "cannot tell" and flags nothing.
+/// A column of rows that can be compared: `deviation(i, a, b, f)` is how far row i lies from the
+/// interpolation at fraction f between rows a and b, `distance(a, b)` how far two rows are apart. NaN says
+/// "cannot tell" and flags nothing.
 pub(super) trait Channel {
     fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64;
     fn distance(&self, a: usize, b: usize) -> f64;
@@ -55,7 +59,8 @@ pub(super) fn find(t_s: &[f64], channel: &impl Channel, floor: f64) -> Vec<bool>
             let block = first..after;
             let untouched = !is_outlier[before..=after].iter().any(|&flag| flag);
             if untouched && t_s[after] - t_s[before] <= max_span_s {
-                let deviation = block.clone().map(|row| deviation_of(row, before, after)).fold(f64::INFINITY, nan_min);
+                let deviation =
+                    block.clone().map(|row| deviation_of(row, before, after)).fold(f64::INFINITY, nan_min);
                 let fault = deviation > threshold
                     && channel.distance(before, after) < NEIGHBOURS_AGREE * deviation
                     && deviation > NEARBY_FACTOR * nearby_median(first, after - 1);
@@ -71,9 +76,15 @@ pub(super) fn find(t_s: &[f64], channel: &impl Channel, floor: f64) -> Vec<bool>
     is_outlier
 }
 
-/// The end rows have one neighbour only: a fault there is a step more than 20 times the usual one at the same pace, over the threshold.
-/// `from_end` counts rows from that end.
-fn flag_end(t_s: &[f64], channel: &impl Channel, threshold: f64, is_outlier: &mut [bool], from_end: impl Fn(usize) -> usize) {
+/// The end rows have one neighbour only: a fault there is a step more than 20 times the usual one at the same
+/// pace, over the threshold. `from_end` counts rows from that end.
+fn flag_end(
+    t_s: &[f64],
+    channel: &impl Channel,
+    threshold: f64,
+    is_outlier: &mut [bool],
+    from_end: impl Fn(usize) -> usize,
+) {
     let step = |i: usize| channel.distance(from_end(i), from_end(i + 1));
     let step_s = |i: usize| (t_s[from_end(i + 1)] - t_s[from_end(i)]).abs();
     let inner = 1..MIN_ROWS - 1;

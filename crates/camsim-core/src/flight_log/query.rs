@@ -4,7 +4,8 @@ use glam::{DQuat, DVec3};
 
 use super::{FlightLog, LogRow, attitude::angle_between_rad};
 
-/// Speeds are measured over at least this long: a GPS quantum of 0.11 m over the log's shortest step of 1 ms would be 110 m/s.
+/// Speeds are measured over at least this long: a GPS quantum of 0.11 m over the log's shortest step of 1 ms
+/// would be 110 m/s.
 const SPEED_BASELINE_S: f64 = 0.25;
 /// Attitude is smoother than position, and real rates change faster.
 const RATE_BASELINE_S: f64 = 0.05;
@@ -15,14 +16,17 @@ impl FlightLog {
         self.rows.last().map_or(0.0, |row| row.t_s)
     }
 
-    /// Position (NED) and attitude (`ned_from_body`) at `t_s`: linear and slerp between rows, constant velocity and angular rate outside
-    /// (those of the first or last 0.25 s and 0.05 s); a log of one row stands still. NaN in gives NaN out.
+    /// Position (NED) and attitude (`ned_from_body`) at `t_s`: linear and slerp between rows, constant
+    /// velocity and angular rate outside (those of the first or last 0.25 s and 0.05 s); a log of one row
+    /// stands still. NaN in gives NaN out.
     pub fn interpolate(&self, t_s: f64) -> (DVec3, DQuat) {
         let rows = &self.rows;
         let after = rows.partition_point(|row| row.t_s <= t_s);
         match (after.checked_sub(1).and_then(|i| rows.get(i)), rows.get(after)) {
             (Some(a), Some(b)) => between(a, b, (t_s - a.t_s) / (b.t_s - a.t_s)),
-            (None, Some(first)) => self.extrapolate(first, t_s, |row, baseline_s| row.t_s - first.t_s >= baseline_s),
+            (None, Some(first)) => {
+                self.extrapolate(first, t_s, |row, baseline_s| row.t_s - first.t_s >= baseline_s)
+            }
             (Some(last), None) if t_s > last.t_s => {
                 let inner = |row: &LogRow, baseline_s: f64| last.t_s - row.t_s >= baseline_s;
                 self.extrapolate_back(last, t_s, inner)
@@ -32,27 +36,44 @@ impl FlightLog {
         }
     }
 
-    fn extrapolate(&self, first: &LogRow, t_s: f64, far_enough: impl Fn(&LogRow, f64) -> bool) -> (DVec3, DQuat) {
-        let inner = |baseline_s| self.rows.iter().find(|row| far_enough(row, baseline_s)).or(self.rows.last()).unwrap_or(first);
+    fn extrapolate(
+        &self,
+        first: &LogRow,
+        t_s: f64,
+        far_enough: impl Fn(&LogRow, f64) -> bool,
+    ) -> (DVec3, DQuat) {
+        let inner = |baseline_s| {
+            self.rows.iter().find(|row| far_enough(row, baseline_s)).or(self.rows.last()).unwrap_or(first)
+        };
         beyond(first, inner(SPEED_BASELINE_S), inner(RATE_BASELINE_S), t_s)
     }
 
-    fn extrapolate_back(&self, last: &LogRow, t_s: f64, far_enough: impl Fn(&LogRow, f64) -> bool) -> (DVec3, DQuat) {
-        let inner = |baseline_s| self.rows.iter().rfind(|row| far_enough(row, baseline_s)).or(self.rows.first()).unwrap_or(last);
+    fn extrapolate_back(
+        &self,
+        last: &LogRow,
+        t_s: f64,
+        far_enough: impl Fn(&LogRow, f64) -> bool,
+    ) -> (DVec3, DQuat) {
+        let inner = |baseline_s| {
+            self.rows.iter().rfind(|row| far_enough(row, baseline_s)).or(self.rows.first()).unwrap_or(last)
+        };
         beyond(last, inner(SPEED_BASELINE_S), inner(RATE_BASELINE_S), t_s)
     }
 
-    /// Speed in m/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.25 s each. 0 for one row.
+    /// Speed in m/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.25 s each. 0
+    /// for one row.
     pub fn speed_percentile_m_s(&self, fraction: f64) -> f64 {
         self.percentile(fraction, SPEED_BASELINE_S, |a, b| a.position_ned_m.distance(b.position_ned_m))
     }
 
-    /// Angular rate in rad/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.05 s each. 0 for one row.
+    /// Angular rate in rad/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.05 s
+    /// each. 0 for one row.
     pub fn angular_rate_percentile_rad_s(&self, fraction: f64) -> f64 {
         self.percentile(fraction, RATE_BASELINE_S, |a, b| angle_between_rad(a.ned_from_body, b.ned_from_body))
     }
 
-    /// Percentile of change per second, each row weighted by the time to the next one so that bursts of rows do not count more.
+    /// Percentile of change per second, each row weighted by the time to the next one so that bursts of rows
+    /// do not count more.
     fn percentile(&self, fraction: f64, baseline_s: f64, change: impl Fn(&LogRow, &LogRow) -> f64) -> f64 {
         let rows = &self.rows;
         let mut rates: Vec<(f64, f64)> = Vec::with_capacity(rows.len());

@@ -66,8 +66,8 @@ pub struct CleaningReport {
     pub longest_step_s: f64,
     /// Rows put in between because angles turn by more than 90 degrees.
     pub inserted: usize,
-    /// Where on the timeline the rows concerned are, as far as they have a time and without those of gaps: seconds since the first good row, divided by the
-    /// `speed` factor; ascending.
+    /// Where on the timeline the rows concerned are, as far as they have a time and without those of gaps:
+    /// seconds since the first good row, divided by the `speed` factor; ascending.
     pub repaired_s: Vec<f64>,
     /// How angles were read: `Wrapped` or `Continuous`, never `Auto`.
     pub angles: AngleKind,
@@ -95,8 +95,17 @@ impl CleaningReport {
             ..
         } = self;
         gaps.all = Vec::new();
-        let repaired =
-            [unusable, null_fixes, null_heights, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates];
+        let repaired = [
+            unusable,
+            null_fixes,
+            null_heights,
+            out_of_order,
+            attitude_missing,
+            attitude_glitches,
+            position_spikes,
+            merged,
+            duplicates,
+        ];
         repaired.into_iter().flat_map(|finding| std::mem::take(&mut finding.all)).collect()
     }
 
@@ -119,7 +128,9 @@ impl fmt::Display for CleaningReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} rows read", self.rows_read)?;
         let gaps = ("gaps of more than 1 s", &self.gaps);
-        for (what, finding) in self.findings().into_iter().chain([gaps]).filter(|(_, finding)| finding.count > 0) {
+        for (what, finding) in
+            self.findings().into_iter().chain([gaps]).filter(|(_, finding)| finding.count > 0)
+        {
             let lines: Vec<String> = finding.lines.iter().map(usize::to_string).collect();
             let more = if finding.count > finding.lines.len() { ", ..." } else { "" };
             write!(f, "; {} {what} (line {}{more})", finding.count, lines.join(", "))?;

@@ -38,7 +38,10 @@ fn a_clean_log_passes_unchanged() {
 
 #[test]
 fn a_full_turn_in_two_rows_turns() {
-    let log = log(&[ned_row(1, 0.0, [0.0, 0.0, -3000.0], [0.0; 3]), ned_row(2, 10.0, [0.0, 0.0, -3000.0], [0.0, 0.0, 360.0])]);
+    let log = log(&[
+        ned_row(1, 0.0, [0.0, 0.0, -3000.0], [0.0; 3]),
+        ned_row(2, 10.0, [0.0, 0.0, -3000.0], [0.0, 0.0, 360.0]),
+    ]);
     assert_eq!(log.report.angles, AngleKind::Continuous);
     assert_eq!(log.report.inserted, 3);
     for i in 0..=40 {
@@ -53,7 +56,11 @@ fn a_full_turn_in_two_rows_turns() {
 #[test]
 fn a_compass_that_writes_360_wraps() {
     let yaws = [358.0, 359.0, 360.0, 1.0, 2.0, 3.0];
-    let rows: Vec<_> = yaws.iter().enumerate().map(|(i, &yaw)| ned_row(i + 1, i as f64, [0.0; 3], [0.0, 0.0, yaw])).collect();
+    let rows: Vec<_> = yaws
+        .iter()
+        .enumerate()
+        .map(|(i, &yaw)| ned_row(i + 1, i as f64, [0.0; 3], [0.0, 0.0, yaw]))
+        .collect();
     let log = log(&rows);
     assert_eq!(log.report.angles, AngleKind::Wrapped);
     assert_eq!(log.report.inserted, 0);
@@ -83,7 +90,11 @@ fn faults_are_found_counted_and_repaired() {
     // All but the row without a time.
     let repaired_s = [5.0, 7.5, 10.5, 11.0, 11.5, 11.95, 12.450_05, 15.0];
     assert_eq!(report.repaired_s.len(), repaired_s.len());
-    assert!(report.repaired_s.iter().zip(repaired_s).all(|(found, at)| (found - at).abs() < 1e-9), "{:?}", report.repaired_s);
+    assert!(
+        report.repaired_s.iter().zip(repaired_s).all(|(found, at)| (found - at).abs() < 1e-9),
+        "{:?}",
+        report.repaired_s
+    );
     assert_eq!(log.rows.len(), 400 - 1 - 3 - 2);
     assert!(log.rows.windows(2).all(|pair| pair[1].t_s - pair[0].t_s >= 1e-3));
     let truth = body_from_euler_deg([0.0, 1.0, 180.0]);
@@ -115,7 +126,12 @@ fn motion_is_not_a_fault() {
             let t_s = f64::from(i) * 0.05;
             let shake = 20.0 * (std::f64::consts::TAU * 3.0 * t_s).sin();
             let east = if t_s > 5.0 { 10.0 * (t_s - 5.0) } else { 0.0 };
-            ned_row(i as usize + 1, t_s, [10.0 * t_s.min(5.0), east, 0.0], [shake, 0.5 * shake, if t_s > 5.0 { 90.0 } else { 0.0 }])
+            ned_row(
+                i as usize + 1,
+                t_s,
+                [10.0 * t_s.min(5.0), east, 0.0],
+                [shake, 0.5 * shake, if t_s > 5.0 { 90.0 } else { 0.0 }],
+            )
         })
         .collect();
     assert!(log(&rows).report.is_clean(), "{}", log(&rows).report);
@@ -143,7 +159,10 @@ fn track_attitude_of_a_coordinated_circle() {
         .map(|i| {
             let t_s = f64::from(i) * 0.05;
             let (sin, cos) = (15.0 / 60.0 * t_s).sin_cos();
-            RawRow { attitude: RawAttitude::None, ..ned_row(1 + i as usize, t_s, [60.0 * sin, 60.0 * (1.0 - cos), -t_s], [0.0; 3]) }
+            RawRow {
+                attitude: RawAttitude::None,
+                ..ned_row(1 + i as usize, t_s, [60.0 * sin, 60.0 * (1.0 - cos), -t_s], [0.0; 3])
+            }
         })
         .collect();
     let options = LogOptions { attitude: AttitudeSource::Track, ..LogOptions::default() };
@@ -174,14 +193,20 @@ fn geodetic_rows_use_the_tangent_frame_where_they_are() {
     let flown = log(&rows);
     let frame = flown.frame.unwrap();
     assert!(flown.rows[0].position_ned_m.length() < 1e-8);
-    assert!(flown.rows[1].ned_from_body.angle_between(frame.ned_from_local(Geodetic::from_deg(47.0, 9.0, 500.0))) < 1e-7);
+    assert!(
+        flown.rows[1].ned_from_body.angle_between(frame.ned_from_local(Geodetic::from_deg(47.0, 9.0, 500.0)))
+            < 1e-7
+    );
     // Level at 9 E is tilted by about 0.68 degrees seen from 8 E.
     let up = flown.rows[1].ned_from_body * DVec3::NEG_Z;
     assert!((up.angle_between(DVec3::NEG_Z).to_degrees() - 0.68).abs() < 0.01);
 
     let msl = LogOptions { height: HeightConversion::MslToEllipsoid, ..LogOptions::default() };
     let raised = FlightLog::from_raw(&rows, &msl).unwrap().frame.unwrap().origin().height_m;
-    assert!((raised - 500.0 - crate::geodesy::geoid_undulation_m(Geodetic::from_deg(47.0, 8.0, 0.0))).abs() < 0.01);
+    assert!(
+        (raised - 500.0 - crate::geodesy::geoid_undulation_m(Geodetic::from_deg(47.0, 8.0, 0.0))).abs()
+            < 0.01
+    );
 }
 
 #[test]
@@ -203,10 +228,16 @@ fn hostile_rows_give_errors_not_panics() {
     let nan = ned_row(4, 0.0, [f64::NAN; 3], [0.0; 3]);
     assert_eq!(FlightLog::from_raw(&[nan], &options), Err(LogError::NoGoodRow { rows: 1, line: 4 }));
     for speed in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(FlightLog::from_raw(&straight(3), &LogOptions { speed, ..options }), Err(LogError::BadSpeed(_))));
+        assert!(matches!(
+            FlightLog::from_raw(&straight(3), &LogOptions { speed, ..options }),
+            Err(LogError::BadSpeed(_))
+        ));
     }
     let origin = Some(Geodetic::from_deg(91.0, 0.0, 0.0));
-    assert_eq!(FlightLog::from_raw(&straight(3), &LogOptions { origin, ..options }), Err(LogError::BadOrigin));
+    assert_eq!(
+        FlightLog::from_raw(&straight(3), &LogOptions { origin, ..options }),
+        Err(LogError::BadOrigin)
+    );
     let mut mixed = straight(3);
     mixed[1].position = RawPosition::Geodetic(Geodetic::default());
     assert_eq!(FlightLog::from_raw(&mixed, &options), Err(LogError::MixedPositions { line: 2 }));
@@ -221,33 +252,46 @@ fn hostile_rows_give_errors_not_panics() {
     ends[0].t_ns = Some(i64::MIN);
     ends[1].t_ns = Some(i64::MAX);
     assert!((FlightLog::from_raw(&ends, &options).unwrap().duration_s() - 1.844_674_407e10).abs() < 10.0);
-    let zero = RawRow { attitude: RawAttitude::Quaternion(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..straight(1)[0] };
+    let zero =
+        RawRow { attitude: RawAttitude::Quaternion(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..straight(1)[0] };
     assert_eq!(FlightLog::from_raw(&[zero], &options), Err(LogError::NoAttitude));
 }
 
 fn geodetic_row(line: usize, t_s: f64, lat_deg: f64, lon_deg: f64, height_m: f64) -> RawRow {
-    RawRow { position: RawPosition::Geodetic(Geodetic::from_deg(lat_deg, lon_deg, height_m)), ..ned_row(line, t_s, [0.0; 3], [0.0; 3]) }
+    RawRow {
+        position: RawPosition::Geodetic(Geodetic::from_deg(lat_deg, lon_deg, height_m)),
+        ..ned_row(line, t_s, [0.0; 3], [0.0; 3])
+    }
 }
 
 #[test]
 fn zeros_that_stand_for_no_fix_are_left_out_and_true_zeros_stay() {
     let alps = |i: usize| geodetic_row(i + 1, i as f64, 47.0 + 1e-5 * i as f64, 8.0, 500.0 + i as f64);
     let mut rows: Vec<RawRow> = (0..20).map(alps).collect();
-    for (i, lat, lon, height) in
-        [(0, 0.0, 0.0, 0.0), (1, 0.0, 0.0, 0.0), (9, 0.0, 8.0, 509.0), (12, 47.00012, 0.0, 512.0), (19, 0.0, 0.0, 0.0)]
-    {
+    for (i, lat, lon, height) in [
+        (0, 0.0, 0.0, 0.0),
+        (1, 0.0, 0.0, 0.0),
+        (9, 0.0, 8.0, 509.0),
+        (12, 47.00012, 0.0, 512.0),
+        (19, 0.0, 0.0, 0.0),
+    ] {
         rows[i] = geodetic_row(i + 1, i as f64, lat, lon, height);
     }
     for i in [2, 3, 15] {
         rows[i] = geodetic_row(i + 1, i as f64, 47.0 + 1e-5 * i as f64, 8.0, 0.0);
     }
     let report = log(&rows).report;
-    assert_eq!((report.null_fixes.count, &report.null_fixes.lines[..]), (5, &[1, 2, 10, 13, 20][..]), "{report}");
+    assert_eq!(
+        (report.null_fixes.count, &report.null_fixes.lines[..]),
+        (5, &[1, 2, 10, 13, 20][..]),
+        "{report}"
+    );
     assert_eq!((report.null_heights.count, &report.null_heights.lines[..]), (3, &[3, 4, 16][..]), "{report}");
     assert!((log(&rows).frame.unwrap().origin().lat_deg() - 47.00004).abs() < 1e-12);
 
     // Over the equator and Greenwich, and off from the sea.
-    let ghana: Vec<_> = (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.1 - 0.01 * i as f64, 0.0, 3.0 * i as f64)).collect();
+    let ghana: Vec<_> =
+        (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.1 - 0.01 * i as f64, 0.0, 3.0 * i as f64)).collect();
     assert!(log(&ghana).report.is_clean(), "{}", log(&ghana).report);
     // A fix at 0, 0 throughout is a made-up place, and a log of its own.
     let nowhere: Vec<_> = (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.0, 0.0, 100.0)).collect();

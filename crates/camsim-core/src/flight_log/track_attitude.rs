@@ -1,7 +1,8 @@
-//! Attitude from the track: heading along the ground track, bank of a coordinated turn, pitch along the flight path.
+//! Attitude from the track: heading along the ground track, bank of a coordinated turn, pitch along the
+//! flight path.
 //!
-//! Velocity and acceleration come from a weighted quadratic fit to the positions around each row (local regression, tricube
-//! weights, Cleveland 1979) over +-1 s, wider where rows are sparse.
+//! Velocity and acceleration come from a weighted quadratic fit to the positions around each row (local
+//! regression, tricube weights, Cleveland 1979) over +-1 s, wider where rows are sparse.
 
 use glam::{DMat3, DVec3};
 
@@ -15,33 +16,45 @@ const MAX_BANK_DEG: f64 = 60.0;
 const HALF_WIDTH_S: f64 = 1.0;
 /// Rows that the fit reaches at least on either side.
 const REACH_ROWS: usize = 3;
-/// Below this ground speed the track's direction is noise: heading is interpolated and bank and pitch fade out.
+/// Below this ground speed the track's direction is noise: heading is interpolated and bank and pitch fade
+/// out.
 const SLOW_M_S: f64 = 0.5;
 
-/// Sets the attitude of every row. Velocities are turned into the tangent frame at each row where there is a `frame`.
+/// Sets the attitude of every row. Velocities are turned into the tangent frame at each row where there is a
+/// `frame`.
 pub(super) fn fill(rows: &mut [LogRow], frame: Option<&LocalFrame>) {
     let motions: Vec<(DVec3, DVec3)> = (0..rows.len()).map(|row| fit_motion(rows, row)).collect();
     let ned_from_local: Vec<_> = rows
         .iter()
-        .map(|row| frame.map_or(glam::DQuat::IDENTITY, |frame| frame.ned_from_local(frame.geodetic_from_ned(row.position_ned_m))))
+        .map(|row| {
+            frame.map_or(glam::DQuat::IDENTITY, |frame| {
+                frame.ned_from_local(frame.geodetic_from_ned(row.position_ned_m))
+            })
+        })
         .collect();
-    let local: Vec<(DVec3, DVec3)> =
-        motions.iter().zip(&ned_from_local).map(|(&(v, a), rotation)| (rotation.inverse() * v, rotation.inverse() * a)).collect();
+    let local: Vec<(DVec3, DVec3)> = motions
+        .iter()
+        .zip(&ned_from_local)
+        .map(|(&(v, a), rotation)| (rotation.inverse() * v, rotation.inverse() * a))
+        .collect();
     let headings = headings_rad(rows, &local);
     for (i, row) in rows.iter_mut().enumerate() {
         let (velocity, acceleration) = local[i];
         let ground_speed = velocity.x.hypot(velocity.y);
         // v psi_dot = lateral acceleration = (v x a)_z / |v|, tan(bank) = v psi_dot / g.
-        let lateral = (velocity.x * acceleration.y - velocity.y * acceleration.x) / ground_speed.max(SLOW_M_S);
+        let lateral =
+            (velocity.x * acceleration.y - velocity.y * acceleration.x) / ground_speed.max(SLOW_M_S);
         let bank_deg = (lateral / GRAVITY_M_S2).atan().to_degrees().clamp(-MAX_BANK_DEG, MAX_BANK_DEG);
         let pitch_deg = (-velocity.z).atan2(ground_speed.hypot(SLOW_M_S)).to_degrees();
         let fade = (ground_speed / SLOW_M_S).min(1.0);
-        let local_from_body = body_from_euler_deg([bank_deg * fade, pitch_deg * fade, headings[i].to_degrees()]);
+        let local_from_body =
+            body_from_euler_deg([bank_deg * fade, pitch_deg * fade, headings[i].to_degrees()]);
         row.ned_from_body = (ned_from_local[i] * local_from_body).normalize();
     }
 }
 
-/// Heading of each row; rows too slow to have one take it from the rows around, by the short way. All zero for a log that stands still.
+/// Heading of each row; rows too slow to have one take it from the rows around, by the short way. All zero
+/// for a log that stands still.
 fn headings_rad(rows: &[LogRow], motions: &[(DVec3, DVec3)]) -> Vec<f64> {
     let mut known: Vec<(usize, f64)> = Vec::new();
     for (i, (velocity, _)) in motions.iter().enumerate() {
@@ -58,7 +71,9 @@ fn headings_rad(rows: &[LogRow], motions: &[(DVec3, DVec3)]) -> Vec<f64> {
                 next += 1;
             }
             match (next.checked_sub(1).map(|k| known[k]), known.get(next).copied()) {
-                (Some((a, from)), Some((b, to))) => from + (to - from) * (rows[i].t_s - rows[a].t_s) / (rows[b].t_s - rows[a].t_s),
+                (Some((a, from)), Some((b, to))) => {
+                    from + (to - from) * (rows[i].t_s - rows[a].t_s) / (rows[b].t_s - rows[a].t_s)
+                }
                 (Some((_, one)), None) | (None, Some((_, one))) => one,
                 (None, None) => 0.0,
             }
@@ -70,7 +85,8 @@ fn wrap_rad(angle: f64) -> f64 {
     (angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
 }
 
-/// Velocity and acceleration at a row from `p(tau) = p0 + v tau + a tau^2 / 2`, fitted with weights `(1 - |tau/h|^3)^3`.
+/// Velocity and acceleration at a row from `p(tau) = p0 + v tau + a tau^2 / 2`, fitted with weights `(1 -
+/// |tau/h|^3)^3`.
 fn fit_motion(rows: &[LogRow], row: usize) -> (DVec3, DVec3) {
     let here = rows[row];
     let reach_before = rows[row.saturating_sub(REACH_ROWS)].t_s;
@@ -104,5 +120,9 @@ fn fit_motion(rows: &[LogRow], row: usize) -> (DVec3, DVec3) {
     // Two rows: the velocity between them.
     let (a, b) = (rows[row.saturating_sub(1)], rows[(row + 1).min(rows.len() - 1)]);
     let span_s = b.t_s - a.t_s;
-    if span_s > 0.0 { ((b.position_ned_m - a.position_ned_m) / span_s, DVec3::ZERO) } else { (DVec3::ZERO, DVec3::ZERO) }
+    if span_s > 0.0 {
+        ((b.position_ned_m - a.position_ned_m) / span_s, DVec3::ZERO)
+    } else {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
 }

@@ -29,7 +29,11 @@ fn round_trip_at_the_awkward_places() {
                     "{lat} {lon} {height}: {:e}",
                     (back.to_ecef() - ecef).length()
                 );
-                assert!((back.height_m - height).abs() < ECEF_ROUNDING_M, "{lat} {lon} {height} -> {}", back.height_m);
+                assert!(
+                    (back.height_m - height).abs() < ECEF_ROUNDING_M,
+                    "{lat} {lon} {height} -> {}",
+                    back.height_m
+                );
                 assert!((back.lat_deg() - lat).abs() < 1e-13, "{lat} {lon} {height} -> {}", back.lat_deg());
             }
         }
@@ -81,17 +85,24 @@ fn nonsense_stays_finite_or_is_named_invalid() {
 
 #[test]
 fn undulations_of_known_points() {
-    // NGA's EGM96 calculator: 17.16 m at (0, 0); 47.65 m over Rothenthurm, bilinear (4 cm RMS) between the nodes of GeographicLib's egm96-15 grid.
+    // NGA's EGM96 calculator: 17.16 m at (0, 0); 47.65 m over Rothenthurm, bilinear (4 cm RMS) between the
+    // nodes of GeographicLib's egm96-15 grid.
     assert!((geoid_undulation_m(Geodetic::from_deg(0.0, 0.0, 0.0)) - 17.16).abs() < 0.02);
     let at = Geodetic::from_deg(47.116, 8.672, 1060.0);
     assert!((geoid_undulation_m(at) - 47.65).abs() < 0.1, "{}", geoid_undulation_m(at));
     let mut cache = GeoidCache::new();
-    for at in [at, Geodetic::from_deg(90.0, 10.0, 0.0), Geodetic::from_deg(-90.0, -10.0, 0.0), Geodetic::from_deg(27.988, 86.925, 0.0)] {
+    for at in [
+        at,
+        Geodetic::from_deg(90.0, 10.0, 0.0),
+        Geodetic::from_deg(-90.0, -10.0, 0.0),
+        Geodetic::from_deg(27.988, 86.925, 0.0),
+    ] {
         assert!((cache.undulation_m(at) - geoid_undulation_m(at)).abs() < 0.01, "{at:?}");
     }
 }
 
-/// The whole model against GeographicLib's 15' grid, at its nodes: only the grid's quantum (3 mm) and its makers' rounding differ.
+/// The whole model against GeographicLib's 15' grid, at its nodes: only the grid's quantum (3 mm) and its
+/// makers' rounding differ.
 #[test]
 fn undulations_agree_with_the_published_grid() {
     let Some(data) = std::env::var_os("CAMSIM_DATA") else {

@@ -1,17 +1,20 @@
-//! Brown-Conrady, polynomial or rational, with tangential terms: the paper's eqs. 8 and 9, OpenCV's default model.
+//! Brown-Conrady, polynomial or rational, with tangential terms: the paper's eqs. 8 and 9, OpenCV's default
+//! model.
 
 use glam::{DMat2, DVec2};
 
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
 
-/// Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the error: 60 reach the last bit.
+/// Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the
+/// error: 60 reach the last bit.
 const MAX_STEPS: usize = 60;
 
 /// Steps without real progress after which there is nothing to be found.
 const MAX_STALLS: u32 = 5;
 
-/// A solution whose image misses the wanted point by more than this (units of the focal length, relative beyond 1) is none.
+/// A solution whose image misses the wanted point by more than this (units of the focal length, relative
+/// beyond 1) is none.
 const MAX_RESIDUAL: f64 = 1e-9;
 
 /// Starts are kept this far inside the fold, where the Jacobian is safely regular.
@@ -42,7 +45,9 @@ impl BrownConrady {
         let fold = FoldCurve::new(radius_of_ray, radial_only, |ideal| formula.distort(ideal));
         // The table knows the radial part alone; its own fold differs a little from that of the whole.
         let radial = Formula { p1: 0.0, p2: 0.0, ..formula };
-        let radial_fold = first_irregular_angle(|angle| radial.margins(DVec2::new(angle.tan(), 0.0))).unwrap_or(MAX_FIELD_RAD).tan();
+        let radial_fold = first_irregular_angle(|angle| radial.margins(DVec2::new(angle.tan(), 0.0)))
+            .unwrap_or(MAX_FIELD_RAD)
+            .tan();
         let table = RadialTable::new(radial_fold, reach, |r| radial.distort(DVec2::new(r, 0.0)).x);
         Self { coefficients, fold, table }
     }
@@ -52,15 +57,16 @@ impl BrownConrady {
         Formula::new(&self.coefficients).distort(ideal)
     }
 
-    /// `[[a, b], [b, c]]` with `a = d + s u^2 + 2 p1 v + 6 p2 u`, `b = s u v + 2 p1 u + 2 p2 v`, `c = d + s v^2 + 6 p1 v + 2 p2 u`,
-    /// where `s = 2 dd/d(r^2) = 2 (N' - D' d) / D`.
+    /// `[[a, b], [b, c]]` with `a = d + s u^2 + 2 p1 v + 6 p2 u`, `b = s u v + 2 p1 u + 2 p2 v`, `c = d + s
+    /// v^2 + 6 p1 v + 2 p2 u`, where `s = 2 dd/d(r^2) = 2 (N' - D' d) / D`.
     pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
         Formula::new(&self.coefficients).jacobian(ideal)
     }
 
-    /// Guarded Newton. From the radial table, each step is pulled back where it would leave the principal branch and halved where the
-    /// residual grew. Accepted is only what is reproduced by the forward function, lies inside the fold and has a positive determinant:
-    /// on a branch whose border is a simple curve that is complete, no wrong root passes.
+    /// Guarded Newton. From the radial table, each step is pulled back where it would leave the principal
+    /// branch and halved where the residual grew. Accepted is only what is reproduced by the forward
+    /// function, lies inside the fold and has a positive determinant: on a branch whose border is a simple
+    /// curve that is complete, no wrong root passes.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         let radius = distorted.length();
         if !distorted.is_finite() || radius > self.fold.distorted_max() {
@@ -75,7 +81,8 @@ impl BrownConrady {
         let formula = Formula::new(&self.coefficients);
         let fold_radius = |ideal: DVec2| self.fold.radius(ideal.y.atan2(ideal.x));
         let start_limit = START_SHARE_OF_FOLD * fold_radius(start);
-        let mut ideal = if start.length() > start_limit { start.normalize_or_zero() * start_limit } else { start };
+        let mut ideal =
+            if start.length() > start_limit { start.normalize_or_zero() * start_limit } else { start };
         let mut error = formula.distort(ideal) - distorted;
         let mut stalls = 0;
         for _ in 0..MAX_STEPS {
@@ -100,7 +107,8 @@ impl BrownConrady {
                 break;
             }
             (ideal, error) = (next, next_error);
-            // A root, double or not, is approached at least fourfold per step; what creeps slides along the fold.
+            // A root, double or not, is approached at least fourfold per step; what creeps slides along the
+            // fold.
             stalls = if after > 0.9 * before { stalls + 1 } else { 0 };
             if stalls == MAX_STALLS {
                 break;
@@ -112,7 +120,8 @@ impl BrownConrady {
         good.then_some(ideal)
     }
 
-    /// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `from` and the fold.
+    /// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of
+    /// `from` and the fold.
     fn inside(&self, from: DVec2, to: DVec2) -> DVec2 {
         let fold_radius = self.fold.radius(to.y.atan2(to.x));
         if to.length() < fold_radius {
@@ -170,8 +179,8 @@ impl Formula {
         DMat2::from_cols(DVec2::new(a, b), DVec2::new(b, c))
     }
 
-    /// What must stay positive on the principal branch: the determinant (with the sign of the trace, so that a second sheet on which both
-    /// eigenvalues are negative does not pass) and the denominator.
+    /// What must stay positive on the principal branch: the determinant (with the sign of the trace, so that
+    /// a second sheet on which both eigenvalues are negative does not pass) and the denominator.
     fn margins(&self, ideal: DVec2) -> [f64; 2] {
         let jacobian = self.jacobian(ideal);
         let det = jacobian.determinant();

@@ -7,7 +7,8 @@ use glam::DVec2;
 /// Rays of a fold curve.
 pub const FOLD_RAYS: usize = 720;
 
-/// Largest angle off axis that a lens may see here: 89 degrees. The ideal plane is infinite at 90, and a flat ideal frame ends well before.
+/// Largest angle off axis that a lens may see here: 89 degrees. The ideal plane is infinite at 90, and a flat
+/// ideal frame ends well before.
 pub const MAX_FIELD_RAD: f64 = 89.0 * PI / 180.0;
 
 /// Steps of the scan along one ray, uniform in the angle off axis.
@@ -16,10 +17,12 @@ const SCAN_STEPS: usize = 256;
 /// Bisections that end a search: 60 halvings of a step reach the last bit of an f64.
 const BISECTIONS: usize = 60;
 
-/// Neighbouring rays whose radii differ by more than this ratio belong to different sheets of the fold: between them the nearer one counts.
+/// Neighbouring rays whose radii differ by more than this ratio belong to different sheets of the fold:
+/// between them the nearer one counts.
 const SHEET_RATIO: f64 = 1.1;
 
-/// Radius of the border of the star-shaped domain of the principal branch, over the direction in the ideal plane.
+/// Radius of the border of the star-shaped domain of the principal branch, over the direction in the ideal
+/// plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoldCurve {
     radii: Vec<f64>,
@@ -29,11 +32,18 @@ pub struct FoldCurve {
 
 impl FoldCurve {
     /// From one radius per ray (`None`: regular up to [`MAX_FIELD_RAD`]) and the forward function.
-    pub(super) fn new(radius_of_ray: impl Fn(f64) -> Option<f64>, same_for_all: bool, distort: impl Fn(DVec2) -> DVec2) -> Self {
+    pub(super) fn new(
+        radius_of_ray: impl Fn(f64) -> Option<f64>,
+        same_for_all: bool,
+        distort: impl Fn(DVec2) -> DVec2,
+    ) -> Self {
         let limit = MAX_FIELD_RAD.tan();
         let angle = |ray: usize| ray as f64 * TAU / FOLD_RAYS as f64;
-        let rays: Vec<Option<f64>> =
-            if same_for_all { vec![radius_of_ray(0.0); FOLD_RAYS] } else { (0..FOLD_RAYS).map(|ray| radius_of_ray(angle(ray))).collect() };
+        let rays: Vec<Option<f64>> = if same_for_all {
+            vec![radius_of_ray(0.0); FOLD_RAYS]
+        } else {
+            (0..FOLD_RAYS).map(|ray| radius_of_ray(angle(ray))).collect()
+        };
         let folds = rays.iter().any(Option::is_some);
         let radii: Vec<f64> = rays.into_iter().map(|radius| radius.unwrap_or(limit)).collect();
         // A hair inside: at a pole of the denominator itself the forward function is infinite.
@@ -66,20 +76,23 @@ impl FoldCurve {
 
     /// Smallest and largest radius.
     pub fn range(&self) -> (f64, f64) {
-        self.radii.iter().fold((f64::INFINITY, 0.0), |(min, max), radius| (min.min(*radius), max.max(*radius)))
+        self.radii
+            .iter()
+            .fold((f64::INFINITY, 0.0), |(min, max), radius| (min.min(*radius), max.max(*radius)))
     }
 
-    /// No point of the branch is imaged farther from the axis than this. (Inside the fold the lens is an open map, so the farthest image is
-    /// that of a border point; 0.1 % covers the border between rays.)
+    /// No point of the branch is imaged farther from the axis than this. (Inside the fold the lens is an open
+    /// map, so the farthest image is that of a border point; 0.1 % covers the border between rays.)
     pub fn distorted_max(&self) -> f64 {
         self.distorted_max * 1.001
     }
 }
 
-/// First value in `(0, limit_of_last_step]` of a ray's parameter where one of the `margins` is no longer positive.
+/// First value in `(0, limit_of_last_step]` of a ray's parameter where one of the `margins` is no longer
+/// positive.
 ///
-/// `at(angle)` gives two functions that are positive on the regular part. They are sampled at [`SCAN_STEPS`] angles off axis; a dip below
-/// zero between two samples is found by searching every local minimum.
+/// `at(angle)` gives two functions that are positive on the regular part. They are sampled at [`SCAN_STEPS`]
+/// angles off axis; a dip below zero between two samples is found by searching every local minimum.
 pub(super) fn first_irregular_angle(at: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
     let step = MAX_FIELD_RAD / SCAN_STEPS as f64;
     // Written so that NaN counts as irregular.

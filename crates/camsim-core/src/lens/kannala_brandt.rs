@@ -5,11 +5,11 @@ use glam::{DMat2, DVec2};
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
 
-/// With `theta = atan(r)`, `r = |(u, v)|`: `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`,
-/// distorted = `(u, v) theta_d / r`.
+/// With `theta = atan(r)`, `r = |(u, v)|`: `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4
+/// theta^8)`, distorted = `(u, v) theta_d / r`.
 ///
-/// Angles off axis from 0 to 89 degrees ([`MAX_FIELD_RAD`]) or to where theta_d stops growing: an ideal *plane* holds no more, so
-/// what a wider fisheye images outside of that has no ideal point here.
+/// Angles off axis from 0 to 89 degrees ([`MAX_FIELD_RAD`]) or to where theta_d stops growing: an ideal
+/// *plane* holds no more, so what a wider fisheye images outside of that has no ideal point here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KannalaBrandt {
     /// `k1 k2 k3 k4`.
@@ -45,8 +45,8 @@ impl KannalaBrandt {
         distort(&self.coefficients, ideal)
     }
 
-    /// `t I + (m - t) e e^T` with `e = (u, v)/r`, the tangential magnification `t = theta_d / r` and the meridional one
-    /// `m = theta_d'(theta) / (1 + r^2)`.
+    /// `t I + (m - t) e e^T` with `e = (u, v)/r`, the tangential magnification `t = theta_d / r` and the
+    /// meridional one `m = theta_d'(theta) / (1 + r^2)`.
     pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
         let r = ideal.length();
         if r < 1e-9 {
@@ -79,7 +79,8 @@ impl KannalaBrandt {
                 low = theta;
             }
             let newton = theta - error / theta_d_slope(&self.coefficients, theta);
-            // `>=` and `<=`, not strict: once a bracket end is the root itself, a strict test would bisect away from it.
+            // `>=` and `<=`, not strict: once a bracket end is the root itself, a strict test would bisect
+            // away from it.
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
             let moved = (next - theta).abs();
             theta = next;

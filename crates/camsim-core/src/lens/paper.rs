@@ -1,8 +1,8 @@
 //! The paper's lens inverse (section 5): Gauss-Newton from the distorted point, without a guard. f64 twin of
 //! `shaders/reverse/ray/gauss_newton.wgsl`.
 //!
-//! It is here for comparison: it gives up on rays that exist and accepts roots beyond the fold that no lens shows. [`Lens::undistort`] is
-//! the one to use.
+//! It is here for comparison: it gives up on rays that exist and accepts roots beyond the fold that no lens
+//! shows. [`Lens::undistort`] is the one to use.
 
 use glam::DVec2;
 
@@ -17,10 +17,11 @@ pub const DIVERGED: f64 = 500.0;
 
 /// Ideal point that the search ends at, or `None` where it does not converge.
 ///
-/// Each step is `J^-1 (distorted - F(at))`, which is what Gauss-Newton's `(J'J)^-1 J'` comes to for a square J. The search ends without an
-/// answer when the residual grows or passes [`DIVERGED`], and with one when it falls below [`MAX_RESIDUAL`]. The residual is
-/// `|(W du, H dv)|`, picture sizes times normalised coordinates, as the paper's program measures it: less than a pixel where the focal
-/// length is shorter than the picture.
+/// Each step is `J^-1 (distorted - F(at))`, which is what Gauss-Newton's `(J'J)^-1 J'` comes to for a square
+/// J. The search ends without an answer when the residual grows or passes [`DIVERGED`], and with one when it
+/// falls below [`MAX_RESIDUAL`]. The residual is `|(W du, H dv)|`, picture sizes times normalised
+/// coordinates, as the paper's program measures it: less than a pixel where the focal length is shorter than
+/// the picture.
 #[must_use]
 pub fn gauss_newton(lens: &Lens, distorted: DVec2, size_px: [u32; 2]) -> Option<DVec2> {
     let size = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1]));
@@ -78,7 +79,8 @@ mod tests {
             with_ray += u32::from(truth.is_some());
             match (found, truth) {
                 (None, Some(_)) => missed += 1,
-                (Some(found), truth) => match truth.filter(|truth| (found.distance(*truth) * 307.6075) < 1.0) {
+                (Some(found), truth) => match truth.filter(|truth| (found.distance(*truth) * 307.6075) < 1.0)
+                {
                     Some(truth) => worst_px = worst_px.max(found.distance(truth) * 307.6075),
                     None => false_roots += 1,
                 },
@@ -94,14 +96,18 @@ mod tests {
             percent(false_roots)
         );
         // A prototype found 6.8 and 1.5; the share depends on who counts what as missed.
-        assert!((3.0..12.0).contains(&(100.0 * f64::from(missed) / f64::from(with_ray))) && percent(false_roots) > 0.3);
+        assert!(
+            (3.0..12.0).contains(&(100.0 * f64::from(missed) / f64::from(with_ray)))
+                && percent(false_roots) > 0.3
+        );
     }
 
     #[test]
     fn near_the_axis_it_is_as_good_as_any() {
         let camera = fisheye();
         for pixel in [DVec2::new(305.0, 226.0), DVec2::new(200.0, 300.0), DVec2::new(400.0, 120.0)] {
-            let found = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px).unwrap();
+            let found =
+                gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px).unwrap();
             assert!(camera.project(found).distance(pixel) < 0.1);
         }
     }

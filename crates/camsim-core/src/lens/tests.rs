@@ -42,9 +42,16 @@ fn jacobians_agree_with_finite_differences() {
             let numeric = DMat2::from_cols(column(DVec2::new(h, 0.0)), column(DVec2::new(0.0, h)));
             let analytic = lens.jacobian(at);
             let scale = 1.0 + analytic.x_axis.abs().max_element() + analytic.y_axis.abs().max_element();
-            // Central differences: h^2 times a third derivative that reaches some 1e3 near the folds of the wilder sets.
-            assert!((numeric - analytic).abs_diff_eq(DMat2::ZERO, 1e-6 * scale), "{name} at {at}: {numeric} vs {analytic}");
-            assert!((analytic.x_axis.y - analytic.y_axis.x).abs() < 1e-12, "{name}: every model here has a symmetric Jacobian");
+            // Central differences: h^2 times a third derivative that reaches some 1e3 near the folds of the
+            // wilder sets.
+            assert!(
+                (numeric - analytic).abs_diff_eq(DMat2::ZERO, 1e-6 * scale),
+                "{name} at {at}: {numeric} vs {analytic}"
+            );
+            assert!(
+                (analytic.x_axis.y - analytic.y_axis.x).abs() < 1e-12,
+                "{name}: every model here has a symmetric Jacobian"
+            );
         }
     }
 }
@@ -57,8 +64,10 @@ fn what_the_lens_shows_is_found_again() {
             for step in 0..=100 {
                 let ideal = DVec2::from_angle(phi) * (f64::from(step) * 0.01 * usable_radius(&lens, phi));
                 let found = lens.undistort(lens.distort(ideal));
-                let found = found.unwrap_or_else(|| panic!("{name}: {ideal} is inside the fold but not found"));
-                // 1e-3 short of a fold the inverse magnifies rounding (1e-16) some 1e3 times, its residual test (1e-9) bounds the rest.
+                let found =
+                    found.unwrap_or_else(|| panic!("{name}: {ideal} is inside the fold but not found"));
+                // 1e-3 short of a fold the inverse magnifies rounding (1e-16) some 1e3 times, its residual
+                // test (1e-9) bounds the rest.
                 assert!((found - ideal).length() < 1e-6, "{name}: {ideal} became {found}");
             }
         }
@@ -71,7 +80,9 @@ fn folds_are_where_they_are_known_to_be() {
     // r (1 + k r^2) peaks at 1/sqrt(-3 k).
     assert!((radius(LensModel::BrownConrady, &[-0.3]) - (1.0 / 0.9_f64).sqrt()).abs() < 1e-12);
     // The pole of 1/(1 - 0.4 r^2).
-    assert!((radius(LensModel::BrownConrady, &[0.0, 0.0, 0.0, 0.0, 0.0, -0.4]) - 2.5_f64.sqrt()).abs() < 1e-9);
+    assert!(
+        (radius(LensModel::BrownConrady, &[0.0, 0.0, 0.0, 0.0, 0.0, -0.4]) - 2.5_f64.sqrt()).abs() < 1e-9
+    );
     // theta (1 - 0.3 theta^2) peaks at 1/sqrt(0.9).
     assert!((radius(LensModel::KannalaBrandt, &[-0.3]) - (1.0 / 0.9_f64.sqrt()).tan()).abs() < 1e-12);
     // 1 + 3 k1 r^2 + 5 k2 r^4 = 0 has no real root: the ring is nearly, not quite, singular.
@@ -87,7 +98,8 @@ fn folds_are_where_they_are_known_to_be() {
 
 #[test]
 fn beyond_the_fold_there_is_no_answer() {
-    // Peak of r (1 - 0.3 r^2) is 0.70273 at 1.0541; the formula goes through zero at 1.826 and shows mirrored points beyond.
+    // Peak of r (1 - 0.3 r^2) is 0.70273 at 1.0541; the formula goes through zero at 1.826 and shows mirrored
+    // points beyond.
     let lens = Lens::new(LensModel::BrownConrady, &[-0.3]).unwrap();
     assert!(lens.undistort(DVec2::new(0.7027, 0.0)).is_some());
     assert_eq!(lens.undistort(DVec2::new(0.7028, 0.0)), None);
@@ -137,7 +149,8 @@ fn bad_coefficients_are_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Whatever the lens: an answer is inside the fold, is imaged where it was asked for; and a point inside is found.
+    /// Whatever the lens: an answer is inside the fold, is imaged where it was asked for; and a point inside
+    /// is found.
     #[test]
     fn random_lenses_round_trip(
         k in prop::array::uniform3(-0.6..0.6_f64),

@@ -46,8 +46,8 @@ impl Clock {
         self.start_s + (frame as f64 + self.phase) / self.fps
     }
 
-    /// Mid-exposure of a pixel after its frame's stamp: lines, counted along the readout, share the readout time evenly about `-delay`;
-    /// rows of the first field are earlier by the interlacing lag.
+    /// Mid-exposure of a pixel after its frame's stamp: lines, counted along the readout, share the readout
+    /// time evenly about `-delay`; rows of the first field are earlier by the interlacing lag.
     pub(super) fn dt_s(&self, [x, y]: [u32; 2]) -> f64 {
         let [width, height] = self.size_px;
         let (nth, of) = match self.readout {
@@ -61,7 +61,8 @@ impl Clock {
         self.readout_s * (2.0 * nth + 1.0 - of) / (2.0 * of) - self.delay_s - lag_s
     }
 
-    /// Mid-exposure of line `line` of the readout (a row, or a column) after the stamp; a column's is that of the field that keeps its time.
+    /// Mid-exposure of line `line` of the readout (a row, or a column) after the stamp; a column's is that of
+    /// the field that keeps its time.
     pub(super) fn dt_line_s(&self, line: u32) -> f64 {
         if self.reads_rows() {
             self.dt_s([0, line])

@@ -1,4 +1,5 @@
-//! The oracle's own inverse of the lens: pixel to ideal ray on the principal branch, from nothing but the lens's forward function and Jacobian.
+//! The oracle's own inverse of the lens: pixel to ideal ray on the principal branch, from nothing but the
+//! lens's forward function and Jacobian.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -53,10 +54,14 @@ impl Eye {
             starts: Vec::new(),
         };
         if !eye.plain {
-            eye.border = (0..SPOKES).into_par_iter().map(|spoke| eye.end_of_branch(direction(spoke))).collect();
+            eye.border =
+                (0..SPOKES).into_par_iter().map(|spoke| eye.end_of_branch(direction(spoke))).collect();
             eye.border_min = eye.border.iter().copied().fold(f64::INFINITY, f64::min);
             eye.rim = eye.find_rim();
-            eye.starts = (0..STARTS * STARTS).into_par_iter().map(|i| eye.solve_from_nothing(eye.distorted(eye.start_px(i)))).collect();
+            eye.starts = (0..STARTS * STARTS)
+                .into_par_iter()
+                .map(|i| eye.solve_from_nothing(eye.distorted(eye.start_px(i))))
+                .collect();
         }
         eye
     }
@@ -99,8 +104,9 @@ impl Eye {
         self.accept(at, wanted)
     }
 
-    /// From the axis along the straight line of images to the wanted one, step by step on the branch; if that line leaves what the branch
-    /// images, or ends on its border, damped Newton from places all over the branch.
+    /// From the axis along the straight line of images to the wanted one, step by step on the branch; if that
+    /// line leaves what the branch images, or ends on its border, damped Newton from places all over the
+    /// branch.
     fn solve_from_nothing(&self, wanted: DVec2) -> Option<DVec2> {
         if !self.may_be_imaged(wanted) {
             return None;
@@ -119,7 +125,8 @@ impl Eye {
         let (mut at, mut gone, mut stride) = (DVec2::ZERO, 0.0_f64, 0.25_f64);
         while gone < 1.0 {
             let next = (gone + stride).min(1.0);
-            let ahead = solve(self.lens.jacobian(at), self.lens.distort(at) - next * wanted).map(|step| at - step);
+            let ahead =
+                solve(self.lens.jacobian(at), self.lens.distort(at) - next * wanted).map(|step| at - step);
             let landed = ahead.filter(|p| self.within_table(*p)).and_then(|p| self.correct(p, next * wanted));
             match landed.filter(|p| self.within_table(*p) && p.distance(at) < 0.5 * (0.2 + at.length())) {
                 Some(p) => {
@@ -161,7 +168,8 @@ impl Eye {
         let mut error = self.lens.distort(at) - wanted;
         let (mut creeping, mut goal) = (0, 0.25 * error.length());
         for _ in 0..80 {
-            // A root, also a double one on the border, is approached at least fourfold a step; what creeps slides along the border.
+            // A root, also a double one on the border, is approached at least fourfold a step; what creeps
+            // slides along the border.
             creeping += 1;
             if error.length() < goal {
                 (creeping, goal) = (0, 0.25 * error.length());
@@ -217,7 +225,8 @@ impl Eye {
     }
 
     fn border_at(&self, ideal: DVec2) -> f64 {
-        let turn = ideal.y.atan2(ideal.x).rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * SPOKES as f64;
+        let turn =
+            ideal.y.atan2(ideal.x).rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * SPOKES as f64;
         let spoke = turn as usize;
         self.border[spoke % SPOKES].min(self.border[(spoke + 1) % SPOKES])
     }
@@ -258,11 +267,16 @@ impl Eye {
         WIDEST_RAD.tan()
     }
 
-    /// The image of the border encloses all that the branch images. A chord between neighbouring images misses an arc by 2e-6 of its radius.
+    /// The image of the border encloses all that the branch images. A chord between neighbouring images
+    /// misses an arc by 2e-6 of its radius.
     fn find_rim(&self) -> Vec<f64> {
         let mut rim = vec![0.0_f64; RIM_BINS];
-        let images: Vec<DVec2> =
-            self.border.iter().enumerate().map(|(spoke, radius)| self.lens.distort(direction(spoke) * (radius * (1.0 - 1e-9)))).collect();
+        let images: Vec<DVec2> = self
+            .border
+            .iter()
+            .enumerate()
+            .map(|(spoke, radius)| self.lens.distort(direction(spoke) * (radius * (1.0 - 1e-9))))
+            .collect();
         for (i, image) in images.iter().enumerate() {
             // Every bin between two neighbouring images takes the farther one.
             let next = images[(i + 1) % images.len()];
@@ -272,7 +286,8 @@ impl Eye {
             }
             let (from, to) = (rim_bin(*image), rim_bin(next));
             let forward = (to + RIM_BINS - from) % RIM_BINS;
-            let (first, count) = if forward <= RIM_BINS / 2 { (from, forward) } else { (to, RIM_BINS - forward) };
+            let (first, count) =
+                if forward <= RIM_BINS / 2 { (from, forward) } else { (to, RIM_BINS - forward) };
             for bin in first + RIM_BINS - 1..=first + RIM_BINS + count + 1 {
                 rim[bin % RIM_BINS] = rim[bin % RIM_BINS].max(reach);
             }

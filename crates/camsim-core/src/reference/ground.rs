@@ -30,14 +30,18 @@ pub(super) struct Ground {
 impl Ground {
     pub(super) fn new(terrain: &Terrain) -> Self {
         let size = terrain.cells.map(|cells| cells.div_ceil(BLOCK));
-        let boxes = (0..size[0] * size[1]).map(|i| block_bounds(terrain, [i % size[0], i / size[0]])).collect();
+        let boxes =
+            (0..size[0] * size[1]).map(|i| block_bounds(terrain, [i % size[0], i / size[0]])).collect();
         let mut levels = vec![Level { size, boxes }];
         while let Some(below) = levels.last().filter(|level| level.size != [1, 1]) {
             let size = below.size.map(|n| n.div_ceil(2));
             let quad = |i: u32| {
                 let [x, y] = [2 * (i % size[0]), 2 * (i / size[0])];
-                let children = (y..(y + 2).min(below.size[1])).flat_map(|y| (x..(x + 2).min(below.size[0])).map(move |x| [x, y]));
-                children.fold(Bounds::NONE, |all, [x, y]| all.join(&below.boxes[(y * below.size[0] + x) as usize]))
+                let children = (y..(y + 2).min(below.size[1]))
+                    .flat_map(|y| (x..(x + 2).min(below.size[0])).map(move |x| [x, y]));
+                children.fold(Bounds::NONE, |all, [x, y]| {
+                    all.join(&below.boxes[(y * below.size[0] + x) as usize])
+                })
             };
             let boxes = (0..size[0] * size[1]).map(quad).collect();
             levels.push(Level { size, boxes });

@@ -23,7 +23,8 @@ impl Holes {
     }
 }
 
-/// Counts them for ideal frames at the poses `keys`, over the centres of all pixels at the exposure phases given (-0.5 to 0.5).
+/// Counts them for ideal frames at the poses `keys`, over the centres of all pixels at the exposure phases
+/// given (-0.5 to 0.5).
 #[must_use]
 pub fn holes(oracle: &Oracle, frame: u64, keys: &[CameraPose], phases: &[f64]) -> Holes {
     let [width, height] = oracle.sequence.scenario.camera.size_px;
@@ -38,5 +39,8 @@ pub fn holes(oracle: &Oracle, frame: u64, keys: &[CameraPose], phases: &[f64]) -
         }
         row
     };
-    (0..height).into_par_iter().map(of_row).reduce(Holes::default, |a, b| Holes { rays: a.rays + b.rays, unseen: a.unseen + b.unseen })
+    (0..height)
+        .into_par_iter()
+        .map(of_row)
+        .reduce(Holes::default, |a, b| Holes { rays: a.rays + b.rays, unseen: a.unseen + b.unseen })
 }

@@ -1,4 +1,5 @@
-//! The error of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame, and of its light.
+//! The error of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame,
+//! and of its light.
 
 use std::sync::Arc;
 
@@ -14,7 +15,8 @@ use crate::{
 /// Largest share of the pixels with a ray but no source in a frame that keeps its tolerance.
 pub const MOST_VOID_SHARE: f64 = 0.01;
 
-/// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for the frame.
+/// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for
+/// the frame.
 const LEAST_SMOOTH_SHARE: f64 = 0.05;
 
 /// Errors of one kind of pixel, pixels of the ideal frame.
@@ -31,7 +33,8 @@ pub struct ErrorStats {
 }
 
 impl ErrorStats {
-    /// Of a set of error magnitudes. One that is not a number makes all but the count infinite: it must not hide.
+    /// Of a set of error magnitudes. One that is not a number makes all but the count infinite: it must not
+    /// hide.
     #[must_use]
     pub fn of(mut errors_px: Vec<f64>) -> Self {
         for error in &mut errors_px {
@@ -70,7 +73,8 @@ pub enum Judged {
     Smooth(f64),
     /// Hardly any pixel (less than one in twenty) is away from silhouettes: the 99th percentile of all.
     Everywhere(f64),
-    /// There is no such percentile: more than a hundredth of the pixels are falsely valid or missing, or there is none at all.
+    /// There is no such percentile: more than a hundredth of the pixels are falsely valid or missing, or
+    /// there is none at all.
     Void,
 }
 
@@ -109,7 +113,8 @@ enum Compared {
     Error { px: f64, at_silhouette: bool },
 }
 
-/// What the centre of every pixel of a frame sees, and which pixels are at silhouettes: looked at once, compared with any number of renderings.
+/// What the centre of every pixel of a frame sees, and which pixels are at silhouettes: looked at once,
+/// compared with any number of renderings.
 #[derive(Debug)]
 pub struct CoordTruth {
     oracle: Arc<Oracle>,
@@ -144,11 +149,20 @@ impl CoordTruth {
     }
 }
 
-/// Compares `coords` of frame `number`, rendered from the ideal frame `ideal` at exposure phase `phase`, with the oracle: where the point that the
-/// pixel's own ray meets lies in the ideal frame. Every `step`-th pixel in both directions. A pixel counts as at a silhouette within 3 px of one, and where
-/// its true point is hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the sequence's.
+/// Compares `coords` of frame `number`, rendered from the ideal frame `ideal` at exposure phase `phase`, with
+/// the oracle: where the point that the pixel's own ray meets lies in the ideal frame. Every `step`-th pixel
+/// in both directions. A pixel counts as at a silhouette within 3 px of one, and where its true point is
+/// hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the
+/// sequence's.
 #[must_use]
-pub fn coord_errors(oracle: &Oracle, number: u64, ideal: &IdealView, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
+pub fn coord_errors(
+    oracle: &Oracle,
+    number: u64,
+    ideal: &IdealView,
+    frame: &RenderedFrame,
+    phase: f64,
+    step: u32,
+) -> Option<CoordErrors> {
     let looks = looks(oracle, number, phase);
     compared(oracle, &looks, &dilated(oracle, &edges(oracle, &looks)), ideal, frame, step)
 }
@@ -164,7 +178,10 @@ fn compared(
     let coords = frame.coords.as_ref()?;
     let [width, height] = frame.size_px;
     let pixels = width as usize * height as usize;
-    if frame.size_px != oracle.sequence.scenario.camera.size_px || coords.len() != pixels || frame.color_rgba.len() != 4 * pixels {
+    if frame.size_px != oracle.sequence.scenario.camera.size_px
+        || coords.len() != pixels
+        || frame.color_rgba.len() != 4 * pixels
+    {
         return None;
     }
     let compare = |i: usize| {
@@ -175,15 +192,20 @@ fn compared(
             (Some(_), false) => Compared::Missing,
             (Some(look), true) => {
                 let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
-                let unseen =
-                    ideal.in_key(look).z <= 0.0 || look.hit.is_some_and(|hit| oracle.hides(ideal.pose.position_ned_m, hit.point_ned_m));
-                Compared::Error { px: found.distance(ideal.source_px(look)), at_silhouette: near[i] || unseen }
+                let unseen = ideal.in_key(look).z <= 0.0
+                    || look.hit.is_some_and(|hit| oracle.hides(ideal.pose.position_ned_m, hit.point_ned_m));
+                Compared::Error {
+                    px: found.distance(ideal.source_px(look)),
+                    at_silhouette: near[i] || unseen,
+                }
             }
         }
     };
     let step = step.max(1);
-    let chosen: Vec<usize> =
-        (0..height).step_by(step as usize).flat_map(|y| (0..width).step_by(step as usize).map(move |x| (y * width + x) as usize)).collect();
+    let chosen: Vec<usize> = (0..height)
+        .step_by(step as usize)
+        .flat_map(|y| (0..width).step_by(step as usize).map(move |x| (y * width + x) as usize))
+        .collect();
     let compared: Vec<Compared> = chosen.into_par_iter().map(compare).collect();
     let (mut smooth, mut at_edges) = (Vec::new(), Vec::new());
     let mut errors = CoordErrors::default();
@@ -192,7 +214,9 @@ fn compared(
             Compared::Skipped => {}
             Compared::FalselyValid => errors.falsely_valid += 1,
             Compared::Missing => errors.missing += 1,
-            Compared::Error { px, at_silhouette } => if at_silhouette { &mut at_edges } else { &mut smooth }.push(px),
+            Compared::Error { px, at_silhouette } => {
+                if at_silhouette { &mut at_edges } else { &mut smooth }.push(px)
+            }
         }
     }
     errors.all = ErrorStats::of(smooth.iter().chain(&at_edges).copied().collect());
@@ -201,7 +225,8 @@ fn compared(
     Some(errors)
 }
 
-/// How far a frame's light is from the oracle's. Peak is 1; channels R, G, B of pixels that are valid in both.
+/// How far a frame's light is from the oracle's. Peak is 1; channels R, G, B of pixels that are valid in
+/// both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageErrors {
     /// All pixels.
@@ -216,7 +241,8 @@ pub struct ImageErrors {
     pub max: f64,
 }
 
-/// Compares a frame with the oracle's, both in linear light; `near` is [`silhouettes`] of the frame. `None` if sizes differ.
+/// Compares a frame with the oracle's, both in linear light; `near` is [`silhouettes`] of the frame. `None`
+/// if sizes differ.
 #[must_use]
 pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool]) -> Option<ImageErrors> {
     let same = truth.size_px == frame.size_px && truth.color_rgba.len() == frame.color_rgba.len();
@@ -238,7 +264,9 @@ pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool])
             max = max.max(difference);
         }
     }
-    let psnr_db = |squares: f64, pixels: u64| if squares > 0.0 { -10.0 * (squares / (3.0 * pixels as f64)).log10() } else { f64::INFINITY };
+    let psnr_db = |squares: f64, pixels: u64| {
+        if squares > 0.0 { -10.0 * (squares / (3.0 * pixels as f64)).log10() } else { f64::INFINITY }
+    };
     Some(ImageErrors {
         all_db: psnr_db(squares[0] + squares[1], pixels[0] + pixels[1]),
         smooth_db: psnr_db(squares[0], pixels[0]),
@@ -248,7 +276,8 @@ pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool])
     })
 }
 
-/// Pixels of a frame within 3 px of a silhouette at any of the exposure phases given (from -0.5 to 0.5), row-major.
+/// Pixels of a frame within 3 px of a silhouette at any of the exposure phases given (from -0.5 to 0.5),
+/// row-major.
 #[must_use]
 pub fn silhouettes(oracle: &Oracle, frame: u64, phases: &[f64]) -> Vec<bool> {
     let size_px = oracle.sequence.scenario.camera.size_px;
@@ -274,14 +303,17 @@ fn looks(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<Look>> {
         .collect()
 }
 
-/// Pixels beside a step or at a fold of depth at their own instant. Where neighbours' looks suggest one, the pixel's camera looks for itself: a neighbour
-/// of another instant may see another place, and one of the other field surely does.
+/// Pixels beside a step or at a fold of depth at their own instant. Where neighbours' looks suggest one, the
+/// pixel's camera looks for itself: a neighbour of another instant may see another place, and one of the
+/// other field surely does.
 fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
     let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
     let field = oracle.clock.field_rows() as usize;
     let inverse_depth = |look: &Look| look.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
     let beside = |before: usize, i: usize, after: usize| {
-        let (Some(before), Some(here), Some(after)) = (&looks[before], &looks[i], &looks[after]) else { return false };
+        let (Some(before), Some(here), Some(after)) = (&looks[before], &looks[i], &looks[after]) else {
+            return false;
+        };
         let seen = inverse_depth(here);
         if !may_step([inverse_depth(before), seen, inverse_depth(after)]) {
             return false;
@@ -291,7 +323,9 @@ fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
             oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
         let [a, c] = [before, after].map(|other| towards(other, 1.0));
-        bends([a, seen, c], FOLD) || steps(seen, a, |share| towards(before, share)) || steps(seen, c, |share| towards(after, share))
+        bends([a, seen, c], FOLD)
+            || steps(seen, a, |share| towards(before, share))
+            || steps(seen, c, |share| towards(after, share))
     };
     (0..looks.len())
         .into_par_iter()
@@ -301,7 +335,9 @@ fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
             let along = y >= field && y + field < height;
             (across && beside(i - 1, i, i + 1))
                 || (along && beside(i - row, i, i + row))
-                || (across && along && (beside(i - row - 1, i, i + row + 1) || beside(i - row + 1, i, i + row - 1)))
+                || (across
+                    && along
+                    && (beside(i - row - 1, i, i + row + 1) || beside(i - row + 1, i, i + row - 1)))
         })
         .collect()
 }
@@ -318,7 +354,9 @@ fn dilated(oracle: &Oracle, marked: &[bool]) -> Vec<bool> {
     }
     for (i, _) in rows.iter().enumerate().filter(|(_, marked)| **marked) {
         let (x, y) = (i % width, i / width);
-        for row in (y.saturating_sub(near)..=(y + near).min(height - 1)).filter(|row| row.abs_diff(y).is_multiple_of(field)) {
+        for row in (y.saturating_sub(near)..=(y + near).min(height - 1))
+            .filter(|row| row.abs_diff(y).is_multiple_of(field))
+        {
             all[row * width + x] = true;
         }
     }
@@ -332,7 +370,13 @@ mod tests {
     fn errors(smooth: u64, silhouettes: u64, falsely_valid: u64, missing: u64) -> CoordErrors {
         let of = |count, p99_px| ErrorStats { count, p99_px, ..ErrorStats::default() };
         let all = of(smooth + silhouettes, 7.0);
-        CoordErrors { all, smooth: of(smooth, 0.01), silhouettes: of(silhouettes, 9.0), falsely_valid, missing }
+        CoordErrors {
+            all,
+            smooth: of(smooth, 0.01),
+            silhouettes: of(silhouettes, 9.0),
+            falsely_valid,
+            missing,
+        }
     }
 
     #[test]

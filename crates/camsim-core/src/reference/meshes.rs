@@ -90,7 +90,8 @@ impl Meshes {
         let cover = |mesh: &Mesh| Cover {
             shape: mesh.shape.clone(),
             one_sided: mesh.material.one_sided,
-            holes: has_alpha(mesh).then(|| (Coat::new(&mesh.material), f64::from(mesh.material.cutoff.unwrap_or(0.0)))),
+            holes: has_alpha(mesh)
+                .then(|| (Coat::new(&mesh.material), f64::from(mesh.material.cutoff.unwrap_or(0.0)))),
             blends: mesh.material.blends,
             normals: if light.is_some() { standing_normals(mesh) } else { Vec::new() },
         };
@@ -116,7 +117,8 @@ impl Meshes {
         let mut best = None;
         self.walk(ray, limit, |triangle, limit| {
             let cover = self.cover(triangle);
-            let (t, weights) = meet(triangle.corners.map(|corner| ray.see(corner)), limit).filter(|_| counts(cover))?;
+            let (t, weights) =
+                meet(triangle.corners.map(|corner| ray.see(corner)), limit).filter(|_| counts(cover))?;
             let (hit, alpha) = self.hit(ray, triangle, t, weights)?;
             if cover.holes.as_ref().is_some_and(|(_, cutoff)| alpha < *cutoff) {
                 return None;
@@ -137,7 +139,10 @@ impl Meshes {
                 // Two triangles that share an edge are one surface there.
                 let on_edge = weights.contains(&0.0);
                 let again = |layer: &Layer| {
-                    on_edge && layer.on_edge && layer.hit.surface == hit.surface && (layer.hit.depth_m - t).abs() <= SAME_PLACE * t
+                    on_edge
+                        && layer.on_edge
+                        && layer.hit.surface == hit.surface
+                        && (layer.hit.depth_m - t).abs() <= SAME_PLACE * t
                 };
                 if !layers.iter().any(again) {
                     layers.push(Layer { hit, alpha, on_edge });
@@ -202,9 +207,10 @@ impl Meshes {
         if cover.one_sided && (b - a).cross(c - a).dot(ray.direction) >= 0.0 {
             return None;
         }
-        let of = [0, 1, 2].map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
-        let [red, green, blue, alpha]: [f64; 4] =
-            [0, 1, 2, 3].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(of[corner].tint[k])).sum());
+        let of = [0, 1, 2]
+            .map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
+        let [red, green, blue, alpha]: [f64; 4] = [0, 1, 2, 3]
+            .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(of[corner].tint[k])).sum());
         let hit = ray_hit(ray, t, weights, of.map(|vertex| vertex.uv), triangle.surface);
         let alpha = cover.holes.as_ref().map_or(1.0, |(coat, _)| coat.alpha_at(hit.texture_uv) * alpha);
         let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray.direction));
@@ -216,22 +222,24 @@ fn has_alpha(mesh: &Mesh) -> bool {
     mesh.material.blends || mesh.material.cutoff.is_some()
 }
 
-/// What of its light comes back from a place of a triangle, towards where the ray comes from: the sun's by the cosine of its angle, the sky's by
-/// the share of it that the face looks at.
+/// What of its light comes back from a place of a triangle, towards where the ray comes from: the sun's by
+/// the cosine of its angle, the sky's by the share of it that the face looks at.
 fn lit(light: &Light, cover: &Cover, triangle: &Triangle, weights: [f64; 3], direction: DVec3) -> f64 {
     if cover.normals.is_empty() {
         return 1.0;
     }
     let [a, b, c] = triangle.corners;
     let from_behind = (b - a).cross(c - a).dot(direction) >= 0.0;
-    let corner = |k: usize| weights[k] * cover.normals[cover.shape.indices[triangle.first as usize + k] as usize];
+    let corner =
+        |k: usize| weights[k] * cover.normals[cover.shape.indices[triangle.first as usize + k] as usize];
     let normal = (corner(0) + corner(1) + corner(2)) * if from_behind { -1.0 } else { 1.0 };
     let of_sun = light.to_sun_ned.dot(normal).max(0.0);
     let of_sky = 0.5 + 0.5 * -normal.z;
     light.sun * of_sun + light.sky * of_sky
 }
 
-/// Outward normals of a shape's corners once it stands: across two directions that lay across the normal before. (The renderer takes cofactors.)
+/// Outward normals of a shape's corners once it stands: across two directions that lay across the normal
+/// before. (The renderer takes cofactors.)
 fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
     if mesh.shape.normals.len() != mesh.shape.vertices.len() {
         return Vec::new();
@@ -249,7 +257,8 @@ fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
 
 /// The hit of a ray on a triangle.
 pub(super) fn ray_hit(ray: &Ray, t: f64, weights: [f64; 3], uv: [[f32; 2]; 3], surface: u32) -> Hit {
-    let texture_uv = [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
+    let texture_uv =
+        [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
     Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, tint: [1.0; 3], surface }
 }
 

@@ -31,7 +31,10 @@ pub(super) struct Coat {
 
 impl Paint {
     pub(super) fn new(scene: &Scene) -> Self {
-        let ground = scene.terrain.as_ref().map(|terrain| Coat::new(&Material::picture(terrain.texture.clone(), Wrap::Clamp)));
+        let ground = scene
+            .terrain
+            .as_ref()
+            .map(|terrain| Coat::new(&Material::picture(terrain.texture.clone(), Wrap::Clamp)));
         let meshes = scene.meshes.iter().map(|mesh| Some(Coat::new(&mesh.material)));
         Self {
             surfaces: std::iter::once(ground).chain(meshes).collect(),
@@ -42,7 +45,9 @@ impl Paint {
 
     /// Linear light that arrives along a ray whose depth has the unit `range_per_depth`.
     pub(super) fn color(&self, hit: Option<&Hit>, range_per_depth: f64) -> DVec3 {
-        let Some((hit, coat)) = hit.and_then(|hit| Some((hit, self.surfaces.get(hit.surface as usize)?.as_ref()?))) else {
+        let Some((hit, coat)) =
+            hit.and_then(|hit| Some((hit, self.surfaces.get(hit.surface as usize)?.as_ref()?)))
+        else {
             return self.sky;
         };
         let color = DVec3::from_array(hit.tint) * coat.color_at(hit.texture_uv) + coat.emissive;
@@ -66,11 +71,23 @@ impl Coat {
             }
         });
         let emissive = DVec3::from_array(material.emissive.map(f64::from));
-        Self { texture: material.texture.clone(), wrap: material.wrap, nearest: material.nearest, emissive, linear }
+        Self {
+            texture: material.texture.clone(),
+            wrap: material.wrap,
+            nearest: material.nearest,
+            emissive,
+            linear,
+        }
     }
 
     fn color_at(&self, uv: [f64; 2]) -> DVec3 {
-        self.read(uv, |pixel| DVec3::new(self.linear[pixel[0] as usize], self.linear[pixel[1] as usize], self.linear[pixel[2] as usize]))
+        self.read(uv, |pixel| {
+            DVec3::new(
+                self.linear[pixel[0] as usize],
+                self.linear[pixel[1] as usize],
+                self.linear[pixel[2] as usize],
+            )
+        })
     }
 
     /// 0..=1.

@@ -45,8 +45,8 @@ impl Ray {
         Some(Self { origin, direction, inverse, axes, shear })
     }
 
-    /// A point as the ray sees it (Woop, Benthin & Wald 2013): equal points are seen equally, so triangles that share an edge agree on
-    /// which side of it the ray passes.
+    /// A point as the ray sees it (Woop, Benthin & Wald 2013): equal points are seen equally, so triangles
+    /// that share an edge agree on which side of it the ray passes.
     pub(super) fn see(&self, point: DVec3) -> Seen {
         let from_origin = point - self.origin;
         let along = from_origin[self.axes[2]];
@@ -67,7 +67,8 @@ impl Ray {
     }
 }
 
-/// Ray parameter in `0 < t < limit` and weights of the corners where a ray meets a triangle, from either side.
+/// Ray parameter in `0 < t < limit` and weights of the corners where a ray meets a triangle, from either
+/// side.
 pub(super) fn meet([a, b, c]: [Seen; 3], limit: f64) -> Option<(f64, [f64; 3])> {
     let wa = c.x * b.y - c.y * b.x;
     let wb = a.x * c.y - a.y * c.x;
@@ -82,7 +83,8 @@ pub(super) fn meet([a, b, c]: [Seen; 3], limit: f64) -> Option<(f64, [f64; 3])> 
     (t > 0.0 && t < limit).then_some((t, weights))
 }
 
-/// Smallest box around points; grown by a hair, so that rounding in [`Ray::enter`] never misses what lies on its faces.
+/// Smallest box around points; grown by a hair, so that rounding in [`Ray::enter`] never misses what lies on
+/// its faces.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) low: DVec3,

@@ -1,4 +1,5 @@
-//! Whole frames by the oracle: each sample of a pixel has its own place in the pixel's area and its own instant of the exposure.
+//! Whole frames by the oracle: each sample of a pixel has its own place in the pixel's area and its own
+//! instant of the exposure.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -14,7 +15,8 @@ use crate::{
     temporal::IdealGeometry,
 };
 
-/// Steps of the additive sequences that fill 3 and 2 dimensions evenly: powers of 1/g, `g^4 = g + 1`, and of 1/g, `g^3 = g + 1` (Roberts).
+/// Steps of the additive sequences that fill 3 and 2 dimensions evenly: powers of 1/g, `g^4 = g + 1`, and of
+/// 1/g, `g^3 = g + 1` (Roberts).
 const EVEN_3D: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
 const EVEN_2D: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 /// Samples of which one mean is formed for the estimate of the error.
@@ -31,9 +33,11 @@ pub struct RenderOptions {
     pub min_samples: u32,
     /// Samples of a pixel, at most.
     pub max_samples: u32,
-    /// A pixel is finished when the standard error of its mean is below this, 1/255 of the linear range, in each channel.
+    /// A pixel is finished when the standard error of its mean is below this, 1/255 of the linear range, in
+    /// each channel.
     pub tolerance_dn: f64,
-    /// Whether vignette, light, noise and saturation are applied; else the frame holds the light that arrives.
+    /// Whether vignette, light, noise and saturation are applied; else the frame holds the light that
+    /// arrives.
     pub photometric: bool,
     /// The ideal frame that the source coordinates of [`Channel::Coords`] refer to; without one they are 0.
     pub key: Option<IdealView>,
@@ -65,12 +69,13 @@ pub struct IdealView {
 }
 
 impl IdealView {
-    /// Where what a look sees lies in the ideal frame, pixels: its point, or for the sky its direction. Not finite on the horizon of the
-    /// key camera, and mirrored behind it.
+    /// Where what a look sees lies in the ideal frame, pixels: its point, or for the sky its direction. Not
+    /// finite on the horizon of the key camera, and mirrored behind it.
     #[must_use]
     pub fn source_px(&self, look: &Look) -> DVec2 {
         let seen = self.in_key(look);
-        self.ideal.principal_px + DVec2::new(self.ideal.focal_px.x * seen.x, self.ideal.focal_px.y * seen.y) / seen.z
+        self.ideal.principal_px
+            + DVec2::new(self.ideal.focal_px.x * seen.x, self.ideal.focal_px.y * seen.y) / seen.z
     }
 
     /// The same in coordinates of the key camera.
@@ -126,8 +131,16 @@ impl Oracle {
     #[must_use]
     pub fn render_reported(&self, frame: u64, options: &RenderOptions) -> (RenderedFrame, Convergence) {
         let size_px = self.sequence.scenario.camera.size_px;
-        let [depth, coords] = [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
-        let job = Job { oracle: self, view: self.view(frame), frame, options, noise_table: tail_table(), truth: depth || coords };
+        let [depth, coords] =
+            [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
+        let job = Job {
+            oracle: self,
+            view: self.view(frame),
+            frame,
+            options,
+            noise_table: tail_table(),
+            truth: depth || coords,
+        };
         let rows: Vec<Row> = (0..size_px[1]).into_par_iter().map(|y| job.row(y, size_px[0])).collect();
         let mut convergence = Convergence::default();
         let mut sum_of_squares = 0.0;
@@ -180,7 +193,11 @@ impl Job<'_> {
         let mut instants = Instants::new(self, y);
         for x in 0..width {
             // A pixel is valid where its centre has a ray.
-            let wanted = self.options.only.as_ref().is_none_or(|only| only.get((y * width + x) as usize).copied().unwrap_or(false));
+            let wanted = self
+                .options
+                .only
+                .as_ref()
+                .is_none_or(|only| only.get((y * width + x) as usize).copied().unwrap_or(false));
             let valid = wanted && self.view.ray([x, y], DVec2::ZERO).is_some();
             if valid {
                 let pixel = self.pixel([x, y], &mut instants);
@@ -215,7 +232,10 @@ impl Job<'_> {
         for batch in 0..max_batches {
             let (mut part, mut count) = (DVec3::ZERO, 0_u32);
             for i in batch * BATCH..(batch + 1) * BATCH {
-                let place = DVec2::new((shift_x + f64::from(i) * steps[0]).fract(), (shift_y + f64::from(i) * steps[1]).fract());
+                let place = DVec2::new(
+                    (shift_x + f64::from(i) * steps[0]).fract(),
+                    (shift_y + f64::from(i) * steps[1]).fract(),
+                );
                 // At the border of what the lens shows, the part of the area that it does show.
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
                 let pose = instants.pose(x, i);
@@ -259,7 +279,15 @@ impl Job<'_> {
                 _ => 1.0,
             }
         });
-        photometric(spec, color, weight as f32, pixel, self.frame as u32, sequence.scenario.noise_seed(), &self.noise_table)
+        photometric(
+            spec,
+            color,
+            weight as f32,
+            pixel,
+            self.frame as u32,
+            sequence.scenario.noise_seed(),
+            &self.noise_table,
+        )
     }
 
     fn coords(&self, pixel: [u32; 2], look: &Look) -> [f32; COORDS_CHANNELS] {
@@ -279,7 +307,8 @@ struct PixelMean {
     finished: bool,
 }
 
-/// Poses at the instants of a row's samples. Where rows are read at once all pixels of a row share the instants, and each pose is found once.
+/// Poses at the instants of a row's samples. Where rows are read at once all pixels of a row share the
+/// instants, and each pose is found once.
 struct Instants<'a> {
     job: &'a Job<'a>,
     y: u32,
@@ -298,7 +327,8 @@ impl<'a> Instants<'a> {
     /// At sample `i` of pixel `x`.
     fn pose(&mut self, x: u32, i: u32) -> CameraPose {
         let at = |i: u32, shift: f64| {
-            let phase = if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
+            let phase =
+                if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
             self.job.oracle.sequence.path.pose(self.job.view.mid_s([x, self.y]) + phase * self.exposure_s)
         };
         let Some(shared) = &mut self.shared else { return at(i, self.shift) };
@@ -323,7 +353,8 @@ fn shifts(key: u64) -> [f64; 3] {
     })
 }
 
-/// The vignette map at a pixel: the map covers the picture, edge to edge; bilinear between its pixel centres, held beyond the outer ones.
+/// The vignette map at a pixel: the map covers the picture, edge to edge; bilinear between its pixel centres,
+/// held beyond the outer ones.
 fn vignette(map: &GrayImage, pixel: [u32; 2], size_px: [u32; 2]) -> f64 {
     let [columns, rows] = map.size_px;
     let axis = |k: usize, of: u32| {
@@ -333,7 +364,8 @@ fn vignette(map: &GrayImage, pixel: [u32; 2], size_px: [u32; 2]) -> f64 {
         (low, (low + 1).min(of - 1), at - f64::from(low))
     };
     let ((x0, x1, tx), (y0, y1, ty)) = (axis(0, columns), axis(1, rows));
-    let at = |x: u32, y: u32| map.values.get((y * columns + x) as usize).map_or(0.0, |value| f64::from(*value));
+    let at =
+        |x: u32, y: u32| map.values.get((y * columns + x) as usize).map_or(0.0, |value| f64::from(*value));
     let top = at(x0, y0) * (1.0 - tx) + at(x1, y0) * tx;
     let bottom = at(x0, y1) * (1.0 - tx) + at(x1, y1) * tx;
     top * (1.0 - ty) + bottom * ty

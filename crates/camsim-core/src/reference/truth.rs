@@ -18,7 +18,8 @@ const RINGS: [f64; 3] = [0.3, 0.65, 1.0];
 pub struct TruthErrors {
     /// Pixels that are valid in both.
     pub pixels: u64,
-    /// Those whose depth is off by more than [`DEPTH_TOLERANCE`], or that show the sky in one of the two only.
+    /// Those whose depth is off by more than [`DEPTH_TOLERANCE`], or that show the sky in one of the two
+    /// only.
     pub depth_beyond: u64,
     /// Of those: depths that no surface has within the distance from the pixel's centre that was allowed.
     pub depth_faults: u64,
@@ -49,15 +50,24 @@ struct PixelError {
     point_fault: bool,
 }
 
-/// Compares depth of frame `number`, and points where the frame has coordinates, with what the centre of each pixel sees at mid-exposure. Where they differ, surfaces within `near_px` of the centre
-/// are looked at too: at an edge that is nearer than this the other side counts as seen. `None` without depth, or if the frame has another size
-/// than the sequence's.
+/// Compares depth of frame `number`, and points where the frame has coordinates, with what the centre of each
+/// pixel sees at mid-exposure. Where they differ, surfaces within `near_px` of the centre are looked at too:
+/// at an edge that is nearer than this the other side counts as seen. `None` without depth, or if the frame
+/// has another size than the sequence's.
 #[must_use]
-pub fn truth_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Option<TruthErrors> {
+pub fn truth_errors(
+    oracle: &Oracle,
+    number: u64,
+    frame: &RenderedFrame,
+    near_px: f64,
+) -> Option<TruthErrors> {
     let depth_m = frame.depth_m.as_ref()?;
     let width = frame.size_px[0];
     let pixels = width as usize * frame.size_px[1] as usize;
-    if frame.size_px != oracle.sequence.scenario.camera.size_px || depth_m.len() != pixels || frame.color_rgba.len() != 4 * pixels {
+    if frame.size_px != oracle.sequence.scenario.camera.size_px
+        || depth_m.len() != pixels
+        || frame.color_rgba.len() != 4 * pixels
+    {
         return None;
     }
     let view = oracle.view(number);
@@ -84,7 +94,14 @@ pub fn truth_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px
     Some(errors)
 }
 
-fn pixel_error(view: &FrameView<'_>, pixel: [u32; 2], look: &Look, depth_m: f64, point: Option<DVec3>, near_px: f64) -> PixelError {
+fn pixel_error(
+    view: &FrameView<'_>,
+    pixel: [u32; 2],
+    look: &Look,
+    depth_m: f64,
+    point: Option<DVec3>,
+    near_px: f64,
+) -> PixelError {
     let [depth, off] = errors_against(look, depth_m, point);
     let is_depth_off = depth > DEPTH_TOLERANCE;
     let is_point_off = off > DEPTH_TOLERANCE;
@@ -101,10 +118,16 @@ fn pixel_error(view: &FrameView<'_>, pixel: [u32; 2], look: &Look, depth_m: f64,
             }
         }
     }
-    PixelError { depth, depth_fault: depth_near > DEPTH_TOLERANCE, point: off, point_fault: point_near > DEPTH_TOLERANCE }
+    PixelError {
+        depth,
+        depth_fault: depth_near > DEPTH_TOLERANCE,
+        point: off,
+        point_fault: point_near > DEPTH_TOLERANCE,
+    }
 }
 
-/// Of a depth (0 = sky) and a point against what a ray meets, relative to its depth; what is not a number is infinitely far off.
+/// Of a depth (0 = sky) and a point against what a ray meets, relative to its depth; what is not a number is
+/// infinitely far off.
 fn errors_against(look: &Look, depth_m: f64, point: Option<DVec3>) -> [f64; 2] {
     let Some(hit) = look.hit else {
         let error = if depth_m == 0.0 { 0.0 } else { f64::INFINITY };

@@ -43,7 +43,9 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Auto<T> {
         match WordOr::<T>::deserialize(deserializer) {
             Ok(WordOr::Value(value)) => Ok(Self::Value(value)),
             Ok(WordOr::Word(word)) if word == "auto" => Ok(Self::Auto),
-            Ok(WordOr::Word(word)) => Err(de::Error::custom(format!("`{word}` is neither \"auto\" nor a legal value here"))),
+            Ok(WordOr::Word(word)) => {
+                Err(de::Error::custom(format!("`{word}` is neither \"auto\" nor a legal value here")))
+            }
             Err(_) => Err(de::Error::custom("expected \"auto\" or a value of this key's type")),
         }
     }
@@ -88,7 +90,11 @@ macro_rules! word {
             }
 
             pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
-                if String::deserialize(deserializer)? == $word { Ok(()) } else { Err(de::Error::custom($expected)) }
+                if String::deserialize(deserializer)? == $word {
+                    Ok(())
+                } else {
+                    Err(de::Error::custom($expected))
+                }
             }
         }
     };

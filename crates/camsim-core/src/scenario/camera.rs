@@ -10,14 +10,16 @@ use super::FieldOr;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSpec {
-    /// Which camera this is: part of the seed of its noise ([`crate::noise::camera_seed`]), so that cameras on one platform do not share theirs.
+    /// Which camera this is: part of the seed of its noise ([`crate::noise::camera_seed`]), so that cameras
+    /// on one platform do not share theirs.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Width and height of the output.
     pub size_px: [u32; 2],
     /// Focal lengths (fx, fy).
     pub focal_px: [f64; 2],
-    /// Principal point; (0, 0) is the centre of the top-left pixel. `None` is the image centre ((W-1)/2, (H-1)/2).
+    /// Principal point; (0, 0) is the centre of the top-left pixel. `None` is the image centre ((W-1)/2,
+    /// (H-1)/2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
     /// Frames a second.
@@ -72,8 +74,8 @@ pub struct MountSpec {
     pub vibration: Vec<VibrationSpec>,
 }
 
-/// One sinusoid `amplitude * sin(2 pi hz t + phase)` about or along one body axis, before the mount; t in seconds of flight since the log's first
-/// good row, whatever the window.
+/// One sinusoid `amplitude * sin(2 pi hz t + phase)` about or along one body axis, before the mount; t in
+/// seconds of flight since the log's first good row, whatever the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VibrationSpec {
@@ -225,7 +227,13 @@ pub struct PhotometricSpec {
 
 impl Default for PhotometricSpec {
     fn default() -> Self {
-        Self { vignette: None, vignette_thresholds: [0.05, 0.5], light: 1.0, noise_sigma: 0.0, output: OutputEncoding::default() }
+        Self {
+            vignette: None,
+            vignette_thresholds: [0.05, 0.5],
+            light: 1.0,
+            noise_sigma: 0.0,
+            output: OutputEncoding::default(),
+        }
     }
 }
 

@@ -170,10 +170,12 @@ pub struct BoardSpec {
     /// Its middle: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
-    /// Its middle on Earth, in place of `at`: latitude and longitude in degrees, height in metres as `flight.height` says.
+    /// Its middle on Earth, in place of `at`: latitude and longitude in degrees, height in metres as
+    /// `flight.height` says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// Roll, pitch, yaw: 0 0 0 lies face up, its top in the north; pitch 90 stands, and is looked at northwards.
+    /// Roll, pitch, yaw: 0 0 0 lies face up, its top in the north; pitch 90 stands, and is looked at
+    /// northwards.
     #[serde(default)]
     pub angles_deg: [f64; 3],
 }
@@ -187,10 +189,12 @@ pub struct GltfSpec {
     /// Where its origin is: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
-    /// The same on Earth, in place of `at`: latitude and longitude in degrees, height in metres as `flight.height` says.
+    /// The same on Earth, in place of `at`: latitude and longitude in degrees, height in metres as
+    /// `flight.height` says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// A table of places in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and if wanted `heading_deg` and `scale`.
+    /// A table of places in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and if wanted
+    /// `heading_deg` and `scale`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placements: Option<PathBuf>,
     /// Where its front (+z) looks, degrees east of north. With 180 its x is east, as maps have it.

@@ -2,14 +2,19 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, Stamps, TrackerSpec};
+use super::{
+    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver,
+    Stamps, TrackerSpec,
+};
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
 
-/// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
+/// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these
+/// never does.
 pub const MAX_ITERATIONS: u32 = 64;
-/// Most samples for a pixel of path, or for an exposure in the paper's preset. Two a pixel keep white texture below 1/255 (NUMERICS section 3).
+/// Most samples for a pixel of path, or for an exposure in the paper's preset. Two a pixel keep white texture
+/// below 1/255 (NUMERICS section 3).
 pub const MAX_BLUR_SAMPLES: u32 = 4096;
 /// Most reads along a side of a pixel; the planner takes 4 at most.
 pub const MAX_FOOTPRINT_TAPS: u32 = 64;
@@ -66,15 +71,21 @@ impl Check {
     }
 
     fn positive(&mut self, key: impl Into<String>, value: f64, fix: &str) {
-        self.require(value.is_finite() && value > 0.0, key, || format!("must be a finite number above 0, not {value}; {fix}"));
+        self.require(value.is_finite() && value > 0.0, key, || {
+            format!("must be a finite number above 0, not {value}; {fix}")
+        });
     }
 
     fn not_negative(&mut self, key: impl Into<String>, value: f64, fix: &str) {
-        self.require(value.is_finite() && value >= 0.0, key, || format!("must be a finite number, 0 or more, not {value}; {fix}"));
+        self.require(value.is_finite() && value >= 0.0, key, || {
+            format!("must be a finite number, 0 or more, not {value}; {fix}")
+        });
     }
 
     fn finite(&mut self, key: impl Into<String>, values: &[f64]) {
-        self.require(values.iter().all(|value| value.is_finite()), key, || format!("must be finite, not {values:?}"));
+        self.require(values.iter().all(|value| value.is_finite()), key, || {
+            format!("must be finite, not {values:?}")
+        });
     }
 
     fn count(&mut self, key: &str, value: Auto<u32>, most: u32) {
@@ -86,10 +97,14 @@ impl Check {
 
 fn check_flight(check: &mut Check, scenario: &Scenario) {
     let flight = &scenario.flight;
-    check.require(!flight.log.as_os_str().is_empty(), "flight.log", || "is empty; give the path of the flight log".into());
+    check.require(!flight.log.as_os_str().is_empty(), "flight.log", || {
+        "is empty; give the path of the flight log".into()
+    });
     if let Some([from, to]) = flight.window_s {
         check.require(from.is_finite() && to.is_finite() && from < to, "flight.window_s", || {
-            format!("must be [begin, end] with begin < end, in seconds from the first row, not [{from}, {to}]")
+            format!(
+                "must be [begin, end] with begin < end, in seconds from the first row, not [{from}, {to}]"
+            )
         });
     }
     check.positive("flight.speed", flight.speed, "1 flies the log in its own time, 2 twice as fast");
@@ -121,9 +136,11 @@ fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
 pub const MAX_SIDE_PX: u32 = crate::camera::MAX_SIZE_PX;
 
 fn check_camera(check: &mut Check, camera: &CameraSpec) {
-    check.require(camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)), "camera.size_px", || {
-        format!("must be [width, height], each 1..{MAX_SIDE_PX}, not {:?}", camera.size_px)
-    });
+    check.require(
+        camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)),
+        "camera.size_px",
+        || format!("must be [width, height], each 1..{MAX_SIDE_PX}, not {:?}", camera.size_px),
+    );
     check_focal(check, "camera.focal_px", camera.focal_px);
     check.finite("camera.principal_point_px", &camera.principal_point_px.unwrap_or_default());
     check.positive("camera.fps", camera.fps, "give frames per second, for example 30");
@@ -150,12 +167,23 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     for (i, zoom) in camera.zoom.iter().enumerate() {
         check.finite(format!("camera.zoom.{i}.at"), &[zoom.at]);
         check_focal(check, &format!("camera.zoom.{i}.focal_px"), zoom.focal_px);
-        check.finite(format!("camera.zoom.{i}.principal_point_px"), &zoom.principal_point_px.unwrap_or_default());
-        check_coefficients(check, &format!("camera.zoom.{i}.coefficients"), camera.lens.model, &zoom.coefficients);
+        check.finite(
+            format!("camera.zoom.{i}.principal_point_px"),
+            &zoom.principal_point_px.unwrap_or_default(),
+        );
+        check_coefficients(
+            check,
+            &format!("camera.zoom.{i}.coefficients"),
+            camera.lens.model,
+            &zoom.coefficients,
+        );
     }
     for (i, pair) in camera.zoom.windows(2).enumerate() {
         check.require(pair[0].at < pair[1].at, format!("camera.zoom.{}.at", i + 1), || {
-            format!("must be above the row before ({}), not {}; sort the table by `at`", pair[0].at, pair[1].at)
+            format!(
+                "must be above the row before ({}), not {}; sort the table by `at`",
+                pair[0].at, pair[1].at
+            )
         });
     }
     check.require(camera.zoom_track.is_none() || !camera.zoom.is_empty(), "camera.zoom_track", || {
@@ -163,18 +191,32 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     });
 
     let shutter = &camera.shutter;
-    check.not_negative("camera.shutter.delay_ms", shutter.delay_ms, "it says how much older than its stamp the image centre is");
-    check.not_negative("camera.shutter.readout_ms", shutter.readout_ms, "turn the direction with camera.shutter.readout");
+    check.not_negative(
+        "camera.shutter.delay_ms",
+        shutter.delay_ms,
+        "it says how much older than its stamp the image centre is",
+    );
+    check.not_negative(
+        "camera.shutter.readout_ms",
+        shutter.readout_ms,
+        "turn the direction with camera.shutter.readout",
+    );
     check.not_negative("camera.shutter.exposure_ms", shutter.exposure_ms, "0 is an instant");
     if let FieldOr::Ms(ms) = shutter.interlace_ms {
-        check.not_negative("camera.shutter.interlace_ms", ms, "choose the earlier rows with camera.shutter.first_field");
+        check.not_negative(
+            "camera.shutter.interlace_ms",
+            ms,
+            "choose the earlier rows with camera.shutter.first_field",
+        );
     }
 
     let photometric = &camera.photometric;
     let [t1, t2] = photometric.vignette_thresholds;
-    check.require(t1.is_finite() && t2.is_finite() && t1 >= 0.0 && t2 > 0.0, "camera.photometric.vignette_thresholds", || {
-        format!("must be [t1 >= 0, t2 > 0], not [{t1}, {t2}]; [0.05, 0.5] is the default")
-    });
+    check.require(
+        t1.is_finite() && t2.is_finite() && t1 >= 0.0 && t2 > 0.0,
+        "camera.photometric.vignette_thresholds",
+        || format!("must be [t1 >= 0, t2 > 0], not [{t1}, {t2}]; [0.05, 0.5] is the default"),
+    );
     check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
     check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
 }
@@ -192,11 +234,14 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
         LensModel::BrownConrady => (8, "the order is k1 k2 p1 p2 k3 k4 k5 k6"),
         LensModel::KannalaBrandt => (4, "the order is k1 k2 k3 k4"),
     };
-    check.require(coefficients.len() <= most, key, || format!("has {} values where at most {most} fit; {order}", coefficients.len()));
+    check.require(coefficients.len() <= most, key, || {
+        format!("has {} values where at most {most} fit; {order}", coefficients.len())
+    });
     // Three are what other programs call k1 k2 k3.
     let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
-    check
-        .require(!radial_alone, key, || format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not"));
+    check.require(!radial_alone, key, || {
+        format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not")
+    });
 }
 
 fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
@@ -209,29 +254,43 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
     check.count("quality.iterations", quality.iterations, MAX_ITERATIONS);
     check.require(
-        quality.iterations == Auto::Auto || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
+        quality.iterations == Auto::Auto
+            || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
         "quality.iterations",
         || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
     );
     check.count("quality.blur_samples", quality.blur_samples, MAX_BLUR_SAMPLES);
     check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
-    check.require(quality.ideal_samples.value().is_none_or(|samples| [1, SAMPLES].contains(&samples)), "quality.ideal_samples", || {
-        format!("must be \"auto\", 1 or {SAMPLES} samples of each pixel of the ideal frame")
-    });
+    check.require(
+        quality.ideal_samples.value().is_none_or(|samples| [1, SAMPLES].contains(&samples)),
+        "quality.ideal_samples",
+        || format!("must be \"auto\", 1 or {SAMPLES} samples of each pixel of the ideal frame"),
+    );
     check.require(
         quality.silhouettes != Silhouettes::Rays || quality.ideal_samples != Auto::Value(SAMPLES),
         "quality.ideal_samples",
         || "is for silhouettes without rays of their own, which quality.silhouettes = \"rays\" asks for; leave one of them out".into(),
     );
-    check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)), "quality.ideal_scale", || {
-        "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
-    });
-    check.require((1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal), "quality.frames_per_ideal", || {
-        format!("must be 1 (each frame its own) to {MAX_FRAMES_PER_IDEAL}, not {}; 8 is the default", quality.frames_per_ideal)
-    });
-    check.require(quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)), "quality.key_frames", || {
-        format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\"")
-    });
+    check.require(
+        quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)),
+        "quality.ideal_scale",
+        || "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into(),
+    );
+    check.require(
+        (1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal),
+        "quality.frames_per_ideal",
+        || {
+            format!(
+                "must be 1 (each frame its own) to {MAX_FRAMES_PER_IDEAL}, not {}; 8 is the default",
+                quality.frames_per_ideal
+            )
+        },
+    );
+    check.require(
+        quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)),
+        "quality.key_frames",
+        || format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\""),
+    );
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
     });
@@ -257,24 +316,32 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     check.require(quality.iterations == Auto::Auto, "quality.iterations", || {
         "does not go with quality.preset = \"paper\", which looks the depth up once; leave it out".into()
     });
-    check.require(matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)), "quality.key_frames", || {
-        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
-    });
-    check.require([1, QualitySpec::default().frames_per_ideal].contains(&quality.frames_per_ideal), "quality.frames_per_ideal", || {
-        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
-    });
+    check.require(
+        matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)),
+        "quality.key_frames",
+        || "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into(),
+    );
+    check.require(
+        [1, QualitySpec::default().frames_per_ideal].contains(&quality.frames_per_ideal),
+        "quality.frames_per_ideal",
+        || "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into(),
+    );
     check.require(quality.ideal_scale == Auto::Auto, "quality.ideal_scale", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
-    check.require(matches!(quality.ideal_samples, Auto::Auto | Auto::Value(1)), "quality.ideal_samples", || {
-        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
-    });
+    check.require(
+        matches!(quality.ideal_samples, Auto::Auto | Auto::Value(1)),
+        "quality.ideal_samples",
+        || "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into(),
+    );
     check.require(quality.silhouettes != Silhouettes::Rays, "quality.silhouettes", || {
         "are plain with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
-    check.require(matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)), "quality.footprint_taps", || {
-        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
-    });
+    check.require(
+        matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)),
+        "quality.footprint_taps",
+        || "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into(),
+    );
 }
 
 #[cfg(test)]
@@ -282,7 +349,9 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{
+        BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
+    };
 
     fn good() -> Scenario {
         Scenario {
@@ -302,7 +371,11 @@ mod tests {
             tracker: Default::default(),
             camera: Default::default(),
             scene: SceneSpec {
-                pattern: Some(PatternSpec { image: "grid.png".into(), width_m: 100.0, at: Default::default() }),
+                pattern: Some(PatternSpec {
+                    image: "grid.png".into(),
+                    width_m: 100.0,
+                    at: Default::default(),
+                }),
                 ..Default::default()
             },
             quality: Default::default(),
@@ -341,7 +414,9 @@ mod tests {
             ("flight.origin", |s| s.flight.origin = Origin::Geodetic([91.0, 0.0, 0.0])),
             ("tracker.rate_hz", |s| s.tracker.rate_hz = f64::NAN),
             ("tracker.max_speed_m_s", |s| s.tracker.max_speed_m_s = Auto::Value(-1.0)),
-            ("tracker.max_acceleration_m_s2", |s| s.tracker.max_acceleration_m_s2 = Auto::Value(f64::INFINITY)),
+            ("tracker.max_acceleration_m_s2", |s| {
+                s.tracker.max_acceleration_m_s2 = Auto::Value(f64::INFINITY)
+            }),
             ("camera.size_px", |s| s.camera.size_px = [640, 0]),
             ("camera.size_px", |s| s.camera.size_px = [u32::MAX, 480]),
             ("camera.focal_px", |s| s.camera.focal_px = [0.0, 500.0]),
@@ -351,19 +426,31 @@ mod tests {
             ("camera.phase", |s| s.camera.phase = f64::NAN),
             ("camera.mount.angles_deg", |s| s.camera.mount.angles_deg[1] = f64::NAN),
             ("camera.mount.vibration.0.amplitude_m", |s| {
-                let wrong = VibrationSpec { axis: Axis::Roll, amplitude_deg: 0.1, amplitude_m: 0.1, hz: 50.0, phase_deg: 0.0 };
+                let wrong = VibrationSpec {
+                    axis: Axis::Roll,
+                    amplitude_deg: 0.1,
+                    amplitude_m: 0.1,
+                    hz: 50.0,
+                    phase_deg: 0.0,
+                };
                 s.camera.mount.vibration.push(wrong);
             }),
             ("camera.lens.coefficients", |s| s.camera.lens.coefficients = vec![0.1]),
             ("camera.lens.coefficients", |s| {
-                s.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.1, 0.01] };
+                s.camera.lens =
+                    LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.1, 0.01] };
             }),
             ("camera.lens.coefficients", |s| {
                 s.camera.lens.model = LensModel::KannalaBrandt;
                 s.camera.lens.coefficients = vec![0.0; 5];
             }),
             ("camera.zoom.1.at", |s| {
-                let row = |at| ZoomSpec { at, focal_px: [500.0, 500.0], principal_point_px: None, coefficients: vec![] };
+                let row = |at| ZoomSpec {
+                    at,
+                    focal_px: [500.0, 500.0],
+                    principal_point_px: None,
+                    coefficients: vec![],
+                };
                 s.camera.zoom = vec![row(2.0), row(1.0)];
             }),
             ("camera.zoom_track", |s| s.camera.zoom_track = Some("zoom.csv".into())),
@@ -371,42 +458,61 @@ mod tests {
             ("camera.shutter.readout_ms", |s| s.camera.shutter.readout_ms = f64::NAN),
             ("camera.shutter.exposure_ms", |s| s.camera.shutter.exposure_ms = -8.0),
             ("camera.shutter.interlace_ms", |s| s.camera.shutter.interlace_ms = FieldOr::Ms(-1.0)),
-            ("camera.photometric.vignette_thresholds", |s| s.camera.photometric.vignette_thresholds = [0.0, 0.0]),
+            ("camera.photometric.vignette_thresholds", |s| {
+                s.camera.photometric.vignette_thresholds = [0.0, 0.0]
+            }),
             ("camera.photometric.light", |s| s.camera.photometric.light = -1.0),
             ("camera.photometric.noise_sigma", |s| s.camera.photometric.noise_sigma = f64::NAN),
             ("scene", |s| s.scene.pattern = None),
             ("scene.gltf.0.scale", |s| s.scene.gltf = vec![GltfSpec { scale: 0.0, ..model() }]),
             ("scene.gltf.0.on_ground", |s| s.scene.gltf = vec![GltfSpec { on_ground: true, ..model() }]),
             ("scene.gltf.1.placements", |s| {
-                s.scene.gltf = vec![model(), GltfSpec { geodetic: Some([1.0; 3]), placements: Some("a.csv".into()), ..model() }];
+                s.scene.gltf = vec![
+                    model(),
+                    GltfSpec { geodetic: Some([1.0; 3]), placements: Some("a.csv".into()), ..model() },
+                ];
             }),
             ("scene.board.kind", |s| s.scene.board = Some(BoardSpec::default())),
             ("scene.board.target", |s| {
-                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), rows: Some(3), ..BoardSpec::default() });
+                s.scene.board =
+                    Some(BoardSpec { target: Some("a.yaml".into()), rows: Some(3), ..BoardSpec::default() });
             }),
             ("scene.board.angles_deg", |s| {
                 let angles_deg = [0.0, f64::NAN, 0.0];
-                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), angles_deg, ..BoardSpec::default() });
+                s.scene.board =
+                    Some(BoardSpec { target: Some("a.yaml".into()), angles_deg, ..BoardSpec::default() });
             }),
             ("scene.board.geodetic", |s| {
                 let geodetic = Some([91.0, 8.0, 400.0]);
-                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
+                s.scene.board =
+                    Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
             }),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
-            ("scene.light.sun_azimuth_deg", |s| s.scene.light = Some(LightSpec { sun_azimuth_deg: f64::INFINITY, ..Default::default() })),
-            ("scene.light.sun_azimuth_deg", |s| s.scene.light = Some(LightSpec { sun_azimuth_deg: 1e300, ..Default::default() })),
+            ("scene.light.sun_azimuth_deg", |s| {
+                s.scene.light = Some(LightSpec { sun_azimuth_deg: f64::INFINITY, ..Default::default() })
+            }),
+            ("scene.light.sun_azimuth_deg", |s| {
+                s.scene.light = Some(LightSpec { sun_azimuth_deg: 1e300, ..Default::default() })
+            }),
             ("scene.light.sun", |s| s.scene.light = Some(LightSpec { sun: 1.1, ..Default::default() })),
-            ("scene.light.sun_elevation_deg", |s| s.scene.light = Some(LightSpec { sun_elevation_deg: -1.0, ..Default::default() })),
+            ("scene.light.sun_elevation_deg", |s| {
+                s.scene.light = Some(LightSpec { sun_elevation_deg: -1.0, ..Default::default() })
+            }),
             ("scene.light.sun", |s| s.scene.light = Some(LightSpec { sun: f64::NAN, ..Default::default() })),
-            ("scene.light.sky", |s| s.scene.light = Some(LightSpec { sun: 0.8, sky: 0.3, ..Default::default() })),
+            ("scene.light.sky", |s| {
+                s.scene.light = Some(LightSpec { sun: 0.8, sky: 0.3, ..Default::default() })
+            }),
             ("quality.preset", |s| {
                 s.quality.preset = Preset::Paper;
                 s.camera.lens.model = LensModel::KannalaBrandt;
             }),
             ("quality.preset", |s| {
                 s.quality.preset = Preset::Paper;
-                s.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.2] };
+                s.camera.lens = LensSpec {
+                    model: LensModel::BrownConrady,
+                    coefficients: vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.2],
+                };
             }),
             ("quality.solver", |s| {
                 s.quality.preset = Preset::Paper;

@@ -1,8 +1,9 @@
 //! Calibration boards, made from their parameters: chessboards, circle grids, AprilGrids, ChArUco boards.
 //!
-//! A board is black shapes on white. Its picture holds how much of each texel is black, exactly, and its scale is chosen so that the shapes'
-//! edges fall between texels wherever their sizes have a common measure. There a bilinear read is half black exactly on the edge; an edge
-//! within a texel is off by at most 1.5 - sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least [`LEAST_TEXELS`].
+//! A board is black shapes on white. Its picture holds how much of each texel is black, exactly, and its
+//! scale is chosen so that the shapes' edges fall between texels wherever their sizes have a common measure.
+//! There a bilinear read is half black exactly on the edge; an edge within a texel is off by at most 1.5 -
+//! sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least [`LEAST_TEXELS`].
 
 use std::sync::Arc;
 
@@ -42,8 +43,9 @@ fn wrong<T>(key: &'static str, message: impl Into<String>) -> Result<T, BoardErr
 /// A point that calibration code looks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardPoint {
-    /// Chessboard, circles and ChArUco: row by row from the top left, as OpenCV counts. AprilGrid: four times the tag's number, and the corners
-    /// of a tag anticlockwise from the one at the bottom left, as Kalibr counts.
+    /// Chessboard, circles and ChArUco: row by row from the top left, as OpenCV counts. AprilGrid: four times
+    /// the tag's number, and the corners of a tag anticlockwise from the one at the bottom left, as Kalibr
+    /// counts.
     pub id: u32,
     /// From the board's middle: right and down, metres.
     pub at_m: DVec2,
@@ -74,31 +76,50 @@ impl Board {
             None => wrong(key, "is missing, and has no default; add it"),
         };
         let metres = |key, value: f64| {
-            if value.is_finite() && value > 0.0 { Ok(value) } else { wrong(key, format!("is {value}; give metres above 0")) }
+            if value.is_finite() && value > 0.0 {
+                Ok(value)
+            } else {
+                wrong(key, format!("is {value}; give metres above 0"))
+            }
         };
         let [columns, rows] = match kind {
-            BoardKind::Chessboard | BoardKind::Charuco => [count("columns", spec.columns, 2)?, count("rows", spec.rows, 2)?],
+            BoardKind::Chessboard | BoardKind::Charuco => {
+                [count("columns", spec.columns, 2)?, count("rows", spec.rows, 2)?]
+            }
             _ => [count("columns", spec.columns, 1)?, count("rows", spec.rows, 1)?],
         };
-        let Some(size_m) = spec.size_m else { return wrong("size_m", "is missing, and has no default; add it") };
+        let Some(size_m) = spec.size_m else {
+            return wrong("size_m", "is missing, and has no default; add it");
+        };
         let size_m = metres("size_m", size_m)?;
         refuse_keys_of_others(spec, kind)?;
         let layout = match kind {
-            BoardKind::Chessboard => {
-                layout::chessboard(columns, rows, DVec2::new(size_m, metres("row_size_m", spec.row_size_m.unwrap_or(size_m))?))
-            }
+            BoardKind::Chessboard => layout::chessboard(
+                columns,
+                rows,
+                DVec2::new(size_m, metres("row_size_m", spec.row_size_m.unwrap_or(size_m))?),
+            ),
             BoardKind::Circles | BoardKind::AsymmetricCircles => {
                 let diameter_m = metres("diameter_m", spec.diameter_m.unwrap_or(0.5 * size_m))?;
-                let nearest_m = if kind == BoardKind::Circles { size_m } else { std::f64::consts::SQRT_2 * size_m };
+                let nearest_m =
+                    if kind == BoardKind::Circles { size_m } else { std::f64::consts::SQRT_2 * size_m };
                 if diameter_m >= nearest_m {
-                    return wrong("diameter_m", format!("is {diameter_m}, but circles are {nearest_m:.4} m apart: make it smaller"));
+                    return wrong(
+                        "diameter_m",
+                        format!("is {diameter_m}, but circles are {nearest_m:.4} m apart: make it smaller"),
+                    );
                 }
                 layout::circles(columns, rows, size_m, diameter_m, kind == BoardKind::AsymmetricCircles)
             }
             BoardKind::Aprilgrid => {
                 let spacing = spec.spacing.unwrap_or(0.3);
                 if !(spacing > 0.0 && spacing <= 1.0) {
-                    return wrong("spacing", format!("is {spacing}; give the gap between tags as a share of size_m, above 0 and up to 1"));
+                    return wrong(
+                        "spacing",
+                        format!(
+                            "is {spacing}; give the gap between tags as a share of size_m, above 0 and up to 1"
+                        ),
+                    );
                 }
                 let first = first_id(spec, columns * rows, codes::APRIL_36H11.len())?;
                 layout::april_grid(columns, rows, size_m, spacing, first)
@@ -106,7 +127,10 @@ impl Board {
             BoardKind::Charuco => {
                 let marker_m = metres("marker_m", spec.marker_m.unwrap_or(0.75 * size_m))?;
                 if marker_m >= size_m {
-                    return wrong("marker_m", format!("is {marker_m}, but a square has {size_m} m: make it smaller"));
+                    return wrong(
+                        "marker_m",
+                        format!("is {marker_m}, but a square has {size_m} m: make it smaller"),
+                    );
                 }
                 let first = first_id(spec, columns * rows / 2, codes::ARUCO_4X4.len())?;
                 layout::charuco(columns, rows, size_m, marker_m, spec.dictionary.unwrap_or_default(), first)
@@ -119,7 +143,12 @@ impl Board {
         let board = Self { layout, margin_m };
         let side = board.scale().texels.max_element();
         if side > MOST_TEXELS {
-            return wrong("margin_m", format!("or the number of squares makes a picture of {side:.0} texels; {MOST_TEXELS} are possible"));
+            return wrong(
+                "margin_m",
+                format!(
+                    "or the number of squares makes a picture of {side:.0} texels; {MOST_TEXELS} are possible"
+                ),
+            );
         }
         Ok(board)
     }
@@ -138,7 +167,8 @@ impl Board {
     pub fn mesh(&self, centre_ned_m: DVec3, ned_from_board: DMat3) -> Mesh {
         let scale = self.scale();
         let corner = |u: f64, v: f64| {
-            let at_m = self.layout.low_m + (DVec2::new(u, v) * scale.texels - scale.margin_texels) * scale.texel_m;
+            let at_m =
+                self.layout.low_m + (DVec2::new(u, v) * scale.texels - scale.margin_texels) * scale.texel_m;
             MeshVertex::new((ned_from_board * at_m.extend(0.0)).as_vec3().to_array(), [u as f32, v as f32])
         };
         let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
@@ -151,8 +181,9 @@ impl Board {
     }
 }
 
-/// From a board's own axes (right, down, into it) to north-east-down, for roll, pitch and yaw in degrees as of a body whose nose is the
-/// board's top and whose floor is its back: 0 0 0 lies face up with its top in the north, pitch 90 stands and is looked at northwards.
+/// From a board's own axes (right, down, into it) to north-east-down, for roll, pitch and yaw in degrees as
+/// of a body whose nose is the board's top and whose floor is its back: 0 0 0 lies face up with its top in
+/// the north, pitch 90 stands and is looked at northwards.
 pub fn ned_from_board(angles_deg: [f64; 3]) -> DMat3 {
     let [roll, pitch, yaw] = angles_deg.map(f64::to_radians);
     let ned_from_body = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, yaw, pitch, roll));
@@ -163,7 +194,12 @@ pub fn ned_from_board(angles_deg: [f64; 3]) -> DMat3 {
 fn first_id(spec: &BoardSpec, tags: u32, known: usize) -> Result<u32, BoardError> {
     let first = spec.first_id.unwrap_or(0);
     if u64::from(first) + u64::from(tags) > known as u64 {
-        return wrong("first_id", format!("is {first} and the board has {tags} tags, but the family has {known}: fewer columns or rows"));
+        return wrong(
+            "first_id",
+            format!(
+                "is {first} and the board has {tags} tags, but the family has {known}: fewer columns or rows"
+            ),
+        );
     }
     Ok(first)
 }

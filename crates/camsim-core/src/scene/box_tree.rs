@@ -25,7 +25,10 @@ struct Node {
 impl BoxTree {
     /// Over things that are known by their place in `boxes`. Empty boxes are left out.
     pub fn new(boxes: &[Aabb]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), things: (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect() };
+        let mut tree = Self {
+            nodes: Vec::new(),
+            things: (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect(),
+        };
         let mut things = std::mem::take(&mut tree.things);
         if !things.is_empty() {
             tree.build(boxes, &mut things, 0);
@@ -66,16 +69,22 @@ impl BoxTree {
         found
     }
 
-    /// The smallest of what `measure` says of the leaves' boxes, infinite without any. `None` leaves out a box and all in it; a box must not be
-    /// farther than those in it.
+    /// The smallest of what `measure` says of the leaves' boxes, infinite without any. `None` leaves out a
+    /// box and all in it; a box must not be farther than those in it.
     pub fn nearest_box_m(&self, measure: impl Fn(&Aabb) -> Option<f64>) -> f64 {
         self.nearest(&measure, |node| measure(&node.bounds).unwrap_or(f64::INFINITY))
     }
 
     /// The same with what `of_thing` says of the things themselves.
-    pub fn nearest_thing_m(&self, measure: impl Fn(&Aabb) -> Option<f64>, of_thing: impl Fn(u32) -> f64) -> f64 {
+    pub fn nearest_thing_m(
+        &self,
+        measure: impl Fn(&Aabb) -> Option<f64>,
+        of_thing: impl Fn(u32) -> f64,
+    ) -> f64 {
         let things = |node: &Node| &self.things[node.next as usize..(node.next + node.count) as usize];
-        self.nearest(&measure, |node| things(node).iter().map(|&thing| of_thing(thing)).fold(f64::INFINITY, f64::min))
+        self.nearest(&measure, |node| {
+            things(node).iter().map(|&thing| of_thing(thing)).fold(f64::INFINITY, f64::min)
+        })
     }
 
     fn nearest(&self, measure: &impl Fn(&Aabb) -> Option<f64>, of_leaf: impl Fn(&Node) -> f64) -> f64 {
@@ -92,7 +101,9 @@ impl BoxTree {
                     let children = [far(at + 1), far(node.next as usize)];
                     let swap = matches!(children, [Some(a), Some(b)] if a.0 < b.0);
                     // The nearer one last, so that it comes off first.
-                    stack.extend(if swap { [children[1], children[0]] } else { children }.into_iter().flatten());
+                    stack.extend(
+                        if swap { [children[1], children[0]] } else { children }.into_iter().flatten(),
+                    );
                 }
             }
         }
@@ -111,7 +122,8 @@ pub(super) fn halves<'a>(boxes: &[Aabb], things: &'a mut [u32]) -> (&'a mut [u32
     let mut centres = Aabb::EMPTY;
     things.iter().for_each(|&thing| centres.include(centre(thing)));
     let sides = centres.max - centres.min;
-    let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
+    let axis =
+        [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
     let middle = things.len() / 2;
     if things.len() > 1 {
         things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
@@ -143,8 +155,10 @@ mod tests {
             let tree = BoxTree::new(&boxes);
             for k in 0..200 {
                 let angle = 0.1 * f64::from(k);
-                let origin = DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.2 * f64::from(k));
-                // A leaf's box holds up to four: not farther than the nearest, and nothing nearer than the leaf.
+                let origin =
+                    DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.2 * f64::from(k));
+                // A leaf's box holds up to four: not farther than the nearest, and nothing nearer than the
+                // leaf.
                 let nearest = boxes.iter().map(|of| of.distance_m(origin)).fold(f64::INFINITY, f64::min);
                 assert!(tree.nearest_box_m(|bounds| Some(bounds.distance_m(origin))) <= nearest);
                 let of_thing = |thing: u32| boxes[thing as usize].distance_m(origin);

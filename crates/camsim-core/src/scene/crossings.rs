@@ -1,7 +1,9 @@
-//! Blended triangles that pass through each other, cut where they do: of such two no whole one is behind the other, of their pieces one is.
+//! Blended triangles that pass through each other, cut where they do: of such two no whole one is behind the
+//! other, of their pieces one is.
 //!
-//! Of each two the smaller is cut along the other's plane. An edge is cut for all triangles of its shape that have it, so that no crack opens. What is
-//! seen stays the same but for positions, which are rounded as all are, and the lengths of interpolated normals.
+//! Of each two the smaller is cut along the other's plane. An edge is cut for all triangles of its shape that
+//! have it, so that no crack opens. What is seen stays the same but for positions, which are rounded as all
+//! are, and the lengths of interpolated normals.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -25,25 +27,34 @@ pub struct Crossings {
     pub left: usize,
 }
 
-/// Cuts the triangles of what is mixed where they cross each other. Never into more than [`MOST_TRIANGLES`] of them all: no order is sure to be
-/// found for so many.
+/// Cuts the triangles of what is mixed where they cross each other. Never into more than [`MOST_TRIANGLES`]
+/// of them all: no order is sure to be found for so many.
 pub fn cut_where_blended_cross(meshes: &mut [Mesh]) -> Crossings {
     let mut done = Crossings::default();
-    let blended =
-        |meshes: &[Mesh]| -> usize { meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| mesh.shape.indices.len() / 3).sum() };
+    let blended = |meshes: &[Mesh]| -> usize {
+        meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| mesh.shape.indices.len() / 3).sum()
+    };
     if blended(meshes) > MOST_TRIANGLES {
         return done;
     }
     // Within each shape, once for all that share it.
     let mut own: HashMap<*const Shape, Arc<Shape>> = HashMap::new();
-    let shapes: Vec<Arc<Shape>> = meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| mesh.shape.clone()).collect();
+    let shapes: Vec<Arc<Shape>> =
+        meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| mesh.shape.clone()).collect();
     for shape in &shapes {
         own.entry(Arc::as_ptr(shape)).or_insert_with(|| {
             let triangles = triangles(0, shape, &|at| at);
-            cut_shape(shape, &triangles, &cutters(&triangles, |_, _| true), &|at| at, (MOST_TRIANGLES, &mut done))
+            cut_shape(
+                shape,
+                &triangles,
+                &cutters(&triangles, |_, _| true),
+                &|at| at,
+                (MOST_TRIANGLES, &mut done),
+            )
         });
     }
-    let with_own = |mesh: &Mesh| own.get(&Arc::as_ptr(&mesh.shape)).map_or(0, |shape| shape.indices.len() / 3);
+    let with_own =
+        |mesh: &Mesh| own.get(&Arc::as_ptr(&mesh.shape)).map_or(0, |shape| shape.indices.len() / 3);
     if meshes.iter().filter(|mesh| mesh.material.blends).map(with_own).sum::<usize>() > MOST_TRIANGLES {
         return Crossings { more: 0, left: done.more.max(1) };
     }
@@ -54,12 +65,23 @@ pub fn cut_where_blended_cross(meshes: &mut [Mesh]) -> Crossings {
     }
     let most_more = done.more + MOST_TRIANGLES.saturating_sub(blended(meshes));
     // Between meshes.
-    let of_mesh = |(i, mesh): (usize, &Mesh)| triangles(i, &mesh.shape, &|at| mesh.origin_ned_m + mesh.ned_from_shape * at);
-    let all: Vec<Triangle> = meshes.iter().enumerate().filter(|(_, mesh)| mesh.material.blends).flat_map(of_mesh).collect();
+    let of_mesh = |(i, mesh): (usize, &Mesh)| {
+        triangles(i, &mesh.shape, &|at| mesh.origin_ned_m + mesh.ned_from_shape * at)
+    };
+    let all: Vec<Triangle> =
+        meshes.iter().enumerate().filter(|(_, mesh)| mesh.material.blends).flat_map(of_mesh).collect();
     let cutters = cutters(&all, |a, b| a.mesh != b.mesh);
-    let concerned: HashSet<usize> = all.iter().zip(&cutters).filter(|(_, by)| !by.is_empty()).map(|(triangle, _)| triangle.mesh).collect();
+    let concerned: HashSet<usize> = all
+        .iter()
+        .zip(&cutters)
+        .filter(|(_, by)| !by.is_empty())
+        .map(|(triangle, _)| triangle.mesh)
+        .collect();
     for (i, mesh) in meshes.iter_mut().enumerate().filter(|(i, _)| concerned.contains(i)) {
-        let (first, end) = (all.partition_point(|triangle| triangle.mesh < i), all.partition_point(|triangle| triangle.mesh <= i));
+        let (first, end) = (
+            all.partition_point(|triangle| triangle.mesh < i),
+            all.partition_point(|triangle| triangle.mesh <= i),
+        );
         let (origin_ned_m, ned_from_shape) = (mesh.origin_ned_m, mesh.ned_from_shape);
         mesh.shape = cut_shape(
             &mesh.shape,
@@ -80,8 +102,14 @@ struct Triangle {
 }
 
 fn triangles(mesh: usize, shape: &Shape, stand: &dyn Fn(DVec3) -> DVec3) -> Vec<Triangle> {
-    let at = |&corner: &u32| shape.vertices.get(corner as usize).map_or(DVec3::NAN, |vertex| stand(position(vertex)));
-    shape.indices.chunks_exact(3).map(|of| Triangle { mesh, points: [at(&of[0]), at(&of[1]), at(&of[2])] }).collect()
+    let at = |&corner: &u32| {
+        shape.vertices.get(corner as usize).map_or(DVec3::NAN, |vertex| stand(position(vertex)))
+    };
+    shape
+        .indices
+        .chunks_exact(3)
+        .map(|of| Triangle { mesh, points: [at(&of[0]), at(&of[1]), at(&of[2])] })
+        .collect()
 }
 
 fn position(vertex: &MeshVertex) -> DVec3 {
@@ -102,7 +130,8 @@ fn cutters(all: &[Triangle], may: impl Fn(&Triangle, &Triangle) -> bool) -> Vec<
     let of = |a: usize| {
         let mut others = tree.overlapping(&boxes[a]);
         others.sort_unstable();
-        let crossed = |&b: &usize| may(&all[a], &all[b]) && is_larger(b, a) && cross(&all[a].points, &all[b].points);
+        let crossed =
+            |&b: &usize| may(&all[a], &all[b]) && is_larger(b, a) && cross(&all[a].points, &all[b].points);
         others.into_iter().map(|b| b as usize).filter(crossed).map(|b| all[b].points).collect()
     };
     (0..all.len()).map(of).collect()
@@ -112,22 +141,27 @@ fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (*b - *a).cross(*c - *a)
 }
 
-/// Distances of corners from a plane, times the length of its normal; `None` where they are all on one side of it, or next to it.
+/// Distances of corners from a plane, times the length of its normal; `None` where they are all on one side
+/// of it, or next to it.
 fn sides(of: &[DVec3; 3], plane: &[DVec3; 3]) -> Option<[f64; 3]> {
     let normal = normal(plane);
     let sides = of.map(|point| normal.dot(point - plane[0]));
-    let (low, high) = sides.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+    let (low, high) =
+        sides.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
     let hair = HAIR * high.max(-low);
     (low < -hair && high > hair).then_some(sides)
 }
 
-/// Whether each of two triangles has corners on both sides of the other, and they meet along more than a point.
+/// Whether each of two triangles has corners on both sides of the other, and they meet along more than a
+/// point.
 fn cross(a: &[DVec3; 3], b: &[DVec3; 3]) -> bool {
     let (Some(of_a), Some(of_b)) = (sides(a, b), sides(b, a)) else { return false };
     let along = normal(a).cross(normal(b)).normalize_or_zero();
     let span = |points: &[DVec3; 3], sides: [f64; 3]| {
         let mut span = [f64::INFINITY, f64::NEG_INFINITY];
-        for (i, j) in [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| (sides[i] < 0.0) != (sides[j] < 0.0)) {
+        for (i, j) in
+            [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| (sides[i] < 0.0) != (sides[j] < 0.0))
+        {
             let at = along.dot(points[i].lerp(points[j], sides[i] / (sides[i] - sides[j])) - a[0]);
             span = [span[0].min(at), span[1].max(at)];
         }
@@ -149,12 +183,17 @@ fn cut_shape(
     if cutters.iter().all(Vec::is_empty) {
         return shape.clone();
     }
-    let pieces = shape.indices.chunks_exact(3).enumerate().map(|(of, corners)| Piece { corners: [corners[0], corners[1], corners[2]], of });
+    let pieces = shape
+        .indices
+        .chunks_exact(3)
+        .enumerate()
+        .map(|(of, corners)| Piece { corners: [corners[0], corners[1], corners[2]], of });
     let mut work = Work { shape: Shape::clone(shape), pieces: pieces.collect(), between: HashMap::new() };
     let before = work.pieces.len();
     for (of, by) in cutters.iter().enumerate().take(triangles.len()) {
         for plane in by {
-            let mine: Vec<[u32; 3]> = work.pieces.iter().filter(|piece| piece.of == of).map(|piece| piece.corners).collect();
+            let mine: Vec<[u32; 3]> =
+                work.pieces.iter().filter(|piece| piece.of == of).map(|piece| piece.corners).collect();
             for corners in mine {
                 let points = corners.map(|corner| stand(position(&work.shape.vertices[corner as usize])));
                 let Some(sides) = sides(&points, plane).filter(|_| cross(&points, plane)) else { continue };
@@ -163,7 +202,9 @@ fn cut_shape(
                     continue;
                 }
                 let hair = HAIR * sides.iter().fold(0.0, |most: f64, side| most.max(side.abs()));
-                let is_cut = |&(i, j): &(usize, usize)| sides[i] * sides[j] < 0.0 && sides[i].abs().min(sides[j].abs()) > hair;
+                let is_cut = |&(i, j): &(usize, usize)| {
+                    sides[i] * sides[j] < 0.0 && sides[i].abs().min(sides[j].abs()) > hair
+                };
                 for (i, j) in [(0, 1), (1, 2), (2, 0)].into_iter().filter(is_cut) {
                     work.cut_edge(corners[i], corners[j], sides[i] / (sides[i] - sides[j]));
                 }
@@ -221,8 +262,11 @@ impl Work {
             self.shape.normals.push(normal.to_array());
         }
         let corner = self.shape.vertices.len() as u32;
-        let vertex =
-            MeshVertex { position_m: mix(a.position_m, b.position_m, part), uv: mix(a.uv, b.uv, part), tint: mix(a.tint, b.tint, part) };
+        let vertex = MeshVertex {
+            position_m: mix(a.position_m, b.position_m, part),
+            uv: mix(a.uv, b.uv, part),
+            tint: mix(a.tint, b.tint, part),
+        };
         self.shape.vertices.push(vertex);
         self.between.insert([from, to], corner);
         corner

@@ -1,7 +1,7 @@
 //! Levels of detail of shapes: fewer triangles, at a known distance from the full surface.
 //!
-//! A level is within its error of the full shape, and the shape of it, as surfaces with their colours and texture coordinates
-//! (`levels/space.rs`). Seen from a distance that is a number of pixels.
+//! A level is within its error of the full shape, and the shape of it, as surfaces with their colours and
+//! texture coordinates (`levels/space.rs`). Seen from a distance that is a number of pixels.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -58,7 +58,11 @@ impl ShapeLevels {
         if !(FEWEST_TRIANGLES..=MOST_TRIANGLES).contains(&(shape.indices.len() / 3)) || !is_sound {
             return Self::full(shape);
         }
-        if shape.has_normals() { Self::simplified::<{ space::LIT }>(shape) } else { Self::simplified::<{ space::UNLIT }>(shape) }
+        if shape.has_normals() {
+            Self::simplified::<{ space::LIT }>(shape)
+        } else {
+            Self::simplified::<{ space::UNLIT }>(shape)
+        }
     }
 
     fn simplified<const AXES: usize>(shape: &Shape) -> Self {
@@ -107,18 +111,29 @@ pub struct SceneLevels {
 }
 
 impl SceneLevels {
-    /// Simplifies each shape of a scene once. What is mixed with what is behind it stays whole: how many layers there are, one behind the other, no
-    /// distance between surfaces bounds.
+    /// Simplifies each shape of a scene once. What is mixed with what is behind it stays whole: how many
+    /// layers there are, one behind the other, no distance between surfaces bounds.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let mut shapes: HashMap<usize, &Arc<Shape>> = HashMap::new();
-        let blended: HashSet<usize> =
-            scene.meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| Arc::as_ptr(&mesh.shape) as usize).collect();
+        let blended: HashSet<usize> = scene
+            .meshes
+            .iter()
+            .filter(|mesh| mesh.material.blends)
+            .map(|mesh| Arc::as_ptr(&mesh.shape) as usize)
+            .collect();
         scene.meshes.iter().for_each(|mesh| {
             shapes.insert(Arc::as_ptr(&mesh.shape) as usize, &mesh.shape);
         });
         let levels = |(key, shape): (usize, &Arc<Shape>)| {
-            (key, Arc::new(if blended.contains(&key) { ShapeLevels::full(shape) } else { ShapeLevels::new(shape) }))
+            (
+                key,
+                Arc::new(if blended.contains(&key) {
+                    ShapeLevels::full(shape)
+                } else {
+                    ShapeLevels::new(shape)
+                }),
+            )
         };
         Self { of: shapes.into_par_iter().map(levels).collect() }
     }
@@ -126,7 +141,10 @@ impl SceneLevels {
     /// Of a shape of the scene.
     #[must_use]
     pub fn of(&self, shape: &Arc<Shape>) -> Arc<ShapeLevels> {
-        self.of.get(&(Arc::as_ptr(shape) as usize)).cloned().unwrap_or_else(|| Arc::new(ShapeLevels::full(shape)))
+        self.of
+            .get(&(Arc::as_ptr(shape) as usize))
+            .cloned()
+            .unwrap_or_else(|| Arc::new(ShapeLevels::full(shape)))
     }
 }
 
@@ -139,7 +157,8 @@ pub struct LevelTolerance {
     pub tangents: [f64; 4],
     /// How far a surface may be displaced in it, pixels.
     pub error_px: f64,
-    /// How far the camera gets from the ideal frame's while it is looked at, metres, and how far that may displace a surface, pixels.
+    /// How far the camera gets from the ideal frame's while it is looked at, metres, and how far that may
+    /// displace a surface, pixels.
     pub travel_m: f64,
     /// As above.
     pub parallax_px: f64,
@@ -148,8 +167,9 @@ pub struct LevelTolerance {
 impl LevelTolerance {
     /// Metres by which the surfaces within a box may be displaced, seen from a pose.
     ///
-    /// A point at the depth z and the tangents u, v moves by at most `f sqrt(1 + u^2 + v^2) / z` pixels a metre. What is displaced by `e` towards
-    /// the camera has a parallax of another depth: `f travel e / z^2`, along a surface that is turned by up to 75 degrees four times that.
+    /// A point at the depth z and the tangents u, v moves by at most `f sqrt(1 + u^2 + v^2) / z` pixels a
+    /// metre. What is displaced by `e` towards the camera has a parallax of another depth: `f travel e /
+    /// z^2`, along a surface that is turned by up to 75 degrees four times that.
     #[must_use]
     pub fn error_m(&self, bounds: &Aabb, pose: &CameraPose) -> f64 {
         let ahead = pose.ned_from_camera * DVec3::Z;
@@ -159,7 +179,8 @@ impl LevelTolerance {
             return 0.0;
         }
         let [u_min, u_max, v_min, v_max] = self.tangents;
-        let widest = (1.0 + u_min.abs().max(u_max.abs()).powi(2) + v_min.abs().max(v_max.abs()).powi(2)).sqrt();
+        let widest =
+            (1.0 + u_min.abs().max(u_max.abs()).powi(2) + v_min.abs().max(v_max.abs()).powi(2)).sqrt();
         let px_per_m = self.focal_px * widest / z_m;
         let by_parallax_m = self.parallax_px * z_m / (4.0 * self.focal_px * widest * self.travel_m) * z_m;
         (self.error_px / px_per_m).min(by_parallax_m)
@@ -195,8 +216,9 @@ impl ModelDetail {
     }
 }
 
-/// By how much a mesh stretches what its shape's levels are away from it. More than anything where light falls on a shape that is stretched in one
-/// direction more than in another: its normals turn towards each other and apart then, of which the levels know nothing.
+/// By how much a mesh stretches what its shape's levels are away from it. More than anything where light
+/// falls on a shape that is stretched in one direction more than in another: its normals turn towards each
+/// other and apart then, of which the levels know nothing.
 #[must_use]
 pub fn level_stretch(mesh: &Mesh) -> f64 {
     let largest = stretch(&mesh.ned_from_shape);

@@ -1,11 +1,13 @@
 //! Sun and sky on request: how much of the light a surface sends back, besides its colour (Lambert).
 //!
-//! `I(n) = sun max(0, n.s) + sky (1 + n.up) / 2`, with s towards the sun: a plane that is met at right angles by the sun has `sun` of its albedo,
-//! and one that faces upwards all of `sky`. No shadows and no gloss: it depends on the surface's point (and its side) alone, so that a
-//! point keeps its brightness wherever it is seen from, and whenever.
+//! `I(n) = sun max(0, n.s) + sky (1 + n.up) / 2`, with s towards the sun: a plane that is met at right angles
+//! by the sun has `sun` of its albedo, and one that faces upwards all of `sky`. No shadows and no gloss: it
+//! depends on the surface's point (and its side) alone, so that a point keeps its brightness wherever it is
+//! seen from, and whenever.
 //!
-//! Models interpolate the normals of their corners and take I of what that gives, *not made a unit vector again*: I is then at most
-//! `sun + sky / 2` times as different as two normals are, which is what their levels of detail are bounded by. The ground has it in its picture.
+//! Models interpolate the normals of their corners and take I of what that gives, *not made a unit vector
+//! again*: I is then at most `sun + sky / 2` times as different as two normals are, which is what their
+//! levels of detail are bounded by. The ground has it in its picture.
 
 use glam::{DMat3, DVec3};
 
@@ -29,19 +31,22 @@ impl Light {
     #[must_use]
     pub fn new(azimuth_rad: f64, elevation_rad: f64, sun: f64, sky: f64) -> Self {
         let (sin, cos) = azimuth_rad.sin_cos();
-        let to_sun_ned = DVec3::new(elevation_rad.cos() * cos, elevation_rad.cos() * sin, -elevation_rad.sin());
+        let to_sun_ned =
+            DVec3::new(elevation_rad.cos() * cos, elevation_rad.cos() * sin, -elevation_rad.sin());
         Self { to_sun_ned, sun, sky }
     }
 
-    /// Factor of a colour where the outward normal is this, 0..=1; shorter than a unit vector where it lies between corners.
+    /// Factor of a colour where the outward normal is this, 0..=1; shorter than a unit vector where it lies
+    /// between corners.
     #[must_use]
     pub fn on(&self, normal_ned: DVec3) -> f64 {
-        (self.sun * normal_ned.dot(self.to_sun_ned).max(0.0) + self.sky * 0.5 * (1.0 - normal_ned.z)).clamp(0.0, 1.0)
+        (self.sun * normal_ned.dot(self.to_sun_ned).max(0.0) + self.sky * 0.5 * (1.0 - normal_ned.z))
+            .clamp(0.0, 1.0)
     }
 }
 
-/// Where a normal in a shape's axes points once the shape stands: by the cofactors of its matrix, which are its inverse's transpose but for the
-/// length. Zero where a matrix leaves nothing of it.
+/// Where a normal in a shape's axes points once the shape stands: by the cofactors of its matrix, which are
+/// its inverse's transpose but for the length. Zero where a matrix leaves nothing of it.
 #[must_use]
 pub fn turned_normal(ned_from_shape: &DMat3, normal: DVec3) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|axis| ned_from_shape.row(axis));
@@ -62,7 +67,10 @@ mod tests {
         // From the south-west, 30 degrees up.
         let light = Light::new(225_f64.to_radians(), 30_f64.to_radians(), 0.7, 0.3);
         let (cos, sin) = (0.75_f64.sqrt(), 0.5);
-        assert!((light.to_sun_ned - DVec3::new(-cos * 0.5_f64.sqrt(), -cos * 0.5_f64.sqrt(), -sin)).length() < 1e-12);
+        assert!(
+            (light.to_sun_ned - DVec3::new(-cos * 0.5_f64.sqrt(), -cos * 0.5_f64.sqrt(), -sin)).length()
+                < 1e-12
+        );
         // Level ground, a ceiling, walls to the sun, away from it and past it.
         let wall = DVec3::new(-0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0);
         for (normal, expected) in [
@@ -82,8 +90,12 @@ mod tests {
     fn light_differs_no_more_than_normals_do() {
         let light = Light::new(1.0, 0.6, 0.8, 0.2);
         let within_ball = |k: u32| {
-            let [a, b, c, d] = crate::noise::pcg4d([k, 5, 2, 9]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
-            DQuat::from_rotation_z(7.0 * a) * DQuat::from_rotation_x(7.0 * b) * DVec3::new(c.cbrt(), 0.0, 0.0) * (0.5 + 0.5 * d)
+            let [a, b, c, d] =
+                crate::noise::pcg4d([k, 5, 2, 9]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
+            DQuat::from_rotation_z(7.0 * a)
+                * DQuat::from_rotation_x(7.0 * b)
+                * DVec3::new(c.cbrt(), 0.0, 0.0)
+                * (0.5 + 0.5 * d)
         };
         for k in 0..2000 {
             let (m, n) = (within_ball(2 * k), within_ball(2 * k + 1));
@@ -96,14 +108,19 @@ mod tests {
         let (along, across) = (DVec3::new(1.0, 2.0, -0.5), DVec3::new(-0.3, 0.7, 1.1));
         let normal = along.cross(across).normalize();
         let turn = DMat3::from_quat(DQuat::from_rotation_z(0.4) * DQuat::from_rotation_x(1.9));
-        for (scale, mirrored) in
-            [([2.0, 2.0, 2.0], false), ([1.0, 5.0, 0.2], false), ([-1.0, 3.0, 1.0], true), ([1e-6, -1e-6, -1e-6], false)]
-        {
+        for (scale, mirrored) in [
+            ([2.0, 2.0, 2.0], false),
+            ([1.0, 5.0, 0.2], false),
+            ([-1.0, 3.0, 1.0], true),
+            ([1e-6, -1e-6, -1e-6], false),
+        ] {
             let matrix = turn * DMat3::from_diagonal(DVec3::from_array(scale));
             let (a, b) = (matrix * along, matrix * across);
             let found = turned_normal(&matrix, normal);
             assert!(
-                (found.length() - 1.0).abs() < 1e-12 && found.dot(a.normalize()).abs() < 1e-12 && found.dot(b.normalize()).abs() < 1e-12
+                (found.length() - 1.0).abs() < 1e-12
+                    && found.dot(a.normalize()).abs() < 1e-12
+                    && found.dot(b.normalize()).abs() < 1e-12
             );
             // The side that it is on moves along with it.
             assert!(found.dot(matrix * normal) > 0.0, "{scale:?}");

@@ -1,4 +1,5 @@
-//! Textured triangle meshes: a shape, what it is covered with, and where it stands. Many meshes may share one shape.
+//! Textured triangle meshes: a shape, what it is covered with, and where it stands. Many meshes may share one
+//! shape.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -12,7 +13,8 @@ use super::{Aabb, Light, Texture, light::turned_normal, terrain::intersect_trian
 pub struct MeshVertex {
     /// Metres in the shape's own axes, from [`Mesh::origin_ned_m`].
     pub position_m: [f32; 3],
-    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right one.
+    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right
+    /// one.
     pub uv: [f32; 2],
     /// Factor of the texture's colour, linear light, and of its alpha; 0..=1.
     pub tint: [f32; 4],
@@ -49,7 +51,8 @@ impl Shape {
         !self.normals.is_empty() && self.normals.len() == self.vertices.len()
     }
 
-    /// For each corner the first that is equal to it in all: files give each side corners of its own, for normals and pictures that may not be there.
+    /// For each corner the first that is equal to it in all: files give each side corners of its own, for
+    /// normals and pictures that may not be there.
     #[must_use]
     pub fn first_equals(&self) -> Vec<u32> {
         // 0 and -0 are one number.
@@ -58,14 +61,18 @@ impl Shape {
         let mut known = HashMap::new();
         let corners = (0..).zip(&self.vertices);
         corners
-            .map(|(i, MeshVertex { position_m, uv, tint })| *known.entry((bits(position_m), bits(uv), bits(tint), normal(i))).or_insert(i))
+            .map(|(i, MeshVertex { position_m, uv, tint })| {
+                *known.entry((bits(position_m), bits(uv), bits(tint), normal(i))).or_insert(i)
+            })
             .collect()
     }
 
     /// Smallest box around the corners, in the shape's own axes.
     pub fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
-        self.vertices.iter().for_each(|vertex| bounds.include(DVec3::from_array(vertex.position_m.map(f64::from))));
+        self.vertices
+            .iter()
+            .for_each(|vertex| bounds.include(DVec3::from_array(vertex.position_m.map(f64::from))));
         bounds
     }
 }
@@ -81,9 +88,11 @@ pub struct Material {
     pub nearest: bool,
     /// Light that is added to the picture's, linear.
     pub emissive: [f32; 3],
-    /// Where the picture's alpha, times the tint's, is below this there is no surface. The picture at full size counts, bilinear.
+    /// Where the picture's alpha, times the tint's, is below this there is no surface. The picture at full
+    /// size counts, bilinear.
     pub cutoff: Option<f32>,
-    /// Whether its colour is mixed with what is behind it, by alpha, wherever there is any: the cut-off then says where it has depth.
+    /// Whether its colour is mixed with what is behind it, by alpha, wherever there is any: the cut-off then
+    /// says where it has depth.
     pub blends: bool,
     /// Whether only the side is there from which the triangles turn anticlockwise.
     pub one_sided: bool,
@@ -92,13 +101,22 @@ pub struct Material {
 impl Material {
     /// A picture, seen from both sides, without holes.
     pub fn picture(texture: Arc<Texture>, wrap: Wrap) -> Self {
-        Self { texture, wrap: [wrap; 2], nearest: false, emissive: [0.0; 3], cutoff: None, blends: false, one_sided: false }
+        Self {
+            texture,
+            wrap: [wrap; 2],
+            nearest: false,
+            emissive: [0.0; 3],
+            cutoff: None,
+            blends: false,
+            one_sided: false,
+        }
     }
 
     /// Whether two materials share their texture and are otherwise equal.
     pub fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.texture, &other.texture)
-            && (self.wrap, self.nearest, self.cutoff, self.one_sided) == (other.wrap, other.nearest, other.cutoff, other.one_sided)
+            && (self.wrap, self.nearest, self.cutoff, self.one_sided)
+                == (other.wrap, other.nearest, other.cutoff, other.one_sided)
             && (self.emissive, self.blends) == (other.emissive, other.blends)
     }
 
@@ -117,41 +135,67 @@ pub struct Mesh {
     pub material: Material,
     /// NED position of the shape's origin, metres.
     pub origin_ned_m: DVec3,
-    /// From the shape's axes to north-east-down; may turn, scale and mirror. Triangles have their fronts where they turn anticlockwise as the mesh stands: those of a shape that is mirrored turn the other
-    /// way in its own axes.
+    /// From the shape's axes to north-east-down; may turn, scale and mirror. Triangles have their fronts
+    /// where they turn anticlockwise as the mesh stands: those of a shape that is mirrored turn the other way
+    /// in its own axes.
     pub ned_from_shape: DMat3,
 }
 
 impl Mesh {
     /// A mesh whose corners are in north-east-down from `origin_ned_m`, three `indices` a triangle.
-    pub fn new(vertices: Vec<MeshVertex>, indices: Vec<u32>, texture: Arc<Texture>, origin_ned_m: DVec3, wrap: Wrap) -> Self {
+    pub fn new(
+        vertices: Vec<MeshVertex>,
+        indices: Vec<u32>,
+        texture: Arc<Texture>,
+        origin_ned_m: DVec3,
+        wrap: Wrap,
+    ) -> Self {
         let shape = Arc::new(Shape { vertices, indices, normals: Vec::new() });
-        Self { shape, material: Material::picture(texture, wrap), origin_ned_m, ned_from_shape: DMat3::IDENTITY }
+        Self {
+            shape,
+            material: Material::picture(texture, wrap),
+            origin_ned_m,
+            ned_from_shape: DMat3::IDENTITY,
+        }
     }
 
-    /// A level picture on the ground: image top to the north, image left to the west, `width_m` from the picture's left edge to its
-    /// right edge; the height follows from square pixels. `centre_ned_m` is the middle of the picture.
+    /// A level picture on the ground: image top to the north, image left to the west, `width_m` from the
+    /// picture's left edge to its right edge; the height follows from square pixels. `centre_ned_m` is the
+    /// middle of the picture.
     pub fn level_picture(texture: Arc<Texture>, centre_ned_m: DVec3, width_m: f64) -> Self {
         let [width_px, height_px] = texture.size_px.map(f64::from);
         let half_east = (0.5 * width_m) as f32;
         let half_north = (0.5 * width_m * height_px / width_px) as f32;
-        let corner = |u: f32, v: f32| MeshVertex::new([half_north * (1.0 - 2.0 * v), half_east * (2.0 * u - 1.0), 0.0], [u, v]);
+        let corner = |u: f32, v: f32| {
+            MeshVertex::new([half_north * (1.0 - 2.0 * v), half_east * (2.0 * u - 1.0), 0.0], [u, v])
+        };
         let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
         // The diagonal runs from north-west to south-east, as in the terrain.
         Self::new(vertices, vec![0, 3, 1, 0, 2, 3], texture, centre_ned_m, Wrap::Clamp)
     }
 
-    /// First point along `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture coordinates there. Looks at
-    /// every triangle, and neither at its side nor at holes.
-    pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<(f64, [f64; 2])> {
+    /// First point along `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture
+    /// coordinates there. Looks at every triangle, and neither at its side nor at holes.
+    pub fn intersect(
+        &self,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        t_max: f64,
+    ) -> Option<(f64, [f64; 2])> {
         let mut best = None;
         let mut limit = t_max;
         for corners in self.shape.indices.chunks_exact(3) {
             let corners = [corners[0], corners[1], corners[2]];
-            if let Some((t, weights)) = intersect_triangle(corners.map(|v| self.position_ned_m(v)), origin_ned_m, direction_ned, limit) {
+            if let Some((t, weights)) = intersect_triangle(
+                corners.map(|v| self.position_ned_m(v)),
+                origin_ned_m,
+                direction_ned,
+                limit,
+            ) {
                 let uvs = corners.map(|v| self.shape.vertices[v as usize].uv);
                 limit = t;
-                best = Some((t, [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum())));
+                best =
+                    Some((t, [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum())));
             }
         }
         best
@@ -170,12 +214,16 @@ impl Mesh {
 
     /// NED position of a vertex, metres.
     pub fn position_ned_m(&self, vertex: u32) -> DVec3 {
-        self.origin_ned_m + self.ned_from_shape * glam::Vec3::from(self.shape.vertices[vertex as usize].position_m).as_dvec3()
+        self.origin_ned_m
+            + self.ned_from_shape
+                * glam::Vec3::from(self.shape.vertices[vertex as usize].position_m).as_dvec3()
     }
 
-    /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right side, and no hole.
+    /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right
+    /// side, and no hole.
     pub fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
-        self.faces(corners, direction_ned) && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
+        self.faces(corners, direction_ned)
+            && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
     }
 
     /// Whether a triangle is there for what looks along a direction.
@@ -201,7 +249,8 @@ impl Mesh {
         [0, 1, 2, 3].map(|channel: usize| (0..3).map(|k| weights[k] * f64::from(of[k][channel])).sum())
     }
 
-    /// Factor of the picture's colour between three corners, seen along a direction: light on the side that is seen, or 1 without normals.
+    /// Factor of the picture's colour between three corners, seen along a direction: light on the side that
+    /// is seen, or 1 without normals.
     pub fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
         if !self.shape.has_normals() {
             return 1.0;
@@ -232,7 +281,10 @@ mod tests {
         let bottom_right = mesh.shape.vertices.iter().position(|v| v.uv == [1.0, 1.0]).expect("corner");
         assert_eq!(mesh.position_ned_m(bottom_right as u32), DVec3::new(90.0, -30.0, 3.0));
         let (t, uv) = mesh.intersect(DVec3::new(105.0, -40.0, -7.0), DVec3::Z, 100.0).expect("hit");
-        assert!((t - 10.0).abs() < 1e-9 && (uv[0] - 0.75).abs() < 1e-9 && (uv[1] - 0.25).abs() < 1e-9, "{t} {uv:?}");
+        assert!(
+            (t - 10.0).abs() < 1e-9 && (uv[0] - 0.75).abs() < 1e-9 && (uv[1] - 0.25).abs() < 1e-9,
+            "{t} {uv:?}"
+        );
         assert_eq!(mesh.intersect(DVec3::new(111.0, -40.0, -7.0), DVec3::Z, 100.0), None);
         // Both triangles turn the same way and cover the rectangle.
         let area: f64 = mesh
@@ -249,7 +301,11 @@ mod tests {
 
     #[test]
     fn a_turned_shape_is_within_its_box_and_shows_one_side() {
-        let texture = Arc::new(Texture { size_px: [2, 1], rgba8: vec![9, 9, 9, 0, 9, 9, 9, 255], encoding: Encoding::Linear });
+        let texture = Arc::new(Texture {
+            size_px: [2, 1],
+            rgba8: vec![9, 9, 9, 0, 9, 9, 9, 255],
+            encoding: Encoding::Linear,
+        });
         let mut mesh = Mesh::level_picture(texture, DVec3::new(5.0, 6.0, 7.0), 4.0);
         mesh.ned_from_shape = DMat3::from_rotation_z(0.7) * DMat3::from_rotation_x(0.4) * 2.0;
         let bounds = mesh.bounds();
@@ -257,13 +313,18 @@ mod tests {
             assert!(bounds.distance_m(mesh.position_ned_m(vertex)) < 1e-12);
         }
         let triangle = [mesh.shape.indices[0], mesh.shape.indices[1], mesh.shape.indices[2]];
-        let sees = |mesh: &Mesh, weights: [f64; 3]| [DVec3::Z, -DVec3::Z].map(|direction| mesh.shows(triangle, weights, direction));
+        let sees = |mesh: &Mesh, weights: [f64; 3]| {
+            [DVec3::Z, -DVec3::Z].map(|direction| mesh.shows(triangle, weights, direction))
+        };
         assert_eq!(sees(&mesh, [0.2, 0.3, 0.5]), [true, true]);
         mesh.material.one_sided = true;
         let one = sees(&mesh, [0.2, 0.3, 0.5]);
         assert!(one[0] != one[1], "{one:?}");
         // Corners 0, 3, 1: uv (0, 0), (1, 1), (1, 0). The left half has no content.
         mesh.material = Material { one_sided: false, cutoff: Some(0.5), ..mesh.material };
-        assert_eq!([sees(&mesh, [0.9, 0.05, 0.05]), sees(&mesh, [0.1, 0.5, 0.4])], [[false, false], [true, true]]);
+        assert_eq!(
+            [sees(&mesh, [0.9, 0.05, 0.05]), sees(&mesh, [0.1, 0.5, 0.4])],
+            [[false, false], [true, true]]
+        );
     }
 }

@@ -1,23 +1,28 @@
-//! In which order triangles that are mixed with what is behind them are drawn: what is behind before what is in front of it.
+//! In which order triangles that are mixed with what is behind them are drawn: what is behind before what is
+//! in front of it.
 //!
-//! Distance alone does not tell: the middle of a large pane may be nearer than a small one in front of its end. Of two triangles that cover each
-//! other in the picture one lies on a single side of the other's plane, unless they cross, and that tells which is behind (Newell, Newell &
-//! Sancha 1972). Of two that neither lie so nor meet, the middle of what both cover tells. All such pairs together are an order from behind to the front.
-//! Where triangles cross (`crossings.rs` cuts those of a scene), or cover each other in a ring, no order of whole triangles is right: in a ring the
-//! distance of their middles decides.
+//! Distance alone does not tell: the middle of a large pane may be nearer than a small one in front of its
+//! end. Of two triangles that cover each other in the picture one lies on a single side of the other's plane,
+//! unless they cross, and that tells which is behind (Newell, Newell & Sancha 1972). Of two that neither lie
+//! so nor meet, the middle of what both cover tells. All such pairs together are an order from behind to the
+//! front. Where triangles cross (`crossings.rs` cuts those of a scene), or cover each other in a ring, no
+//! order of whole triangles is right: in a ring the distance of their middles decides.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
 use glam::{DVec2, DVec3};
 
-/// Triangles, and pairs of them that cover each other in the picture, for which an order is looked for; of more there is none but by distance.
+/// Triangles, and pairs of them that cover each other in the picture, for which an order is looked for; of
+/// more there is none but by distance.
 pub const MOST_TRIANGLES: usize = 1 << 14;
 /// See above.
 pub const MOST_PAIRS: usize = 1 << 20;
 
-/// A corner this much of the triangles' size beside a plane lies in it: panes side by side cover nothing of each other.
+/// A corner this much of the triangles' size beside a plane lies in it: panes side by side cover nothing of
+/// each other.
 const IN_PLANE: f64 = 1e-9;
-/// Of how far a triangle reaches to one side of a plane, as much to the other counts as nothing: corners where triangles were cut are rounded.
+/// Of how far a triangle reaches to one side of a plane, as much to the other counts as nothing: corners
+/// where triangles were cut are rounded.
 pub(super) const HAIR: f64 = 1e-4;
 /// Likewise, of the picture's unit, for borders that touch in it.
 const TOUCHING: f64 = 1e-9;
@@ -51,7 +56,8 @@ pub struct PaintOrder {
     pub out_of_order: u32,
 }
 
-/// The order of triangles; `None` where there are too many of them, or of pairs. Corners are in the camera's axes (x right, y down, z ahead), metres.
+/// The order of triangles; `None` where there are too many of them, or of pairs. Corners are in the camera's
+/// axes (x right, y down, z ahead), metres.
 #[must_use]
 pub fn back_to_front(triangles: &[[DVec3; 3]]) -> Option<PaintOrder> {
     if triangles.len() > MOST_TRIANGLES {
@@ -86,10 +92,12 @@ pub fn back_to_front(triangles: &[[DVec3; 3]]) -> Option<PaintOrder> {
     Some(resolved(&seen, &in_front, behind))
 }
 
-/// Takes what nothing is left behind, the farthest first, and where there is no such triangle the farthest of all.
+/// Takes what nothing is left behind, the farthest first, and where there is no such triangle the farthest of
+/// all.
 fn resolved(seen: &[Seen], in_front: &[Vec<u32>], mut behind: Vec<u32>) -> PaintOrder {
     let ready = |place: u32| Ready { distance_m: seen[place as usize].distance_m, place };
-    let mut open: BinaryHeap<Ready> = (0..seen.len() as u32).filter(|&place| behind[place as usize] == 0).map(ready).collect();
+    let mut open: BinaryHeap<Ready> =
+        (0..seen.len() as u32).filter(|&place| behind[place as usize] == 0).map(ready).collect();
     let mut from_afar: Vec<u32> = (0..seen.len() as u32).collect();
     from_afar.sort_by_key(|&place| std::cmp::Reverse(ready(place)));
     let mut from_afar = from_afar.into_iter();
@@ -122,12 +130,14 @@ impl Seen {
         let reach = corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f64::max);
         let is_ahead = corners.iter().all(|corner| corner.z > 0.0);
         let uv = is_ahead.then(|| corners.map(|corner| corner.truncate() / corner.z));
-        let bounds = uv.map_or([DVec2::NEG_INFINITY, DVec2::INFINITY], |[a, b, c]| [a.min(b).min(c), a.max(b).max(c)]);
+        let bounds =
+            uv.map_or([DVec2::NEG_INFINITY, DVec2::INFINITY], |[a, b, c]| [a.min(b).min(c), a.max(b).max(c)]);
         let distance_m = ((a + b + c) / 3.0).length();
         Self { corners, normal, slack: IN_PLANE * reach * normal.length(), uv, bounds, distance_m }
     }
 
-    /// Whether the two may cover a place of the picture together: false where a line of it has them on two sides.
+    /// Whether the two may cover a place of the picture together: false where a line of it has them on two
+    /// sides.
     fn covers(&self, other: &Self) -> bool {
         if self.bounds[1].cmple(other.bounds[0]).any() || other.bounds[1].cmple(self.bounds[0]).any() {
             return false;
@@ -136,7 +146,8 @@ impl Seen {
         !(parts(own, others) || parts(others, own))
     }
 
-    /// `Less` if it is behind the other one and drawn first; `None` where both are in one plane, or they cross where one is not before the camera.
+    /// `Less` if it is behind the other one and drawn first; `None` where both are in one plane, or they
+    /// cross where one is not before the camera.
     fn depth_order(&self, other: &Self) -> Option<Ordering> {
         // Towards the camera, which is at 0, a corner is in front.
         let side_of = |plane: &Self, corners: &[DVec3; 3], hair: f64| {
@@ -146,7 +157,9 @@ impl Seen {
                 return None;
             }
             let towards_eye = corners.map(|corner| from_plane(corner) * eye.signum());
-            let (low, high) = towards_eye.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+            let (low, high) = towards_eye
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
             let slack = plane.slack.max(hair * high.max(-low));
             match (low >= -slack, high <= slack) {
                 (true, false) => Some(Ordering::Greater),
@@ -154,11 +167,15 @@ impl Seen {
                 _ => None,
             }
         };
-        let order = |hair: f64| side_of(other, &self.corners, hair).or_else(|| side_of(self, &other.corners, hair).map(Ordering::reverse));
+        let order = |hair: f64| {
+            side_of(other, &self.corners, hair)
+                .or_else(|| side_of(self, &other.corners, hair).map(Ordering::reverse))
+        };
         order(0.0).or_else(|| order(HAIR)).or_else(|| self.order_where_both_are(other))
     }
 
-    /// Which is behind in the middle of what both cover: neither lies on one side of the other's plane, though they need not meet.
+    /// Which is behind in the middle of what both cover: neither lies on one side of the other's plane,
+    /// though they need not meet.
     fn order_where_both_are(&self, other: &Self) -> Option<Ordering> {
         let (own, others) = (self.uv.as_ref()?, other.uv.as_ref()?);
         let both = (0..3).fold(own.to_vec(), |left, k| {
@@ -254,9 +271,14 @@ mod tests {
                 let size = 0.5 * 30_f64.powf(part(k, 0));
                 let corner = |n: u32| {
                     let at = |m: u32, size: f64| size * (part(k, 10 * n + m) - 0.5);
-                    tilt * DVec3::new(at(3, size) + 10.0 * (part(k, 1) - 0.5), at(4, size) + 10.0 * (part(k, 2) - 0.5), at(5, 0.09))
+                    tilt * DVec3::new(
+                        at(3, size) + 10.0 * (part(k, 1) - 0.5),
+                        at(4, size) + 10.0 * (part(k, 2) - 0.5),
+                        at(5, 0.09),
+                    )
                 };
-                let slab = tilt * DVec3::new(0.0, 0.0, 0.1 * (f64::from(k) - 150.0)) + DVec3::new(0.0, 0.0, 40.0);
+                let slab =
+                    tilt * DVec3::new(0.0, 0.0, 0.1 * (f64::from(k) - 150.0)) + DVec3::new(0.0, 0.0, 40.0);
                 [corner(1), corner(2), corner(3)].map(|corner| corner + slab)
             })
             .collect();
@@ -294,8 +316,10 @@ mod tests {
             let mut pane = Mesh::level_picture(texture.clone(), DVec3::ZERO, 3.0 + 5.0 * part(k, 1));
             pane.material.blends = true;
             let turn = |n: u32| 6.3 * part(k, n);
-            pane.ned_from_shape = glam::DMat3::from_rotation_x(turn(2)) * glam::DMat3::from_rotation_y(turn(3));
-            pane.origin_ned_m = DVec3::new(14.0 * part(k, 4) - 7.0, 14.0 * part(k, 5) - 7.0, 12.0 + 8.0 * part(k, 6));
+            pane.ned_from_shape =
+                glam::DMat3::from_rotation_x(turn(2)) * glam::DMat3::from_rotation_y(turn(3));
+            pane.origin_ned_m =
+                DVec3::new(14.0 * part(k, 4) - 7.0, 14.0 * part(k, 5) - 7.0, 12.0 + 8.0 * part(k, 6));
             pane
         });
         let mut meshes: Vec<Mesh> = panes.collect();
@@ -306,30 +330,52 @@ mod tests {
             };
             meshes.iter().flat_map(of).collect()
         };
-        let wrong = |triangles: &[[DVec3; 3]]| wrong_places(triangles, &back_to_front(triangles).unwrap().places);
-        let area = |triangles: &[[DVec3; 3]]| triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum::<f64>();
+        let wrong =
+            |triangles: &[[DVec3; 3]]| wrong_places(triangles, &back_to_front(triangles).unwrap().places);
+        let area = |triangles: &[[DVec3; 3]]| {
+            triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum::<f64>()
+        };
         let before = corners(&meshes);
         let done = cut_where_blended_cross(&mut meshes);
         let after = corners(&meshes);
-        eprintln!("{} -> {} triangles, {} -> {} places in the wrong order", before.len(), after.len(), wrong(&before), wrong(&after));
+        eprintln!(
+            "{} -> {} triangles, {} -> {} places in the wrong order",
+            before.len(),
+            after.len(),
+            wrong(&before),
+            wrong(&after)
+        );
         assert_eq!((after.len() - before.len(), 0), (done.more, done.left));
         assert!(done.more > 100 && after.len() < 20 * before.len(), "{done:?}");
         assert!((area(&after) / area(&before) - 1.0).abs() < 1e-5, "nothing is lost");
         // They are counted: a few of all.
         let out_of_order = back_to_front(&after).unwrap().out_of_order;
-        assert!(out_of_order > 0 && (out_of_order as usize) < after.len() / 4, "{out_of_order} of {}", after.len());
-        assert!(wrong(&before) > 100 && wrong(&after) < wrong(&before) / 4, "{} {}", wrong(&before), wrong(&after));
+        assert!(
+            out_of_order > 0 && (out_of_order as usize) < after.len() / 4,
+            "{out_of_order} of {}",
+            after.len()
+        );
+        assert!(
+            wrong(&before) > 100 && wrong(&after) < wrong(&before) / 4,
+            "{} {}",
+            wrong(&before),
+            wrong(&after)
+        );
         // What is left are rings: of each two by themselves the order is right.
         let unlike = |triangles: &[[DVec3; 3]]| {
             let seen: Vec<Seen> = triangles.iter().map(|corners| Seen::new(*corners)).collect();
             let is_wrong = |uv: DVec2| {
-                let mut met: Vec<(f64, &Seen)> = seen.iter().filter_map(|of| Some((depth(of.corners, uv)?, of))).collect();
+                let mut met: Vec<(f64, &Seen)> =
+                    seen.iter().filter_map(|of| Some((depth(of.corners, uv)?, of))).collect();
                 met.sort_by(|a, b| b.0.total_cmp(&a.0));
-                let wrong =
-                    |pair: &[(f64, &Seen)]| pair[0].0 > pair[1].0 + 1e-4 && pair[0].1.depth_order(pair[1].1) != Some(Ordering::Less);
+                let wrong = |pair: &[(f64, &Seen)]| {
+                    pair[0].0 > pair[1].0 + 1e-4 && pair[0].1.depth_order(pair[1].1) != Some(Ordering::Less)
+                };
                 met.windows(2).any(wrong)
             };
-            (0..60 * 60).filter(|i| is_wrong(DVec2::new(f64::from(i % 60), f64::from(i / 60)) / 30.0 - 0.99)).count()
+            (0..60 * 60)
+                .filter(|i| is_wrong(DVec2::new(f64::from(i % 60), f64::from(i / 60)) / 30.0 - 0.99))
+                .count()
         };
         assert!(unlike(&before) > 50 && unlike(&after) == 0, "{} {}", unlike(&before), unlike(&after));
         // Once is enough.
@@ -341,11 +387,18 @@ mod tests {
         // Three in a ring, two that cross, one behind the camera, some that are no triangles.
         let bar = |k: f64| {
             let turn = glam::DMat3::from_rotation_z(k * std::f64::consts::TAU / 3.0);
-            [DVec3::new(-1.0, 0.4, 9.0), DVec3::new(3.0, 0.6, 11.0), DVec3::new(3.0, 0.8, 11.0)].map(|at| turn * at)
+            [DVec3::new(-1.0, 0.4, 9.0), DVec3::new(3.0, 0.6, 11.0), DVec3::new(3.0, 0.8, 11.0)]
+                .map(|at| turn * at)
         };
         let across = [DVec3::new(-3.0, -1.0, 8.0), DVec3::new(3.0, -1.0, 12.0), DVec3::new(0.0, 2.0, 10.0)];
-        let mut triangles =
-            vec![bar(0.0), bar(1.0), bar(2.0), across, across.map(|at| DVec3::new(-at.x, at.y, at.z)), across.map(|at| -at)];
+        let mut triangles = vec![
+            bar(0.0),
+            bar(1.0),
+            bar(2.0),
+            across,
+            across.map(|at| DVec3::new(-at.x, at.y, at.z)),
+            across.map(|at| -at),
+        ];
         triangles.extend([[DVec3::ZERO; 3], [DVec3::NAN; 3], [DVec3::INFINITY; 3], [DVec3::Z; 3]]);
         assert_eq!(back_to_front(&triangles[..3]).unwrap().out_of_order, 1);
         assert_eq!(back_to_front(&triangles[..2]).unwrap().out_of_order, 0);

@@ -1,10 +1,12 @@
-//! Four boxes that a ray is tested against at once, in single precision: relative to the middle of all boxes of a tree, and rounded outwards, so that a ray never misses what is inside of them.
+//! Four boxes that a ray is tested against at once, in single precision: relative to the middle of all boxes
+//! of a tree, and rounded outwards, so that a ray never misses what is inside of them.
 
 use glam::{DVec3, Vec3, Vec4};
 
 use super::Aabb;
 
-/// Rounding errors of single precision: of a sum of coordinates, as a part of the largest, and of a ray parameter.
+/// Rounding errors of single precision: of a sum of coordinates, as a part of the largest, and of a ray
+/// parameter.
 const ROUNDING: f64 = 4e-7;
 const WIDER: f32 = 1e-6;
 
@@ -40,7 +42,8 @@ impl Quad {
         }
     }
 
-    /// Ray parameters from which on a ray may be in each box, and which of the boxes it may be in at all, as bits.
+    /// Ray parameters from which on a ray may be in each box, and which of the boxes it may be in at all, as
+    /// bits.
     pub fn enter(&self, ray: &BoxRay, limit_m: f32) -> (Vec4, u32) {
         let (mut enter, mut exit) = (Vec4::ZERO, Vec4::splat(limit_m));
         for k in 0..3 {
@@ -61,7 +64,11 @@ impl BoxRay {
         const LEAST: f64 = 1e-30;
         let inverse = |d: f64| (1.0 / if d.abs() < LEAST { LEAST.copysign(d) } else { d }) as f32;
         let slack_m = 1e-9 + ROUNDING * (origin.abs().max_element() + extent_m);
-        Self { origin: origin.as_vec3().to_array(), inverse: direction.to_array().map(inverse), slack_m: -down(-slack_m) }
+        Self {
+            origin: origin.as_vec3().to_array(),
+            inverse: direction.to_array().map(inverse),
+            slack_m: -down(-slack_m),
+        }
     }
 }
 

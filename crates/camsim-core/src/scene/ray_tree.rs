@@ -33,7 +33,8 @@ struct Node {
 impl RayTree {
     /// Over things that are known by their place in `boxes`. Empty boxes are left out.
     pub fn new(boxes: &[Aabb]) -> Self {
-        let mut things: Vec<u32> = (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect();
+        let mut things: Vec<u32> =
+            (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect();
         if things.is_empty() {
             return Self::default();
         }
@@ -63,9 +64,16 @@ impl RayTree {
         here as u32
     }
 
-    /// The first meeting of a ray: `meet(thing, limit)` gives the ray parameter and what is found there, for a thing that is met before
-    /// `limit`. All are asked where the ray has numbers that are none: no ray leads to the axes of what is pressed flat.
-    pub fn first<T>(&self, origin: DVec3, direction: DVec3, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
+    /// The first meeting of a ray: `meet(thing, limit)` gives the ray parameter and what is found there, for
+    /// a thing that is met before `limit`. All are asked where the ray has numbers that are none: no ray
+    /// leads to the axes of what is pressed flat.
+    pub fn first<T>(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_max: f64,
+        meet: impl Fn(u32, f64) -> Option<(f64, T)>,
+    ) -> Option<(f64, T)> {
         let length = direction.length();
         if !(length.is_normal() && origin.is_finite()) {
             return self.first_of_all(t_max, meet);
@@ -111,8 +119,11 @@ impl RayTree {
 
     /// The same by a look at everything.
     fn first_of_all<T>(&self, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
-        let is_there = |node: &Node, lane: usize| node.holds[lane] & THING != 0 && !node.boxes.get(lane).is_empty();
-        let things = self.nodes.iter().flat_map(|node| (0..4).filter(|&lane| is_there(node, lane)).map(|lane| node.holds[lane] & !THING));
+        let is_there =
+            |node: &Node, lane: usize| node.holds[lane] & THING != 0 && !node.boxes.get(lane).is_empty();
+        let things = self.nodes.iter().flat_map(|node| {
+            (0..4).filter(|&lane| is_there(node, lane)).map(|lane| node.holds[lane] & !THING)
+        });
         things.fold(None, |best: Option<(f64, T)>, thing| {
             let limit = best.as_ref().map_or(t_max, |(t, _)| *t);
             meet(thing, limit).or(best)
@@ -129,11 +140,19 @@ mod tests {
     fn the_first_that_a_ray_meets_is_what_a_look_at_everything_finds() {
         let part = |k: u32, step: f64| (f64::from(k) * step).fract();
         // Far from their origin too, and with boxes that are flat or at the same place.
-        for (count, away_m) in [(0, 0.0), (1, 10.0), (2, 0.0), (4, 0.0), (5, -300.0), (300, 0.0), (1000, 6.4e6)] {
+        for (count, away_m) in
+            [(0, 0.0), (1, 10.0), (2, 0.0), (4, 0.0), (5, -300.0), (300, 0.0), (1000, 6.4e6)]
+        {
             let of = |k: u32| {
                 let k = k - k % 7 / 6;
-                let min = away_m + 40.0 * DVec3::new(part(k, 0.618_034), part(k, 0.754_878), part(k, 0.569_840));
-                let size = 2.0 * DVec3::new(part(k, 0.31), part(k, 0.47), if k.is_multiple_of(5) { 0.0 } else { part(k, 0.83) });
+                let min =
+                    away_m + 40.0 * DVec3::new(part(k, 0.618_034), part(k, 0.754_878), part(k, 0.569_840));
+                let size = 2.0
+                    * DVec3::new(
+                        part(k, 0.31),
+                        part(k, 0.47),
+                        if k.is_multiple_of(5) { 0.0 } else { part(k, 0.83) },
+                    );
                 if k % 11 == 3 { Aabb::EMPTY } else { Aabb { min, max: min + size } }
             };
             let boxes: Vec<Aabb> = (0..count).map(of).collect();
@@ -141,12 +160,15 @@ mod tests {
             let (mut met, mut asked) = (0, 0);
             for k in 0..400 {
                 let angle = 0.1 * f64::from(k);
-                let origin = away_m + DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.1 * f64::from(k));
+                let origin = away_m
+                    + DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.1 * f64::from(k));
                 let aslant = DVec3::new(-angle.cos(), -angle.sin(), 0.3 * (0.7 * f64::from(k)).sin());
                 let along = DVec3::new(-angle.cos().signum(), 0.0, 0.0);
                 let direction = [aslant, along, 1e-6 * aslant, 3e5 * aslant, aslant][k as usize % 5];
                 let t_max = if k % 3 == 0 { f64::INFINITY } else { 45.0 / direction.length() };
-                let enter = |i: u32, limit: f64| boxes[i as usize].enter(origin, inverse(direction), limit).map(|t| (t, i));
+                let enter = |i: u32, limit: f64| {
+                    boxes[i as usize].enter(origin, inverse(direction), limit).map(|t| (t, i))
+                };
                 let all = (0..count).filter_map(|i| enter(i, t_max)).min_by(|a, b| a.0.total_cmp(&b.0));
                 let asked_now = std::cell::Cell::new(0);
                 let found = tree.first(origin, direction, t_max, |i, limit| {
@@ -164,13 +186,23 @@ mod tests {
 
     #[test]
     fn a_ray_that_leads_nowhere_asks_all() {
-        let boxes: Vec<Aabb> = (0..23).map(|k| Aabb { min: DVec3::splat(f64::from(k)), max: DVec3::splat(f64::from(k) + 0.5) }).collect();
+        let boxes: Vec<Aabb> = (0..23)
+            .map(|k| Aabb { min: DVec3::splat(f64::from(k)), max: DVec3::splat(f64::from(k) + 0.5) })
+            .collect();
         let tree = RayTree::new(&boxes);
-        for (origin, direction) in
-            [(DVec3::NAN, DVec3::NAN), (DVec3::ONE, DVec3::NAN), (DVec3::INFINITY, DVec3::X), (DVec3::ONE, DVec3::ZERO)]
-        {
-            let meet = |i: u32, limit: f64| Some((f64::from((7 * i + 5) % 23), i)).filter(|(t, _)| *t < limit);
-            assert_eq!(tree.first(origin, direction, f64::INFINITY, meet), Some((0.0, 19)), "{origin} {direction}");
+        for (origin, direction) in [
+            (DVec3::NAN, DVec3::NAN),
+            (DVec3::ONE, DVec3::NAN),
+            (DVec3::INFINITY, DVec3::X),
+            (DVec3::ONE, DVec3::ZERO),
+        ] {
+            let meet =
+                |i: u32, limit: f64| Some((f64::from((7 * i + 5) % 23), i)).filter(|(t, _)| *t < limit);
+            assert_eq!(
+                tree.first(origin, direction, f64::INFINITY, meet),
+                Some((0.0, 19)),
+                "{origin} {direction}"
+            );
             assert_eq!(tree.first(origin, direction, 0.0, meet), None);
         }
     }

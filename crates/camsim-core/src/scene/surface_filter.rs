@@ -1,4 +1,5 @@
-//! What the filter of the ideal frame's surfaces leaves of a wave of their pictures, by the reads that the plan takes.
+//! What the filter of the ideal frame's surfaces leaves of a wave of their pictures, by the reads that the
+//! plan takes.
 
 use glam::{DMat2, DVec2};
 
@@ -36,13 +37,17 @@ const ONE_TAP: f64 = 0.5;
 /// A smaller version of a picture.
 struct Version {
     level: f64,
-    /// Times 12, beyond what the picture has between its texels, texels^2: `3 (4^level - 1)`, a mixture between whole levels.
+    /// Times 12, beyond what the picture has between its texels, texels^2: `3 (4^level - 1)`, a mixture
+    /// between whole levels.
     variance: f64,
 }
 
 impl Version {
     fn of_level(level: f64) -> Self {
-        Self { level, variance: 3.0 * ((2.0 * level.floor()).exp2() * (1.0 + 3.0 * (level - level.floor())) - 1.0) }
+        Self {
+            level,
+            variance: 3.0 * ((2.0 * level.floor()).exp2() * (1.0 + 3.0 * (level - level.floor())) - 1.0),
+        }
     }
 
     /// For reads `cell` texels apart.
@@ -73,7 +78,11 @@ impl SurfaceFilter {
         let spread = (0.25 * (a - c) * (a - c) + b * b).sqrt();
         let (longer, shorter) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
         let along = if spread > 1e-6 * mean {
-            let both = if a >= c { DVec2::new(0.5 * (a - c) + spread, b) } else { DVec2::new(b, 0.5 * (c - a) + spread) };
+            let both = if a >= c {
+                DVec2::new(0.5 * (a - c) + spread, b)
+            } else {
+                DVec2::new(b, 0.5 * (c - a) + spread)
+            };
             both.normalize_or(DVec2::X)
         } else {
             DVec2::X
@@ -81,7 +90,9 @@ impl SurfaceFilter {
         let ([long_taps, short_taps], Version { level, variance }) = match reads {
             SurfaceReads::One => ([1.0, 1.0], Version::for_cell(longer)),
             SurfaceReads::Two => ([2.0, 1.0], Version::for_cell((0.5 * longer).max(shorter))),
-            SurfaceReads::Four if longer < IN_A_ROW * shorter.max(1.0) => ([2.0, 2.0], Version::for_cell(0.5 * longer)),
+            SurfaceReads::Four if longer < IN_A_ROW * shorter.max(1.0) => {
+                ([2.0, 2.0], Version::for_cell(0.5 * longer))
+            }
             SurfaceReads::Four => ([4.0, 1.0], Version::for_cell((0.25 * longer).max(shorter))),
             SurfaceReads::Grid => {
                 let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };
@@ -90,7 +101,9 @@ impl SurfaceFilter {
                 ([long_taps, short_taps], Version::of_level((longer / long_taps).max(covered).log2()))
             }
         };
-        let length = |side: f64, taps: f64| ((side * side - variance).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt();
+        let length = |side: f64, taps: f64| {
+            ((side * side - variance).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt()
+        };
         Self {
             sides: [along * length(longer, long_taps), along.perp() * length(shorter, short_taps)],
             taps: [long_taps as u32, short_taps as u32],
@@ -122,7 +135,11 @@ impl SurfaceFilter {
             let texels = level.exp2();
             let axis = |nu: f64| {
                 let own = sinc(nu);
-                if texels < 1.5 || own.abs() < 1e-3 { 1.0 } else { mean_of(texels as u32, nu) * (sinc(texels * nu) / own).powi(2) }
+                if texels < 1.5 || own.abs() < 1e-3 {
+                    1.0
+                } else {
+                    mean_of(texels as u32, nu) * (sinc(texels * nu) / own).powi(2)
+                }
             };
             axis(cycles.x) * axis(cycles.y)
         };
@@ -155,7 +172,8 @@ mod tests {
                 assert!((variance - 1.0).abs() < 0.03, "{reads:?}, {texels} twice as long: {variance}");
             }
         }
-        // Two reads of a square, and one of anything: what stands for the cell, which is as wide as the pixel is long.
+        // Two reads of a square, and one of anything: what stands for the cell, which is as wide as the pixel
+        // is long.
         let variance = of(DVec2::splat(2.0), SurfaceReads::Two, DVec2::new(0.0, 0.02));
         assert!((variance - CELL_VARIANCE).abs() < 0.03, "{variance}");
         for (sides, times) in [(DVec2::splat(2.0), 1.0), (DVec2::new(3.0, 1.5), 4.0)] {
@@ -163,17 +181,23 @@ mod tests {
             assert!((variance - times * CELL_VARIANCE).abs() < 0.05 * times, "{sides}: {variance}");
         }
         // Pixels narrower than texels: the picture itself.
-        assert_eq!(SurfaceFilter::new(DMat2::from_diagonal(DVec2::splat(0.7)), SurfaceReads::One).leaves(DVec2::new(0.2, 0.3)), 1.0);
+        assert_eq!(
+            SurfaceFilter::new(DMat2::from_diagonal(DVec2::splat(0.7)), SurfaceReads::One)
+                .leaves(DVec2::new(0.2, 0.3)),
+            1.0
+        );
     }
 
     #[test]
     fn more_reads_are_nearer_to_the_pixel() {
-        // Of a texture with the power 1 / nu^2, what is left of its waves against the mean over the pixel, RMS of the texture's own.
+        // Of a texture with the power 1 / nu^2, what is left of its waves against the mean over the pixel,
+        // RMS of the texture's own.
         let error = |sides: DVec2, reads| {
             let filter = SurfaceFilter::new(DMat2::from_diagonal(sides), reads);
             let waves = (0..56 * 56).map(|i| {
                 let cycles = (DVec2::new(f64::from(i % 56), f64::from(i / 56)) - 27.5) / 20.0;
-                let power = (sinc(cycles.x) * sinc(cycles.y)).powi(4) / (cycles - cycles.round()).length_squared();
+                let power =
+                    (sinc(cycles.x) * sinc(cycles.y)).powi(4) / (cycles - cycles.round()).length_squared();
                 let exact = sinc(sides.x * cycles.x) * sinc(sides.y * cycles.y);
                 (power, power * (filter.leaves(cycles) - exact).powi(2))
             });

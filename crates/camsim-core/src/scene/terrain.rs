@@ -1,16 +1,18 @@
 //! Ground from a grid of heights: two triangles a cell, diagonal from north-west to south-east.
 //!
-//! The full grid is *the* surface. For drawing, its chunks of 64x64 cells are hierarchies of right triangles, each halved as often as a
-//! camera needs it ([`TerrainDetail`]).
+//! The full grid is *the* surface. For drawing, its chunks of 64x64 cells are hierarchies of right triangles,
+//! each halved as often as a camera needs it ([`TerrainDetail`]).
 //!
 //! # Why there are no gaps
 //!
-//! * Vertex positions are rounded to multiples of one power of two, [`Terrain::quantum_m`], and chunk centres are whole metres. Offsets
-//!   are exact in f32, and so is `centre_ned_m - camera` for a camera position rounded to whole metres. Their f32 sum rounds the
-//!   same exact number for each chunk that shares a vertex, so the sums are equal bit by bit, at any distance.
-//! * Two triangles that share their longest side are halved together or not at all: whether they are follows from the vertex between them alone, its
-//!   error and its surroundings' tolerance. Errors are kept as those of all that needs the vertex, and it is judged by at least the
-//!   places that these are judged by: so a vertex that is used finds all those it needs used.
+//! * Vertex positions are rounded to multiples of one power of two, [`Terrain::quantum_m`], and chunk centres
+//!   are whole metres. Offsets are exact in f32, and so is `centre_ned_m - camera` for a camera position
+//!   rounded to whole metres. Their f32 sum rounds the same exact number for each chunk that shares a vertex,
+//!   so the sums are equal bit by bit, at any distance.
+//! * Two triangles that share their longest side are halved together or not at all: whether they are follows
+//!   from the vertex between them alone, its error and its surroundings' tolerance. Errors are kept as those
+//!   of all that needs the vertex, and it is judged by at least the places that these are judged by: so a
+//!   vertex that is used finds all those it needs used.
 
 mod bounds;
 mod build;
@@ -55,9 +57,11 @@ pub const CHUNK_CELLS: u32 = 64;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct TerrainVertex {
-    /// North, east, down in metres from the chunk's centre: a multiple of [`Terrain::quantum_m`]. NaN for a void (no triangle uses it).
+    /// North, east, down in metres from the chunk's centre: a multiple of [`Terrain::quantum_m`]. NaN for a
+    /// void (no triangle uses it).
     pub offset_m: [f32; 3],
-    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right one.
+    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right
+    /// one.
     pub uv: [f32; 2],
 }
 
@@ -68,7 +72,8 @@ pub struct TerrainChunk {
     pub centre_ned_m: DVec3,
     /// Box around the valid vertices; empty if there is none.
     pub bounds: Aabb,
-    /// Index of the north-west vertex in [`Terrain::vertices`]. Rows of `cells[0] + 1` vertices follow, from north to south.
+    /// Index of the north-west vertex in [`Terrain::vertices`]. Rows of `cells[0] + 1` vertices follow, from
+    /// north to south.
     pub first_vertex: u32,
     /// Cells from west to east and from north to south, 1..=64.
     pub cells: [u32; 2],
@@ -93,7 +98,8 @@ pub struct Terrain {
     pub void_cells: u64,
     /// The picture on the ground.
     pub texture: Arc<Texture>,
-    /// Colour of the ground beyond the picture (R G B A as stored): its outermost texels have it at every level. None: they stay as they are.
+    /// Colour of the ground beyond the picture (R G B A as stored): its outermost texels have it at every
+    /// level. None: they stay as they are.
     pub beyond: Option<[u8; 4]>,
     /// Vertices lie on multiples of this, metres (a power of two).
     pub quantum_m: f64,
@@ -102,9 +108,11 @@ pub struct Terrain {
     tree: BlockTree,
     /// The border, side after side.
     border: Vec<BorderPart>,
-    /// Errors of the hierarchies of all chunks ([`errors::PER_CHUNK`] each), with those of all that needs a vertex.
+    /// Errors of the hierarchies of all chunks ([`errors::PER_CHUNK`] each), with those of all that needs a
+    /// vertex.
     errors: Vec<u16>,
-    /// Largest horizontal deviation of what is judged by squares of each of [`lattice::NODE_CELLS`], metres: next to nothing but on grids that bend.
+    /// Largest horizontal deviation of what is judged by squares of each of [`lattice::NODE_CELLS`], metres:
+    /// next to nothing but on grids that bend.
     horizontal_m: [f64; lattice::NODE_CELLS.len()],
 }
 
@@ -133,7 +141,9 @@ pub enum TerrainError {
         rows: u32,
     },
     /// Numbers of vertices and chunks must fit an index of 32 bits.
-    #[error("a grid of {cols} x {rows} heights is too large: crop or thin it to less than 2 000 000 000 vertices")]
+    #[error(
+        "a grid of {cols} x {rows} heights is too large: crop or thin it to less than 2 000 000 000 vertices"
+    )]
     TooLarge {
         /// Vertices from west to east.
         cols: u32,
@@ -164,7 +174,8 @@ pub enum TerrainError {
 }
 
 impl Terrain {
-    /// Position of vertex (i, j) of a chunk, i from the west, j from the north: NED metres, exact; NaN for a void.
+    /// Position of vertex (i, j) of a chunk, i from the west, j from the north: NED metres, exact; NaN for a
+    /// void.
     pub fn position_ned_m(&self, chunk: u32, i: u32, j: u32) -> DVec3 {
         let chunk = &self.chunks[chunk as usize];
         let vertex = &self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize];
@@ -178,8 +189,8 @@ impl Terrain {
     }
 }
 
-/// The two triangles of cell (a, b) of a chunk, as columns and rows of its vertices: north-west, south-east, north-east and north-west,
-/// south-west, south-east.
+/// The two triangles of cell (a, b) of a chunk, as columns and rows of its vertices: north-west, south-east,
+/// north-east and north-west, south-west, south-east.
 fn cell_triangles([a, b]: [u32; 2]) -> [[[u32; 2]; 3]; 2] {
     let [nw, ne, sw, se] = [[a, b], [a + 1, b], [a, b + 1], [a + 1, b + 1]];
     [[nw, se, ne], [nw, sw, se]]

@@ -95,8 +95,9 @@ pub struct Texture {
 pub enum TexelForm {
     /// Bytes in the texture's [`Encoding`], which the device decodes.
     Stored,
-    /// Half floats of linear light, as devices decode roughly: bytes of sRGB are off by up to 0.35/255 of the linear range with Mesa's software driver and by
-    /// 1.08/255 on an NVIDIA H200. Halves round by at most 2^-11 of the value. Smaller versions have not been rounded to bytes.
+    /// Half floats of linear light, as devices decode roughly: bytes of sRGB are off by up to 0.35/255 of the
+    /// linear range with Mesa's software driver and by 1.08/255 on an NVIDIA H200. Halves round by at most
+    /// 2^-11 of the value. Smaller versions have not been rounded to bytes.
     Light,
 }
 
@@ -122,7 +123,10 @@ pub struct MipLevel {
 
 impl fmt::Debug for Texture {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Texture").field("size_px", &self.size_px).field("encoding", &self.encoding).finish_non_exhaustive()
+        f.debug_struct("Texture")
+            .field("size_px", &self.size_px)
+            .field("encoding", &self.encoding)
+            .finish_non_exhaustive()
     }
 }
 
@@ -156,7 +160,8 @@ impl Texture {
     {
         let at = [0, 1].map(|k: usize| uv[k] * f64::from(self.size_px[k]) - 0.5);
         let read = |x: f64, y: f64| {
-            let index = wrap[1].texel(y, self.size_px[1]) * self.size_px[0] as usize + wrap[0].texel(x, self.size_px[0]);
+            let index = wrap[1].texel(y, self.size_px[1]) * self.size_px[0] as usize
+                + wrap[0].texel(x, self.size_px[0]);
             value(self.rgba8.get(4 * index..4 * index + 4).unwrap_or(&[0, 0, 0, 255]))
         };
         if nearest {
@@ -168,16 +173,19 @@ impl Texture {
         row(y) * (1.0 - ty) + row(y + 1.0) * ty
     }
 
-    /// The levels 1, 2, ... down to 1x1 (level 0 is the texture itself); each side is half of the level above, rounded down, at least 1.
+    /// The levels 1, 2, ... down to 1x1 (level 0 is the texture itself); each side is half of the level
+    /// above, rounded down, at least 1.
     ///
-    /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it covers, so odd sizes keep
-    /// the picture in place. Colour is weighted by alpha: pixels without content do not darken their neighbours.
+    /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it
+    /// covers, so odd sizes keep the picture in place. Colour is weighted by alpha: pixels without content do
+    /// not darken their neighbours.
     pub fn mips(&self, form: TexelForm) -> Vec<MipLevel> {
         self.mips_within(form, None)
     }
 
-    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) around each level, in place of its outermost texels: what a clamped
-    /// picture shows beyond is then the same at every level, if its own outermost texels are of that colour.
+    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) around each level, in place of
+    /// its outermost texels: what a clamped picture shows beyond is then the same at every level, if its own
+    /// outermost texels are of that colour.
     pub fn mips_within(&self, form: TexelForm, border: Option<[u8; 4]>) -> Vec<MipLevel> {
         let border = border.map(|color| self.texels(&color, form).into_owned());
         let mut levels = Vec::new();
@@ -185,8 +193,11 @@ impl Texture {
             return levels;
         }
         let table = self.encoding.decode_table();
-        // The picture itself never stands there in floats: of a large one they would take four times its memory.
-        let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| linear(&table, &self.rgba8[4 * at..4 * at + 4]));
+        // The picture itself never stands there in floats: of a large one they would take four times its
+        // memory.
+        let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| {
+            linear(&table, &self.rgba8[4 * at..4 * at + 4])
+        });
         loop {
             let mut texels = match form {
                 TexelForm::Stored => image.encode(self.encoding),
@@ -214,14 +225,16 @@ impl Texture {
         if form == TexelForm::Stored {
             return Cow::Borrowed(rgba8);
         }
-        let [color, alpha] =
-            [self.encoding, Encoding::Linear].map(|encoding| encoding.decode_table().map(|value| f16::from_f32(value).to_ne_bytes()));
+        let [color, alpha] = [self.encoding, Encoding::Linear]
+            .map(|encoding| encoding.decode_table().map(|value| f16::from_f32(value).to_ne_bytes()));
         let mut halves = vec![0; 2 * rgba8.len()];
-        halves.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(rgba8.par_chunks_exact(4)).for_each(|(out, texel)| {
-            for (k, (half, &byte)) in out.chunks_exact_mut(2).zip(texel).enumerate() {
-                half.copy_from_slice(&if k < 3 { &color } else { &alpha }[usize::from(byte)]);
-            }
-        });
+        halves.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(rgba8.par_chunks_exact(4)).for_each(
+            |(out, texel)| {
+                for (k, (half, &byte)) in out.chunks_exact_mut(2).zip(texel).enumerate() {
+                    half.copy_from_slice(&if k < 3 { &color } else { &alpha }[usize::from(byte)]);
+                }
+            },
+        );
         Cow::Owned(halves)
     }
 
@@ -258,11 +271,17 @@ impl Texture {
         let at = 4 * (y as usize * self.size_px[0] as usize + x as usize);
         let pixel = &self.rgba8[at..at + 4];
         let light = self.encoding.decode_table();
-        [light[usize::from(pixel[0])], light[usize::from(pixel[1])], light[usize::from(pixel[2])], f32::from(pixel[3]) / 255.0]
+        [
+            light[usize::from(pixel[0])],
+            light[usize::from(pixel[1])],
+            light[usize::from(pixel[2])],
+            f32::from(pixel[3]) / 255.0,
+        ]
     }
 
-    /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear sampling across the border of
-    /// the content does not pull in black. Alpha stays as it is. Does nothing to an opaque (or an empty) picture.
+    /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear
+    /// sampling across the border of the content does not pull in black. Alpha stays as it is. Does nothing
+    /// to an opaque (or an empty) picture.
     pub fn bleed_into_transparent(&mut self) {
         let mut transparent = self.rgba8.chunks_exact(4).filter(|pixel| pixel[3] == 0).peekable();
         if transparent.peek().is_none() {
@@ -333,19 +352,22 @@ impl LinearImage {
 
     fn halves(&self) -> Vec<u8> {
         let mut bytes = vec![0; TexelForm::Light.bytes() * self.premultiplied.len()];
-        bytes.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(&self.premultiplied).for_each(|(out, &[r, g, b, alpha])| {
-            if alpha > 0.0 {
-                for (half, value) in out.chunks_exact_mut(2).zip([r / alpha, g / alpha, b / alpha, alpha]) {
-                    half.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
+        bytes.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(&self.premultiplied).for_each(
+            |(out, &[r, g, b, alpha])| {
+                if alpha > 0.0 {
+                    for (half, value) in out.chunks_exact_mut(2).zip([r / alpha, g / alpha, b / alpha, alpha])
+                    {
+                        half.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
+                    }
                 }
-            }
-        });
+            },
+        );
         bytes
     }
 }
 
-/// Source pixels that target pixel `to` of `to_size` covers among `from_size`: the first one and the share of each (sum 1).
-/// Halving covers at most 3 pixels: n / floor(n/2) <= 3.
+/// Source pixels that target pixel `to` of `to_size` covers among `from_size`: the first one and the share of
+/// each (sum 1). Halving covers at most 3 pixels: n / floor(n/2) <= 3.
 fn cover(to: usize, from_size: usize, to_size: usize) -> (usize, [f32; 3]) {
     // In units of 1/to_size source pixels everything is an integer.
     let (begin, end) = (to * from_size, (to + 1) * from_size);
@@ -381,7 +403,11 @@ mod tests {
 
     #[test]
     fn averaging_happens_in_linear_light() {
-        let texture = Texture { size_px: [2, 1], rgba8: vec![0, 0, 0, 255, 255, 255, 255, 255], encoding: Encoding::Srgb };
+        let texture = Texture {
+            size_px: [2, 1],
+            rgba8: vec![0, 0, 0, 255, 255, 255, 255, 255],
+            encoding: Encoding::Srgb,
+        };
         let mips = texture.mips(TexelForm::Stored);
         // Half of the light is sRGB 188, not 128.
         assert_eq!((mips.len(), &mips[0].texels[..]), (1, &[188, 188, 188, 255][..]));
@@ -412,7 +438,8 @@ mod tests {
 
     #[test]
     fn a_border_is_of_its_colour_at_every_level() {
-        let texture = Texture { size_px: [12, 9], rgba8: [200, 100, 50, 255].repeat(108), encoding: Encoding::Srgb };
+        let texture =
+            Texture { size_px: [12, 9], rgba8: [200, 100, 50, 255].repeat(108), encoding: Encoding::Srgb };
         let grey = [118, 118, 118, 255];
         let plain = texture.mips(TexelForm::Stored);
         for (level, plain) in texture.mips_within(TexelForm::Stored, Some(grey)).iter().zip(&plain) {
@@ -442,8 +469,11 @@ mod tests {
 
     #[test]
     fn void_pixels_do_not_darken() {
-        let mut texture =
-            Texture { size_px: [4, 1], rgba8: vec![0, 0, 0, 0, 200, 100, 50, 255, 0, 0, 0, 0, 0, 0, 0, 0], encoding: Encoding::Srgb };
+        let mut texture = Texture {
+            size_px: [4, 1],
+            rgba8: vec![0, 0, 0, 0, 200, 100, 50, 255, 0, 0, 0, 0, 0, 0, 0, 0],
+            encoding: Encoding::Srgb,
+        };
         let mips = texture.mips(TexelForm::Stored);
         assert_eq!(&mips[0].texels[..4], [200, 100, 50, 128]);
         assert_eq!(&mips[0].texels[4..], [0, 0, 0, 0]);
@@ -457,7 +487,9 @@ mod tests {
 
     #[test]
     fn halves_are_the_light_of_bytes_and_versions_are_not_rounded_to_bytes() {
-        let halves = |bytes: &[u8]| -> Vec<f64> { bytes.chunks_exact(2).map(|b| f16::from_ne_bytes([b[0], b[1]]).to_f64()).collect() };
+        let halves = |bytes: &[u8]| -> Vec<f64> {
+            bytes.chunks_exact(2).map(|b| f16::from_ne_bytes([b[0], b[1]]).to_f64()).collect()
+        };
         let exact = |byte: u8| {
             let stored = f64::from(byte) / 255.0;
             if stored <= 0.040_45 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
@@ -473,7 +505,11 @@ mod tests {
         }
         assert_eq!(*texture.texels(&texture.rgba8, TexelForm::Stored), texture.rgba8);
         // The mean of two neighbours, where bytes have only one of the two.
-        let pair = Texture { size_px: [2, 1], rgba8: vec![200, 40, 9, 255, 201, 41, 10, 255], encoding: Encoding::Srgb };
+        let pair = Texture {
+            size_px: [2, 1],
+            rgba8: vec![200, 40, 9, 255, 201, 41, 10, 255],
+            encoding: Encoding::Srgb,
+        };
         let mips = pair.mips(TexelForm::Light);
         let found = halves(&mips[0].texels);
         for (k, byte) in [200, 40, 9].into_iter().enumerate() {

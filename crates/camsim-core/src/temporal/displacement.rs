@@ -1,5 +1,5 @@
-//! The paper's displacement models: constant twist and constant depth (eqs. 10 to 18). f64 twins of `linear.wgsl` and `rk2.wgsl` in
-//! `shaders/reverse/temporal_inverse`.
+//! The paper's displacement models: constant twist and constant depth (eqs. 10 to 18). f64 twins of
+//! `linear.wgsl` and `rk2.wgsl` in `shaders/reverse/temporal_inverse`.
 
 use glam::{DVec2, DVec3};
 
@@ -18,8 +18,8 @@ pub struct Twist {
     pub rate_rad_s: DVec3,
 }
 
-/// `d(u, v)/dt` of a world point seen at `uv` with inverse planar depth `inverse_depth` (1/m): eqs. 11 and 12, a point stands still and
-/// moves by `-V - w x r` in the camera.
+/// `d(u, v)/dt` of a world point seen at `uv` with inverse planar depth `inverse_depth` (1/m): eqs. 11 and
+/// 12, a point stands still and moves by `-V - w x r` in the camera.
 #[must_use]
 pub fn image_rate(uv: DVec2, inverse_depth: f64, twist: &Twist) -> DVec2 {
     let point_rate = -twist.velocity_m_s * inverse_depth - twist.rate_rad_s.cross(uv.extend(1.0));
@@ -32,8 +32,8 @@ pub fn linear(uv: DVec2, inverse_depth: f64, twist: &Twist, dt_s: f64) -> DVec2 
     uv - image_rate(uv, inverse_depth, twist) * dt_s
 }
 
-/// Steps of at most `max_step_rad` of rotation that a time shift takes: `floor(|dt| |w| / step) + 1`, as the reference program counts, at most
-/// [`RK2_MAX_STEPS`].
+/// Steps of at most `max_step_rad` of rotation that a time shift takes: `floor(|dt| |w| / step) + 1`, as the
+/// reference program counts, at most [`RK2_MAX_STEPS`].
 #[must_use]
 pub fn rk2_steps(twist: &Twist, dt_s: f64, max_step_rad: f64) -> u32 {
     let whole = (dt_s.abs() * twist.rate_rad_s.length() / max_step_rad).floor();
@@ -70,7 +70,8 @@ mod tests {
             assert_eq!(rk2_steps(&twist, 1.0, f64::to_radians(step_deg)), steps);
             let error = found.distance(exact);
             // e = r theta step^2 / 6 to first order (third order term of the rotation's series, once a step).
-            let law = uv.length() * 36_f64.to_radians() * (36_f64.to_radians() / f64::from(steps)).powi(2) / 6.0;
+            let law =
+                uv.length() * 36_f64.to_radians() * (36_f64.to_radians() / f64::from(steps)).powi(2) / 6.0;
             assert!(error < 1.3 * law && error < before, "{step_deg}: {error} {law}");
             before = error;
         }

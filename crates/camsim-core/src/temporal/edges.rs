@@ -1,6 +1,7 @@
-//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the depth of the one surface of the ideal frame
-//! that it meets, and with the colour of that surface. f64 twin of `shaders/reverse/edges/supersampled.wgsl`. Which pixels are marked is
-//! [`super::marks`]; borders within a pixel are [`super::lines`].
+//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the depth of
+//! the one surface of the ideal frame that it meets, and with the colour of that surface. f64 twin of
+//! `shaders/reverse/edges/supersampled.wgsl`. Which pixels are marked is [`super::marks`]; borders within a
+//! pixel are [`super::lines`].
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -8,7 +9,8 @@ use super::{IdealGeometry, fine::FineImage};
 
 /// Golden ratio: its multiples are even over an interval for any number of them.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// Distance of two looks along the parallax of a ray, ideal pixels, while they are no more than [`MAX_LOOKS`].
+/// Distance of two looks along the parallax of a ray, ideal pixels, while they are no more than
+/// [`MAX_LOOKS`].
 const LOOK_PX: f64 = 0.5;
 const MAX_LOOKS: f64 = 128.0;
 /// Halvings of the distance in which a ray stops being free.
@@ -16,7 +18,8 @@ const HALVINGS: u32 = 5;
 /// A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
 const GAP_PX: f64 = 0.1;
 
-/// Ray `i` of `count` (a power of two): place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
+/// Ray `i` of `count` (a power of two): place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share
+/// of the exposure gone by.
 #[must_use]
 pub fn ray_place(i: u32, count: u32) -> (DVec2, f64) {
     let step = 1.0 / f64::from(count);
@@ -79,9 +82,15 @@ fn pose_along(nodes: &[(DMat3, DVec3)], share: f64) -> Option<(DMat3, DVec3)> {
     }))
 }
 
-/// Where a ray first meets a surface, and the key that shows it: the nearest in time, or the next that sees what the ray meets.
+/// Where a ray first meets a surface, and the key that shows it: the nearest in time, or the next that sees
+/// what the ray meets.
 #[must_use]
-pub fn first_surface_of_keys(uv: DVec2, share: f64, keys: &Keys<'_>, ideal: &IdealGeometry) -> Option<(usize, Met)> {
+pub fn first_surface_of_keys(
+    uv: DVec2,
+    share: f64,
+    keys: &Keys<'_>,
+    ideal: &IdealGeometry,
+) -> Option<(usize, Met)> {
     let window_share = keys.line_share + (share - 0.5) * keys.exposure_share;
     let mut first = None;
     for rank in 0..keys.views.len() {
@@ -96,13 +105,20 @@ pub fn first_surface_of_keys(uv: DVec2, share: f64, keys: &Keys<'_>, ideal: &Ide
     first
 }
 
-/// Where a ray first meets a surface of the ideal frame. Its points, from the nearest surface of all (`nearest_w` in the key camera, 1/m)
-/// to infinity, lie on a line of the ideal frame: as long as they are nearer than what the key shows at their places the ray is free.
-/// Where it is free no longer and the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if
-/// it is still hidden when it gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last
-/// stands in.
+/// Where a ray first meets a surface of the ideal frame. Its points, from the nearest surface of all
+/// (`nearest_w` in the key camera, 1/m) to infinity, lie on a line of the ideal frame: as long as they are
+/// nearer than what the key shows at their places the ray is free. Where it is free no longer and the depths
+/// to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still
+/// hidden when it gets as deep as what was seen last, it has met what the key camera does not see, and what
+/// was seen last stands in.
 #[must_use]
-pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, image: &FineImage<'_>, ideal: &IdealGeometry) -> Met {
+pub fn first_surface(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    nearest_w: f64,
+    image: &FineImage<'_>,
+    ideal: &IdealGeometry,
+) -> Met {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
     let in_line = |in_key: f64| in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
@@ -122,8 +138,8 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
         let (at_px, found) = look_at(at_infinity);
         return Met { at_px, in_line: found, seen: true };
     }
-    // A ray that is free at two looks, the second deeper than what the first saw, may have met that in between: it has if the surface goes
-    // on to where the ray is as deep.
+    // A ray that is free at two looks, the second deeper than what the first saw, may have met that in
+    // between: it has if the surface goes on to where the ray is as deep.
     let met_before = |free: (DVec2, f64)| {
         let (at_px, found) = look_at(free.1);
         let goes_on = (free.1 - found).abs() * px_per_w < GAP_PX && ideal.contains(at_px);
@@ -175,9 +191,16 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
     Met { at_px: free.0, in_line: free.1, seen: false }
 }
 
-/// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and over the exposure.
+/// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and
+/// over the exposure.
 #[must_use]
-pub fn gather_edges(uv: DVec2, d_uv: [DVec2; 2], keys: &Keys<'_>, count: u32, ideal: &IdealGeometry) -> DVec3 {
+pub fn gather_edges(
+    uv: DVec2,
+    d_uv: [DVec2; 2],
+    keys: &Keys<'_>,
+    count: u32,
+    ideal: &IdealGeometry,
+) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for i in 0..count {
         let (place, share) = ray_place(i, count);
@@ -196,7 +219,11 @@ mod tests {
     use super::*;
     use crate::temporal::{fine::Centre, marks::marks};
 
-    const IDEAL: IdealGeometry = IdealGeometry { size_px: [80, 20], focal_px: DVec2::splat(60.0), principal_px: DVec2::new(39.5, 9.5) };
+    const IDEAL: IdealGeometry = IdealGeometry {
+        size_px: [80, 20],
+        focal_px: DVec2::splat(60.0),
+        principal_px: DVec2::new(39.5, 9.5),
+    };
     const ROOF: f64 = 1.0 / 20.0;
     const GROUND: f64 = 1.0 / 60.0;
 
@@ -204,7 +231,10 @@ mod tests {
     fn image(scale: u32) -> Drawn {
         draw(scale, |at_px| {
             let roof = at_px.x < IDEAL.principal_px.x;
-            Centre { inverse_depth: if roof { ROOF } else { GROUND }, color: if roof { DVec3::ONE } else { DVec3::ZERO } }
+            Centre {
+                inverse_depth: if roof { ROOF } else { GROUND },
+                color: if roof { DVec3::ONE } else { DVec3::ZERO },
+            }
         })
     }
 
@@ -230,9 +260,12 @@ mod tests {
     }
 
     fn draw(scale: u32, look: impl Fn(DVec2) -> Centre) -> Drawn {
-        let corners = |[width, height]: [u32; 2]| (0..width * height).map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)));
-        let fine = corners(IDEAL.size_px.map(|side| side * scale))
-            .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5));
+        let corners = |[width, height]: [u32; 2]| {
+            (0..width * height).map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
+        };
+        let fine = corners(IDEAL.size_px.map(|side| side * scale)).flat_map(|corner| {
+            FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5)
+        });
         let samples: Vec<f64> = fine.map(|at_px| look(at_px).inverse_depth).collect();
         let centres: Vec<Centre> = corners(IDEAL.size_px).map(&look).collect();
         let marks = marks(IDEAL.size_px, scale, &centres, &samples);
@@ -262,8 +295,14 @@ mod tests {
                 // Under the roof, and deep enough under it to tell: said to be so.
                 let under_px = IDEAL.principal_px.x - exact_px;
                 let hidden = !roof && under_px > -0.3;
-                assert!(hidden || (at_px.x - exact_px).abs() <= LOOK_PX / 32.0 + 1e-9, "shift {shift_m}, u {u}: {at_px} {exact_px}");
-                assert!(met.seen != (hidden && under_px > 0.3) || under_px.abs() <= 0.3, "shift {shift_m}, u {u}: {met:?} {under_px}");
+                assert!(
+                    hidden || (at_px.x - exact_px).abs() <= LOOK_PX / 32.0 + 1e-9,
+                    "shift {shift_m}, u {u}: {at_px} {exact_px}"
+                );
+                assert!(
+                    met.seen != (hidden && under_px > 0.3) || under_px.abs() <= 0.3,
+                    "shift {shift_m}, u {u}: {met:?} {under_px}"
+                );
                 assert_eq!(met.in_line, seen);
             }
         }
@@ -295,13 +334,18 @@ mod tests {
 
     #[test]
     fn a_second_key_shows_what_the_first_hides() {
-        // As `image`, but the ground's colour is its place: the key at x = 1.5 m sees 3 px more of it beside the roof.
-        let ground_m = |at_px: DVec2, key_m: f64| (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x / GROUND + key_m;
+        // As `image`, but the ground's colour is its place: the key at x = 1.5 m sees 3 px more of it beside
+        // the roof.
+        let ground_m =
+            |at_px: DVec2, key_m: f64| (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x / GROUND + key_m;
         let seen_from = |key_m: f64| {
             draw(2, |at_px| {
                 let roof = (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x < -key_m * ROOF;
                 let w = if roof { ROOF } else { GROUND };
-                Centre { inverse_depth: w, color: if roof { DVec3::splat(-100.0) } else { DVec3::splat(ground_m(at_px, key_m)) } }
+                Centre {
+                    inverse_depth: w,
+                    color: if roof { DVec3::splat(-100.0) } else { DVec3::splat(ground_m(at_px, key_m)) },
+                }
             })
         };
         let keys_m = [-1.5, 1.5];
@@ -323,7 +367,8 @@ mod tests {
                 (views[key].image.color(met.at_px).x - expected).abs()
             };
             let (one, two) = (color(&views[..1]), color(&views));
-            // Beside the roof the colour of the last pixel of the ground stands for what is up to a pixel away.
+            // Beside the roof the colour of the last pixel of the ground stands for what is up to a pixel
+            // away.
             assert!(two <= 1.0 / IDEAL.focal_px.x / GROUND, "{u}: {two}");
             filled += u32::from(one > 1.0);
         }
@@ -332,7 +377,9 @@ mod tests {
 
     #[test]
     fn keys_come_in_the_order_of_their_distance() {
-        let order = |share: f64, count: usize| (0..count).map(|rank| key_of_rank(share, count, rank)).collect::<Vec<_>>();
+        let order = |share: f64, count: usize| {
+            (0..count).map(|rank| key_of_rank(share, count, rank)).collect::<Vec<_>>()
+        };
         assert_eq!(order(0.1, 2), [0, 1]);
         assert_eq!(order(0.9, 2), [1, 0]);
         assert_eq!(order(0.5, 2), [0, 1]);
@@ -344,12 +391,16 @@ mod tests {
     fn rays_are_even_over_area_and_time() {
         for count in [16, 32, 64, 256] {
             let places: Vec<_> = (0..count).map(|i| ray_place(i, count)).collect();
-            for of in [|p: &(DVec2, f64)| p.0.x + 0.5, |p: &(DVec2, f64)| p.0.y + 0.5, |p: &(DVec2, f64)| p.1] {
+            for of in [|p: &(DVec2, f64)| p.0.x + 0.5, |p: &(DVec2, f64)| p.0.y + 0.5, |p: &(DVec2, f64)| p.1]
+            {
                 let mut values: Vec<f64> = places.iter().map(of).collect();
                 values.sort_by(f64::total_cmp);
                 for (k, value) in values.iter().enumerate() {
                     let even = (k as f64 + 0.5) / f64::from(count);
-                    assert!((0.0..1.0).contains(value) && (value - even).abs() < 2.0 / f64::from(count), "{count}: {value} {even}");
+                    assert!(
+                        (0.0..1.0).contains(value) && (value - even).abs() < 2.0 / f64::from(count),
+                        "{count}: {value} {even}"
+                    );
                 }
             }
         }

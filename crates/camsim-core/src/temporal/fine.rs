@@ -1,5 +1,5 @@
-//! An ideal frame with several samples a pixel, and what it shows at a place. f64 twin of `shaders/reverse/edges/supersampled.wgsl`
-//! (samples) and of `shaders/reverse/edges/color/` (colours).
+//! An ideal frame with several samples a pixel, and what it shows at a place. f64 twin of
+//! `shaders/reverse/edges/supersampled.wgsl` (samples) and of `shaders/reverse/edges/color/` (colours).
 
 use glam::{DVec2, DVec3};
 
@@ -7,7 +7,8 @@ use super::lines::{EdgeLine, edge_line};
 
 /// Depths this near to each other, relative to the nearest, are of one surface.
 const ONE_SURFACE: f64 = 0.02;
-/// Bilinear weight from which pixels of the same surface give its colour: less is lost in single precision, far out in the frame.
+/// Bilinear weight from which pixels of the same surface give its colour: less is lost in single precision,
+/// far out in the frame.
 const LEAST_WEIGHT: f64 = 1e-3;
 
 /// What is at the middle of an ideal pixel.
@@ -26,15 +27,16 @@ struct Around {
     t: DVec2,
 }
 
-/// An ideal frame whose depth is supersampled: `scale` fine pixels along a side of an ideal pixel, four samples each.
+/// An ideal frame whose depth is supersampled: `scale` fine pixels along a side of an ideal pixel, four
+/// samples each.
 #[derive(Clone, Copy, Debug)]
 pub struct FineImage<'a> {
     /// Ideal width, height.
     pub size_px: [u32; 2],
     /// Fine pixels along a side of an ideal pixel.
     pub scale: u32,
-    /// Inverse planar depth in the key camera, 1/m, 0 = sky: row-major fine pixels, four samples each, in the order of
-    /// [`FineImage::SAMPLE_PLACES`].
+    /// Inverse planar depth in the key camera, 1/m, 0 = sky: row-major fine pixels, four samples each, in the
+    /// order of [`FineImage::SAMPLE_PLACES`].
     pub samples: &'a [f64],
     /// Linear R G B of the samples; empty for frames whose colours are those of the pixels' middles alone.
     pub sample_colors: &'a [DVec3],
@@ -47,9 +49,14 @@ pub struct FineImage<'a> {
 }
 
 impl FineImage<'_> {
-    /// Standard places of the samples, fine pixels from the fine pixel's top-left corner: one in each quarter, in the order of quarters.
-    pub const SAMPLE_PLACES: [DVec2; 4] =
-        [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
+    /// Standard places of the samples, fine pixels from the fine pixel's top-left corner: one in each
+    /// quarter, in the order of quarters.
+    pub const SAMPLE_PLACES: [DVec2; 4] = [
+        DVec2::new(0.375, 0.125),
+        DVec2::new(0.875, 0.375),
+        DVec2::new(0.125, 0.625),
+        DVec2::new(0.625, 0.875),
+    ];
 
     /// The border within each fine pixel, for [`FineImage::lines`].
     #[must_use]
@@ -59,8 +66,8 @@ impl FineImage<'_> {
         (0..width * height).map(|i| edge_line([i % width, i / width], [width, height], &depth)).collect()
     }
 
-    /// Inverse depth (1/m) of the surface that is seen at a position: its sample's in a marked pixel, elsewhere, where one surface is around,
-    /// bilinear between the pixels' middles.
+    /// Inverse depth (1/m) of the surface that is seen at a position: its sample's in a marked pixel,
+    /// elsewhere, where one surface is around, bilinear between the pixels' middles.
     #[must_use]
     pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
         let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
@@ -69,7 +76,8 @@ impl FineImage<'_> {
             return self.samples[self.sample(at_px)];
         }
         let around = self.around(at_px);
-        let [w00, w10, w01, w11] = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| self.centre(&around, x, y).inverse_depth);
+        let [w00, w10, w01, w11] =
+            [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| self.centre(&around, x, y).inverse_depth);
         super::blend_inverse_depths([w00, w10, w01, w11], around.t)
     }
 
@@ -82,12 +90,15 @@ impl FineImage<'_> {
     }
 
     fn centre(&self, around: &Around, x: i32, y: i32) -> Centre {
-        let at = |k: usize, step: i32| (around.base[k] + f64::from(step)).clamp(0.0, f64::from(self.size_px[k]) - 1.0);
+        let at = |k: usize, step: i32| {
+            (around.base[k] + f64::from(step)).clamp(0.0, f64::from(self.size_px[k]) - 1.0)
+        };
         self.centres[(at(1, y) * f64::from(self.size_px[0]) + at(0, x)) as usize]
     }
 
-    /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine
-    /// pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
+    /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two
+    /// surfaces runs through the fine pixel, one of the surface on the position's side. Positions outside go
+    /// to the border of the frame.
     fn sample(&self, at_px: DVec2) -> usize {
         let size_px = self.size_px.map(|side| i64::from(side * self.scale));
         let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
@@ -101,17 +112,21 @@ impl FineImage<'_> {
         let Some(line) = self.lines.get(index(texel)).copied().flatten() else { return own };
         let nearer = line.normal.dot(at - corner - 0.5) > line.offset_px;
         let of_side = |texel: [i64; 2]| {
-            (0..4).map(|k| 4 * index(texel) + (quarter ^ k)).find(|&sample| (self.samples[sample] > line.between) == nearer)
+            (0..4)
+                .map(|k| 4 * index(texel) + (quarter ^ k))
+                .find(|&sample| (self.samples[sample] > line.between) == nearer)
         };
-        // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has some.
+        // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has
+        // some.
         let towards = if nearer { line.normal } else { -line.normal };
         let beside = |k: usize| (texel[k] + towards[k].round_ties_even() as i64).clamp(0, size_px[k] - 1);
         of_side(texel).or_else(|| of_side([beside(0), beside(1)])).unwrap_or(own)
     }
 
-    /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples have none, bilinear between
-    /// those of the four pixels around it, or, where those show two surfaces, of those on the side of the mean of their depths that
-    /// [`FineImage::inverse_depth`] is on; where that is none, the nearest in depth of the sixteen around it.
+    /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples
+    /// have none, bilinear between those of the four pixels around it, or, where those show two surfaces, of
+    /// those on the side of the mean of their depths that [`FineImage::inverse_depth`] is on; where that is
+    /// none, the nearest in depth of the sixteen around it.
     #[must_use]
     pub fn color(&self, at_px: DVec2) -> DVec3 {
         if let Some(&color) = self.sample_colors.get(self.sample(at_px)) {
@@ -122,8 +137,9 @@ impl FineImage<'_> {
         let t = around.t;
         let centre = |x, y| self.centre(&around, x, y);
         let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (x, y, centre(x, y)));
-        let (low, high) =
-            four.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (_, _, c)| (low.min(c.inverse_depth), high.max(c.inverse_depth)));
+        let (low, high) = four.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (_, _, c)| {
+            (low.min(c.inverse_depth), high.max(c.inverse_depth))
+        });
         let between = 0.5 * (low + high);
         let one_surface = low > (1.0 - ONE_SURFACE) * high;
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);

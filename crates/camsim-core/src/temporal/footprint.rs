@@ -29,8 +29,8 @@ pub enum TapStage {
     },
 }
 
-/// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has this variance (times 12), 1 of
-/// the ideal pixel and 2 of the tent.
+/// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has
+/// this variance (times 12), 1 of the ideal pixel and 2 of the tent.
 pub const TENT_PX2: f64 = 3.0;
 
 /// Widest area that is read, ideal pixels: six of them along each axis.
@@ -46,14 +46,16 @@ pub enum Kernel {
     Bilinear,
     /// By a cubic spline of this softness.
     Spline(DVec2),
-    /// By the part of a rectangle of these sides that each of them covers, ideal pixels, from 1 to [`WIDEST_AREA_PX`]. Of sides of 1 that is the bilinear one.
+    /// By the part of a rectangle of these sides that each of them covers, ideal pixels, from 1 to
+    /// [`WIDEST_AREA_PX`]. Of sides of 1 that is the bilinear one.
     Area(DVec2),
 }
 
 /// Reads of an output pixel in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Extent of the grid of reads along x and y, ideal pixels: the pixel's own, less what each read covers, so that the variances agree.
+    /// Extent of the grid of reads along x and y, ideal pixels: the pixel's own, less what each read covers,
+    /// so that the variances agree.
     pub dx: DVec2,
     /// See above.
     pub dy: DVec2,
@@ -78,7 +80,9 @@ impl Footprint {
         let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
         let has_spline = matches!(stage, TapStage::Spline | TapStage::Area | TapStage::SplineOrGrid { .. });
         let kernel = match stage {
-            TapStage::Area if sides_of_area(dx, dy).max_element() > NARROW_AREA_PX => Kernel::Area(sides_of_area(dx, dy)),
+            TapStage::Area if sides_of_area(dx, dy).max_element() > NARROW_AREA_PX => {
+                Kernel::Area(sides_of_area(dx, dy))
+            }
             _ if has_spline && taps == [1, 1] => Kernel::Spline(DVec2::new(softness(dx), softness(dy))),
             _ => Kernel::Bilinear,
         };
@@ -113,9 +117,10 @@ impl Footprint {
     }
 }
 
-/// Sides of the rectangle that is read of a pixel: along the frame's own axes, so that with the ideal pixels' own width its variance is the pixel's, which has the same along all axes
-/// if it is a square, however that is turned. What ideal pixels of several samples have themselves is not taken off besides, as it is of grids: borders come out sharper so, and nearer to
-/// what they are.
+/// Sides of the rectangle that is read of a pixel: along the frame's own axes, so that with the ideal pixels'
+/// own width its variance is the pixel's, which has the same along all axes if it is a square, however that
+/// is turned. What ideal pixels of several samples have themselves is not taken off besides, as it is of
+/// grids: borders come out sharper so, and nearer to what they are.
 fn sides_of_area(dx: DVec2, dy: DVec2) -> DVec2 {
     (dx * dx + dy * dy - 1.0).clamp(DVec2::ONE, DVec2::splat(WIDEST_AREA_PX * WIDEST_AREA_PX)).map(f64::sqrt)
 }
@@ -129,12 +134,13 @@ fn spread(side: DVec2, taps: u32) -> DVec2 {
     side * ((length2 - TENT_PX2).max(0.0) / (1.0 - f64::from(taps * taps).recip()) / length2).sqrt()
 }
 
-/// The order in which the cells of a grid are read while the exposure goes by: cells count row after row, four bits each and the first one lowest. By
-/// columns and rows, of which there are no fewer columns.
+/// The order in which the cells of a grid are read while the exposure goes by: cells count row after row,
+/// four bits each and the first one lowest. By columns and rows, of which there are no fewer columns.
 ///
-/// Each read is of one cell at one instant, so that cells and instants must not go together: read row after row, a path across the rows is longer or
-/// shorter than it is. These orders were found by search to leave least of borders in any direction, for paths of 0.8 to 8 ideal pixels, and to be near
-/// the pixel's centre on the whole wherever they stop (scripts/order_of_reads.py).
+/// Each read is of one cell at one instant, so that cells and instants must not go together: read row after
+/// row, a path across the rows is longer or shorter than it is. These orders were found by search to leave
+/// least of borders in any direction, for paths of 0.8 to 8 ideal pixels, and to be near the pixel's centre
+/// on the whole wherever they stop (scripts/order_of_reads.py).
 const TURNS: [([u32; 2], u64); 6] = [
     ([4, 1], 0x1302),
     ([3, 2], 0x42_0531),
@@ -144,8 +150,8 @@ const TURNS: [([u32; 2], u64); 6] = [
     ([4, 4], 0x64df_2790_c5be_318a),
 ];
 
-/// The cell that is read in a turn. Grids that have no order of their own begin with the first cell and the last one, the second and the one before the
-/// last, and so on.
+/// The cell that is read in a turn. Grids that have no order of their own begin with the first cell and the
+/// last one, the second and the one before the last, and so on.
 fn place_of_turn([nx, ny]: [u32; 2], turn: u32) -> u32 {
     let [columns, rows] = [nx.max(ny), nx.min(ny)];
     let Some((_, turns)) = TURNS.iter().find(|(grid, _)| *grid == [columns, rows]) else {
@@ -156,12 +162,16 @@ fn place_of_turn([nx, ny]: [u32; 2], turn: u32) -> u32 {
     if nx >= ny { place } else { place % columns * nx + place / columns }
 }
 
-/// Where the reads of a grid of `taps` along each side lie, in the order in which they are read: shares of its sides from the middle on.
+/// Where the reads of a grid of `taps` along each side lie, in the order in which they are read: shares of
+/// its sides from the middle on.
 #[must_use]
 pub fn tap_shares(taps: [u32; 2]) -> Vec<[f32; 2]> {
     let [nx, ny] = taps.map(|n| n.max(1));
     let share = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
-    (0..nx * ny).map(|turn| place_of_turn([nx, ny], turn)).map(|place| [share(place % nx, nx), share(place / nx, ny)]).collect()
+    (0..nx * ny)
+        .map(|turn| place_of_turn([nx, ny], turn))
+        .map(|place| [share(place % nx, nx), share(place / nx, ny)])
+        .collect()
 }
 
 #[cfg(test)]
@@ -174,23 +184,30 @@ mod tests {
         // A parabola's mean over an area tells its variance.
         let size_px = [40, 40];
         let parabola = |i: u32| (f64::from(i % 40) - 20.0).powi(2) + 1.0 / 12.0;
-        let rgba: Vec<f32> = (0..1600).flat_map(|i| [parabola(i) as f32, (i % 40) as f32 - 20.0, 0.0, 1.0]).collect();
+        let rgba: Vec<f32> =
+            (0..1600).flat_map(|i| [parabola(i) as f32, (i % 40) as f32 - 20.0, 0.0, 1.0]).collect();
         let color = ColorImage { size_px, rgba: &rgba };
         let mean = |width_px: f64, stage: TapStage| {
             let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
             let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
             // Over all positions between the pixels, about each of them.
             let about = |k: u32| {
-                let (found, x) = (gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8), at(k).x - 20.0);
+                let (found, x) =
+                    (gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8), at(k).x - 20.0);
                 found.x - 2.0 * x * found.y + x * x
             };
             (0..16).map(about).sum::<f64>() / 16.0
         };
         for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
             let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
-            assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
+            assert!(
+                (found - width_px * width_px / 12.0).abs() < 2e-3,
+                "{width_px}: {found} {}",
+                width_px * width_px / 12.0
+            );
         }
-        // An area has the pixel's own variance with the ideal pixels' squares; what they are the mean of is not taken off.
+        // An area has the pixel's own variance with the ideal pixels' squares; what they are the mean of is
+        // not taken off.
         for width_px in [1.5, 2.0, 2.6, 3.4, 5.0] {
             let found = mean(width_px, TapStage::Area) - (width_px * width_px + 1.0) / 12.0;
             assert!(found.abs() < 2e-3, "{width_px}: {found}");
@@ -198,7 +215,9 @@ mod tests {
         assert_eq!(mean(1.4, TapStage::Area), mean(1.4, TapStage::Spline), "narrow ones are splines");
         // What one bilinear read is off by, and that a grid is the same where it has several.
         assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
-        for [width_px, is_off_by] in [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]] {
+        for [width_px, is_off_by] in
+            [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]]
+        {
             let found = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
             assert!((found - is_off_by).abs() < 2e-3, "{width_px}: {found} {is_off_by}");
         }
@@ -247,19 +266,28 @@ mod tests {
             let count = nx * ny;
             let cell = |turn: u32| {
                 let place = place_of_turn([nx, ny], turn);
-                DVec2::new(f64::from(place % nx), f64::from(place / nx)) - 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1))
+                DVec2::new(f64::from(place % nx), f64::from(place / nx))
+                    - 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1))
             };
             let with_time = |of: &dyn Fn(DVec2) -> f64| {
                 let values: Vec<f64> = (0..count).map(|turn| of(cell(turn))).collect();
                 let mean = values.iter().sum::<f64>() / f64::from(count);
                 let middle = 0.5 * f64::from(count - 1);
                 let sum = |value: &dyn Fn(f64, f64) -> f64| {
-                    (0..count).zip(&values).map(|(turn, v)| value(v - mean, f64::from(turn) - middle)).sum::<f64>()
+                    (0..count)
+                        .zip(&values)
+                        .map(|(turn, v)| value(v - mean, f64::from(turn) - middle))
+                        .sum::<f64>()
                 };
                 let both = (sum(&|v, _| v * v) * sum(&|_, t| t * t)).sqrt();
                 if both > 1e-9 { sum(&|v, t| v * t) / both } else { 0.0 }
             };
-            for correlation in [with_time(&|c| c.x), with_time(&|c| c.y), with_time(&|c| c.x * c.y), with_time(&|c| c.length_squared())] {
+            for correlation in [
+                with_time(&|c| c.x),
+                with_time(&|c| c.y),
+                with_time(&|c| c.x * c.y),
+                with_time(&|c| c.length_squared()),
+            ] {
                 assert!(correlation.abs() < 0.3, "{nx} x {ny}: {correlation}");
             }
         }

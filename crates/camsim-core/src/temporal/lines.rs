@@ -1,7 +1,8 @@
-//! The border of two surfaces within a pixel of a supersampled ideal frame, as a straight line through the samples around it. f64 twin of
-//! `shaders/ideal/lines.wgsl`.
+//! The border of two surfaces within a pixel of a supersampled ideal frame, as a straight line through the
+//! samples around it. f64 twin of `shaders/ideal/lines.wgsl`.
 //!
-//! Four samples know the share of a pixel that a surface covers to 0.09 RMS. All samples along eight pixels of a straight border know it to 0.03.
+//! Four samples know the share of a pixel that a surface covers to 0.09 RMS. All samples along eight pixels
+//! of a straight border know it to 0.03.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -21,7 +22,8 @@ const MOST_MEMBERS: usize = 64;
 /// Samples that differ by less than this, relative to the nearest, are of one surface.
 const ONE_SURFACE: f64 = 0.02;
 
-/// A border: the nearer surface is where `normal · x > offset_px`, x in fine pixels from the middle of the fine pixel.
+/// A border: the nearer surface is where `normal · x > offset_px`, x in fine pixels from the middle of the
+/// fine pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeLine {
     /// Unit vector towards the nearer surface.
@@ -35,30 +37,42 @@ pub struct EdgeLine {
 /// A sample that takes part: its place, and 1 for the nearer surface or 0 for the farther.
 type Member = (DVec2, f64);
 
-/// The line through a fine pixel, or `None`: one surface, more than two, or a corner. `inverse_depth` gives a sample of a fine pixel, in the
-/// order of [`FineImage::SAMPLE_PLACES`]; it is asked for fine pixels within `size_px` alone.
+/// The line through a fine pixel, or `None`: one surface, more than two, or a corner. `inverse_depth` gives a
+/// sample of a fine pixel, in the order of [`FineImage::SAMPLE_PLACES`]; it is asked for fine pixels within
+/// `size_px` alone.
 ///
-/// Logistic regression by Newton's method: first over the 3x3 fine pixels around, then over the band along the line that was found. A line
-/// counts if all members lie on their side.
+/// Logistic regression by Newton's method: first over the 3x3 fine pixels around, then over the band along
+/// the line that was found. A line counts if all members lie on their side.
 #[must_use]
-pub fn edge_line(fine_pixel: [i64; 2], size_px: [i64; 2], inverse_depth: &dyn Fn([i64; 2], usize) -> f64) -> Option<EdgeLine> {
+pub fn edge_line(
+    fine_pixel: [i64; 2],
+    size_px: [i64; 2],
+    inverse_depth: &dyn Fn([i64; 2], usize) -> f64,
+) -> Option<EdgeLine> {
     let at = |step: [i64; 2]| {
         let [x, y] = [fine_pixel[0] + step[0], fine_pixel[1] + step[1]];
         (x >= 0 && y >= 0 && x < size_px[0] && y < size_px[1]).then_some([x, y])
     };
     let samples = |step: [i64; 2]| {
         at(step).into_iter().flat_map(move |pixel| {
-            (0..4).map(move |i| (DVec2::new(step[0] as f64, step[1] as f64) + FineImage::SAMPLE_PLACES[i] - 0.5, inverse_depth(pixel, i)))
+            (0..4).map(move |i| {
+                (
+                    DVec2::new(step[0] as f64, step[1] as f64) + FineImage::SAMPLE_PLACES[i] - 0.5,
+                    inverse_depth(pixel, i),
+                )
+            })
         })
     };
     let around: Vec<(DVec2, f64)> = (0..9).flat_map(|k| samples([k % 3 - 1, k / 3 - 1])).collect();
-    let (low, high) = around.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s.1), high.max(s.1)));
+    let (low, high) =
+        around.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s.1), high.max(s.1)));
     if low >= (1.0 - ONE_SURFACE) * high {
         return None;
     }
     let between = 0.5 * (low + high);
     let member = |(place, w): (DVec2, f64)| (place, f64::from(u8::from(w > between)));
-    let (normal, offset_px) = fitted(&around.into_iter().map(member).collect::<Vec<_>>(), 3).filter(|line| line.1.abs() <= 1.0)?;
+    let (normal, offset_px) =
+        fitted(&around.into_iter().map(member).collect::<Vec<_>>(), 3).filter(|line| line.1.abs() <= 1.0)?;
     REACH
         .into_iter()
         .find_map(|reach| {
@@ -66,7 +80,9 @@ pub fn edge_line(fine_pixel: [i64; 2], size_px: [i64; 2], inverse_depth: &dyn Fn
                 .into_iter()
                 .flat_map(|step| samples(step).map(move |sample| (step, sample)))
                 .filter(|(step, (place, _))| {
-                    *step == [0, 0] || ((normal.dot(*place) - offset_px).abs() < BAND && normal.perp_dot(*place).abs() < reach)
+                    *step == [0, 0]
+                        || ((normal.dot(*place) - offset_px).abs() < BAND
+                            && normal.perp_dot(*place).abs() < reach)
                 })
                 .map(|(_, sample)| member(sample))
                 .take(MOST_MEMBERS)
@@ -124,11 +140,13 @@ mod tests {
 
     const SIDE: i64 = 13;
 
-    /// The line of the middle pixel of a picture of two surfaces, and the share of that pixel's samples on the nearer one.
+    /// The line of the middle pixel of a picture of two surfaces, and the share of that pixel's samples on
+    /// the nearer one.
     fn of(nearer: &dyn Fn(DVec2) -> bool) -> (Option<EdgeLine>, f64) {
         let middle = SIDE / 2;
         let depth = |[x, y]: [i64; 2], i: usize| {
-            let place = DVec2::new((x - middle) as f64, (y - middle) as f64) + FineImage::SAMPLE_PLACES[i] - 0.5;
+            let place =
+                DVec2::new((x - middle) as f64, (y - middle) as f64) + FineImage::SAMPLE_PLACES[i] - 0.5;
             if nearer(place) { 1.0 / 40.0 } else { 1.0 / 60.0 }
         };
         let own = (0..4).filter(|&i| depth([middle; 2], i) > 0.02).count() as f64 / 4.0;
@@ -167,9 +185,11 @@ mod tests {
     #[test]
     fn what_is_no_line_has_none() {
         assert_eq!(of(&|_| true).0, None);
-        // A strip thinner than a pixel, and a corner in the middle of the pixel: no line has all samples on its sides.
+        // A strip thinner than a pixel, and a corner in the middle of the pixel: no line has all samples on
+        // its sides.
         for k in 0..40 {
-            let (x, y) = (DVec2::from_angle(f64::from(k) * 0.7), DVec2::from_angle(f64::from(k) * 0.7 + 1.57));
+            let (x, y) =
+                (DVec2::from_angle(f64::from(k) * 0.7), DVec2::from_angle(f64::from(k) * 0.7 + 1.57));
             assert_eq!(of(&|place| x.dot(place).abs() < 0.3).0, None, "strip {k}");
             let corner = of(&|place| x.dot(place) > 0.0 && y.dot(place) > 0.0).0;
             assert_eq!(corner, None, "corner {k}");

@@ -1,14 +1,16 @@
-//! Which pixels of an ideal frame are marked: those that, with their neighbours, show more than one surface. f64 twin of
-//! `shaders/ideal/marks.wgsl` and `shaders/ideal/spread/`.
+//! Which pixels of an ideal frame are marked: those that, with their neighbours, show more than one surface.
+//! f64 twin of `shaders/ideal/marks.wgsl` and `shaders/ideal/spread/`.
 
 use super::fine::Centre;
 
 /// A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
 pub const EDGE_STEP: f64 = 0.01;
-/// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another picture begins, bends less.
+/// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another
+/// picture begins, bends less.
 pub const FINE_EDGE_STEP: f64 = 0.003;
 
-/// Along one direction: a second difference of inverse depth beyond what a smooth surface has (a plane has none), or sky beside a surface.
+/// Along one direction: a second difference of inverse depth beyond what a smooth surface has (a plane has
+/// none), or sky beside a surface.
 #[must_use]
 pub fn steps(before: f64, here: f64, after: f64, edge_step: f64) -> bool {
     let high = before.max(here).max(after);
@@ -16,8 +18,9 @@ pub fn steps(before: f64, here: f64, after: f64, edge_step: f64) -> bool {
     (before - 2.0 * here + after).abs() > edge_step * high || (low == 0.0 && high > 0.0)
 }
 
-/// Marks of an ideal frame of `size_px` (width, height), row-major, from what is at the middles of its pixels, and from `4 scale^2` samples a
-/// pixel (laid out as in [`super::fine::FineImage::samples`]) where surfaces may be thinner than a pixel; empty where they are not.
+/// Marks of an ideal frame of `size_px` (width, height), row-major, from what is at the middles of its
+/// pixels, and from `4 scale^2` samples a pixel (laid out as in [`super::fine::FineImage::samples`]) where
+/// surfaces may be thinner than a pixel; empty where they are not.
 #[must_use]
 pub fn marks(size_px: [u32; 2], scale: u32, centres: &[Centre], samples: &[f64]) -> Vec<bool> {
     let [width, height] = size_px.map(i64::from);
@@ -28,8 +31,11 @@ pub fn marks(size_px: [u32; 2], scale: u32, centres: &[Centre], samples: &[f64])
             centres[(y * width + x) as usize].inverse_depth
         };
         let slope = (at(1, 0) - at(-1, 0)).abs() + (at(0, 1) - at(0, -1)).abs();
-        [[1, 0], [0, 1], [1, 1], [1, -1]].into_iter().any(|[dx, dy]| steps(at(-dx, -dy), at(0, 0), at(dx, dy), edge_step))
-            || (!samples.is_empty() && is_thin(size_px[0], scale, samples, [x as usize, y as usize], slope, edge_step))
+        [[1, 0], [0, 1], [1, 1], [1, -1]]
+            .into_iter()
+            .any(|[dx, dy]| steps(at(-dx, -dy), at(0, 0), at(dx, dy), edge_step))
+            || (!samples.is_empty()
+                && is_thin(size_px[0], scale, samples, [x as usize, y as usize], slope, edge_step))
     };
     (0..width * height).map(|i| is_marked(i % width, i / width)).collect()
 }
@@ -52,14 +58,19 @@ mod tests {
     #[test]
     fn planes_have_no_steps() {
         assert!(!steps(0.001, 0.011, 0.021, EDGE_STEP) && !steps(0.0, 0.0, 0.0, EDGE_STEP));
-        assert!(steps(0.01, 0.01, 0.02, EDGE_STEP) && steps(0.0, 0.0, 0.01, EDGE_STEP) && steps(0.01, 0.01, 0.0, EDGE_STEP));
+        assert!(
+            steps(0.01, 0.01, 0.02, EDGE_STEP)
+                && steps(0.0, 0.0, 0.01, EDGE_STEP)
+                && steps(0.01, 0.01, 0.0, EDGE_STEP)
+        );
         assert!(!steps(0.01, 0.01, 0.010_05, EDGE_STEP) && steps(0.01, 0.01, 0.010_05, FINE_EDGE_STEP));
         // No depth is no step and no panic.
         assert!(!steps(f64::NAN, f64::NAN, f64::NAN, EDGE_STEP));
     }
 
     fn marked(scale: u32, look: impl Fn(i64) -> f64, samples: &[f64]) -> Vec<usize> {
-        let centres: Vec<Centre> = (0..64).map(|i| Centre { inverse_depth: look(i % 8), ..Centre::default() }).collect();
+        let centres: Vec<Centre> =
+            (0..64).map(|i| Centre { inverse_depth: look(i % 8), ..Centre::default() }).collect();
         let marks = marks([8, 8], scale, &centres, samples);
         (0..8).filter(|&x| marks[3 * 8 + x]).collect()
     }
@@ -68,7 +79,8 @@ mod tests {
     fn pixels_beside_a_step_are_marked() {
         assert_eq!(marked(1, |x| if x < 4 { 0.1 } else { 0.02 }, &[]), [3, 4]);
         assert_eq!(marked(1, |x| if x < 4 { 0.1 } else { 0.0 }, &[]), [3, 4]);
-        // A slope, however steep; but the frame's border has no pixel beyond it that would tell a steep one from a step.
+        // A slope, however steep; but the frame's border has no pixel beyond it that would tell a steep one
+        // from a step.
         assert_eq!(marked(1, |x| 0.1 - 0.0009 * x as f64, &[]), [0; 0]);
         assert_eq!(marked(1, |x| 0.1 - 0.01 * x as f64, &[]), [0, 7]);
     }

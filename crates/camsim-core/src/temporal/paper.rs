@@ -1,5 +1,6 @@
-//! The paper's gather: samples on the straight segment between the two ends of the exposure, both ends included, on stored values. f64 twins
-//! of `shaders/reverse/gather/straight.wgsl` and `shaders/reverse/color/stored.wgsl`.
+//! The paper's gather: samples on the straight segment between the two ends of the exposure, both ends
+//! included, on stored values. f64 twins of `shaders/reverse/gather/straight.wgsl` and
+//! `shaders/reverse/color/stored.wgsl`.
 
 use glam::{DVec2, DVec3};
 
@@ -7,7 +8,8 @@ use super::ColorImage;
 
 /// Mean of `samples` equally weighted samples from the first end to the last; one sample is the middle.
 ///
-/// With both ends included it averages over a path `samples / (samples - 1)` too long: the paper's choice (its eq. 20 in steps).
+/// With both ends included it averages over a path `samples / (samples - 1)` too long: the paper's choice
+/// (its eq. 20 in steps).
 #[must_use]
 pub fn gather_straight(ends_px: [DVec2; 2], samples: u32, stored: &ColorImage<'_>) -> DVec3 {
     let at = |i: u32| if samples < 2 { 0.5 } else { f64::from(i) / f64::from(samples - 1) };
@@ -15,7 +17,8 @@ pub fn gather_straight(ends_px: [DVec2; 2], samples: u32, stored: &ColorImage<'_
     (0..count).map(|i| stored.sample(ends_px[0].lerp(ends_px[1], at(i)))).sum::<DVec3>() / f64::from(count)
 }
 
-/// `mix(color, sky, clamp(distance / end, 0, 1))`, the paper's linear fog, on stored values. Sky (`inverse_depth` 0) is all fog.
+/// `mix(color, sky, clamp(distance / end, 0, 1))`, the paper's linear fog, on stored values. Sky
+/// (`inverse_depth` 0) is all fog.
 #[must_use]
 pub fn linear_fog(color: DVec3, sky: DVec3, uv: DVec2, inverse_depth: f64, end_m: f64) -> DVec3 {
     let amount = uv.extend(1.0).length() / (inverse_depth * end_m).max(1e-30);
@@ -28,7 +31,8 @@ mod tests {
 
     #[test]
     fn both_ends_count_as_much_as_the_middle() {
-        let rgba: Vec<f32> = (0..16).flat_map(|i| [if i == 4 { 1.0 } else { 0.0 }, i as f32, 0.0, 1.0]).collect();
+        let rgba: Vec<f32> =
+            (0..16).flat_map(|i| [if i == 4 { 1.0 } else { 0.0 }, i as f32, 0.0, 1.0]).collect();
         let image = ColorImage { size_px: [16, 1], rgba: &rgba };
         let ends = [DVec2::new(4.0, 0.0), DVec2::new(12.0, 0.0)];
         let mean = gather_straight(ends, 5, &image);
@@ -40,7 +44,9 @@ mod tests {
     fn fog_grows_with_slant_range() {
         let (black, sky) = (DVec3::ZERO, DVec3::ONE);
         assert!((linear_fog(black, sky, DVec2::ZERO, 1.0 / 250.0, 1000.0).x - 0.25).abs() < 1e-12);
-        assert!((linear_fog(black, sky, DVec2::X, 1.0 / 250.0, 1000.0).x - 0.25 * 2_f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (linear_fog(black, sky, DVec2::X, 1.0 / 250.0, 1000.0).x - 0.25 * 2_f64.sqrt()).abs() < 1e-12
+        );
         assert_eq!(linear_fog(black, sky, DVec2::ZERO, 0.0, 1000.0), sky);
     }
 }

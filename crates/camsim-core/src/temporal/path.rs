@@ -1,5 +1,5 @@
-//! Path of a source over the exposure: polynomials of time through a few places that are known exactly. Twin of
-//! `shaders/reverse/gather/path/*.wgsl`.
+//! Path of a source over the exposure: polynomials of time through a few places that are known exactly. Twin
+//! of `shaders/reverse/gather/path/*.wgsl`.
 
 use glam::DVec2;
 
@@ -44,7 +44,8 @@ impl Curve {
 /// The polynomials through all of `places`, one after the other: one for each so many steps as `stage` says.
 pub fn curves(places: &[DVec2], stage: PathStage) -> impl ExactSizeIterator<Item = Curve> + '_ {
     let steps = stage.steps() as usize;
-    (0..places.len().saturating_sub(1) / steps).map(move |k| Curve::through(&places[k * steps..=(k + 1) * steps]))
+    (0..places.len().saturating_sub(1) / steps)
+        .map(move |k| Curve::through(&places[k * steps..=(k + 1) * steps]))
 }
 
 #[cfg(test)]
@@ -81,7 +82,10 @@ mod tests {
                     }
                 }
                 let order = 1 + stage.steps() as i32;
-                assert!(worst <= bound * wh.powi(order) && worst > 0.4 * bound * wh.powi(order), "{stage:?} {wh}: {worst:.2e}");
+                assert!(
+                    worst <= bound * wh.powi(order) && worst > 0.4 * bound * wh.powi(order),
+                    "{stage:?} {wh}: {worst:.2e}"
+                );
             }
         }
     }

@@ -6,22 +6,31 @@ use glam::DVec2;
 
 /// Samples of a pixel where it has several.
 pub const SAMPLES: u32 = 4;
-/// Where they are from the pixel's middle on, pixels: the standard places of devices. No two are in one row or column, so that borders along these are known to a quarter of
-/// a pixel.
-pub const SAMPLE_PLACES: [DVec2; 4] =
-    [DVec2::new(-0.125, -0.375), DVec2::new(0.375, -0.125), DVec2::new(-0.375, 0.125), DVec2::new(0.125, 0.375)];
+/// Where they are from the pixel's middle on, pixels: the standard places of devices. No two are in one row
+/// or column, so that borders along these are known to a quarter of a pixel.
+pub const SAMPLE_PLACES: [DVec2; 4] = [
+    DVec2::new(-0.125, -0.375),
+    DVec2::new(0.375, -0.125),
+    DVec2::new(-0.375, 0.125),
+    DVec2::new(0.125, 0.375),
+];
 /// Inverse depths that differ by no more than this part of the nearest one are of one surface.
 const ONE_SURFACE: f32 = 0.02;
 
-/// Inverse depth of a pixel's middle from those of its samples, 0 of what is infinitely far, and how it changes from pixel to pixel across and down. It is their mean, which is exact
-/// on a plane; where they are of several surfaces the mean of those of the nearest one, or if that has but one, of the nearest one behind it.
+/// Inverse depth of a pixel's middle from those of its samples, 0 of what is infinitely far, and how it
+/// changes from pixel to pixel across and down. It is their mean, which is exact on a plane; where they are
+/// of several surfaces the mean of those of the nearest one, or if that has but one, of the nearest one
+/// behind it.
 #[must_use]
 pub fn middle_depth(all: [f32; 4], slopes: [f32; 2]) -> f32 {
     // As they would be at the pixel's middle.
     let places = SAMPLE_PLACES.map(|place| place.as_vec2());
-    let middle: [f32; 4] = std::array::from_fn(|k| all[k] - slopes[0] * places[k].x - slopes[1] * places[k].y);
+    let middle: [f32; 4] =
+        std::array::from_fn(|k| all[k] - slopes[0] * places[k].x - slopes[1] * places[k].y);
     let most = all.iter().fold(0.0_f32, |most, &of| most.max(of));
-    let range = |of: &[f32; 4]| of.iter().fold([f32::INFINITY, 0.0_f32], |[low, high], &of| [low.min(of), high.max(of)]);
+    let range = |of: &[f32; 4]| {
+        of.iter().fold([f32::INFINITY, 0.0_f32], |[low, high], &of| [low.min(of), high.max(of)])
+    };
     let mean = 0.25 * ((all[0] + all[3]) + (all[1] + all[2]));
     let is_one = |of: &[f32; 4]| {
         let [low, high] = range(of);
@@ -34,7 +43,9 @@ pub fn middle_depth(all: [f32; 4], slopes: [f32; 2]) -> f32 {
     if near[1] > 1.0 {
         return near[0];
     }
-    let behind = all.iter().fold(0.0_f32, |next, &of| if of < (1.0 - ONE_SURFACE) * most { next.max(of) } else { next });
+    let behind = all
+        .iter()
+        .fold(0.0_f32, |next, &of| if of < (1.0 - ONE_SURFACE) * most { next.max(of) } else { next });
     mean_from(all, behind)[0]
 }
 

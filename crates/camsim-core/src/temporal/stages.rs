@@ -8,10 +8,11 @@ use serde::Serialize;
 pub enum NodeDepths {
     /// At mid-exposure, for all.
     Mid,
-    /// At both ends; what is between takes what lies between. The second look-up begins with what the first has found, and so takes one
-    /// iteration less.
+    /// At both ends; what is between takes what lies between. The second look-up begins with what the first
+    /// has found, and so takes one iteration less.
     Ends,
-    /// At mid-exposure and, beginning with what that has found, at both ends; what is between takes the parabola through them.
+    /// At mid-exposure and, beginning with what that has found, at both ends; what is between takes the
+    /// parabola through them.
     Three,
     /// In each, beginning with what the one before has found.
     Each,
@@ -22,8 +23,9 @@ impl NodeDepths {
     pub const ALL: [Self; 4] = [Self::Mid, Self::Ends, Self::Three, Self::Each];
 }
 
-/// The curve that joins the nodes of an exposure: one polynomial of time through each so many of them, the last of which is the next one's
-/// first. With h from node to node it misses a path p by at most `h^2 |p''| / 8`, `h^3 |p'''| / 15.6` or `h^5 |p'''''| / 33`.
+/// The curve that joins the nodes of an exposure: one polynomial of time through each so many of them, the
+/// last of which is the next one's first. With h from node to node it misses a path p by at most `h^2 |p''| /
+/// 8`, `h^3 |p'''| / 15.6` or `h^5 |p'''''| / 33`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PathStage {

@@ -1,18 +1,23 @@
-//! Pixels of an output frame whose depth, looked up in an ideal frame, may belong to no surface or to the wrong one.
+//! Pixels of an output frame whose depth, looked up in an ideal frame, may belong to no surface or to the
+//! wrong one.
 //!
-//! On a plane inverse depth is affine in the picture, so its second difference along a line of pixels is zero, and on a smooth surface it is small. A look-up between
-//! texels of an ideal frame is wrong only across a crease or an edge, by at most a quarter of the second difference there (the error of linear
-//! interpolation at a kink, at its worst in the middle between two texels). A region that shows the wrong surface altogether ends at an edge of what was looked up or of what is
-//! truly there: from its border on, each pixel that a ray corrects makes its neighbours suspect.
+//! On a plane inverse depth is affine in the picture, so its second difference along a line of pixels is
+//! zero, and on a smooth surface it is small. A look-up between texels of an ideal frame is wrong only across
+//! a crease or an edge, by at most a quarter of the second difference there (the error of linear
+//! interpolation at a kink, at its worst in the middle between two texels). A region that shows the wrong
+//! surface altogether ends at an edge of what was looked up or of what is truly there: from its border on,
+//! each pixel that a ray corrects makes its neighbours suspect.
 
 use rayon::prelude::*;
 
-/// Second difference of inverse depth, relative to the largest of the three, from which a ray decides: depths that are looked up elsewhere err by at most a quarter of it.
+/// Second difference of inverse depth, relative to the largest of the three, from which a ray decides: depths
+/// that are looked up elsewhere err by at most a quarter of it.
 pub const BEND: f32 = 1e-3;
 /// Relative change of inverse depth by a ray from which the pixels around it are suspect too.
 pub const CHANGE: f32 = 5e-4;
 
-/// Inverse depths of a frame's pixels (1/m, 0 = nothing), row-major, and which of them have a ray through the lens.
+/// Inverse depths of a frame's pixels (1/m, 0 = nothing), row-major, and which of them have a ray through the
+/// lens.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthGrid<'a> {
     /// Pixels of a row.
@@ -25,7 +30,8 @@ pub struct DepthGrid<'a> {
     pub valid: &'a [bool],
 }
 
-/// Whether inverse depth bends more between three pixels in a line than on a smooth surface. Sky beside a surface does.
+/// Whether inverse depth bends more between three pixels in a line than on a smooth surface. Sky beside a
+/// surface does.
 #[must_use]
 pub fn bends(before: f32, here: f32, after: f32) -> bool {
     (before - 2.0 * here + after).abs() > BEND * before.max(here).max(after)
@@ -81,14 +87,22 @@ impl DepthGrid<'_> {
         if here < stride || here + stride + width > self.inverse_depth.len() {
             return;
         }
-        let (above, below) = (&self.inverse_depth[here - stride..][..width], &self.inverse_depth[here + stride..][..width]);
-        let (valid_above, valid_below) = (&self.valid[here - stride..][..width], &self.valid[here + stride..][..width]);
+        let (above, below) =
+            (&self.inverse_depth[here - stride..][..width], &self.inverse_depth[here + stride..][..width]);
+        let (valid_above, valid_below) =
+            (&self.valid[here - stride..][..width], &self.valid[here + stride..][..width]);
         for x in 0..width {
             bent[x] |= bends(above[x], row[x], below[x]) & valid_above[x] & valid[x] & valid_below[x];
         }
         for x in 1..width.saturating_sub(1) {
-            bent[x] |= bends(above[x - 1], row[x], below[x + 1]) & valid_above[x - 1] & valid[x] & valid_below[x + 1];
-            bent[x] |= bends(above[x + 1], row[x], below[x - 1]) & valid_above[x + 1] & valid[x] & valid_below[x - 1];
+            bent[x] |= bends(above[x - 1], row[x], below[x + 1])
+                & valid_above[x - 1]
+                & valid[x]
+                & valid_below[x + 1];
+            bent[x] |= bends(above[x + 1], row[x], below[x - 1])
+                & valid_above[x + 1]
+                & valid[x]
+                & valid_below[x - 1];
         }
     }
 }
@@ -98,7 +112,11 @@ mod tests {
     use super::*;
 
     /// Suspects of a grid of 12 x 10 pixels, from inverse depths by place.
-    fn suspects(row_step: usize, valid: impl Fn(usize, usize) -> bool, look: impl Fn(f32, f32) -> f32) -> Vec<[usize; 2]> {
+    fn suspects(
+        row_step: usize,
+        valid: impl Fn(usize, usize) -> bool,
+        look: impl Fn(f32, f32) -> f32,
+    ) -> Vec<[usize; 2]> {
         let places = || (0..10).flat_map(|y| (0..12).map(move |x| [x, y]));
         let inverse_depth: Vec<f32> = places().map(|[x, y]| look(x as f32, y as f32)).collect();
         let valid: Vec<bool> = places().map(|[x, y]| valid(x, y)).collect();
@@ -111,12 +129,16 @@ mod tests {
         assert!(suspects(1, |_, _| true, |x, y| 0.01 + 0.002 * x + 0.003 * y).is_empty());
         assert!(suspects(1, |_, _| true, |_, _| 0.0).is_empty());
         // A step between the fields of an interlaced frame is none: they are of other instants.
-        assert!(suspects(2, |_, _| true, |_, y| if (y as u32).is_multiple_of(2) { 0.01 } else { 0.02 }).is_empty());
+        assert!(
+            suspects(2, |_, _| true, |_, y| if (y as u32).is_multiple_of(2) { 0.01 } else { 0.02 })
+                .is_empty()
+        );
     }
 
     #[test]
     fn edges_creases_and_skylines_are_suspect_with_their_neighbours() {
-        let column = |found: Vec<[usize; 2]>| found.iter().filter(|at| at[1] == 5).map(|at| at[0]).collect::<Vec<_>>();
+        let column =
+            |found: Vec<[usize; 2]>| found.iter().filter(|at| at[1] == 5).map(|at| at[0]).collect::<Vec<_>>();
         assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.02 })), [3, 4, 5, 6]);
         assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.0 })), [3, 4, 5, 6]);
         assert_eq!(column(suspects(1, |_, _| true, |x, _| 0.1 + 2e-4 * (x - 5.0).max(0.0))), [4, 5, 6]);
@@ -140,6 +162,8 @@ mod tests {
 
     #[test]
     fn numbers_that_are_none_are_no_bend() {
-        assert!(!bends(f32::NAN, 0.1, 0.1) && !changed(f32::NAN, 0.1) && changed(0.0, 0.1) && !changed(0.0, 0.0));
+        assert!(
+            !bends(f32::NAN, 0.1, 0.1) && !changed(f32::NAN, 0.1) && changed(0.0, 0.1) && !changed(0.0, 0.0)
+        );
     }
 }

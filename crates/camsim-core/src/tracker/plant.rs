@@ -1,12 +1,16 @@
-//! Controller and plant: two nested square-root loops on a double integrator, for position and for attitude (paper, section 3).
+//! Controller and plant: two nested square-root loops on a double integrator, for position and for attitude
+//! (paper, section 3).
 //!
-//! The outer loop turns the error e into a velocity relative to the target, eq. (2) with a linear zone around the origin:
-//! `p e` for e below `b/p^2`, else `sqrt(2 b (e - b/(2 p^2)))`, both with slope p where they meet. The target's own velocity is added
-//! (feed-forward) and the sum is limited. The inner loop does the same from velocity error to acceleration; no limit is put on jerk, so its square
-//! root is infinitely steep and what remains is its linear zone, which is everything that one tick can correct, and the acceleration limit.
+//! The outer loop turns the error e into a velocity relative to the target, eq. (2) with a linear zone around
+//! the origin: `p e` for e below `b/p^2`, else `sqrt(2 b (e - b/(2 p^2)))`, both with slope p where they
+//! meet. The target's own velocity is added (feed-forward) and the sum is limited. The inner loop does the
+//! same from velocity error to acceleration; no limit is put on jerk, so its square root is infinitely steep
+//! and what remains is its linear zone, which is everything that one tick can correct, and the acceleration
+//! limit.
 //!
-//! Errors, speeds and accelerations are vectors and their lengths are limited. The velocity after a tick lies between the one before and the
-//! wanted one, both inside the ball of the speed limit, so all limits hold at every tick, whatever the log does.
+//! Errors, speeds and accelerations are vectors and their lengths are limited. The velocity after a tick lies
+//! between the one before and the wanted one, both inside the ball of the speed limit, so all limits hold at
+//! every tick, whatever the log does.
 
 use glam::{DQuat, DVec3};
 
@@ -16,15 +20,18 @@ use crate::{
     trajectory::{advance, so3},
 };
 
-/// Gain of the linear zone, 1/s. With braking at 0.8 of the limit a 10 m step is overshoot-free from 50 to 1000 Hz.
+/// Gain of the linear zone, 1/s. With braking at 0.8 of the limit a 10 m step is overshoot-free from 50 to
+/// 1000 Hz.
 const LINEAR_GAIN_HZ: f64 = 8.0;
 /// Bound on gain times step: at lower control rates the linear zone grows instead of ringing.
 const LARGEST_GAIN_STEP: f64 = 0.16;
-/// Share of the acceleration limit that braking counts on; the rest is for the target's own acceleration and the finite tick.
+/// Share of the acceleration limit that braking counts on; the rest is for the target's own acceleration and
+/// the finite tick.
 const BRAKING_SHARE: f64 = 0.8;
 /// A demand counts as limited beyond this relative excess, which is above rounding.
 const EXCESS: f64 = 1e-9;
-/// Accelerations stay below their limit by this share: a difference of velocities, divided by the step, is rounded.
+/// Accelerations stay below their limit by this share: a difference of velocities, divided by the step, is
+/// rounded.
 const ROUNDING_SHARE: f64 = 1e-10;
 
 /// One channel group (position or attitude): limits on the lengths of its velocity and acceleration.
@@ -89,7 +96,8 @@ pub(crate) struct Followed {
 pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed {
     let step_s = reference.step_s;
     let linear = SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2);
-    let angular = SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
+    let angular =
+        SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
     let mut saturation = SaturationClock::new(step_s);
     let mut target = reference.target(0);
     let mut state = BodyState {
@@ -105,11 +113,13 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed
         let next = reference.target(k);
 
         // The error that would be left if the next tick had exactly the target's velocity.
-        let reached = state.position_ned_m + (state.velocity_ned_m_s + next.velocity_ned_m_s) * (0.5 * step_s);
+        let reached =
+            state.position_ned_m + (state.velocity_ned_m_s + next.velocity_ned_m_s) * (0.5 * step_s);
         let moved = linear.step(state.velocity_ned_m_s, next.position_ned_m - reached, next.velocity_ned_m_s);
         state.acceleration_ned_m_s2 = (moved.velocity - state.velocity_ned_m_s) / step_s;
 
-        // The same on the rotation group: the error is a rotation vector in body axes, and the target's rate is turned into them.
+        // The same on the rotation group: the error is a rotation vector in body axes, and the target's rate
+        // is turned into them.
         let own_from_target: DQuat = state.ned_from_body.inverse() * target.ned_from_body;
         let target_rate = own_from_target * next.rate_body_rad_s;
         let (rate, mean_rate) = (state.rate_body_rad_s, 0.5 * (state.rate_body_rad_s + target_rate));
@@ -118,7 +128,12 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed
         let turned = angular.step(rate, so3::log(reached.inverse() * next.ned_from_body), target_rate);
         state.angular_acceleration_body_rad_s2 = (turned.velocity - rate) / step_s;
 
-        saturation.tick([moved.velocity_limited, moved.acceleration_limited, turned.velocity_limited, turned.acceleration_limited]);
+        saturation.tick([
+            moved.velocity_limited,
+            moved.acceleration_limited,
+            turned.velocity_limited,
+            turned.acceleration_limited,
+        ]);
         states.push(state);
         state = advance(&state, step_s);
         // Velocities are copied, not integrated, so that rounding cannot creep over a limit.

@@ -1,11 +1,13 @@
-//! The reference that the plant follows: the log, interpolated, sampled half-way between control ticks and smoothed without lag.
+//! The reference that the plant follows: the log, interpolated, sampled half-way between control ticks and
+//! smoothed without lag.
 
 use glam::{DQuat, DVec3, DVec4};
 
 use super::at_rank;
 use crate::{flight_log::LogRow, trajectory::so3};
 
-/// The log between its rows: straight lines in position, great circles in attitude. Rows are in order of time.
+/// The log between its rows: straight lines in position, great circles in attitude. Rows are in order of
+/// time.
 #[derive(Clone, Debug)]
 pub(crate) struct Interpolated<'a> {
     rows: &'a [LogRow],
@@ -27,7 +29,11 @@ impl<'a> Interpolated<'a> {
         if later || self.rows[self.row].t_s > t_s {
             let ahead = self.row + 2;
             let near = later && self.rows.get(ahead).is_none_or(|row| row.t_s > t_s);
-            self.row = if near { self.row + 1 } else { self.rows.partition_point(|row| row.t_s <= t_s).saturating_sub(1) };
+            self.row = if near {
+                self.row + 1
+            } else {
+                self.rows.partition_point(|row| row.t_s <= t_s).saturating_sub(1)
+            };
         }
         let from = &self.rows[self.row];
         let Some(to) = self.rows.get(self.row + 1) else { return (from.position_ned_m, from.ned_from_body) };
@@ -40,7 +46,8 @@ impl<'a> Interpolated<'a> {
         (from.position_ned_m.lerp(to.position_ned_m, part), from.ned_from_body * so3::exp(turn * part))
     }
 
-    /// As [`Self::at`], but continued beyond either end by point reflection, which keeps position and velocity continuous there.
+    /// As [`Self::at`], but continued beyond either end by point reflection, which keeps position and
+    /// velocity continuous there.
     fn reflected(&mut self, t_s: f64) -> (DVec3, DQuat) {
         let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
         let edge = if t_s < first.t_s {
@@ -51,13 +58,17 @@ impl<'a> Interpolated<'a> {
             return self.at(t_s);
         };
         let (position, attitude) = self.at(2.0 * edge.t_s - t_s);
-        (2.0 * edge.position_ned_m - position, (edge.ned_from_body * attitude.inverse() * edge.ned_from_body).normalize())
+        (
+            2.0 * edge.position_ned_m - position,
+            (edge.ned_from_body * attitude.inverse() * edge.ned_from_body).normalize(),
+        )
     }
 }
 
-/// Positions and attitudes at the middles of control intervals, as the coefficients of a uniform quadratic B-spline:
-/// at tick k the position is the mean of coefficients k and k + 1 and the velocity their difference over the step. A double
-/// integrator that starts on such a reference and has accelerations enough stays on it exactly.
+/// Positions and attitudes at the middles of control intervals, as the coefficients of a uniform quadratic
+/// B-spline: at tick k the position is the mean of coefficients k and k + 1 and the velocity their difference
+/// over the step. A double integrator that starts on such a reference and has accelerations enough stays on
+/// it exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct Reference {
     pub(crate) step_s: f64,
@@ -80,12 +91,19 @@ impl Reference {
         Self::sampled_from(log, start_s, step_s, 0, count)
     }
 
-    fn sampled_from(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, before: usize, count: usize) -> Self {
+    fn sampled_from(
+        log: &mut Interpolated<'_>,
+        start_s: f64,
+        step_s: f64,
+        before: usize,
+        count: usize,
+    ) -> Self {
         let (mut position_ned_m, mut ned_from_body) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let mut previous = DQuat::IDENTITY;
         for k in 0..count {
             let (position, attitude) = log.reflected(start_s + (k as f64 - before as f64 - 0.5) * step_s);
-            // q and -q are one attitude; the nearer of the two is the one that can be averaged with its neighbour.
+            // q and -q are one attitude; the nearer of the two is the one that can be averaged with its
+            // neighbour.
             previous = if k > 0 && previous.dot(attitude) < 0.0 { -attitude } else { attitude };
             position_ned_m.push(position);
             ned_from_body.push(previous);
@@ -93,9 +111,17 @@ impl Reference {
         Self { step_s, position_ned_m, ned_from_body }
     }
 
-    /// The log smoothed by four moving averages in a row, which together are close to a Gaussian of `sigma_s` and shift nothing in time.
-    pub(crate) fn smoothed(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, count: usize, sigma_s: f64) -> Self {
-        // The variance of one average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; four of them add up to sigma^2.
+    /// The log smoothed by four moving averages in a row, which together are close to a Gaussian of `sigma_s`
+    /// and shift nothing in time.
+    pub(crate) fn smoothed(
+        log: &mut Interpolated<'_>,
+        start_s: f64,
+        step_s: f64,
+        count: usize,
+        sigma_s: f64,
+    ) -> Self {
+        // The variance of one average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; four of them add up to
+        // sigma^2.
         let ticks2 = (sigma_s / step_s).powi(2);
         let half = ((0.25 + 0.75 * ticks2).sqrt() - 0.5).round().max(0.0) as usize;
         let raw = Self::sampled_from(log, start_s, step_s, PASSES * half, count + 2 * PASSES * half);
@@ -117,10 +143,13 @@ impl Reference {
         let inner = 1..self.ticks();
         let stride = inner.len() / MOST_RANKED + 1;
         let rate = 1.0 / (self.step_s * self.step_s);
-        let linear = |k: usize| (self.position_ned_m[k + 1] - 2.0 * self.position_ned_m[k] + self.position_ned_m[k - 1]).length();
+        let linear = |k: usize| {
+            (self.position_ned_m[k + 1] - 2.0 * self.position_ned_m[k] + self.position_ned_m[k - 1]).length()
+        };
         let turn = |k: usize| so3::log(self.ned_from_body[k].inverse() * self.ned_from_body[k + 1]);
         let angular = |k: usize| (turn(k) - turn(k - 1)).length();
-        let ranked = |of: &dyn Fn(usize) -> f64| rate * at_rank(inner.clone().step_by(stride).map(of).collect(), rank);
+        let ranked =
+            |of: &dyn Fn(usize) -> f64| rate * at_rank(inner.clone().step_by(stride).map(of).collect(), rank);
         [ranked(&linear), ranked(&angular)]
     }
 
@@ -144,8 +173,9 @@ const MOST_RANKED: usize = 1_000_000;
 /// Number of moving averages: four give a kernel with two continuous derivatives.
 const PASSES: usize = 4;
 
-/// Means over `2 half + 1` values in place of them; there are `2 half` fewer. The running sum carries the rounding of each step, so values
-/// are taken relative to the first one. In place, because of hours of flight the system takes longer to hand out memory than this takes.
+/// Means over `2 half + 1` values in place of them; there are `2 half` fewer. The running sum carries the
+/// rounding of each step, so values are taken relative to the first one. In place, because of hours of flight
+/// the system takes longer to hand out memory than this takes.
 fn moving_average(values: &mut Vec<DVec3>, half: usize) {
     let width = 2 * half + 1;
     let Some(&base) = values.first() else { return };
@@ -160,8 +190,9 @@ fn moving_average(values: &mut Vec<DVec3>, half: usize) {
     values.truncate(count);
 }
 
-/// Normalised mean quaternions, in place too. Exact for a constant rate, otherwise an error of third order in the angle that the window spans.
-/// Where the log turns so fast that the mean says nothing, the attitude stays as it is.
+/// Normalised mean quaternions, in place too. Exact for a constant rate, otherwise an error of third order in
+/// the angle that the window spans. Where the log turns so fast that the mean says nothing, the attitude
+/// stays as it is.
 fn average_attitude(values: &mut Vec<DQuat>, half: usize) {
     let width = 2 * half + 1;
     let components = |q: &DQuat| DVec4::new(q.x, q.y, q.z, q.w);
@@ -185,16 +216,27 @@ mod tests {
     use super::*;
 
     fn row(t_s: f64, north_m: f64, yaw_rad: f64) -> LogRow {
-        LogRow { t_s, position_ned_m: DVec3::new(north_m, 0.0, -50.0), ned_from_body: DQuat::from_rotation_z(yaw_rad) }
+        LogRow {
+            t_s,
+            position_ned_m: DVec3::new(north_m, 0.0, -50.0),
+            ned_from_body: DQuat::from_rotation_z(yaw_rad),
+        }
     }
 
     #[test]
     fn looks_up_forward_backward_and_outside() {
         let rows: Vec<_> = (0..50).map(|i| row(f64::from(i), f64::from(i * i), 0.1 * f64::from(i))).collect();
         let mut log = Interpolated::new(&rows).unwrap();
-        for (t_s, north_m) in
-            [(0.5, 0.5), (1.5, 2.5), (48.5, 2352.5), (3.0, 9.0), (2.999, 8.995), (-9.0, 0.0), (99.0, 2401.0), (49.0, 2401.0)]
-        {
+        for (t_s, north_m) in [
+            (0.5, 0.5),
+            (1.5, 2.5),
+            (48.5, 2352.5),
+            (3.0, 9.0),
+            (2.999, 8.995),
+            (-9.0, 0.0),
+            (99.0, 2401.0),
+            (49.0, 2401.0),
+        ] {
             let (position, attitude) = log.at(t_s);
             assert!((position.x - north_m).abs() < 1e-9, "{t_s}");
             let yaw = 0.1 * t_s.clamp(0.0, 49.0);
@@ -205,7 +247,8 @@ mod tests {
 
     #[test]
     fn smoothing_keeps_uniform_motion_to_both_ends() {
-        let rows: Vec<_> = (0..9).map(|i| row(0.5 * f64::from(i), 3.0 * f64::from(i), 0.7 * f64::from(i))).collect();
+        let rows: Vec<_> =
+            (0..9).map(|i| row(0.5 * f64::from(i), 3.0 * f64::from(i), 0.7 * f64::from(i))).collect();
         let mut log = Interpolated::new(&rows).unwrap();
         let reference = Reference::smoothed(&mut log, 0.0, 0.01, 402, 0.1);
         for k in [0, 1, 200, 399, 400] {
@@ -221,7 +264,8 @@ mod tests {
     #[test]
     fn kernel_has_the_variance_asked_for() {
         // A parabola gains sigma^2 times half its second derivative.
-        let rows: Vec<_> = (0..4001).map(|i| row(0.001 * f64::from(i), (0.001 * f64::from(i) - 2.0).powi(2), 0.0)).collect();
+        let rows: Vec<_> =
+            (0..4001).map(|i| row(0.001 * f64::from(i), (0.001 * f64::from(i) - 2.0).powi(2), 0.0)).collect();
         let mut log = Interpolated::new(&rows).unwrap();
         let reference = Reference::smoothed(&mut log, 0.0, 0.001, 4001, 0.1);
         let gained = reference.position_ned_m[2000].x - (2000.0 * 0.001 - 0.0005 - 2.0f64).powi(2);
@@ -230,7 +274,11 @@ mod tests {
     }
 
     /// As the formulas stand, into a new list: the sums in the same order.
-    fn averages_written_out(positions: &[DVec3], attitudes: &[DQuat], half: usize) -> (Vec<DVec3>, Vec<DQuat>) {
+    fn averages_written_out(
+        positions: &[DVec3],
+        attitudes: &[DQuat],
+        half: usize,
+    ) -> (Vec<DVec3>, Vec<DQuat>) {
         let (width, base) = (2 * half + 1, positions[0]);
         let mut sum: DVec3 = positions.iter().take(width - 1).map(|value| *value - base).sum();
         let mut of_positions = Vec::new();
@@ -244,7 +292,8 @@ mod tests {
         for window in attitudes.windows(width) {
             sum += DVec4::from_array(window[width - 1].to_array());
             let mean = sum / width as f64;
-            let mean = if mean.length() > 0.5 { DQuat::from_vec4(mean / mean.length()) } else { window[half] };
+            let mean =
+                if mean.length() > 0.5 { DQuat::from_vec4(mean / mean.length()) } else { window[half] };
             let turned = of_attitudes.last().is_some_and(|before| before.dot(mean) < 0.0);
             of_attitudes.push(if turned { -mean } else { mean });
             sum -= DVec4::from_array(window[0].to_array());
@@ -257,9 +306,11 @@ mod tests {
         // Slow turns, and turns so fast that a window's mean is next to nothing.
         for (rate, half) in [(0.01, 0), (0.01, 7), (0.9, 7), (2.3, 3), (0.01, 150), (0.01, 200)] {
             let at = |k: i32| f64::from(k);
-            let mut positions: Vec<DVec3> = (0..301).map(|k| DVec3::new(1e5 + at(k).sin(), at(k * k) * 0.37, -at(k).sqrt())).collect();
+            let mut positions: Vec<DVec3> =
+                (0..301).map(|k| DVec3::new(1e5 + at(k).sin(), at(k * k) * 0.37, -at(k).sqrt())).collect();
             let axis = DVec3::new(0.6, -0.48, 0.64);
-            let mut attitudes: Vec<DQuat> = (0..301).map(|k| DQuat::from_axis_angle(axis, rate * at(k) + 0.2 * at(k).cos())).collect();
+            let mut attitudes: Vec<DQuat> =
+                (0..301).map(|k| DQuat::from_axis_angle(axis, rate * at(k) + 0.2 * at(k).cos())).collect();
             let expected = averages_written_out(&positions, &attitudes, half);
             moving_average(&mut positions, half);
             average_attitude(&mut attitudes, half);

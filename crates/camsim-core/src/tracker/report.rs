@@ -71,7 +71,8 @@ pub struct TrackReport {
 const SIGNLESS_BELOW: f64 = 1e-6;
 
 impl TrackReport {
-    /// Compares at `rate_hz` over the trajectory's span. `None` without rows or for a rate that is not positive.
+    /// Compares at `rate_hz` over the trajectory's span. `None` without rows or for a rate that is not
+    /// positive.
     pub fn measure(trajectory: &Trajectory, rows: &[LogRow], rate_hz: f64) -> Option<Self> {
         let mut log = Interpolated::new(rows)?;
         if !(rate_hz > 0.0 && rate_hz.is_finite()) {
@@ -87,12 +88,18 @@ impl TrackReport {
             // A hair inside the segment that begins here, so that rounding cannot pick the one before.
             let t_s = (start_s + (k as f64 + 1e-7) / rate_hz).min(end_s);
             let state = trajectory.state(t_s);
-            for ((error, square), worst) in errors(&state, log.at(t_s)).into_iter().zip(&mut squares).zip(&mut worst) {
+            for ((error, square), worst) in
+                errors(&state, log.at(t_s)).into_iter().zip(&mut squares).zip(&mut worst)
+            {
                 *square += error * error;
                 *worst = worst.max(error.abs());
             }
             report.max_used.include(&state);
-            let accelerations = state.acceleration_ned_m_s2.to_array().into_iter().chain(state.angular_acceleration_body_rad_s2.to_array());
+            let accelerations = state
+                .acceleration_ned_m_s2
+                .to_array()
+                .into_iter()
+                .chain(state.angular_acceleration_body_rad_s2.to_array());
             for (sign, acceleration) in signs.iter_mut().zip(accelerations) {
                 sign.include(acceleration);
             }

@@ -1,20 +1,24 @@
-//! Spline planner: the whole log is known, so the reference can be the closest motion that the plant is able to follow.
+//! Spline planner: the whole log is known, so the reference can be the closest motion that the plant is able
+//! to follow.
 //!
-//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can do. Its coefficients c minimise
+//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can do. Its
+//! coefficients c minimise
 //!
 //! ```text
 //! sum_k |(c_(k-1) + 6 c_k + c_(k+1))/8 - r_k|^2 + sum_k lambda_k |(c_(k-1) - 2 c_k + c_(k+1))/h^2|^2
 //! ```
 //!
-//! with r the log half-way between ticks. lambda is one constant at first and is raised where the acceleration exceeds its limit, until none does.
-//! The normal equations have five diagonals. Attitude is done alike with rotation vectors relative to the smoothed log, where they are small.
+//! with r the log half-way between ticks. lambda is one constant at first and is raised where the
+//! acceleration exceeds its limit, until none does. The normal equations have five diagonals. Attitude is
+//! done alike with rotation vectors relative to the smoothed log, where they are small.
 
 use glam::DVec3;
 
 use super::{ResolvedLimits, reference::Reference};
 use crate::trajectory::so3;
 
-/// Time constant of the unconstrained fit, lambda = tau^4: with it, one position quantum of a GNSS log (0.11 m) stays under 2 g.
+/// Time constant of the unconstrained fit, lambda = tau^4: with it, one position quantum of a GNSS log (0.11
+/// m) stays under 2 g.
 const TIME_CONSTANT_S: f64 = 0.05;
 /// Share of the acceleration limit planned with; the rest absorbs the coupling of rotation axes.
 const PLANNED_SHARE: f64 = 0.97;
@@ -25,13 +29,22 @@ const MOST_PASSES: usize = 20;
 pub(crate) fn planned(raw: &Reference, smoothed: Reference, limits: &ResolvedLimits) -> Reference {
     let h2 = raw.step_s * raw.step_s;
     let position = || {
-        let residual: Vec<DVec3> = raw.position_ned_m.iter().zip(&smoothed.position_ned_m).map(|(log, smooth)| *log - *smooth).collect();
+        let residual: Vec<DVec3> = raw
+            .position_ned_m
+            .iter()
+            .zip(&smoothed.position_ned_m)
+            .map(|(log, smooth)| *log - *smooth)
+            .collect();
         let second = second_differences(&smoothed.position_ned_m, |from, to| *to - *from);
         corrections(&residual, &second, limits.max_acceleration_m_s2 * h2, raw.step_s)
     };
     let attitude = || {
-        let residual: Vec<DVec3> =
-            raw.ned_from_body.iter().zip(&smoothed.ned_from_body).map(|(log, smooth)| so3::log(smooth.inverse() * *log)).collect();
+        let residual: Vec<DVec3> = raw
+            .ned_from_body
+            .iter()
+            .zip(&smoothed.ned_from_body)
+            .map(|(log, smooth)| so3::log(smooth.inverse() * *log))
+            .collect();
         let second = second_differences(&smoothed.ned_from_body, |from, to| so3::log(from.inverse() * *to));
         corrections(&residual, &second, limits.max_angular_acceleration_rad_s2 * h2, raw.step_s)
     };
@@ -39,7 +52,12 @@ pub(crate) fn planned(raw: &Reference, smoothed: Reference, limits: &ResolvedLim
     Reference {
         step_s: smoothed.step_s,
         position_ned_m: smoothed.position_ned_m.iter().zip(&shifts).map(|(at, shift)| *at + *shift).collect(),
-        ned_from_body: smoothed.ned_from_body.iter().zip(&turns).map(|(at, turn)| (*at * so3::exp(*turn)).normalize()).collect(),
+        ned_from_body: smoothed
+            .ned_from_body
+            .iter()
+            .zip(&turns)
+            .map(|(at, turn)| (*at * so3::exp(*turn)).normalize())
+            .collect(),
     }
 }
 
@@ -57,8 +75,8 @@ fn second_differences<T>(values: &[T], difference: impl Fn(&T, &T) -> DVec3) -> 
     second
 }
 
-/// Corrections d of a smooth base so that base + d is near the log: `residual` = log - base, `second` = second differences of the base,
-/// `limit` on the second differences of the sum.
+/// Corrections d of a smooth base so that base + d is near the log: `residual` = log - base, `second` =
+/// second differences of the base, `limit` on the second differences of the sum.
 fn corrections(residual: &[DVec3], second: &[DVec3], limit: f64, step_s: f64) -> Vec<DVec3> {
     let count = residual.len();
     let mut weights = vec![(TIME_CONSTANT_S / step_s).powi(4); count];
@@ -72,7 +90,8 @@ fn corrections(residual: &[DVec3], second: &[DVec3], limit: f64, step_s: f64) ->
             let excess2 = sum.length_squared() / (planned_limit * planned_limit);
             if excess2 > 1.0 {
                 within &= excess2 < (1.0 / (PLANNED_SHARE * PLANNED_SHARE));
-                // Faster growth needs as many passes and smooths more than it has to (0.12 m instead of 0.10 m on a real flight).
+                // Faster growth needs as many passes and smooths more than it has to (0.12 m instead of 0.10
+                // m on a real flight).
                 weights[k] *= excess2;
             }
         }
@@ -93,7 +112,12 @@ struct BandedFit {
 
 impl BandedFit {
     fn new(count: usize) -> Self {
-        Self { diagonal: vec![0.0; count], first: vec![0.0; count], second: vec![0.0; count], solution: vec![DVec3::ZERO; count] }
+        Self {
+            diagonal: vec![0.0; count],
+            first: vec![0.0; count],
+            second: vec![0.0; count],
+            solution: vec![DVec3::ZERO; count],
+        }
     }
 
     /// Adds `weight |stencil . d - value|^2` centred at `k`.
@@ -184,7 +208,9 @@ mod tests {
                     value.length_squared() + weights[k] * bend.length_squared()
                 })
                 .sum();
-            inner + (d[0] - residual[0]).length_squared() + (d[count - 1] - residual[count - 1]).length_squared()
+            inner
+                + (d[0] - residual[0]).length_squared()
+                + (d[count - 1] - residual[count - 1]).length_squared()
         };
         let least = cost(&fit.solution);
         for k in 0..count {
@@ -204,10 +230,12 @@ mod tests {
     fn corrections_keep_the_acceleration_limit() {
         // A step of 5 m in a 400 Hz log, limit 19.6 m/s^2.
         let (step_s, limit) = (1.0 / 400.0, 19.6 / 160_000.0);
-        let residual: Vec<DVec3> = (0..2000).map(|k| if k < 1000 { DVec3::ZERO } else { DVec3::Y * 5.0 }).collect();
+        let residual: Vec<DVec3> =
+            (0..2000).map(|k| if k < 1000 { DVec3::ZERO } else { DVec3::Y * 5.0 }).collect();
         let second = vec![DVec3::ZERO; residual.len()];
         let d = corrections(&residual, &second, limit, step_s);
-        let used = second_differences(&d, |from, to| *to - *from).iter().map(|a| a.length()).fold(0.0, f64::max);
+        let used =
+            second_differences(&d, |from, to| *to - *from).iter().map(|a| a.length()).fold(0.0, f64::max);
         assert!(used <= limit, "{}", used / limit);
         assert!(d[100].length() < 0.01 && (d[1900] - DVec3::Y * 5.0).length() < 0.01);
     }

@@ -12,7 +12,8 @@ fn lawnmower() -> Option<Vec<LogRow>> {
         eprintln!("CAMSIM_DATA is not set: real flight left out");
         return None;
     };
-    let text = std::fs::read_to_string(std::path::Path::new(&data).join("camsim/path_lawnmower.csv")).unwrap();
+    let text =
+        std::fs::read_to_string(std::path::Path::new(&data).join("camsim/path_lawnmower.csv")).unwrap();
     let mut rows = Vec::new();
     let mut origin = None;
     for (i, line) in text.lines().enumerate() {
@@ -22,7 +23,11 @@ fn lawnmower() -> Option<Vec<LogRow>> {
         let (lat0, lon0, ecef0, t0_s) = *origin.get_or_insert((lat, lon, ecef, v[0]));
         let d = ecef - ecef0;
         let (sp, cp, sl, cl) = (lat0.sin(), lat0.cos(), lon0.sin(), lon0.cos());
-        let ned = DVec3::new(-sp * cl * d.x - sp * sl * d.y + cp * d.z, -sl * d.x + cl * d.y, -cp * cl * d.x - cp * sl * d.y - sp * d.z);
+        let ned = DVec3::new(
+            -sp * cl * d.x - sp * sl * d.y + cp * d.z,
+            -sl * d.x + cl * d.y,
+            -cp * cl * d.x - cp * sl * d.y - sp * d.z,
+        );
         if !CORRUPTED.contains(&(i + 1)) {
             rows.push(LogRow {
                 t_s: v[0] - t0_s,
@@ -37,7 +42,11 @@ fn lawnmower() -> Option<Vec<LogRow>> {
 fn ecef(lat: f64, lon: f64, height_m: f64) -> DVec3 {
     let (a, e2) = (6_378_137.0, 6.694_379_990_141_316_5e-3);
     let n = a / (1.0 - e2 * lat.sin().powi(2)).sqrt();
-    DVec3::new((n + height_m) * lat.cos() * lon.cos(), (n + height_m) * lat.cos() * lon.sin(), (n * (1.0 - e2) + height_m) * lat.sin())
+    DVec3::new(
+        (n + height_m) * lat.cos() * lon.cos(),
+        (n + height_m) * lat.cos() * lon.sin(),
+        (n * (1.0 - e2) + height_m) * lat.sin(),
+    )
 }
 
 fn attitude(roll: f64, pitch: f64, yaw: f64) -> DQuat {
@@ -72,7 +81,8 @@ fn assert_limits_kept(tracked: &Tracked) {
     }
 }
 
-/// The stored segments join: the end of each is the beginning of the next, in position, velocity, attitude and rate.
+/// The stored segments join: the end of each is the beginning of the next, in position, velocity, attitude
+/// and rate.
 fn assert_joined(trajectory: &Trajectory) {
     let knots = trajectory.knots();
     for k in 1..knots.len() {
@@ -88,11 +98,14 @@ fn assert_joined(trajectory: &Trajectory) {
 #[test]
 fn real_flight_is_followed_closer_than_the_reference_program_does() {
     let Some(rows) = lawnmower() else { return };
-    // Largest RMS per channel; the reference program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052 deg. Most of the yaw error is one more
-    // corrupted row, 44848 (10 deg off for 24 ms).
+    // Largest RMS per channel; the reference program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052
+    // deg. Most of the yaw error is one more corrupted row, 44848 (10 deg off for 24 ms).
     let sqrt = [0.115, 0.07, 0.004, 0.045, 0.039, 0.047];
     let spline = [0.105, 0.062, 0.003, 0.026, 0.019, 0.045];
-    for (kind, most, rates) in [(TrackerKind::Sqrt, sqrt, &[200.0, 400.0, 800.0][..]), (TrackerKind::Spline, spline, &[200.0, 400.0][..])] {
+    for (kind, most, rates) in [
+        (TrackerKind::Sqrt, sqrt, &[200.0, 400.0, 800.0][..]),
+        (TrackerKind::Spline, spline, &[200.0, 400.0][..]),
+    ] {
         for &rate_hz in rates {
             let tracked = track(&rows, &paper_limits(spec(kind, rate_hz))).unwrap();
             assert_limits_kept(&tracked);
@@ -103,17 +116,25 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
             let channels = [rms.north_m, rms.east_m, rms.down_m, rms.roll_deg, rms.pitch_deg, rms.yaw_deg];
             assert!(channels.into_iter().zip(most).all(|(own, most)| own < most), "{name}");
             for share in report.sign_changes_ned.into_iter().chain(report.sign_changes_body) {
-                // No chatter, which would be 100 %: what is left are the turns of the log's own noise, up to 7 a second of which `spline` keeps.
+                // No chatter, which would be 100 %: what is left are the turns of the log's own noise, up to
+                // 7 a second of which `spline` keeps.
                 let most = if kind == TrackerKind::Sqrt { 0.03 } else { 0.03f64.max(7.5 / rate_hz) };
                 assert!(share <= most, "{name}: {share}");
             }
-            assert!(report.max_used.acceleration_m_s2 <= 19.6 && report.max_used.angular_acceleration_deg_s2 <= 60.0);
-            assert!(report.samples == tracked.trajectory.segments() || report.samples + 1 == tracked.trajectory.segments());
+            assert!(
+                report.max_used.acceleration_m_s2 <= 19.6
+                    && report.max_used.angular_acceleration_deg_s2 <= 60.0
+            );
+            assert!(
+                report.samples == tracked.trajectory.segments()
+                    || report.samples + 1 == tracked.trajectory.segments()
+            );
         }
     }
 }
 
-/// Follows a step of 10 m (north) or 30 deg (yaw) that is smoothed so little that the controller has to do the work.
+/// Follows a step of 10 m (north) or 30 deg (yaw) that is smoothed so little that the controller has to do
+/// the work.
 fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyState>, ResolvedLimits) {
     let limits = ResolvedLimits {
         max_speed_m_s: 50.0,
@@ -125,8 +146,12 @@ fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyStat
     let jump = ticks / 20;
     let reference = Reference {
         step_s: 1.0 / rate_hz,
-        position_ned_m: (0..=ticks).map(|k| if k > jump { DVec3::X * distance_m } else { DVec3::ZERO }).collect(),
-        ned_from_body: (0..=ticks).map(|k| DQuat::from_rotation_z(if k > jump { angle_rad } else { 0.0 })).collect(),
+        position_ned_m: (0..=ticks)
+            .map(|k| if k > jump { DVec3::X * distance_m } else { DVec3::ZERO })
+            .collect(),
+        ned_from_body: (0..=ticks)
+            .map(|k| DQuat::from_rotation_z(if k > jump { angle_rad } else { 0.0 }))
+            .collect(),
     };
     (plant::follow(&reference, &limits).states, limits)
 }
@@ -136,20 +161,29 @@ fn a_step_is_taken_without_overshoot_or_chatter() {
     for rate_hz in [50.0, 100.0, 200.0, 400.0, 1000.0] {
         let (states, _) = step_response(rate_hz, 10.0, 0.5);
         let accelerations = |pick: fn(&BodyState) -> f64| {
-            let signs: Vec<bool> = states.iter().map(pick).filter(|a| a.abs() > 1e-6).map(|a| a > 0.0).collect();
+            let signs: Vec<bool> =
+                states.iter().map(pick).filter(|a| a.abs() > 1e-6).map(|a| a > 0.0).collect();
             signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
         };
         let farthest = states.iter().map(|state| state.position_ned_m.x).fold(0.0, f64::max);
         assert!(farthest <= 10.0 + 1e-9, "{rate_hz} Hz: {farthest}");
         let turned = |state: &BodyState| so3::log(state.ned_from_body).z;
         assert!(states.iter().map(turned).fold(0.0, f64::max) <= 0.5 + 1e-9, "{rate_hz} Hz");
-        // The target velocity of the one tick of the jump gives a last push one way, then braking: few changes in all.
+        // The target velocity of the one tick of the jump gives a last push one way, then braking: few
+        // changes in all.
         assert!(accelerations(|state| state.acceleration_ned_m_s2.x) <= 3, "{rate_hz} Hz");
         assert!(accelerations(|state| state.angular_acceleration_body_rad_s2.z) <= 3, "{rate_hz} Hz");
         let last = states.last().unwrap();
-        assert!((last.position_ned_m.x - 10.0).abs() < 1e-4 && (turned(last) - 0.5).abs() < 1e-4, "{rate_hz} Hz: {last:?}");
-        // The optimum is 2 sqrt(10 / 19.6) = 1.43 s; braking at 0.8 of the limit and the linear zone cost the rest.
-        let settled = states.iter().rposition(|state| (state.position_ned_m.x - 10.0).abs() > 0.1).unwrap() as f64 / rate_hz - 0.2;
+        assert!(
+            (last.position_ned_m.x - 10.0).abs() < 1e-4 && (turned(last) - 0.5).abs() < 1e-4,
+            "{rate_hz} Hz: {last:?}"
+        );
+        // The optimum is 2 sqrt(10 / 19.6) = 1.43 s; braking at 0.8 of the limit and the linear zone cost the
+        // rest.
+        let settled = states.iter().rposition(|state| (state.position_ned_m.x - 10.0).abs() > 0.1).unwrap()
+            as f64
+            / rate_hz
+            - 0.2;
         assert!(settled < 1.9, "{rate_hz} Hz: {settled} s");
     }
 }
@@ -160,13 +194,20 @@ fn yaw_goes_the_short_way_through_180() {
         .map(|i| {
             let t_s = 0.025 * f64::from(i);
             let yaw_deg = 170.0 + 4.0 * t_s;
-            row(t_s, DVec3::X * t_s, attitude(0.0, 0.0, (if yaw_deg > 180.0 { yaw_deg - 360.0 } else { yaw_deg }).to_radians()))
+            row(
+                t_s,
+                DVec3::X * t_s,
+                attitude(0.0, 0.0, (if yaw_deg > 180.0 { yaw_deg - 360.0 } else { yaw_deg }).to_radians()),
+            )
         })
         .collect();
     for kind in [TrackerKind::Sqrt, TrackerKind::Spline] {
         let tracked = track(&rows, &spec(kind, 400.0)).unwrap();
         let report = tracked.report(&rows).unwrap();
-        assert!(report.max_error.yaw_deg < 1e-6 && report.max_used.angular_rate_deg_s < 4.000_01, "{kind:?} {report:?}");
+        assert!(
+            report.max_error.yaw_deg < 1e-6 && report.max_used.angular_rate_deg_s < 4.000_01,
+            "{kind:?} {report:?}"
+        );
     }
 }
 
@@ -185,12 +226,15 @@ fn a_loop_through_vertical_is_no_trouble() {
         let tracked = track(&rows, &spec(kind, 400.0)).unwrap();
         assert_limits_kept(&tracked);
         let report = tracked.report(&rows).unwrap();
-        // The corner between loop and roll turns the rate vector by 90 deg: a change of 51 deg/s, whose distance at 60 deg/s^2 is 22 deg;
-        // the smoothed reference begins it early.
+        // The corner between loop and roll turns the rate vector by 90 deg: a change of 51 deg/s, whose
+        // distance at 60 deg/s^2 is 22 deg; the smoothed reference begins it early.
         assert!(report.max_error.attitude_deg < 15.0, "{kind:?} {report:?}");
         // Away from the corner there is nothing to lag behind.
         for t_s in [1.0, 2.5, 5.0, 7.5, 13.5, 15.0, 18.0] {
-            let error = so3::log(tracked.trajectory.state(t_s).ned_from_body.inverse() * Interpolated::new(&rows).unwrap().at(t_s).1);
+            let error = so3::log(
+                tracked.trajectory.state(t_s).ned_from_body.inverse()
+                    * Interpolated::new(&rows).unwrap().at(t_s).1,
+            );
             assert!(error.length() < 1e-3, "{kind:?} {t_s}: {error}");
         }
     }
@@ -200,8 +244,10 @@ fn a_loop_through_vertical_is_no_trouble() {
 fn one_row_two_rows_and_gaps() {
     let kinds = [TrackerKind::Hold, TrackerKind::Linear, TrackerKind::Sqrt, TrackerKind::Spline];
     let one = [row(3.0, DVec3::new(1.0, 2.0, -3.0), attitude(0.1, 0.2, 0.3))];
-    let two = [row(0.0, DVec3::ZERO, DQuat::IDENTITY), row(40.0, DVec3::X * 12_000.0, DQuat::from_rotation_z(1.5))];
-    let close = [row(0.0, DVec3::ZERO, DQuat::IDENTITY), row(5e-5, DVec3::X * 0.11, DQuat::from_rotation_z(0.01))];
+    let two =
+        [row(0.0, DVec3::ZERO, DQuat::IDENTITY), row(40.0, DVec3::X * 12_000.0, DQuat::from_rotation_z(1.5))];
+    let close =
+        [row(0.0, DVec3::ZERO, DQuat::IDENTITY), row(5e-5, DVec3::X * 0.11, DQuat::from_rotation_z(0.01))];
     let gap: Vec<_> = (0..200)
         .map(|i| {
             let t_s = 0.05 * f64::from(i) + if i >= 100 { 12.0 } else { 0.0 };
@@ -218,7 +264,10 @@ fn one_row_two_rows_and_gaps() {
         for t_s in [-5.0, 3.0, 8.0] {
             let state = still.trajectory.state(t_s);
             assert!((state.position_ned_m - one[0].position_ned_m).length() < 1e-12, "{kind:?}");
-            assert!(so3::log(state.ned_from_body.inverse() * one[0].ned_from_body).length() < 1e-12, "{kind:?}");
+            assert!(
+                so3::log(state.ned_from_body.inverse() * one[0].ned_from_body).length() < 1e-12,
+                "{kind:?}"
+            );
         }
         assert_eq!(still.report(&one).unwrap().samples, 1);
 
@@ -254,7 +303,11 @@ fn limits_hold_on_noise_and_impossible_logs() {
             row(0.01 * f64::from(i), p, so3::exp(DVec3::new(random(), random(), random()) * 6.0))
         })
         .collect();
-    let tight = TrackerSpec { max_speed_m_s: Auto::Value(10.0), max_angular_rate_deg_s: Auto::Value(20.0), ..TrackerSpec::default() };
+    let tight = TrackerSpec {
+        max_speed_m_s: Auto::Value(10.0),
+        max_angular_rate_deg_s: Auto::Value(20.0),
+        ..TrackerSpec::default()
+    };
     for kind in [TrackerKind::Sqrt, TrackerKind::Spline] {
         for rate_hz in [7.0, 50.0, 400.0, 1000.0] {
             let tracked = track(&rows, &TrackerSpec { kind, rate_hz, ..tight.clone() }).unwrap();
@@ -266,7 +319,8 @@ fn limits_hold_on_noise_and_impossible_logs() {
 
 #[test]
 fn a_limit_that_holds_the_platform_back_is_named() {
-    let rows: Vec<_> = (0..200).map(|i| row(0.1 * f64::from(i), DVec3::X * 3.0 * f64::from(i), DQuat::IDENTITY)).collect();
+    let rows: Vec<_> =
+        (0..200).map(|i| row(0.1 * f64::from(i), DVec3::X * 3.0 * f64::from(i), DQuat::IDENTITY)).collect();
     let slow = TrackerSpec { max_speed_m_s: Auto::Value(20.0), ..TrackerSpec::default() };
     let warnings = track(&rows, &slow).unwrap().warnings();
     assert!(warnings.len() == 1 && warnings[0].contains("tracker.max_speed_m_s = 20"), "{warnings:?}");
@@ -277,8 +331,17 @@ fn a_limit_that_holds_the_platform_back_is_named() {
 
 /// A platform that shakes at 1.5 Hz by 20 degrees: 1777 deg/s^2 at most. After 10 s of rest.
 fn agile() -> Vec<LogRow> {
-    let turn = |t_s: f64| if t_s < 10.0 { 0.0 } else { 20_f64.to_radians() * (std::f64::consts::TAU * 1.5 * (t_s - 10.0)).sin() };
-    (0..4000).map(|i| 0.005 * f64::from(i)).map(|t_s| row(t_s, DVec3::ZERO, DQuat::from_rotation_z(turn(t_s)))).collect()
+    let turn = |t_s: f64| {
+        if t_s < 10.0 {
+            0.0
+        } else {
+            20_f64.to_radians() * (std::f64::consts::TAU * 1.5 * (t_s - 10.0)).sin()
+        }
+    };
+    (0..4000)
+        .map(|i| 0.005 * f64::from(i))
+        .map(|t_s| row(t_s, DVec3::ZERO, DQuat::from_rotation_z(turn(t_s))))
+        .collect()
 }
 
 #[test]
@@ -291,7 +354,10 @@ fn accelerations_come_from_the_log_and_are_at_least_the_papers() {
         assert!((1600.0..1950.0).contains(&limit_deg_s2), "{kind:?}: {limit_deg_s2}");
         assert_eq!(tracked.limits.max_acceleration_m_s2, PAPER_ACCELERATION_M_S2);
         let report = tracked.report(&rows).unwrap();
-        assert!(report.rms.attitude_deg < most_deg && tracked.saturation.angular_acceleration_s < 0.1, "{kind:?}: {report:?}");
+        assert!(
+            report.rms.attitude_deg < most_deg && tracked.saturation.angular_acceleration_s < 0.1,
+            "{kind:?}: {report:?}"
+        );
     }
 }
 
@@ -306,7 +372,8 @@ fn a_limit_is_told_with_the_time_at_which_it_held_the_motion_back() {
     assert!((9.5..10.3).contains(&since) && tracked.holds.len() <= MOST_HOLDS, "{since}");
     let warning = tracked.distance_warning(&rows).unwrap();
     assert!(warning.contains("deg RMS from the log"), "{warning}");
-    let still: Vec<_> = (0..100).map(|i| row(0.1 * f64::from(i), DVec3::X * f64::from(i), DQuat::IDENTITY)).collect();
+    let still: Vec<_> =
+        (0..100).map(|i| row(0.1 * f64::from(i), DVec3::X * f64::from(i), DQuat::IDENTITY)).collect();
     assert_eq!(track(&still, &TrackerSpec::default()).unwrap().distance_warning(&still), None);
 }
 
@@ -329,7 +396,9 @@ fn faults_are_named() {
     let denormal = row(5e-324, DVec3::X, DQuat::IDENTITY);
     let linear = spec(TrackerKind::Linear, 400.0);
     assert_eq!(track(&[good, denormal], &linear).unwrap_err(), TrackerError::Overflow);
-    let smooth = track(&[good, denormal], &TrackerSpec { max_speed_m_s: Auto::Value(5.0), ..TrackerSpec::default() }).unwrap();
+    let smooth =
+        track(&[good, denormal], &TrackerSpec { max_speed_m_s: Auto::Value(5.0), ..TrackerSpec::default() })
+            .unwrap();
     assert!(smooth.trajectory.state(0.5).position_ned_m.is_finite());
     let late = row(1e9, DVec3::ZERO, DQuat::IDENTITY);
     assert!(matches!(track(&[good, late], &default).unwrap_err(), TrackerError::TooLong { .. }));

@@ -39,9 +39,11 @@ pub fn log(rotation: DQuat) -> DVec3 {
     }
 }
 
-/// Left Jacobian times a vector: the angular rate, in the outer frame, of `exp(v(t))` whose rotation vector changes at `v_rate`.
+/// Left Jacobian times a vector: the angular rate, in the outer frame, of `exp(v(t))` whose rotation vector
+/// changes at `v_rate`.
 ///
-/// `J v' = v' + (1 - cos a)/a^2 v x v' + (a - sin a)/a^3 v x (v x v')`, a = |v| (e.g. Barfoot, State Estimation for Robotics, 7.77).
+/// `J v' = v' + (1 - cos a)/a^2 v x v' + (a - sin a)/a^3 v x (v x v')`, a = |v| (e.g. Barfoot, State
+/// Estimation for Robotics, 7.77).
 pub fn left_jacobian_times(rotation_vector: DVec3, vector_rate: DVec3) -> DVec3 {
     let angle2 = rotation_vector.length_squared();
     let (first, second) = if angle2 < SERIES_BELOW_RAD2 {

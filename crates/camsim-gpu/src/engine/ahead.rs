@@ -1,5 +1,6 @@
-//! Frames' plans and what else the host computes for them, made by rayon's threads while the device works on earlier frames. All of it is a
-//! function of sequence and frame number: who computes it, and when, does not show.
+//! Frames' plans and what else the host computes for them, made by rayon's threads while the device works on
+//! earlier frames. All of it is a function of sequence and frame number: who computes it, and when, does not
+//! show.
 
 use std::{
     collections::VecDeque,
@@ -16,13 +17,16 @@ use camsim_core::{
     scene::{GroundTiles, PlacedMesh, TerrainDetail},
     temporal::IdealGeometry,
 };
-use camsim_plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times};
+use camsim_plan::{
+    FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times,
+};
 
 use super::ms_since;
 use crate::ideal::base_ned_m;
 
-/// Frames that are prepared before they are asked for, at most, with as many threads, where each is planned by itself: some megabytes of triangles and poses. Those of a group have one ideal
-/// frame's, and as many groups are begun as are best planned at once.
+/// Frames that are prepared before they are asked for, at most, with as many threads, where each is planned
+/// by itself: some megabytes of triangles and poses. Those of a group have one ideal frame's, and as many
+/// groups are begun as are best planned at once.
 const MOST_AHEAD: usize = 16;
 /// Frames of one group that one thread prepares, at most: as many are ready while as many are begun.
 const MOST_TOGETHER: usize = 16;
@@ -69,7 +73,8 @@ struct View {
     reads: SurfaceReads,
 }
 
-/// Prepares frames; the last triangles are kept, of as many groups as are planned at once, for frames that see them in the same way.
+/// Prepares frames; the last triangles are kept, of as many groups as are planned at once, for frames that
+/// see them in the same way.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
@@ -93,7 +98,12 @@ impl Preparer {
 
     fn meshes(&self, plan: &FramePlan) -> Arc<[PlacedMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
-        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px, reads: plan.surface_reads };
+        let view = View {
+            poses,
+            ideal: plan.ideal,
+            terrain_error_px: plan.terrain_error_px,
+            reads: plan.surface_reads,
+        };
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
         let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, meshes)) = seen().iter().find(|(seen, _)| *seen == view) {
@@ -103,8 +113,10 @@ impl Preparer {
         let terrain = self.planner.sequence().scene.terrain.iter();
         let meshes = terrain.flat_map(|terrain| {
             view.poses.iter().map(|pose| {
-                let detail = TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
-                let tiles = self.tiles.as_ref().map_or_else(Vec::new, |tiles| detail.tiles(tiles, view.reads));
+                let detail =
+                    TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
+                let tiles =
+                    self.tiles.as_ref().map_or_else(Vec::new, |tiles| detail.tiles(tiles, view.reads));
                 PlacedMesh { tiles, ..detail.mesh_to_draw().placed(terrain, base_ned_m(pose)) }
             })
         });
@@ -131,7 +143,8 @@ pub(super) struct Ahead<'a, 'scope, I: Iterator<Item = u64>> {
 impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
     /// Begins with the first frames. The scope ends when those that have been begun are done.
     pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
-        let mut ahead = Self { scope, preparer, frames: frames.peekable(), begun: VecDeque::new(), together: 0 };
+        let mut ahead =
+            Self { scope, preparer, frames: frames.peekable(), begun: VecDeque::new(), together: 0 };
         ahead.begin();
         ahead
     }

@@ -9,7 +9,9 @@ use camsim_core::{
 };
 use camsim_plan::{EdgeStage, SurfaceReads};
 
-use super::{MAX_FINE_TARGETS, MAX_TARGETS, RenderErrorBase, Session, ahead::Prepared, ms_since, slot::Target};
+use super::{
+    MAX_FINE_TARGETS, MAX_TARGETS, RenderErrorBase, Session, ahead::Prepared, ms_since, slot::Target,
+};
 use crate::{
     ideal::{IdealTarget, host::View},
     recorder::Recorder,
@@ -43,7 +45,12 @@ pub(super) struct Drawn {
 
 impl Session<'_> {
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    pub(super) fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), RenderErrorBase> {
+    pub(super) fn ideal(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        prepared: &Prepared,
+        slot: usize,
+    ) -> Result<(), RenderErrorBase> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         let models = plan.model_tolerance(&self.planner.sequence().scenario.quality);
@@ -81,7 +88,8 @@ impl Session<'_> {
             (drawn.target, drawn.out_of_order) = (Some(target), out_of_order);
         }
         if let Some(on_host) = self.on_host.as_mut().filter(|_| by_host) {
-            let (scene, buffers, terrain) = (&self.planner.sequence().scene, &self.buffers, prepared.meshes.first());
+            let (scene, buffers, terrain) =
+                (&self.planner.sequence().scene, &self.buffers, prepared.meshes.first());
             let begun = Instant::now();
             drawn.copy = Some(on_host.draw(View { plan, scene, buffers, terrain, tolerance: &models }));
             drawn.ideal_ms = Some(ms_since(begun));
@@ -101,7 +109,8 @@ impl Session<'_> {
         let plan = &prepared.plan;
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
-        // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
+        // The one used last stands last; `drawn` may name another's place, but is replaced below before
+        // anybody looks.
         let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
         let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let has_samples = plan.edges != EdgeStage::None || plan.samples_a_pixel > 1;
@@ -122,7 +131,8 @@ impl Session<'_> {
             ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));
         }
         if let Some(pool) = self.buffers.tiles_mut() {
-            let mut tiles: Vec<u32> = prepared.meshes.iter().flat_map(|mesh| mesh.tiles.iter().copied()).collect();
+            let mut tiles: Vec<u32> =
+                prepared.meshes.iter().flat_map(|mesh| mesh.tiles.iter().copied()).collect();
             tiles.sort_unstable();
             tiles.dedup();
             pool.bring(gpu, &tiles)?;

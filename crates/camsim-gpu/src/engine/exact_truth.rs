@@ -1,4 +1,5 @@
-//! Depth and coordinates where a look-up in the ideal frame does not tell them: by rays in f64, cast by the host.
+//! Depth and coordinates where a look-up in the ideal frame does not tell them: by rays in f64, cast by the
+//! host.
 
 use camsim_core::temporal::suspects::{DepthGrid, changed};
 use camsim_plan::{FramePlan, Planner, Sight};
@@ -7,16 +8,24 @@ use rayon::prelude::*;
 
 use crate::layout::Truth;
 
-/// Casts rays for the pixels that the device has left to the host (their depth is below 0), for those whose depth may belong to no surface or to the wrong one,
-/// and from each pixel that a ray has corrected on for its neighbours. `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
-pub(super) fn complete(truth: &mut [Truth], color_rgba: &[f32], planner: &Planner, plan: &FramePlan, phase: f64) {
+/// Casts rays for the pixels that the device has left to the host (their depth is below 0), for those whose
+/// depth may belong to no surface or to the wrong one, and from each pixel that a ray has corrected on for
+/// its neighbours. `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
+pub(super) fn complete(
+    truth: &mut [Truth],
+    color_rgba: &[f32],
+    planner: &Planner,
+    plan: &FramePlan,
+    phase: f64,
+) {
     let width = plan.camera.size_px[0] as usize;
     let sight = |i: usize, truth: &Truth| {
         let uv = DVec2::new(f64::from(truth.uv[0]), f64::from(truth.uv[1]));
         planner.sight(plan, [(i % width) as u32, (i / width) as u32], uv, phase)
     };
-    let cast =
-        |truth: &[Truth], pixels: &[usize]| -> Vec<(usize, Sight)> { pixels.par_iter().map(|&i| (i, sight(i, &truth[i]))).collect() };
+    let cast = |truth: &[Truth], pixels: &[usize]| -> Vec<(usize, Sight)> {
+        pixels.par_iter().map(|&i| (i, sight(i, &truth[i]))).collect()
+    };
     let mut by_ray: Vec<bool> = truth.iter().map(|of| of.depth_m < 0.0).collect();
     let unknown: Vec<usize> = (0..truth.len()).filter(|&i| by_ray[i]).collect();
     for (i, sight) in cast(truth, &unknown) {
@@ -26,8 +35,13 @@ pub(super) fn complete(truth: &mut [Truth], color_rgba: &[f32], planner: &Planne
     let inverse_depth: Vec<f32> = truth.iter().map(inverse_depth).collect();
     let row_step = if plan.shutter.interlace_s() > 0.0 { 2 } else { 1 };
     let grid = DepthGrid { width, row_step, inverse_depth: &inverse_depth, valid: &valid };
-    let mut pixels: Vec<usize> =
-        grid.suspects().into_iter().enumerate().filter(|&(i, suspect)| suspect && !by_ray[i]).map(|(i, _)| i).collect();
+    let mut pixels: Vec<usize> = grid
+        .suspects()
+        .into_iter()
+        .enumerate()
+        .filter(|&(i, suspect)| suspect && !by_ray[i])
+        .map(|(i, _)| i)
+        .collect();
     pixels.iter().for_each(|&i| by_ray[i] = true);
     while !pixels.is_empty() {
         let found = cast(truth, &pixels);

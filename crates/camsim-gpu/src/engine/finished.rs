@@ -1,4 +1,5 @@
-//! What a session hands over: the frame, how it was made, and where its time went; and how that is taken from device and host.
+//! What a session hands over: the frame, how it was made, and where its time went; and how that is taken from
+//! device and host.
 
 use std::time::Instant;
 
@@ -13,22 +14,26 @@ use super::{
 };
 use crate::{context::GpuError, layout::Truth, recorder::PassTime};
 
-/// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
+/// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one
+/// before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTimes {
     /// The host planned it and computed its tables, on another thread than what follows.
     pub plan_ms: f64,
     /// The host wrote its tables and recorded its passes.
     pub record_ms: f64,
-    /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame before.
+    /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame
+    /// before.
     pub submit_ms: f64,
-    /// The host drew the ideal frame, where it does that itself ([`crate::reverse::host`]); none where an earlier frame's is kept.
+    /// The host drew the ideal frame, where it does that itself ([`crate::reverse::host`]); none where an
+    /// earlier frame's is kept.
     pub ideal_ms: Option<f64>,
     /// The host waited for the device.
     pub wait_ms: f64,
     /// The host made the picture from the ideal frame, where it does that itself ([`crate::reverse::host`]).
     pub reverse_ms: Option<f64>,
-    /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what pixels at silhouettes see.
+    /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what
+    /// pixels at silhouettes see.
     pub read_ms: f64,
     /// What ran on the device, if asked for ([`Session::time_passes`]) and if the adapter has time stamps.
     pub passes: Vec<PassTime>,
@@ -43,7 +48,8 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
-    /// Blended triangles that are mixed before something behind them, since they cover each other in rings; of all ideal frames.
+    /// Blended triangles that are mixed before something behind them, since they cover each other in rings;
+    /// of all ideal frames.
     pub out_of_order: u32,
     /// Where its time went.
     pub times: FrameTimes,
@@ -62,7 +68,9 @@ impl Session<'_> {
         let plan = done.plan;
         let begun = Instant::now();
         let by_host = match (&mut self.on_host, &done.on_host) {
-            (Some(on_host), Some((frame, Lines::Poses(poses)))) => Some(on_host.render(&plan, frame, &poses.entries)?),
+            (Some(on_host), Some((frame, Lines::Poses(poses)))) => {
+                Some(on_host.render(&plan, frame, &poses.entries)?)
+            }
             _ => None,
         };
         times.reverse_ms = by_host.as_ref().map(|_| ms_since(begun));
@@ -77,7 +85,8 @@ impl Session<'_> {
             exact_truth::complete(truth, &color_rgba, &self.planner, &plan, f64::from(self.coords_phase));
         }
         let size_px = plan.camera.size_px;
-        let coords = truth.as_ref().map(|truth| coords(truth, &color_rgba, &plan, &self.planner.sequence().path));
+        let coords =
+            truth.as_ref().map(|truth| coords(truth, &color_rgba, &plan, &self.planner.sequence().path));
         let frame = RenderedFrame {
             index: plan.frame,
             stamp_ns: self.planner.sequence().epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),

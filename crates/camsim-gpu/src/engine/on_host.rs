@@ -1,4 +1,5 @@
-//! Frames whose reverse pipeline runs on the host: what they read of the device, and what stays from frame to frame.
+//! Frames whose reverse pipeline runs on the host: what they read of the device, and what stays from frame to
+//! frame.
 
 use camsim_core::{sequence::Sequence, temporal::IdealGeometry};
 use camsim_plan::{FramePlan, RayStage};
@@ -69,7 +70,10 @@ impl OnHost {
     pub fn new(gpu: &GpuContext, sequence: &Sequence, buffers: &SceneBuffers) -> Self {
         Self {
             kernel: HostKernel::new(),
-            scene: gpu.ideal_on_host.then(|| HostScene::new(&sequence.scene, buffers, gpu.max_picture_px)).flatten(),
+            scene: gpu
+                .ideal_on_host
+                .then(|| HostScene::new(&sequence.scene, buffers, gpu.max_picture_px))
+                .flatten(),
             vignette: super::renew::vignette_weights_of(sequence).1,
             map: None,
             map_copy: None,
@@ -97,15 +101,27 @@ impl OnHost {
     }
 
     /// Records the lens map's way to the host, once.
-    pub fn copy_map(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, map: Option<&LensMap>) {
+    pub fn copy_map(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        plan: &FramePlan,
+        map: Option<&LensMap>,
+    ) {
         let is_known = self.map.is_some() || self.map_copy.is_some();
         let Some(map) = map.filter(|_| plan.ray == RayStage::LensMap && !is_known) else { return };
-        let rows = Rows::new(gpu, "camsim.lens_map", [map.texture.width(), map.texture.height()], size_of::<[f32; 2]>());
+        let rows = Rows::new(
+            gpu,
+            "camsim.lens_map",
+            [map.texture.width(), map.texture.height()],
+            size_of::<[f32; 2]>(),
+        );
         rows.copy(recorder.encoder(), &map.texture);
         self.recorded.map = Some(rows);
     }
 
-    /// Whether it makes frames of a plan: if it draws their ideal frames itself there is no copy that they must be worth.
+    /// Whether it makes frames of a plan: if it draws their ideal frames itself there is no copy that they
+    /// must be worth.
     pub fn makes(&self, plan: &FramePlan, place: ReverseOn) -> bool {
         if self.draws() { host::serves(plan) } else { place.is_host(plan) }
     }
@@ -131,16 +147,23 @@ impl OnHost {
     }
 
     /// Records an ideal frame's way to the host; which copy it is.
-    pub fn copy_ideal(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, target: &IdealTarget, ideal: &IdealGeometry) -> usize {
+    pub fn copy_ideal(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        target: &IdealTarget,
+        ideal: &IdealGeometry,
+    ) -> usize {
         // The frame in flight may still read the other one.
         self.last = (self.last + 1) % COPIES;
         let copy = &mut self.copies[self.last];
         copy.is_drawn = false;
         // Depth can only be copied whole.
         let whole = [target.depth.width(), target.depth.height()];
-        for (rows, size_px, texture, texel_bytes) in
-            [(&mut copy.color, ideal.size_px, &target.color, COLOR_BYTES), (&mut copy.depth, whole, &target.depth, DEPTH_BYTES)]
-        {
+        for (rows, size_px, texture, texel_bytes) in [
+            (&mut copy.color, ideal.size_px, &target.color, COLOR_BYTES),
+            (&mut copy.depth, whole, &target.depth, DEPTH_BYTES),
+        ] {
             rows.fit(gpu, size_px, texel_bytes);
             rows.copy(recorder.encoder(), texture);
         }
@@ -161,7 +184,8 @@ impl OnHost {
         }
     }
 
-    /// The picture of a frame whose commands are done, linear R G B A, and the truth about it where that is wanted.
+    /// The picture of a frame whose commands are done, linear R G B A, and the truth about it where that is
+    /// wanted.
     pub fn render(
         &mut self,
         plan: &FramePlan,
@@ -177,7 +201,8 @@ impl OnHost {
         let copy = &self.copies[frame.copy];
         if copy.is_drawn {
             let DrawnFrame { color, depth, stride } = &copy.drawn;
-            let ideal = IdealOnHost { color, color_stride: *stride as u32, depth, depth_stride: *stride as u32 };
+            let ideal =
+                IdealOnHost { color, color_stride: *stride as u32, depth, depth_stride: *stride as u32 };
             return Ok(self.reverse(plan, frame, poses, ideal));
         }
         let (color, depth) = (copy.color.view()?, copy.depth.view()?);
@@ -197,6 +222,15 @@ impl OnHost {
         poses: &[[[f32; 4]; 3]],
         ideal: IdealOnHost<'_>,
     ) -> (Vec<f32>, Option<Vec<Truth>>) {
-        self.kernel.render(plan, &HostInputs { frame: &frame.uniforms, poses, map: self.map.as_ref(), vignette: &self.vignette, ideal })
+        self.kernel.render(
+            plan,
+            &HostInputs {
+                frame: &frame.uniforms,
+                poses,
+                map: self.map.as_ref(),
+                vignette: &self.vignette,
+                ideal,
+            },
+        )
     }
 }

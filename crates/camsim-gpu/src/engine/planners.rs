@@ -6,14 +6,20 @@ use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
 use crate::context::GpuContext;
 
-/// What a software adapter's planners are asked to leave to others: with 5, Linux gives them a third of what a usual thread gets beside them.
+/// What a software adapter's planners are asked to leave to others: with 5, Linux gives them a third of what
+/// a usual thread gets beside them.
 #[cfg(target_os = "linux")]
 const NICE: i32 = 5;
 
-/// Runs `work` with a scope whose tasks plan. Where the device is the same processor, they are threads of their own that stand back: every frame waits for the device's
-/// passes, but plans are made ahead, and while a pass has one thread there is room for them. A single frame, as the viewer asks for, waits for its plan: that goes first.
-/// Whoever calls from a pool of rayon's has the work done there.
-pub(super) fn scope<'scope, R>(gpu: &GpuContext, is_single: bool, work: impl FnOnce(&Scope<'scope>) -> R) -> R {
+/// Runs `work` with a scope whose tasks plan. Where the device is the same processor, they are threads of
+/// their own that stand back: every frame waits for the device's passes, but plans are made ahead, and while
+/// a pass has one thread there is room for them. A single frame, as the viewer asks for, waits for its plan:
+/// that goes first. Whoever calls from a pool of rayon's has the work done there.
+pub(super) fn scope<'scope, R>(
+    gpu: &GpuContext,
+    is_single: bool,
+    work: impl FnOnce(&Scope<'scope>) -> R,
+) -> R {
     let stands_back = gpu.is_software && !is_single && rayon::current_thread_index().is_none();
     match stands_back.then(of_low_priority).flatten() {
         Some(pool) => pool.in_place_scope(work),
@@ -24,11 +30,18 @@ pub(super) fn scope<'scope, R>(gpu: &GpuContext, is_single: bool, work: impl FnO
 /// One pool for all engines of the program; `None` where there are no threads to be had.
 fn of_low_priority() -> Option<&'static ThreadPool> {
     static POOL: OnceLock<Option<ThreadPool>> = OnceLock::new();
-    let build = || ThreadPoolBuilder::new().thread_name(|i| format!("camsim-plan-{i}")).start_handler(|_| stand_back()).build().ok();
+    let build = || {
+        ThreadPoolBuilder::new()
+            .thread_name(|i| format!("camsim-plan-{i}"))
+            .start_handler(|_| stand_back())
+            .build()
+            .ok()
+    };
     POOL.get_or_init(build).as_ref()
 }
 
-/// On Linux each thread has a priority of its own. That it may not be changed costs a little time and nothing else.
+/// On Linux each thread has a priority of its own. That it may not be changed costs a little time and nothing
+/// else.
 fn stand_back() {
     #[cfg(target_os = "linux")]
     let _ = rustix::process::nice(NICE);
@@ -46,7 +59,9 @@ mod tests {
     /// Priority of the thread that a task of the scope runs on, above that of this one.
     fn above(gpu: &GpuContext, is_single: bool) -> i32 {
         let (give, given) = channel();
-        scope(gpu, is_single, |scope| scope.spawn(move |_| give.send(rustix::process::nice(0).unwrap()).unwrap()));
+        scope(gpu, is_single, |scope| {
+            scope.spawn(move |_| give.send(rustix::process::nice(0).unwrap()).unwrap())
+        });
         given.recv().unwrap() - rustix::process::nice(0).unwrap()
     }
 

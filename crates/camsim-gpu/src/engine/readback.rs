@@ -30,8 +30,14 @@ pub(super) struct Output {
 
 impl Output {
     pub fn new(gpu: &GpuContext, label: &str, size: u64) -> Self {
-        let create =
-            |usage| gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        let create = |usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
         Self {
             on_device: create(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
             on_host: create(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
@@ -47,7 +53,8 @@ impl Output {
     }
 }
 
-/// Bytes that are worth a thread of their own, and threads at most: the system gives large pictures their memory page by page as it is first written, which takes several times as long as the copy.
+/// Bytes that are worth a thread of their own, and threads at most: the system gives large pictures their
+/// memory page by page as it is first written, which takes several times as long as the copy.
 const BYTES_A_THREAD: usize = 8 << 20;
 const MOST_THREADS: usize = 8;
 
@@ -63,14 +70,18 @@ pub(super) fn read_mapped<T: bytemuck::Pod>(buffer: &wgpu::Buffer) -> Result<Vec
 /// The whole values among so many bytes. Threads are not those of the pool, which may all be at plans.
 fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
     let bytes = &bytes[..bytes.len() / size_of::<T>() * size_of::<T>()];
-    let threads = (bytes.len() / BYTES_A_THREAD).min(MOST_THREADS).min(available_parallelism().map_or(1, NonZero::get));
+    let threads =
+        (bytes.len() / BYTES_A_THREAD).min(MOST_THREADS).min(available_parallelism().map_or(1, NonZero::get));
     if threads < 2 {
-        // Where they are aligned, as mapped memory is, one copy; the other way fills the numbers with zeros first.
-        return bytemuck::try_cast_slice(bytes).map_or_else(|_| bytemuck::pod_collect_to_vec(bytes), <[T]>::to_vec);
+        // Where they are aligned, as mapped memory is, one copy; the other way fills the numbers with zeros
+        // first.
+        return bytemuck::try_cast_slice(bytes)
+            .map_or_else(|_| bytemuck::pod_collect_to_vec(bytes), <[T]>::to_vec);
     }
     let mut values: Vec<T> = bytemuck::zeroed_vec(bytes.len() / size_of::<T>());
     let piece = bytes.len().div_ceil(threads);
-    let pieces = Mutex::new(bytemuck::cast_slice_mut::<T, u8>(&mut values).chunks_mut(piece).zip(bytes.chunks(piece)));
+    let pieces =
+        Mutex::new(bytemuck::cast_slice_mut::<T, u8>(&mut values).chunks_mut(piece).zip(bytes.chunks(piece)));
     let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
     let work = || {
         while let Some((into, from)) = next() {
@@ -87,8 +98,14 @@ fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
     values
 }
 
-/// What was found beside the picture, with each pixel's time shift, and the direction of the sky where there is a ray (alpha) and nothing that it meets.
-pub(super) fn coords(truth: &[Truth], color_rgba: &[f32], plan: &FramePlan, path: &CameraPath) -> Vec<[f32; COORDS_CHANNELS]> {
+/// What was found beside the picture, with each pixel's time shift, and the direction of the sky where there
+/// is a ray (alpha) and nothing that it meets.
+pub(super) fn coords(
+    truth: &[Truth],
+    color_rgba: &[f32],
+    plan: &FramePlan,
+    path: &CameraPath,
+) -> Vec<[f32; COORDS_CHANNELS]> {
     let width = plan.camera.size_px[0] as usize;
     let of_row = |(y, (row, alphas)): (usize, (&[Truth], &[f32]))| {
         // Where lines are rows, all pixels of one look at one instant.
@@ -97,7 +114,9 @@ pub(super) fn coords(truth: &[Truth], color_rgba: &[f32], plan: &FramePlan, path
             let dt_s = plan.shutter.dt_pixel_s(x as u32, y as u32);
             let [mut n, mut e, mut d] = t.point_ned_m;
             if t.depth_m == 0.0 && rgba[3] > 0.0 {
-                let pose = last.filter(|(of_s, _)| *of_s == dt_s).map_or_else(|| path.pose(plan.stamp_s + dt_s), |(_, pose)| pose);
+                let pose = last
+                    .filter(|(of_s, _)| *of_s == dt_s)
+                    .map_or_else(|| path.pose(plan.stamp_s + dt_s), |(_, pose)| pose);
                 last = Some((dt_s, pose));
                 let uv = DVec2::new(f64::from(t.uv[0]), f64::from(t.uv[1]));
                 [n, e, d] = sky_direction_ned(&pose, uv).as_vec3().to_array();
@@ -110,13 +129,20 @@ pub(super) fn coords(truth: &[Truth], color_rgba: &[f32], plan: &FramePlan, path
 }
 
 /// All of a buffer.
-pub(super) fn read_buffer<T: bytemuck::Pod>(gpu: &GpuContext, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+pub(super) fn read_buffer<T: bytemuck::Pod>(
+    gpu: &GpuContext,
+    buffer: &wgpu::Buffer,
+) -> Result<Vec<T>, GpuError> {
     let on_host = on_host(gpu, "camsim.read_buffer", buffer.size());
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_buffer") });
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_buffer") });
     encoder.copy_buffer_to_buffer(buffer, 0, &on_host, 0, buffer.size());
     gpu.queue.submit([encoder.finish()]);
     on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
+    gpu.device
+        .poll(wgpu::PollType::wait_indefinitely())
+        .map_err(|error| GpuError::Device(error.to_string()))?;
     read_mapped(&on_host)
 }
 
@@ -142,13 +168,21 @@ impl Rows {
 
     /// For none yet.
     pub fn empty(gpu: &GpuContext, label: &'static str) -> Self {
-        Self { buffer: on_host(gpu, label, wgpu::COPY_BUFFER_ALIGNMENT), label, size_px: [0; 2], stride_bytes: 0, is_asked_for: false }
+        Self {
+            buffer: on_host(gpu, label, wgpu::COPY_BUFFER_ALIGNMENT),
+            label,
+            size_px: [0; 2],
+            stride_bytes: 0,
+            is_asked_for: false,
+        }
     }
 
-    /// Takes texels of so many bytes from now on, and is not mapped any more. The buffer grows, but does not shrink: sizes that come and go need no other one.
+    /// Takes texels of so many bytes from now on, and is not mapped any more. The buffer grows, but does not
+    /// shrink: sizes that come and go need no other one.
     pub fn fit(&mut self, gpu: &GpuContext, size_px: [u32; 2], texel_bytes: usize) {
         self.size_px = size_px;
-        self.stride_bytes = (size_px[0] * texel_bytes as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        self.stride_bytes =
+            (size_px[0] * texel_bytes as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(self.stride_bytes) * u64::from(size_px[1]);
         if std::mem::take(&mut self.is_asked_for) {
             self.buffer.unmap();
@@ -166,10 +200,19 @@ impl Rows {
 
     pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture) {
         encoder.copy_texture_to_buffer(
-            wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
+            wgpu::TexelCopyTextureInfo {
+                texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d::ZERO,
+                aspect: wgpu::TextureAspect::All,
+            },
             wgpu::TexelCopyBufferInfo {
                 buffer: &self.buffer,
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(self.stride_bytes), rows_per_image: None },
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(self.stride_bytes),
+                    rows_per_image: None,
+                },
             },
             wgpu::Extent3d { width: self.size_px[0], height: self.size_px[1], depth_or_array_layers: 1 },
         );
@@ -184,7 +227,9 @@ impl Rows {
     pub fn read<T: bytemuck::Pod>(&self) -> Result<Large<T>, GpuError> {
         let [width, height] = self.size_px.map(|side| side as usize);
         let mut values = Large::zeros(width * height);
-        for (into, row) in values.chunks_exact_mut(width).zip(self.view()?.chunks_exact(self.stride_bytes as usize)) {
+        for (into, row) in
+            values.chunks_exact_mut(width).zip(self.view()?.chunks_exact(self.stride_bytes as usize))
+        {
             let into: &mut [u8] = bytemuck::cast_slice_mut(into);
             into.copy_from_slice(&row[..into.len()]);
         }
@@ -197,7 +242,12 @@ const GROWS_BY_BYTES: u64 = 1 << 20;
 
 fn on_host(gpu: &GpuContext, label: &str, size: u64) -> wgpu::Buffer {
     let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
-    gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage,
+        mapped_at_creation: false,
+    })
 }
 
 /// The top-left `width` x `height` texels of a texture.
@@ -208,14 +258,24 @@ pub(super) fn read_texture<T: bytemuck::Pod>(
     height: u32,
 ) -> Result<Vec<T>, GpuError> {
     // Depth can only be copied whole.
-    let mut copied = Rows::new(gpu, "camsim.read_texture", [texture.width(), texture.height()], size_of::<T>());
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
+    let mut copied =
+        Rows::new(gpu, "camsim.read_texture", [texture.width(), texture.height()], size_of::<T>());
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
     copied.copy(&mut encoder, texture);
     gpu.queue.submit([encoder.finish()]);
     copied.recall();
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
+    gpu.device
+        .poll(wgpu::PollType::wait_indefinitely())
+        .map_err(|error| GpuError::Device(error.to_string()))?;
     let all = copied.read::<T>()?;
-    Ok(all.chunks_exact(texture.width() as usize).take(height as usize).flat_map(|row| &row[..width as usize]).copied().collect())
+    Ok(all
+        .chunks_exact(texture.width() as usize)
+        .take(height as usize)
+        .flat_map(|row| &row[..width as usize])
+        .copied()
+        .collect())
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Going on with another sequence: what a viewer does whenever somebody turns a knob. Kernels and the scene's pictures, which take longest to
-//! make, stay on the device; what depends on the camera is made anew.
+//! Going on with another sequence: what a viewer does whenever somebody turns a knob. Kernels and the scene's
+//! pictures, which take longest to make, stay on the device; what depends on the camera is made anew.
 
 use std::sync::Arc;
 
@@ -19,12 +19,17 @@ use crate::{
 };
 
 impl Session<'_> {
-    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the last bit. Fast where its scene is the
-    /// one of this session (the same [`Arc`]) and its preset too; otherwise everything is made anew.
+    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the
+    /// last bit. Fast where its scene is the one of this session (the same [`Arc`]) and its preset too;
+    /// otherwise everything is made anew.
     ///
     /// # Errors
     /// As [`Engine::session`]; the session then stays as it was.
-    pub fn renew<E: std::error::Error + 'static>(&mut self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<(), RenderError<E>> {
+    pub fn renew<E: std::error::Error + 'static>(
+        &mut self,
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+    ) -> Result<(), RenderError<E>> {
         let before = self.planner.sequence();
         let (old, new) = (&before.scenario, &sequence.scenario);
         if !Arc::ptr_eq(&before.scene, &sequence.scene) || old.quality.preset != new.quality.preset {
@@ -76,7 +81,13 @@ impl Engine {
 }
 
 /// Numbers that never change, by places: one or two a texel.
-fn table(gpu: &GpuContext, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat, values: &[f32]) -> wgpu::TextureView {
+fn table(
+    gpu: &GpuContext,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    values: &[f32],
+) -> wgpu::TextureView {
     let descriptor = wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -88,7 +99,8 @@ fn table(gpu: &GpuContext, label: &str, [width, height]: [u32; 2], format: wgpu:
         view_formats: &[],
     };
     let order = wgpu::util::TextureDataOrder::LayerMajor;
-    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, bytemuck::cast_slice(values));
+    let texture =
+        gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, bytemuck::cast_slice(values));
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
@@ -103,7 +115,9 @@ pub(super) fn noise_table(gpu: &GpuContext) -> wgpu::TextureView {
 pub(super) fn vignette_weights_of(sequence: &Sequence) -> ([u32; 2], Vec<f32>) {
     let camera = &sequence.scenario.camera;
     match &sequence.vignette {
-        Some(map) => (camera.size_px, vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds)),
+        Some(map) => {
+            (camera.size_px, vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds))
+        }
         None => ([1, 1], vec![1.0]),
     }
 }

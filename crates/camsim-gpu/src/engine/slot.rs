@@ -48,15 +48,20 @@ impl Slot {
             frame,
             poses: pose_buffer(gpu, 48 * width.max(height)),
             color: Output::new(gpu, "camsim.color", 16 * width * height),
-            truth: truth.then(|| Output::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)),
+            truth: truth
+                .then(|| Output::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)),
             clock: None,
         }
     }
 
-    /// Once the frame has been submitted: asks for what the host reads of it, the outputs where the device has made them, and for what it writes the next one to.
+    /// Once the frame has been submitted: asks for what the host reads of it, the outputs where the device
+    /// has made them, and for what it writes the next one to.
     pub fn recall(&mut self, has_outputs: bool) {
-        let outputs =
-            has_outputs.then(|| std::iter::once(&self.color).chain(&self.truth)).into_iter().flatten().map(|output| &output.on_host);
+        let outputs = has_outputs
+            .then(|| std::iter::once(&self.color).chain(&self.truth))
+            .into_iter()
+            .flatten()
+            .map(|output| &output.on_host);
         for on_host in outputs.chain(self.clock.as_ref().map(PassClock::on_host)) {
             // A failed mapping shows when the range is read.
             on_host.map_async(wgpu::MapMode::Read, .., |_| {});

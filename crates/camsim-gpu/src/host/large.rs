@@ -1,11 +1,12 @@
-//! Numbers that frame after frame reads all over, in large pages where the system has them: a processor remembers where a few pages are, and looks
-//! the others up over and over.
+//! Numbers that frame after frame reads all over, in large pages where the system has them: a processor
+//! remembers where a few pages are, and looks the others up over and over.
 
 use std::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 
-/// Numbers in a row. What holds at least a large page asks for such; everything else, and where there are none, is a vector.
+/// Numbers in a row. What holds at least a large page asks for such; everything else, and where there are
+/// none, is a vector.
 #[derive(Debug)]
 pub(crate) enum Large<T> {
     Heap(Vec<T>),
@@ -57,7 +58,9 @@ impl<T: Pod> DerefMut for Large<T> {
         match self {
             Self::Heap(values) => values,
             #[cfg(target_os = "linux")]
-            Self::Pages(pages, len) => bytemuck::cast_slice_mut(&mut pages.bytes_mut()[..*len * size_of::<T>()]),
+            Self::Pages(pages, len) => {
+                bytemuck::cast_slice_mut(&mut pages.bytes_mut()[..*len * size_of::<T>()])
+            }
         }
     }
 }
@@ -79,8 +82,11 @@ mod pages {
     impl Pages {
         /// Of zeros; `None` for what is smaller than a page, and where the system gives none.
         pub fn of(bytes: usize) -> Option<Self> {
-            let bytes = Some(bytes).filter(|&bytes| bytes >= LARGE_PAGE_BYTES)?.checked_next_multiple_of(LARGE_PAGE_BYTES)?;
-            // Most systems begin what is so large at a large page; one more is room for those that do not, and is never touched.
+            let bytes = Some(bytes)
+                .filter(|&bytes| bytes >= LARGE_PAGE_BYTES)?
+                .checked_next_multiple_of(LARGE_PAGE_BYTES)?;
+            // Most systems begin what is so large at a large page; one more is room for those that do not,
+            // and is never touched.
             let memory = MmapMut::map_anon(bytes.checked_add(LARGE_PAGE_BYTES)?).ok()?;
             memory.advise(Advice::HugePage).ok()?;
             let first = memory.as_ptr().align_offset(LARGE_PAGE_BYTES);
@@ -126,7 +132,9 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn pages_begin_at_a_large_one() {
-        for (len, may_have_pages) in [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)] {
+        for (len, may_have_pages) in
+            [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)]
+        {
             let numbers: Large<f64> = Large::zeros(len);
             // A system need not have large pages.
             let has_pages = matches!(numbers, Large::Pages(..));

@@ -1,7 +1,8 @@
 //! What processors have beyond what all of them have. The only place that takes their word for it.
 
-/// Does work by the widest vectors that the processor has, and returns what that gives. Only what is inlined into it is compiled for these: functions are marked so, and
-/// loops are written out, since closures that arrays' `map` or iterators call mostly stay calls.
+/// Does work by the widest vectors that the processor has, and returns what that gives. Only what is inlined
+/// into it is compiled for these: functions are marked so, and loops are written out, since closures that
+/// arrays' `map` or iterators call mostly stay calls.
 macro_rules! widest {
     ($vectors:ident => $work:expr) => {{
         #[cfg(target_arch = "x86_64")]
@@ -24,7 +25,8 @@ pub(crate) const SIDE_BY_SIDE: usize = 8;
 pub(crate) type Wholes = [i32; SIDE_BY_SIDE];
 pub(crate) type Numbers = [f32; SIDE_BY_SIDE];
 
-/// What is not left to the compiler: half floats, and what it makes a condition for each number of where it is one for all.
+/// What is not left to the compiler: half floats, and what it makes a condition for each number of where it
+/// is one for all.
 pub(crate) trait Vectors: Copy + Sync {
     /// Finite half floats as floats.
     fn numbers(self, halves: [u16; 8]) -> Numbers;
@@ -42,7 +44,8 @@ pub(crate) trait Vectors: Copy + Sync {
 /// Where something is, of places side by side.
 #[derive(Clone, Copy)]
 pub(crate) struct Inside<'a> {
-    /// It is where all of these are at least 0: each the sum of one number for all places and one for each. They wrap around.
+    /// It is where all of these are at least 0: each the sum of one number for all places and one for each.
+    /// They wrap around.
     pub sides: [(i32, &'a Wholes); 3],
     /// Places after the first one that are asked.
     pub last: i32,
@@ -126,9 +129,10 @@ mod x86 {
     use std::arch::{
         is_x86_feature_detected,
         x86_64::{
-            __m128i, __m256, __m256i, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _mm256_add_epi32, _mm256_add_ps, _mm256_andnot_ps,
-            _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_movemask_ps, _mm256_mul_ps,
-            _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32, _mm256_set1_ps, _mm256_sub_epi32,
+            __m128i, __m256, __m256i, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _mm256_add_epi32, _mm256_add_ps,
+            _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtph_ps,
+            _mm256_cvtps_ph, _mm256_movemask_ps, _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256,
+            _mm256_set1_epi32, _mm256_set1_ps, _mm256_sub_epi32,
         },
     };
 
@@ -140,7 +144,10 @@ mod x86 {
 
     impl Avx2 {
         pub fn find() -> Option<Self> {
-            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("f16c")).then_some(Self(()))
+            (is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("f16c"))
+            .then_some(Self(()))
         }
 
         /// Runs what is compiled for it.
@@ -165,7 +172,10 @@ mod x86 {
             unsafe {
                 let sum = |all: i32, each: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), each);
                 let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
-                _mm256_castsi256_ps(_mm256_or_si256(beside, _mm256_sub_epi32(_mm256_set1_epi32(what.last), places)))
+                _mm256_castsi256_ps(_mm256_or_si256(
+                    beside,
+                    _mm256_sub_epi32(_mm256_set1_epi32(what.last), places),
+                ))
             }
         }
     }
@@ -190,7 +200,10 @@ mod x86 {
             let [of_a, of_b]: [__m256i; 2] = of.map(|of| bytemuck::cast(*of));
             // SAFETY: `self` tells that this processor has it.
             bytemuck::cast(unsafe {
-                _mm256_add_epi32(_mm256_mullo_epi32(_mm256_set1_epi32(a), of_a), _mm256_mullo_epi32(_mm256_set1_epi32(b), of_b))
+                _mm256_add_epi32(
+                    _mm256_mullo_epi32(_mm256_set1_epi32(a), of_a),
+                    _mm256_mullo_epi32(_mm256_set1_epi32(b), of_b),
+                )
             })
         }
 
@@ -198,7 +211,9 @@ mod x86 {
         fn mixed_numbers(self, [a, b]: [f32; 2], of: [&Numbers; 2]) -> Numbers {
             let [of_a, of_b]: [__m256; 2] = of.map(|of| bytemuck::cast(*of));
             // SAFETY: `self` tells that this processor has it.
-            bytemuck::cast(unsafe { _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(a), of_a), _mm256_mul_ps(_mm256_set1_ps(b), of_b)) })
+            bytemuck::cast(unsafe {
+                _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(a), of_a), _mm256_mul_ps(_mm256_set1_ps(b), of_b))
+            })
         }
 
         #[inline(always)]
@@ -256,22 +271,36 @@ mod tests {
             let near = numbers(k + 3, seed % 3 != 0);
             let what = Shown {
                 name: seed,
-                inside: Inside { sides: [(all[0], &inside[0]), (all[1], &inside[1]), (all[2], &inside[2])], last: (seed % 11) as i32 },
+                inside: Inside {
+                    sides: [(all[0], &inside[0]), (all[1], &inside[1]), (all[2], &inside[2])],
+                    last: (seed % 11) as i32,
+                },
                 near: ((seed % 4) as f32, &near),
             };
             let before = (numbers(k + 4, seed % 2 == 0), [7; SIDE_BY_SIDE]);
             let (mut by_any, mut by_avx2) = (before, before);
             Any.show(&what, &mut by_any.0, &mut by_any.1);
             avx2.run(|avx2| avx2.show(&what, &mut by_avx2.0, &mut by_avx2.1));
-            assert_eq!((by_any.0.map(f32::to_bits), by_any.1), (by_avx2.0.map(f32::to_bits), by_avx2.1), "{seed}");
-            assert_eq!(Any.is_any_inside(&what.inside), avx2.run(|avx2| avx2.is_any_inside(&what.inside)), "{seed}");
+            assert_eq!(
+                (by_any.0.map(f32::to_bits), by_any.1),
+                (by_avx2.0.map(f32::to_bits), by_avx2.1),
+                "{seed}"
+            );
+            assert_eq!(
+                Any.is_any_inside(&what.inside),
+                avx2.run(|avx2| avx2.is_any_inside(&what.inside)),
+                "{seed}"
+            );
             counts[by_any.1.iter().filter(|&&shown| shown != 7).count()] += 1;
 
             let (a, b) = (wholes(k + 5, 1 << 20), wholes(k + 6, 1 << 20));
             let factors = [wholes(k + 7, 1 << 20)[0], wholes(k + 8, 300)[0]];
             assert_eq!(Any.mixed(factors, [&a, &b]), avx2.run(|avx2| avx2.mixed(factors, [&a, &b])));
             let (a, b, [c, d, ..]) = (numbers(k + 9, true), numbers(k + 10, true), numbers(k + 11, true));
-            assert_eq!(Any.mixed_numbers([c, d], [&a, &b]), avx2.run(|avx2| avx2.mixed_numbers([c, d], [&a, &b])));
+            assert_eq!(
+                Any.mixed_numbers([c, d], [&a, &b]),
+                avx2.run(|avx2| avx2.mixed_numbers([c, d], [&a, &b]))
+            );
         }
         assert!(counts[..8].iter().all(|&count| count > 100), "not all kinds were there: {counts:?}");
     }

@@ -12,7 +12,8 @@ pub(super) enum Writes {
     /// Colour, if there is any, and depth.
     #[default]
     All,
-    /// Colour over what is there, by alpha; what has depth hides it. The target's own alpha stays: it is a mark.
+    /// Colour over what is there, by alpha; what has depth hides it. The target's own alpha stays: it is a
+    /// mark.
     Mixed,
     /// Depth alone, beside a target of colour.
     Depth,
@@ -85,7 +86,10 @@ pub(super) fn pipeline(
             buffers,
         },
         // Anticlockwise is anticlockwise in the picture, whose rows go down as the device's do not.
-        primitive: wgpu::PrimitiveState { cull_mode: one_sided.then_some(wgpu::Face::Back), ..Default::default() },
+        primitive: wgpu::PrimitiveState {
+            cull_mode: one_sided.then_some(wgpu::Face::Back),
+            ..Default::default()
+        },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(writes != Writes::Mixed),

@@ -24,7 +24,8 @@ pub struct FineTarget {
     pub scale: u32,
     /// near / z, 4 samples a fine pixel; where surfaces are not thin, near marked pixels only.
     pub depth: wgpu::Texture,
-    /// Linear colour, 4 samples a fine pixel, where there is more than one a pixel: what is thinner than a pixel then has its own.
+    /// Linear colour, 4 samples a fine pixel, where there is more than one a pixel: what is thinner than a
+    /// pixel then has its own.
     pub color: Option<wgpu::Texture>,
     /// Borders of two surfaces within fine pixels: `shaders/ideal/lines.wgsl`.
     pub lines: wgpu::Texture,
@@ -85,12 +86,18 @@ impl FineTarget {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
         let buffer = |label, size, usage| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
-            gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
         let depth = texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage);
-        let color = (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage));
+        let color = (scale > 1)
+            .then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage));
         Self {
             scale,
             depth_view: whole(&depth),

@@ -1,10 +1,13 @@
 //! The ideal frame on the host's own processors, for software adapters.
 //!
-//! Such an adapter's driver draws triangles as a GPU would: it shades blocks of 4x4 pixels for each triangle that touches them, small triangles over and over, and one is a matter of a microsecond.
-//! Here triangles only tell which of them a pixel shows, and how far it is; then each pixel's colour is worked out once, from the planes of its own triangle, whose derivatives are exact. Corners
-//! stand on the devices' grid of 1/256 px and borders belong to triangles by the same rule, so that nothing is covered twice or not at all.
+//! Such an adapter's driver draws triangles as a GPU would: it shades blocks of 4x4 pixels for each triangle
+//! that touches them, small triangles over and over, and one is a matter of a microsecond. Here triangles
+//! only tell which of them a pixel shows, and how far it is; then each pixel's colour is worked out once,
+//! from the planes of its own triangle, whose derivatives are exact. Corners stand on the devices' grid of
+//! 1/256 px and borders belong to triangles by the same rule, so that nothing is covered twice or not at all.
 //!
-//! Where triangles go: corners ([`corners`]) -> triangles and the bands of rows that they may be in ([`triangles`]) -> what pixels show ([`cover`]) -> colours ([`shade`], [`reads`]).
+//! Where triangles go: corners ([`corners`]) -> triangles and the bands of rows that they may be in
+//! ([`triangles`]) -> what pixels show ([`cover`]) -> colours ([`shade`], [`reads`]).
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
@@ -47,7 +50,8 @@ use triangles::{BAND_ROWS, Chunk, Kind, MORE};
 
 /// Corners of the terrain that a task projects.
 const CORNERS_A_TASK: usize = 4096;
-/// Chunks that are drawn at once: a million triangles at most, which bounds the memory that they take, and their numbers. What has more is drawn in turns, each over the one before.
+/// Chunks that are drawn at once: a million triangles at most, which bounds the memory that they take, and
+/// their numbers. What has more is drawn in turns, each over the one before.
 const CHUNKS_A_ROUND: usize = 256;
 /// What is on the ground.
 const GROUND: u32 = 0;
@@ -77,7 +81,11 @@ impl DrawnFrame {
     /// Linear R G B A and near / z of a frame of this size, row-major.
     pub fn images(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
         let (width, height) = (width as usize, height as usize);
-        let color = self.color.chunks_exact(CHANNELS * self.stride).take(height).flat_map(|row| &row[..CHANNELS * width]);
+        let color = self
+            .color
+            .chunks_exact(CHANNELS * self.stride)
+            .take(height)
+            .flat_map(|row| &row[..CHANNELS * width]);
         let depth = self.depth.chunks_exact(self.stride).take(height).flat_map(|row| &row[..width]);
         (color.map(|&bits| half::f16::from_bits(bits).to_f32()).collect(), depth.copied().collect())
     }
@@ -140,12 +148,14 @@ struct Drawing<'a> {
     seen: &'a [u32],
 }
 
-/// Whether the host can draw a scene: not with pictures larger than a texture, mirrored beyond their borders or with sharp texels, with holes, or with blended surfaces, which only the
-/// device draws.
+/// Whether the host can draw a scene: not with pictures larger than a texture, mirrored beyond their borders
+/// or with sharp texels, with holes, or with blended surfaces, which only the device draws.
 #[must_use]
 pub fn draws(scene: &Scene, max_picture_px: u32) -> bool {
     let is_whole = |terrain: &Terrain| is_whole(terrain.texture.size_px, max_picture_px);
-    let is_plain = |look: &Material| look.cutoff.is_none() && !look.blends && picture::is_read(&look.texture, look.wrap, look.nearest);
+    let is_plain = |look: &Material| {
+        look.cutoff.is_none() && !look.blends && picture::is_read(&look.texture, look.wrap, look.nearest)
+    };
     scene.terrain.as_ref().is_none_or(is_whole) && scene.meshes.iter().all(|mesh| is_plain(&mesh.material))
 }
 
@@ -160,7 +170,13 @@ impl HostScene {
             Some(terrain) => Picture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
             None => Picture::Uniform([0.0; 4]),
         };
-        let mut paints = vec![Paint { picture: Arc::new(ground), tint: [1.0; 3], emissive: [0.0; 3], has_more: false, sky: None }];
+        let mut paints = vec![Paint {
+            picture: Arc::new(ground),
+            tint: [1.0; 3],
+            emissive: [0.0; 3],
+            has_more: false,
+            sky: None,
+        }];
         paints.extend(buffers.batches.iter().map(|batch| paint(batch, pictures.of(batch))));
         let model = |batch: &MeshBatch| Model {
             levels: Piece::of_levels(&batch.shape, &batch.levels),
@@ -168,7 +184,14 @@ impl HostScene {
             light: batch.light,
         };
         let models = buffers.batches.iter().map(model).collect();
-        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Large::default(), sampled: Sampled::default() })
+        Some(Self {
+            paints,
+            models,
+            chunks: Vec::new(),
+            terrain: Vec::new(),
+            shown: Large::default(),
+            sampled: Sampled::default(),
+        })
     }
 
     /// Draws the one ideal frame of a plan.
@@ -194,7 +217,13 @@ impl HostScene {
     }
 
     /// Draws so many chunks at once, each number of them over what is there.
-    fn draw_all<P: Places>(&mut self, places: P, drawing: &Drawing<'_>, jobs: &[Vec<Part>], into: &mut DrawnFrame) {
+    fn draw_all<P: Places>(
+        &mut self,
+        places: P,
+        drawing: &Drawing<'_>,
+        jobs: &[Vec<Part>],
+        into: &mut DrawnFrame,
+    ) {
         let Drawing { camera, view, .. } = drawing;
         into.fit(camera.size_px);
         self.shown.fit(into.depth.len());
@@ -223,7 +252,14 @@ impl HostScene {
         sampled.clear(camera.size_px);
         self.collect(drawing, jobs, |chunk| sampled.mark(chunk));
         let chunks = &self.chunks[..jobs.len()];
-        let shader = Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
+        let shader = Shader {
+            camera,
+            chunks,
+            paints: &self.paints,
+            reads: view.plan.surface_reads,
+            a_pixel: ALONG as f32,
+            is_over: false,
+        };
         sampled.fill(&shader, &mut self.shown, into);
         self.sampled = sampled;
     }
@@ -254,7 +290,8 @@ impl HostScene {
         });
     }
 
-    /// Triangles of all jobs, and which bands they are in; each chunk of them is shown as soon as they are there.
+    /// Triangles of all jobs, and which bands they are in; each chunk of them is shown as soon as they are
+    /// there.
     fn collect(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>], show: impl Fn(&Chunk) + Sync) {
         let bands = (drawing.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
@@ -281,7 +318,14 @@ impl HostScene {
     }
 
     #[inline(always)]
-    fn triangles(&self, vectors: impl Vectors, drawing: &Drawing<'_>, part: &Part, benches: &mut Benches, chunk: &mut Chunk) {
+    fn triangles(
+        &self,
+        vectors: impl Vectors,
+        drawing: &Drawing<'_>,
+        part: &Part,
+        benches: &mut Benches,
+        chunk: &mut Chunk,
+    ) {
         let Drawing { camera, pose, view, seen } = drawing;
         match part {
             Part::Terrain(of) => {
@@ -295,12 +339,22 @@ impl HostScene {
             Part::Piece { batch, level, piece, places } => {
                 let model = &self.models[*batch];
                 let paint = *batch + 1;
-                let kind = Kind { paint: paint as u32, one_sided: model.one_sided, sky: self.paints[paint].sky };
+                let kind =
+                    Kind { paint: paint as u32, one_sided: model.one_sided, sky: self.paints[paint].sky };
                 let piece = &model.levels[*level][*piece];
                 for &place in &seen[places.clone()] {
                     let stands = &view.buffers.placed[place as usize];
                     match self.paints[paint].has_more {
-                        true => piece.draw_more(vectors, camera, pose, stands, model.light, kind, &mut benches.1, chunk),
+                        true => piece.draw_more(
+                            vectors,
+                            camera,
+                            pose,
+                            stands,
+                            model.light,
+                            kind,
+                            &mut benches.1,
+                            chunk,
+                        ),
                         false => piece.draw(vectors, camera, pose, stands, kind, &mut benches.0, chunk),
                     }
                 }
@@ -308,14 +362,27 @@ impl HostScene {
         }
     }
 
-    /// Depth and colour of every pixel; with `is_over` of those that show something nearer than what is there.
-    fn fill<P: Places>(&mut self, places: P, camera: &Camera, plan: &FramePlan, chunks: usize, is_over: bool, into: &mut DrawnFrame) {
+    /// Depth and colour of every pixel; with `is_over` of those that show something nearer than what is
+    /// there.
+    fn fill<P: Places>(
+        &mut self,
+        places: P,
+        camera: &Camera,
+        plan: &FramePlan,
+        chunks: usize,
+        is_over: bool,
+        into: &mut DrawnFrame,
+    ) {
         let (stride, reads) = (into.stride, plan.surface_reads);
         let a_pixel = camera.size_px[0] as f32 / plan.ideal.size_px[0] as f32;
-        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, a_pixel, is_over };
+        let shader =
+            Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, a_pixel, is_over };
         let of_band = stride * BAND_ROWS;
-        let bands =
-            into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
+        let bands = into
+            .depth
+            .par_chunks_mut(of_band)
+            .zip(into.color.par_chunks_mut(CHANNELS * of_band))
+            .zip(self.shown.par_chunks_mut(of_band));
         bands.enumerate().for_each(|(band, ((depth, color), shown))| {
             if !is_over {
                 depth.fill(0.0);
@@ -328,7 +395,13 @@ impl HostScene {
 }
 
 #[inline(always)]
-fn fill_band(vectors: impl Vectors, places: impl Places, shader: &Shader<'_>, mut band: Band<'_>, color: &mut [u16]) {
+fn fill_band(
+    vectors: impl Vectors,
+    places: impl Places,
+    shader: &Shader<'_>,
+    mut band: Band<'_>,
+    color: &mut [u16],
+) {
     for (number, chunk) in (0..).zip(shader.chunks) {
         band.draw(vectors, places, chunk, number, |_| true);
     }
@@ -347,10 +420,15 @@ fn fill_band(vectors: impl Vectors, places: impl Places, shader: &Shader<'_>, mu
 fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(Part, usize)> {
     let count = terrain.map_or(0, |mesh| mesh.indices.len());
     let step = 3 * TRIANGLES_A_CHUNK;
-    (0..count).step_by(step).map(|first| first..(first + step).min(count)).map(|of| (Part::Terrain(of.clone()), of.len() / 3)).collect()
+    (0..count)
+        .step_by(step)
+        .map(|first| first..(first + step).min(count))
+        .map(|of| (Part::Terrain(of.clone()), of.len() / 3))
+        .collect()
 }
 
-/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many different models there are; of the terrain or of models.
+/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many
+/// different models there are; of the terrain or of models.
 fn jobs(parts: Vec<(Part, usize)>) -> Vec<Vec<Part>> {
     let mut jobs: Vec<Vec<Part>> = Vec::new();
     let mut room = 0;
@@ -370,9 +448,16 @@ fn jobs(parts: Vec<(Part, usize)>) -> Vec<Vec<Part>> {
 }
 
 fn paint(batch: &MeshBatch, picture: Arc<Picture>) -> Paint {
-    let tint = |corner: usize| batch.shape.vertices.get(corner).map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]]);
+    let tint = |corner: usize| {
+        batch
+            .shape
+            .vertices
+            .get(corner)
+            .map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]])
+    };
     let first = tint(0);
-    let has_more = batch.light.is_some() || (0..batch.shape.vertices.len()).any(|corner| tint(corner) != first);
+    let has_more =
+        batch.light.is_some() || (0..batch.shape.vertices.len()).any(|corner| tint(corner) != first);
     let sky = batch.light.map(|light| light.sky as f32);
     Paint { picture, tint: first, emissive: batch.look.emissive, has_more, sky }
 }

@@ -15,9 +15,11 @@ use crate::{
     upload::{MeshBatch, SceneBuffers},
 };
 
-const FEWER_TRIANGLES: &str = "have fewer triangles with alphaMode BLEND, or make those MASK whose alpha is 0 or 1";
+const FEWER_TRIANGLES: &str =
+    "have fewer triangles with alphaMode BLEND, or make those MASK whose alpha is 0 or 1";
 
-/// The triangles that one ideal frame mixes. Buffers are replaced by larger ones when a frame has more than any before.
+/// The triangles that one ideal frame mixes. Buffers are replaced by larger ones when a frame has more than
+/// any before.
 #[derive(Debug)]
 pub(super) struct Ordered {
     indices: wgpu::Buffer,
@@ -48,7 +50,8 @@ impl Ordered {
         Self { indices: index_buffer(gpu, 0), draws: Vec::new(), out_of_order: 0 }
     }
 
-    /// Finds and writes the order. `drawn` says which placements are drawn of each batch, `seen` whose those are.
+    /// Finds and writes the order. `drawn` says which placements are drawn of each batch, `seen` whose those
+    /// are.
     pub fn order(
         &mut self,
         gpu: &GpuContext,
@@ -60,7 +63,9 @@ impl Ordered {
         tangents: [f64; 4],
     ) -> Result<(), GpuError> {
         let mut triangles = Vec::new();
-        for (number, (batch, placements)) in buffers.batches.iter().zip(drawn).enumerate().filter(|(_, (batch, _))| batch.kind.blends) {
+        for (number, (batch, placements)) in
+            buffers.batches.iter().zip(drawn).enumerate().filter(|(_, (batch, _))| batch.kind.blends)
+        {
             for placement in placements.iter().cloned().flatten() {
                 let place = seen.get(placement as usize).and_then(|&mesh| buffers.placed.get(mesh as usize));
                 let Some(place) = place else { continue };
@@ -68,16 +73,26 @@ impl Ordered {
                 let camera_from_shape = camera_from_ned * place.ned_from_shape;
                 let origin_m = camera_from_ned * (place.origin_ned_m - pose.position_ned_m);
                 let of_shape = in_sight(batch, camera_from_shape, origin_m, tangents);
-                triangles.extend(of_shape.map(|(corners, in_camera_m)| Triangle { batch: number, placement, corners, in_camera_m }));
+                triangles.extend(of_shape.map(|(corners, in_camera_m)| Triangle {
+                    batch: number,
+                    placement,
+                    corners,
+                    in_camera_m,
+                }));
             }
         }
         let places: Vec<[DVec3; 3]> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
-        let order = back_to_front(&places).unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), out_of_order: 0 });
+        let order = back_to_front(&places)
+            .unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), out_of_order: 0 });
         self.out_of_order = order.out_of_order;
         self.draws = runs(&triangles, &order.places);
         let indices: Vec<u32> = order.places.iter().flat_map(|&k| triangles[k as usize].corners).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&indices);
-        gpu.check_storage("the triangles that one frame mixes with what is behind them", bytes.len() as u64, FEWER_TRIANGLES)?;
+        gpu.check_storage(
+            "the triangles that one frame mixes with what is behind them",
+            bytes.len() as u64,
+            FEWER_TRIANGLES,
+        )?;
         if self.indices.size() < bytes.len() as u64 {
             self.indices = index_buffer(gpu, bytes.len() as u64);
         }
@@ -87,10 +102,19 @@ impl Ordered {
         Ok(())
     }
 
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, buffers: &SceneBuffers) {
+    pub fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &SurfacePipelines,
+        slot: &IdealSlot,
+        buffers: &SceneBuffers,
+    ) {
         let mut last = None;
         for Draw { batch: number, placement, indices } in &self.draws {
-            let (Some(batch), Some(group)) = (buffers.batches.get(*number), slot.mesh_groups.get(*number)) else { continue };
+            let (Some(batch), Some(group)) = (buffers.batches.get(*number), slot.mesh_groups.get(*number))
+            else {
+                continue;
+            };
             let Some(pipeline) = pipelines.layers.get(&batch.kind) else { continue };
             if last != Some(*number) {
                 pass.set_pipeline(pipeline);
@@ -134,7 +158,8 @@ fn in_sight(
     })
 }
 
-/// Meshes from the farthest on by the middle of their triangles, and the triangles of each likewise: of more than an order is found for.
+/// Meshes from the farthest on by the middle of their triangles, and the triangles of each likewise: of more
+/// than an order is found for.
 fn mesh_by_mesh(triangles: &[Triangle]) -> Vec<u32> {
     let middle = |triangle: &Triangle| triangle.in_camera_m.iter().sum::<DVec3>() / 3.0;
     let mut of_mesh = std::collections::HashMap::new();
@@ -177,17 +202,26 @@ mod tests {
     /// Far away along the axis, of a placement of a batch.
     fn triangle(batch: usize, placement: u32, far_m: f64) -> Triangle {
         let at = |x: f64, y: f64| DVec3::new(x, y, far_m);
-        Triangle { batch, placement, corners: [0, 1, 2], in_camera_m: [at(-0.01, -0.01), at(0.01, -0.01), at(0.0, 0.02)] }
+        Triangle {
+            batch,
+            placement,
+            corners: [0, 1, 2],
+            in_camera_m: [at(-0.01, -0.01), at(0.01, -0.01), at(0.0, 0.02)],
+        }
     }
 
     #[test]
     fn meshes_within_each_other_are_drawn_one_after_the_other() {
         // The middles of the two meshes are 10.5 and 11 m away.
-        let triangles = [triangle(0, 3, 10.0), triangle(1, 4, 10.5), triangle(0, 3, 11.0), triangle(1, 4, 11.5)];
+        let triangles =
+            [triangle(0, 3, 10.0), triangle(1, 4, 10.5), triangle(0, 3, 11.0), triangle(1, 4, 11.5)];
         let order = mesh_by_mesh(&triangles);
         assert_eq!(order, [3, 1, 2, 0]);
         let draws = runs(&triangles, &order);
-        assert_eq!(draws, [Draw { batch: 1, placement: 4, indices: 0..6 }, Draw { batch: 0, placement: 3, indices: 6..12 }]);
+        assert_eq!(
+            draws,
+            [Draw { batch: 1, placement: 4, indices: 0..6 }, Draw { batch: 0, placement: 3, indices: 6..12 }]
+        );
         // With an order of their own they take turns.
         let places: Vec<_> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
         let order = back_to_front(&places).expect("few").places;

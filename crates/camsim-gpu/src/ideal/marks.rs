@@ -1,4 +1,5 @@
-//! Marks of silhouettes in an ideal frame, the borders of surfaces within marked pixels, and what lies within reach of each place.
+//! Marks of silhouettes in an ideal frame, the borders of surfaces within marked pixels, and what lies within
+//! reach of each place.
 
 use camsim_plan::{FramePlan, SIZE_QUANTUM_PX};
 
@@ -15,19 +16,22 @@ use crate::{
 
 /// A packed normal and offset, and the depth value between the surfaces.
 pub(super) const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
-/// Side of the square of pixels that a workgroup of `shaders/ideal/marks.wgsl` takes: frames begin at multiples of it in their target.
+/// Side of the square of pixels that a workgroup of `shaders/ideal/marks.wgsl` takes: frames begin at
+/// multiples of it in their target.
 const MARKS_PX: u32 = 16;
 const _: () = assert!(SIZE_QUANTUM_PX.is_multiple_of(MARKS_PX) && MARKS_PX.is_multiple_of(TILE_PX));
 /// Tiles that a workgroup of `shaders/ideal/reach.wgsl` takes.
 const REACH_WORKGROUP: u32 = 64;
-/// Head of the list of marked tiles before a frame: a draw of strips of four vertices, none yet, and an empty dispatch.
+/// Head of the list of marked tiles before a frame: a draw of strips of four vertices, none yet, and an empty
+/// dispatch.
 const NO_MARKED: [u32; 8] = [4, 0, 0, 0, 0, 1, 1, 0];
 /// Bytes of that head.
 pub(super) const MARKED_HEAD_BYTES: u64 = 4 * NO_MARKED.len() as u64;
 /// Where its arguments of a dispatch begin.
 const DISPATCH_BYTES: u64 = 16;
 
-/// What marks look at: at each pixel's middle, or at its samples too, where something thinner than a pixel may be in view.
+/// What marks look at: at each pixel's middle, or at its samples too, where something thinner than a pixel
+/// may be in view.
 pub(crate) fn spread_slot(thin: bool) -> Slot {
     ("spread", if thin { "ideal/spread/samples.wgsl" } else { "ideal/spread/none.wgsl" })
 }
@@ -64,30 +68,50 @@ impl MarksPass {
         let device = &gpu.device;
         let uniform = buffer(wgpu::BufferBindingType::Uniform);
         let group = |visibility, types: &[wgpu::BindingType]| {
-            let entries: Vec<_> =
-                (0..).zip(types).map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.marks"), entries: &entries })
+            let entries: Vec<_> = (0..)
+                .zip(types)
+                .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None })
+                .collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("camsim.ideal.marks"),
+                entries: &entries,
+            })
         };
-        let compute = |file: &str, slots: &[Slot], entry_point: &str, types: &[wgpu::BindingType]| -> Result<_, ComposeError> {
+        let compute = |file: &str,
+                       slots: &[Slot],
+                       entry_point: &str,
+                       types: &[wgpu::BindingType]|
+         -> Result<_, ComposeError> {
             let layout = group(wgpu::ShaderStages::COMPUTE, types);
             let pipeline = compute_pipeline(gpu, file, slots, entry_point, &layout)?;
             Ok(Compute { layout, pipeline })
         };
         let marks = |thin: bool| {
             let samples = thin.then_some(depth_texture(true));
-            let types: Vec<_> = [depth_texture(false), storage(false), uniform, storage(false)].into_iter().chain(samples).collect();
+            let types: Vec<_> = [depth_texture(false), storage(false), uniform, storage(false)]
+                .into_iter()
+                .chain(samples)
+                .collect();
             compute("ideal/marks.wgsl", &[spread_slot(thin)], "marks", &types)
         };
         let view_dimension = wgpu::TextureViewDimension::D2;
-        let lines =
-            wgpu::BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format: LINES_FORMAT, view_dimension };
+        let lines = wgpu::BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::WriteOnly,
+            format: LINES_FORMAT,
+            view_dimension,
+        };
         let reach_layout = group(wgpu::ShaderStages::COMPUTE, &[storage(true), storage(false), uniform]);
         let reach = |entry_point| compute_pipeline(gpu, "ideal/reach.wgsl", &[], entry_point, &reach_layout);
         let stamp_layout = group(wgpu::ShaderStages::VERTEX, &[storage(true), uniform]);
         Ok(Self {
             marks: [marks(false)?, marks(true)?],
             stamp: (stamp_layout.clone(), stamp_pipeline(gpu, &stamp_layout)?),
-            borders: compute("ideal/borders.wgsl", &[], "borders", &[depth_texture(true), storage(true), uniform, lines])?,
+            borders: compute(
+                "ideal/borders.wgsl",
+                &[],
+                "borders",
+                &[depth_texture(true), storage(true), uniform, lines],
+            )?,
             reach: [reach("along_rows")?, reach("along_columns")?],
             reach_layout,
         })
@@ -119,7 +143,13 @@ impl MarksPass {
     }
 
     /// Writes the marks into the frame's colour; once they are known.
-    pub(super) fn stamp(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, target: &IdealTarget, fine: &FineTarget) {
+    pub(super) fn stamp(
+        &self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        target: &IdealTarget,
+        fine: &FineTarget,
+    ) {
         let groups = fine.mark_groups.get_or_init(|| self.bind(gpu, target, fine));
         let attachment = wgpu::RenderPassColorAttachment {
             view: &target.drawn_color,
@@ -134,7 +164,14 @@ impl MarksPass {
     }
 
     /// Finds the borders within marked pixels, and what lies within reach; once the samples are drawn.
-    pub(super) fn borders(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, target: &IdealTarget, fine: &FineTarget) {
+    pub(super) fn borders(
+        &self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        plan: &FramePlan,
+        target: &IdealTarget,
+        fine: &FineTarget,
+    ) {
         let [across, down] = target.allocated_px.map(|side| side.div_ceil(TILE_PX));
         let reach = plan.mark_reach_px().div_ceil(TILE_PX).min(across.max(down));
         recorder.write(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
@@ -152,12 +189,19 @@ impl MarksPass {
 
     fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &FineTarget) -> MarkGroups {
         let bind = |layout: &wgpu::BindGroupLayout, resources: &[wgpu::BindingResource<'_>]| {
-            let entries: Vec<_> =
-                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() }).collect();
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.marks"), layout, entries: &entries })
+            let entries: Vec<_> = (0..)
+                .zip(resources)
+                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+                .collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("camsim.ideal.marks"),
+                layout,
+                entries: &entries,
+            })
         };
         let lines = whole(&fine.lines);
-        let [samples, depth, lines] = [&fine.depth_view, &target.gathered_depth, &lines].map(wgpu::BindingResource::TextureView);
+        let [samples, depth, lines] =
+            [&fine.depth_view, &target.gathered_depth, &lines].map(wgpu::BindingResource::TextureView);
         let of = wgpu::Buffer::as_entire_binding;
         let (marked, layout) = (of(&fine.marked), of(&fine.layout));
         let marks = [depth, of(&fine.within_reach), layout.clone(), marked.clone(), samples.clone()];
@@ -166,7 +210,10 @@ impl MarksPass {
             marks: [bind(&self.marks[0].layout, &marks[..4]), bind(&self.marks[1].layout, &marks)],
             stamp: bind(&self.stamp.0, &[marked.clone(), of(&fine.target_px)]),
             borders: bind(&self.borders.layout, &[samples, marked, layout, lines]),
-            reach: [reach(&fine.within_reach, &fine.within_rows), reach(&fine.within_rows, &fine.within_reach)],
+            reach: [
+                reach(&fine.within_reach, &fine.within_rows),
+                reach(&fine.within_rows, &fine.within_reach),
+            ],
         }
     }
 }
@@ -206,17 +253,24 @@ fn compute_pipeline(
         module: &module,
         entry_point: Some(entry_point),
         // What a workgroup shares is set by the shader where it is not written whole.
-        compilation_options: wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: false, ..Default::default() },
+        compilation_options: wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: false,
+            ..Default::default()
+        },
         cache: None,
     }))
 }
 
 /// Writes alpha alone.
-fn stamp_pipeline(gpu: &GpuContext, layout: &wgpu::BindGroupLayout) -> Result<wgpu::RenderPipeline, ComposeError> {
+fn stamp_pipeline(
+    gpu: &GpuContext,
+    layout: &wgpu::BindGroupLayout,
+) -> Result<wgpu::RenderPipeline, ComposeError> {
     let file = "ideal/stamp.wgsl";
     let module = shaders::module(&gpu.device, file, file, &[])?;
     let compilation_options = wgpu::PipelineCompilationOptions::default();
-    let alpha = wgpu::ColorTargetState { format: COLOR_FORMAT, blend: None, write_mask: wgpu::ColorWrites::ALPHA };
+    let alpha =
+        wgpu::ColorTargetState { format: COLOR_FORMAT, blend: None, write_mask: wgpu::ColorWrites::ALPHA };
     Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(file),
         layout: Some(&pipeline_layout(gpu, file, layout)),
@@ -226,7 +280,10 @@ fn stamp_pipeline(gpu: &GpuContext, layout: &wgpu::BindGroupLayout) -> Result<wg
             compilation_options: compilation_options.clone(),
             buffers: &[],
         },
-        primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
+        primitive: wgpu::PrimitiveState {
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            ..Default::default()
+        },
         depth_stencil: None,
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {

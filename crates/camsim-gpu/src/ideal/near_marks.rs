@@ -44,11 +44,20 @@ pub(super) struct NearMarksPass {
 impl Kept {
     pub(super) fn new(gpu: &GpuContext, index_bytes: u64) -> Self {
         let create = |label, size, usage| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let (storage, written) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::COPY_DST);
         Self {
-            layout: create("camsim.ideal.key_layout", size_of::<KeyLayout>() as u64, wgpu::BufferUsages::UNIFORM | written),
+            layout: create(
+                "camsim.ideal.key_layout",
+                size_of::<KeyLayout>() as u64,
+                wgpu::BufferUsages::UNIFORM | written,
+            ),
             arguments: create(
                 "camsim.ideal.kept",
                 size_of_val(&NONE_KEPT) as u64,
@@ -62,16 +71,26 @@ impl Kept {
 
 impl NearMarksPass {
     /// `camera`, `terrain`: layouts of what draws the terrain, which is read here too.
-    pub(super) fn new(gpu: &GpuContext, camera: &wgpu::BindGroupLayout, terrain: &wgpu::BindGroupLayout) -> Result<Self, ComposeError> {
+    pub(super) fn new(
+        gpu: &GpuContext,
+        camera: &wgpu::BindGroupLayout,
+        terrain: &wgpu::BindGroupLayout,
+    ) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
         let layout = |types: &[wgpu::BufferBindingType]| {
-            let entries: Vec<_> =
-                (0..).zip(types).map(|(binding, &ty)| super::buffer_entry(binding, wgpu::ShaderStages::COMPUTE, ty)).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.near_marks"), entries: &entries })
+            let entries: Vec<_> = (0..)
+                .zip(types)
+                .map(|(binding, &ty)| super::buffer_entry(binding, wgpu::ShaderStages::COMPUTE, ty))
+                .collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("camsim.ideal.near_marks"),
+                entries: &entries,
+            })
         };
         let tiles_layout = layout(&[storage(true)]);
-        let kept_layout = layout(&[storage(true), wgpu::BufferBindingType::Uniform, storage(false), storage(false)]);
+        let kept_layout =
+            layout(&[storage(true), wgpu::BufferBindingType::Uniform, storage(false), storage(false)]);
         let module = shaders::module(device, SHADER, SHADER, &[])?;
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(SHADER),
@@ -102,7 +121,9 @@ impl NearMarksPass {
     ) {
         let keys: Vec<_> = (0..)
             .zip(slots.iter().zip(index_counts))
-            .filter_map(|(k, (slot, &count))| slot.terrain.as_ref().filter(|_| count > 0).map(|terrain| (k, slot, terrain, count)))
+            .filter_map(|(k, (slot, &count))| {
+                slot.terrain.as_ref().filter(|_| count > 0).map(|terrain| (k, slot, terrain, count))
+            })
             .map(|(k, slot, terrain, index_count)| {
                 let layout = KeyLayout {
                     ideal_size_px: plan.ideal.size_px,
@@ -118,7 +139,8 @@ impl NearMarksPass {
             .collect();
         let mut pass = recorder.compute_pass("near_marks");
         pass.set_pipeline(&self.pipeline);
-        let tiles = fine.near_marks_group.get_or_init(|| self.bind(gpu, &self.tiles_layout, &[&fine.within_reach]));
+        let tiles =
+            fine.near_marks_group.get_or_init(|| self.bind(gpu, &self.tiles_layout, &[&fine.within_reach]));
         for &(slot, terrain, index_count) in &keys {
             let kept = &terrain.kept;
             let buffers = [&terrain.indices, &kept.layout, &kept.arguments, &kept.indices];
@@ -132,9 +154,20 @@ impl NearMarksPass {
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let entries: Vec<_> =
-            (0..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }).collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.near_marks"), layout, entries: &entries })
+    fn bind(
+        &self,
+        gpu: &GpuContext,
+        layout: &wgpu::BindGroupLayout,
+        buffers: &[&wgpu::Buffer],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("camsim.ideal.near_marks"),
+            layout,
+            entries: &entries,
+        })
     }
 }

@@ -39,7 +39,8 @@ fn covered_slot(samples: u32) -> Slot {
     ("covered", if samples > 1 { "ideal/covered/samples.wgsl" } else { "ideal/covered/whole.wgsl" })
 }
 
-/// What fills the slots of the ground. It goes on beyond its triangles: reads in the middles of their parts would only blur it.
+/// What fills the slots of the ground. It goes on beyond its triangles: reads in the middles of their parts
+/// would only blur it.
 pub(crate) fn ground_slots(reads: SurfaceReads, has_tiles: bool, has_fog: bool) -> [Slot; 4] {
     [reads_slot(reads), covered_slot(1), picture_slot(has_tiles), fog_slot(has_fog)]
 }
@@ -116,10 +117,23 @@ impl IdealPass {
                 continue;
             }
             let depth = Drawing { holes: true, writes: Writes::Depth, ..drawing };
-            meshes.insert(*kind, pipeline(gpu, "ideal/mesh_holes.wgsl", &slots, &layouts, &vertices[..1], depth)?);
+            meshes.insert(
+                *kind,
+                pipeline(gpu, "ideal/mesh_holes.wgsl", &slots, &layouts, &vertices[..1], depth)?,
+            );
             if format.is_some() {
                 let mixed = Drawing { writes: Writes::Mixed, ..drawing };
-                layers.insert(*kind, pipeline(gpu, kind.shader(), &mesh_slots(reads, samples, true, self.has_fog), &layouts, all, mixed)?);
+                layers.insert(
+                    *kind,
+                    pipeline(
+                        gpu,
+                        kind.shader(),
+                        &mesh_slots(reads, samples, true, self.has_fog),
+                        &layouts,
+                        all,
+                        mixed,
+                    )?,
+                );
             }
         }
         Ok(SurfacePipelines { terrain, meshes, layers })

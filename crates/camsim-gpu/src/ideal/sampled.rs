@@ -1,4 +1,5 @@
-//! Ideal frames of four samples a pixel on the device: what they are drawn to, and which depth their pixels have.
+//! Ideal frames of four samples a pixel on the device: what they are drawn to, and which depth their pixels
+//! have.
 
 use super::{
     COLOR_FORMAT, DEPTH_FORMAT, FINE_SAMPLES,
@@ -23,9 +24,11 @@ pub(super) struct SampledTarget {
 impl SampledTarget {
     pub fn new(gpu: &GpuContext, allocated_px: [u32; 2]) -> Self {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let color = texture(gpu, "camsim.ideal.sampled_color", allocated_px, COLOR_FORMAT, FINE_SAMPLES, usage);
+        let color =
+            texture(gpu, "camsim.ideal.sampled_color", allocated_px, COLOR_FORMAT, FINE_SAMPLES, usage);
         let usage = usage | wgpu::TextureUsages::TEXTURE_BINDING;
-        let depth = texture(gpu, "camsim.ideal.sampled_depth", allocated_px, DEPTH_FORMAT, FINE_SAMPLES, usage);
+        let depth =
+            texture(gpu, "camsim.ideal.sampled_depth", allocated_px, DEPTH_FORMAT, FINE_SAMPLES, usage);
         Self { color: whole(&color), depth: whole(&depth), group: std::sync::OnceLock::new() }
     }
 }
@@ -46,8 +49,16 @@ impl MiddleDepthPass {
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: true,
         };
-        let entries = [wgpu::BindGroupLayoutEntry { binding: 0, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }];
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(FILE), entries: &entries });
+        let entries = [wgpu::BindGroupLayoutEntry {
+            binding: 0,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        }];
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(FILE),
+            entries: &entries,
+        });
         let module = shaders::module(device, FILE, FILE, &[])?;
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(FILE),
@@ -73,7 +84,12 @@ impl MiddleDepthPass {
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState { module: &module, entry_point: Some("fragment"), compilation_options, targets: &[] }),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options,
+                targets: &[],
+            }),
             multiview_mask: None,
             cache: None,
         });
@@ -89,9 +105,16 @@ impl MiddleDepthPass {
         depth: wgpu::RenderPassDepthStencilAttachment<'_>,
     ) {
         let group = from.group.get_or_init(|| {
-            let entries = [wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&from.depth) }];
+            let entries = [wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&from.depth),
+            }];
             let label = Some("camsim.ideal.middle_depth");
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &self.layout, entries: &entries })
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label,
+                layout: &self.layout,
+                entries: &entries,
+            })
         });
         let mut pass = recorder.render_pass("middle_depth", None, Some(depth));
         pass.set_pipeline(&self.pipeline);

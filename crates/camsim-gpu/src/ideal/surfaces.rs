@@ -20,18 +20,29 @@ use crate::{
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
 
-/// Meshes that may be in view from a key, by their places in [`SceneBuffers::placed`], those of one batch and level of detail side by side; and which of them each batch draws with
-/// each of its levels.
-pub(super) fn see_meshes(buffers: &SceneBuffers, pose: &CameraPose, tolerance: &LevelTolerance) -> (Vec<u32>, Vec<Vec<Range<u32>>>) {
+/// Meshes that may be in view from a key, by their places in [`SceneBuffers::placed`], those of one batch and
+/// level of detail side by side; and which of them each batch draws with each of its levels.
+pub(super) fn see_meshes(
+    buffers: &SceneBuffers,
+    pose: &CameraPose,
+    tolerance: &LevelTolerance,
+) -> (Vec<u32>, Vec<Vec<Range<u32>>>) {
     let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
     let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
-    let places: Vec<_> = buffers.batches.iter().map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end)).collect();
+    let places: Vec<_> = buffers
+        .batches
+        .iter()
+        .map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end))
+        .collect();
     let batches = buffers.batches.iter().zip(places);
-    let drawn = batches.map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance)).collect();
+    let drawn = batches
+        .map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance))
+        .collect();
     (seen, drawn)
 }
 
-/// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how much detail; gives whose place each is.
+/// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how
+/// much detail; gives whose place each is.
 pub(super) fn place_meshes(
     recorder: &mut Recorder<'_>,
     slot: &mut IdealSlot,
@@ -66,7 +77,9 @@ fn by_level(
 ) -> Vec<Range<u32>> {
     let level = |&i: &u32| match batch.ranges.len() {
         0 | 1 => 0,
-        _ => batch.levels.within(tolerance.error_m(&buffers.bounds[i as usize], pose) / buffers.placed[i as usize].stretch),
+        _ => batch.levels.within(
+            tolerance.error_m(&buffers.bounds[i as usize], pose) / buffers.placed[i as usize].stretch,
+        ),
     };
     seen.sort_by_cached_key(level);
     let levels: Vec<usize> = seen.iter().map(level).collect();
@@ -98,14 +111,16 @@ pub(super) fn draw_meshes(
             pass.set_vertex_buffer(1, normals.slice(..));
         }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-        for (indices, instances) in batch.ranges.iter().zip(drawn).filter(|(_, instances)| !instances.is_empty()) {
+        for (indices, instances) in
+            batch.ranges.iter().zip(drawn).filter(|(_, instances)| !instances.is_empty())
+        {
             pass.draw_indexed(indices.clone(), 0, instances.clone());
         }
     }
 }
 
-/// Vertices and triangles of a terrain that one ideal frame draws: no others are on the device. Buffers are replaced by larger ones when a
-/// frame has more than any before.
+/// Vertices and triangles of a terrain that one ideal frame draws: no others are on the device. Buffers are
+/// replaced by larger ones when a frame has more than any before.
 #[derive(Debug)]
 pub(super) struct TerrainSlot {
     vertices: wgpu::Buffer,
@@ -125,7 +140,8 @@ impl TerrainSlot {
         Self { vertices: vertex_buffer(gpu, 0), indices, kept, table: None, group: None }
     }
 
-    /// Makes what binds picture and vertices, if they are new, and writes where the picture's tiles are, if that has changed.
+    /// Makes what binds picture and vertices, if they are new, and writes where the picture's tiles are, if
+    /// that has changed.
     pub fn bind(
         &mut self,
         gpu: &GpuContext,
@@ -150,13 +166,18 @@ impl TerrainSlot {
                 entry(2, self.vertices.as_entire_binding()),
             ];
             entries.extend(self.table.as_ref().map(|(table, _)| entry(3, table.as_entire_binding())));
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.terrain"), layout, entries: &entries })
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("camsim.ideal.terrain"),
+                layout,
+                entries: &entries,
+            })
         });
     }
 
     fn tell_tiles(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, tiles: &TilePool) {
-        let (table, told) =
-            self.table.get_or_insert_with(|| (create(gpu, "camsim.ideal.tiles", tiles.table_bytes(), wgpu::BufferUsages::STORAGE), [0; 2]));
+        let (table, told) = self.table.get_or_insert_with(|| {
+            (create(gpu, "camsim.ideal.tiles", tiles.table_bytes(), wgpu::BufferUsages::STORAGE), [0; 2])
+        });
         let now = tiles.changes();
         if *told != now {
             tiles.write_table(recorder, table);
@@ -168,8 +189,7 @@ impl TerrainSlot {
     }
 }
 
-const FEWER_TRIANGLES: &str =
-    "allow larger quality.max_terrain_error_px and quality.max_error_dn, or use a coarser DEM in scene.terrain.dem";
+const FEWER_TRIANGLES: &str = "allow larger quality.max_terrain_error_px and quality.max_error_dn, or use a coarser DEM in scene.terrain.dem";
 
 /// Writes the vertices and triangles of a key; returns the number of indices.
 pub(super) fn place_terrain(
@@ -178,8 +198,12 @@ pub(super) fn place_terrain(
     slot: &mut TerrainSlot,
     mesh: &PlacedMesh,
 ) -> Result<u32, GpuError> {
-    let (vertices, indices): (&[u8], &[u8]) = (bytemuck::cast_slice(&mesh.vertices), bytemuck::cast_slice(&mesh.indices));
-    for (bytes, what) in [(vertices, "the vertices of the terrain in one frame"), (indices, "the triangles of the terrain in one frame")] {
+    let (vertices, indices): (&[u8], &[u8]) =
+        (bytemuck::cast_slice(&mesh.vertices), bytemuck::cast_slice(&mesh.indices));
+    for (bytes, what) in [
+        (vertices, "the vertices of the terrain in one frame"),
+        (indices, "the triangles of the terrain in one frame"),
+    ] {
         gpu.check_storage(what, room(bytes.len() as u64), FEWER_TRIANGLES)?;
     }
     if slot.vertices.size() < vertices.len() as u64 {
@@ -205,7 +229,12 @@ pub(super) enum Triangles {
 }
 
 /// Draws a terrain's triangles, all at once.
-pub(super) fn draw_terrain(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, triangles: Triangles) {
+pub(super) fn draw_terrain(
+    pass: &mut wgpu::RenderPass<'_>,
+    pipelines: &SurfacePipelines,
+    slot: &IdealSlot,
+    triangles: Triangles,
+) {
     let Some(terrain) = slot.terrain.as_ref() else { return };
     let Some(group) = terrain.group.as_ref() else { return };
     pass.set_pipeline(&pipelines.terrain);

@@ -1,8 +1,10 @@
 //! The reverse pipeline on the host's own processors: for software adapters, whose device they are anyway.
 //!
-//! A twin, stage by stage, of the kernel in `shaders/reverse`, for the ways of sampling that most frames have ([`serves`]). Such an adapter's driver compiles a kernel for pixels side
-//! by side and reads buffers, textures and conditions lane by lane; here colour is read four channels at a time, what no pixel of a block needs is left out, and the picture is written where it is
-//! wanted. Only ideal frame and lens map come from the device.
+//! A twin, stage by stage, of the kernel in `shaders/reverse`, for the ways of sampling that most frames have
+//! ([`serves`]). Such an adapter's driver compiles a kernel for pixels side by side and reads buffers,
+//! textures and conditions lane by lane; here colour is read four channels at a time, what no pixel of a
+//! block needs is left out, and the picture is written where it is wanted. Only ideal frame and lens map come
+//! from the device.
 
 #![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one place in all arrays")]
 
@@ -33,8 +35,9 @@ pub(crate) use ideal::IdealOnHost;
 pub(crate) use rays::LensMapOnHost;
 use source::Pose;
 
-/// Pixels of an ideal frame for each pixel that is made from it, at most: with 13 frames come in less time than from the device with and without an exposure, with 29 without one not any more
-/// (docs/PERFORMANCE.md, "The reverse pipeline on the host").
+/// Pixels of an ideal frame for each pixel that is made from it, at most: with 13 frames come in less time
+/// than from the device with and without an exposure, with 29 without one not any more (docs/PERFORMANCE.md,
+/// "The reverse pipeline on the host").
 const MOST_COPIED: f64 = 12.0;
 /// Rows that a task takes.
 const ROWS_A_TASK: usize = 16;
@@ -44,8 +47,8 @@ const ROWS_A_TASK: usize = 16;
 pub enum ReverseOn {
     /// On the device.
     Device,
-    /// On the host, for frames that it [`serves`] and whose ideal frame it [draws](crate::ideal::host::draws) itself or that are [worth the copy](is_worth_the_copy): the default on a software
-    /// adapter.
+    /// On the host, for frames that it [`serves`] and whose ideal frame it [draws](crate::ideal::host::draws)
+    /// itself or that are [worth the copy](is_worth_the_copy): the default on a software adapter.
     Best,
     /// On the host, for all frames that it serves.
     Host,
@@ -63,7 +66,8 @@ impl ReverseOn {
     }
 }
 
-/// Whether this processor has what makes it fast here: multiplication and addition in one, and on x86-64 vectors of eight and half floats.
+/// Whether this processor has what makes it fast here: multiplication and addition in one, and on x86-64
+/// vectors of eight and half floats.
 #[must_use]
 pub fn suits_processor() -> bool {
     #[cfg(target_arch = "x86_64")]
@@ -72,13 +76,15 @@ pub fn suits_processor() -> bool {
     cfg!(target_arch = "aarch64")
 }
 
-/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes, by a lens that stays, lines that are rows, and grids of few reads.
-/// That is what most frames are by default.
+/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes,
+/// by a lens that stays, lines that are rows, and grids of few reads. That is what most frames are by
+/// default.
 #[must_use]
 pub fn serves(plan: &FramePlan) -> bool {
     let key = PipelineKey::of(plan);
     let is_plain = key.keys != KeyKind::Several && !plan.edges.has_rays() && !key.paper;
-    let solves = matches!(key.temporal, TemporalKind::Identity | TemporalKind::Rotation | TemporalKind::Reproject);
+    let solves =
+        matches!(key.temporal, TemporalKind::Identity | TemporalKind::Rotation | TemporalKind::Reproject);
     let keeps_lens = key.ray == RayStage::Pinhole || plan.zoom.is_none();
     let has_rows = plan.shutter.lines_axis() == LinesAxis::Rows;
     let has_few_taps = match plan.taps {
@@ -89,7 +95,8 @@ pub fn serves(plan: &FramePlan) -> bool {
     is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides
 }
 
-/// Whether a frame that is [`served`](serves) takes less time here: its ideal frame is brought here in less than its output frames save.
+/// Whether a frame that is [`served`](serves) takes less time here: its ideal frame is brought here in less
+/// than its output frames save.
 #[must_use]
 pub fn is_worth_the_copy(plan: &FramePlan) -> bool {
     let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
@@ -131,7 +138,8 @@ struct Reads<'a> {
     poses: &'a [Pose],
     /// Pose of the key camera in the mid-window camera, if it is another one and somebody asks.
     elsewhere: Option<Pose>,
-    /// The same numbers for depth and coordinates, where they are told: where the sky is does not depend on what is beside it.
+    /// The same numbers for depth and coordinates, where they are told: where the sky is does not depend on
+    /// what is beside it.
     frame_of_truth: Option<&'a FrameUniforms>,
     /// The first pixel's place in the ideal frame, where pixels are those.
     copied_from: Option<[u32; 2]>,
@@ -146,7 +154,8 @@ impl HostKernel {
         Self { segments: tail_segments(), cells: Cells::new() }
     }
 
-    /// The picture of a plan that it [`serves`], linear R G B A, row-major; and the truth about it as looked up, where the plan asks for that.
+    /// The picture of a plan that it [`serves`], linear R G B A, row-major; and the truth about it as looked
+    /// up, where the plan asks for that.
     #[must_use]
     pub fn render(&self, plan: &FramePlan, inputs: &HostInputs<'_>) -> (Vec<f32>, Option<Vec<Truth>>) {
         let key = PipelineKey::of(plan);
@@ -164,7 +173,10 @@ impl HostKernel {
             map: map.filter(|_| key.ray == RayStage::LensMap),
             vignette,
             poses,
-            elsewhere: poses.get(height * poses_a_line(frame)).copied().filter(|_| key.keys == KeyKind::Elsewhere),
+            elsewhere: poses
+                .get(height * poses_a_line(frame))
+                .copied()
+                .filter(|_| key.keys == KeyKind::Elsewhere),
             copied_from: plan.copied_from(),
             segments: &self.segments,
             cells: &self.cells,
@@ -174,9 +186,9 @@ impl HostKernel {
         let rows = picture.par_chunks_mut(4 * width * ROWS_A_TASK).zip(0_u32..u32::MAX);
         let of_task = |task: u32| task * ROWS_A_TASK as u32;
         match tells_truth {
-            true => {
-                rows.zip(truth.par_chunks_mut(width * ROWS_A_TASK)).for_each(|((rows, task), truth)| reads.rows(of_task(task), rows, truth))
-            }
+            true => rows
+                .zip(truth.par_chunks_mut(width * ROWS_A_TASK))
+                .for_each(|((rows, task), truth)| reads.rows(of_task(task), rows, truth)),
             false => rows.for_each(|(rows, task)| reads.rows(of_task(task), rows, &mut [])),
         }
         (picture, tells_truth.then_some(truth))
@@ -210,7 +222,11 @@ impl Reads<'_> {
         for x in (0..width).step_by(LANES) {
             let end = width.min(x + LANES);
             for (number, row) in rows.chunks_exact_mut(4 * width).enumerate() {
-                let truth = if self.frame_of_truth.is_some() { &mut truth[number * width..][x..end] } else { &mut [] };
+                let truth = if self.frame_of_truth.is_some() {
+                    &mut truth[number * width..][x..end]
+                } else {
+                    &mut []
+                };
                 self.block(vectors, [x as u32, first + number as u32], &mut row[4 * x..4 * end], truth);
             }
         }
@@ -232,17 +248,28 @@ impl Reads<'_> {
         if let Some(mid) = self.poses_of(y).last().filter(|_| is_asked.iter().any(|&asked| asked > 0.0)) {
             let sides = || rays::sides(self.frame, self.map, x, y);
             let area = Footprint::new(self.cells, self.tap, sides, self.frame.max_taps);
-            // The picture first, then the truth about it: one place in the code, where all of this is written out.
+            // The picture first, then the truth about it: one place in the code, where all of this is written
+            // out.
             for (frame, is_truth) in [(Some(self.frame), false), (self.frame_of_truth, true)] {
                 let Some(frame) = frame else { continue };
                 let reads = Reads { frame, ..*self };
-                let gathered = reads.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, if is_truth { &ZERO } else { &wanted });
+                let gathered = reads.gather(
+                    vectors,
+                    &rays.uv,
+                    &area,
+                    self.poses_of(y),
+                    mid,
+                    if is_truth { &ZERO } else { &wanted },
+                );
                 if is_truth {
                     reads.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
                 } else {
-                    colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
+                    colors =
+                        self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
                     // What is black whatever it shows is not looked for.
-                    inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
+                    inside = each(|i| {
+                        if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] }
+                    });
                 }
             }
         }

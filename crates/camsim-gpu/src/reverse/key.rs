@@ -176,7 +176,11 @@ impl PipelineKey {
             tap: plan.taps.into(),
             keys: match temporal {
                 _ if plan.keys.len() > 1 => KeyKind::Several,
-                TemporalKind::Rotation | TemporalKind::Reproject if plan.truth && plan.looks_from_elsewhere() => KeyKind::Elsewhere,
+                TemporalKind::Rotation | TemporalKind::Reproject
+                    if plan.truth && plan.looks_from_elsewhere() =>
+                {
+                    KeyKind::Elsewhere
+                }
                 _ => KeyKind::Single,
             },
             edges: plan.edges.into(),
@@ -199,25 +203,35 @@ impl PipelineKey {
                     }
                     // Without parallax all key cameras see the same.
                     let parallax = temporal == TemporalKind::Reproject;
-                    for (key_kind, edges) in [KeyKind::Single, KeyKind::Elsewhere, KeyKind::Several]
-                        .into_iter()
-                        .flat_map(|kind| [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (kind, edges)))
+                    for (key_kind, edges) in
+                        [KeyKind::Single, KeyKind::Elsewhere, KeyKind::Several].into_iter().flat_map(|kind| {
+                            [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (kind, edges))
+                        })
                     {
                         let has_poses = parallax || temporal == Rotation;
-                        if key_kind == KeyKind::Several && !parallax || key_kind == KeyKind::Elsewhere && !has_poses {
+                        if key_kind == KeyKind::Several && !parallax
+                            || key_kind == KeyKind::Elsewhere && !has_poses
+                        {
                             continue;
                         }
                         let looks_up = blur && temporal == Reproject;
                         let exposures = NodeDepths::ALL
                             .into_iter()
                             .flat_map(|depths| PathStage::ALL.map(|path| (depths, path)))
-                            .filter(|&(depths, path)| looks_up || depths == NodeDepths::Each && (blur || path == PathStage::Straight));
+                            .filter(|&(depths, path)| {
+                                looks_up
+                                    || depths == NodeDepths::Each && (blur || path == PathStage::Straight)
+                            });
                         for (depths, path) in exposures {
                             for tap in TapKind::ALL {
-                                let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
+                                let truths: &[bool] =
+                                    if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
                                 let looks: &[Looks] = if parallax { &Looks::ALL } else { &[Looks::Several] };
-                                let stretches: &[Stretches] = if blur { &Stretches::ALL } else { &[Stretches::Several] };
-                                let loops = looks.iter().flat_map(|&looks| stretches.iter().map(move |&stretches| (looks, stretches)));
+                                let stretches: &[Stretches] =
+                                    if blur { &Stretches::ALL } else { &[Stretches::Several] };
+                                let loops = looks.iter().flat_map(|&looks| {
+                                    stretches.iter().map(move |&stretches| (looks, stretches))
+                                });
                                 keys.extend(loops.flat_map(|(looks, stretches)| {
                                     truths.iter().map(move |&truth| Self {
                                         ray,
@@ -308,7 +322,11 @@ impl PipelineKey {
             false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
             true => ("reverse/depth/nearest.wgsl", "reverse/color/stored.wgsl"),
         };
-        let edges = if self.edges == EdgeKind::None { "reverse/edges/none.wgsl" } else { "reverse/edges/listed.wgsl" };
+        let edges = if self.edges == EdgeKind::None {
+            "reverse/edges/none.wgsl"
+        } else {
+            "reverse/edges/listed.wgsl"
+        };
         let surface_color = match self.edges {
             EdgeKind::Samples => "reverse/edges/color/samples.wgsl",
             EdgeKind::None | EdgeKind::Centres => "reverse/edges/color/centres.wgsl",
@@ -370,14 +388,21 @@ mod tests {
 
     #[test]
     fn every_variant_is_valid_without_any_capability() {
-        // What fills `looks` and `stretches` knows nothing of lens map and taps: written out, one of each will do.
+        // What fills `looks` and `stretches` knows nothing of lens map and taps: written out, one of each
+        // will do.
         let is_told_apart = |key: &PipelineKey| {
             let loops = key.looks == Looks::Several && key.stretches == Stretches::Several;
             loops || key.ray == RayStage::LensMap && key.tap == TapKind::Spline
         };
         let texts = PipelineKey::all().into_iter().filter(is_told_apart).flat_map(|key| {
-            let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER] };
-            files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
+            let files = if key.edges == EdgeKind::None {
+                vec![SHADER]
+            } else {
+                vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER]
+            };
+            files
+                .into_iter()
+                .map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
         let surfaces = [
             ("ideal/terrain.wgsl", false),
@@ -406,11 +431,17 @@ mod tests {
         let others = ["ideal/near_marks.wgsl", "ideal/stamp.wgsl", "ideal/borders.wgsl", "ideal/reach.wgsl"];
         let others = others.map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
         for (name, text) in texts.chain(surfaces).chain(marks).chain(others) {
-            let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
+            let module = naga::front::wgsl::parse_str(&text)
+                .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             // Holes are looked for sample by sample: all but the oldest adapters can.
             let holes = name.starts_with("ideal/mesh_holes");
-            let capabilities = if holes { naga::valid::Capabilities::MULTISAMPLED_SHADING } else { naga::valid::Capabilities::empty() };
-            let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
+            let capabilities = if holes {
+                naga::valid::Capabilities::MULTISAMPLED_SHADING
+            } else {
+                naga::valid::Capabilities::empty()
+            };
+            let mut validator =
+                naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
         assert_eq!(PipelineKey::all().len(), 18_818);

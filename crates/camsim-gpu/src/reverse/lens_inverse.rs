@@ -1,7 +1,8 @@
 //! lens_inverse: pixel -> ideal ray, as a **lens map** that is computed once per lens and zoom value.
 //!
-//! Reads intrinsics, coefficients and the f64 fold curve and start table of [`Lens`]; writes one `rg32float` texel per pixel: ideal
-//! `(u, v)` of the pixel's centre, or [`INVALID_UV`] twice. CPU twin: [`CameraModel::lens_inverse`].
+//! Reads intrinsics, coefficients and the f64 fold curve and start table of [`Lens`]; writes one `rg32float`
+//! texel per pixel: ideal `(u, v)` of the pixel's centre, or [`INVALID_UV`] twice. CPU twin:
+//! [`CameraModel::lens_inverse`].
 
 use bytemuck::{Pod, Zeroable};
 use camsim_core::camera::CameraModel;
@@ -26,7 +27,8 @@ pub enum Start {
     Warm,
 }
 
-/// Every variant of the stage, in the order of [`LensInversePass`]'s pipelines. A pinhole has nothing to start from.
+/// Every variant of the stage, in the order of [`LensInversePass`]'s pipelines. A pinhole has nothing to
+/// start from.
 pub const VARIANTS: [(LensModel, Start); 5] = [
     (LensModel::Pinhole, Start::Cold),
     (LensModel::BrownConrady, Start::Cold),
@@ -55,7 +57,8 @@ struct LensUniform {
 
 impl LensUniform {
     fn new(camera: &CameraModel) -> Self {
-        // Clamped so that the integer difference to a pixel cannot overflow; so far out every pixel is invalid or meaningless anyway.
+        // Clamped so that the integer difference to a pixel cannot overflow; so far out every pixel is
+        // invalid or meaningless anyway.
         let whole = camera.principal_point_px.round().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
         let mut uniform = Self {
             size_px: camera.size_px,
@@ -66,7 +69,10 @@ impl LensUniform {
             rational: [0.0; 4],
             tangential: [0.0; 2],
             distorted_max: finite_f32(camera.lens.distorted_max()),
-            table_distorted_max: camera.lens.radial_table().map_or(1.0, |table| finite_f32(table.distorted_max())),
+            table_distorted_max: camera
+                .lens
+                .radial_table()
+                .map_or(1.0, |table| finite_f32(table.distorted_max())),
             theta_max: 0.0,
             fold_min: camera.lens.fold_curve().map_or(0.0, |fold| finite_f32(fold.range().0)),
             padding: [0.0; 2],
@@ -128,7 +134,8 @@ pub fn shader_source(model: LensModel, start: Start) -> String {
 /// A lens map, and how this stage has come to it so far.
 #[derive(Debug)]
 pub struct LensMap {
-    /// [`LENS_MAP_FORMAT`], the camera's size: written by this stage, then sampled, copied, or given as `warm`.
+    /// [`LENS_MAP_FORMAT`], the camera's size: written by this stage, then sampled, copied, or given as
+    /// `warm`.
     pub texture: wgpu::Texture,
     /// All of it.
     pub view: wgpu::TextureView,
@@ -147,7 +154,9 @@ impl LensMap {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: LENS_MAP_FORMAT,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            usage: wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
         Self { view: whole(&texture), texture, groups: Vec::new() }
@@ -190,14 +199,18 @@ impl LensInversePass {
         let table_bytes = (FOLD_RAYS + RADIAL_TABLE_LEN) * size_of::<f32>();
         Self {
             pipelines,
-            uniform: buffer("camsim.lens_inverse.lens", size_of::<LensUniform>(), wgpu::BufferUsages::UNIFORM),
+            uniform: buffer(
+                "camsim.lens_inverse.lens",
+                size_of::<LensUniform>(),
+                wgpu::BufferUsages::UNIFORM,
+            ),
             table: buffer("camsim.lens_inverse.table", table_bytes, wgpu::BufferUsages::STORAGE),
         }
     }
 
-    /// Records the pass that writes the lens map of `camera` to `target`, a map of the camera's size. `warm`, the map of a camera of the
-    /// same size and nearby zoom, only shortens the way to the same solution: keep it a pure function of scenario and frame (a zoom table
-    /// entry's map, never the previous frame's).
+    /// Records the pass that writes the lens map of `camera` to `target`, a map of the camera's size. `warm`,
+    /// the map of a camera of the same size and nearby zoom, only shortens the way to the same solution: keep
+    /// it a pure function of scenario and frame (a zoom table entry's map, never the previous frame's).
     pub fn encode(
         &self,
         device: &wgpu::Device,
@@ -240,7 +253,10 @@ impl LensInversePass {
         warm: Option<&wgpu::TextureView>,
     ) -> wgpu::BindGroup {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let mut entries = vec![entry(0, self.uniform.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(target))];
+        let mut entries = vec![
+            entry(0, self.uniform.as_entire_binding()),
+            entry(2, wgpu::BindingResource::TextureView(target)),
+        ];
         if model != LensModel::Pinhole {
             entries.push(entry(1, self.table.as_entire_binding()));
         }
@@ -255,7 +271,12 @@ impl LensInversePass {
 
 /// Explicit, because float32 textures are not filterable and a derived layout would ask for a filterable one.
 fn pipeline_layout(device: &wgpu::Device, model: LensModel, start: Start) -> wgpu::PipelineLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let mut entries = vec![
         entry(0, buffer(wgpu::BufferBindingType::Uniform)),
@@ -281,8 +302,10 @@ fn pipeline_layout(device: &wgpu::Device, model: LensModel, start: Start) -> wgp
             },
         ));
     }
-    let layout =
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.lens_inverse"), entries: &entries });
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("camsim.lens_inverse"),
+        entries: &entries,
+    });
     device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("camsim.lens_inverse"),
         bind_group_layouts: &[Some(&layout)],
@@ -300,14 +323,18 @@ mod tests {
 
     fn parsed(model: LensModel, start: Start) -> naga::Module {
         let source = shader_source(model, start);
-        naga::front::wgsl::parse_str(&source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)))
+        naga::front::wgsl::parse_str(&source)
+            .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)))
     }
 
     #[test]
     fn every_variant_is_valid_without_any_capability() {
         for (model, start) in VARIANTS {
             let module = parsed(model, start);
-            let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+            let mut validator = naga::valid::Validator::new(
+                naga::valid::ValidationFlags::all(),
+                naga::valid::Capabilities::empty(),
+            );
             validator.validate(&module).unwrap_or_else(|error| panic!("{model:?} {start:?}: {error:?}"));
         }
     }
@@ -316,8 +343,11 @@ mod tests {
     fn the_uniform_is_laid_out_as_in_the_shader() {
         let module = parsed(LensModel::BrownConrady, Start::Cold);
         let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("LensUniform")).unwrap();
-        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("LensUniform is not a struct") };
-        let offsets: Vec<_> = members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset as usize)).collect();
+        let naga::TypeInner::Struct { members, span } = &ty.inner else {
+            panic!("LensUniform is not a struct")
+        };
+        let offsets: Vec<_> =
+            members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset as usize)).collect();
         let mirror = [
             ("size_px", offset_of!(LensUniform, size_px)),
             ("focal_px", offset_of!(LensUniform, focal_px)),
@@ -339,7 +369,12 @@ mod tests {
     fn the_shaders_constants_are_those_of_the_core() {
         let source = shader_source(LensModel::BrownConrady, Start::Cold);
         assert!(source.contains(&format!("const FOLD_RAYS: u32 = {}u;", camsim_core::lens::FOLD_RAYS)));
-        assert!(source.contains(&format!("const RADIAL_TABLE_LEN: u32 = {}u;", camsim_core::lens::RADIAL_TABLE_LEN)));
+        assert!(
+            source.contains(&format!(
+                "const RADIAL_TABLE_LEN: u32 = {}u;",
+                camsim_core::lens::RADIAL_TABLE_LEN
+            ))
+        );
         assert!(source.contains(&format!("const INVALID_UV: f32 = {INVALID_UV:e};")));
     }
 }

@@ -22,10 +22,12 @@ use glam::{DQuat, DVec3, EulerRot};
 
 /// The software adapter, so that figures compare between machines, or the one that `CAMSIM_ADAPTER` names.
 pub fn engine() -> Engine {
-    Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them")
+    Engine::new(AdapterChoice::Software)
+        .expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them")
 }
 
-/// Whether textures are read and triangles drawn by code. Circuits weigh texels with 8 bits of fraction, and move corners to multiples of 1/256 px.
+/// Whether textures are read and triangles drawn by code. Circuits weigh texels with 8 bits of fraction, and
+/// move corners to multiples of 1/256 px.
 pub fn is_software(engine: &Engine) -> bool {
     engine.gpu().adapter.kind == "software"
 }
@@ -91,7 +93,11 @@ pub fn pattern(width_m: f64) -> Scene {
         [level(x, y, 8.0, 0.0), level(x, y, 5.0, 1.0), level(x, y, 11.0, 2.0), 255]
     });
     let texture = Texture { size_px: [SIDE, SIDE], rgba8: rgba8.collect(), encoding: Encoding::Linear };
-    Scene { meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)], sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }
+    Scene {
+        meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)],
+        sky_linear: [0.2, 0.4, 0.8],
+        ..Scene::default()
+    }
 }
 
 /// A sequence whose frame 0 has its stamp at t = 0.
@@ -110,7 +116,13 @@ pub fn sequence(scenario: Scenario, trajectory: Trajectory, scene: Scene) -> Arc
 }
 
 /// Renders one frame with the given coordinates phase.
-pub fn render_at_phase(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64, phase: f32) -> Finished {
+pub fn render_at_phase(
+    engine: &Engine,
+    sequence: &Arc<Sequence>,
+    channels: &[Channel],
+    frame: u64,
+    phase: f32,
+) -> Finished {
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     session.set_coords_phase(phase);
     let mut found = None;
@@ -131,7 +143,8 @@ pub fn render(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], f
 /// Frame 0 with coordinates of the given phase, and the ideal frame that it was gathered from.
 pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, IdealImages) {
     let engine = engine();
-    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
+    let mut session =
+        engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
     session.set_coords_phase(phase);
     let mut found = None;
     let mut keep = |finished| {
@@ -143,7 +156,8 @@ pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, Ide
     (found.expect("one frame"), ideal)
 }
 
-/// Boxes on level ground: `side` x `side` of them, 30 m apart, turned and of different size; textures are smooth pictures.
+/// Boxes on level ground: `side` x `side` of them, 30 m apart, turned and of different size; textures are
+/// smooth pictures.
 pub fn city(side: u32) -> Scene {
     let mut scene = pattern(800.0);
     let texture = scene.meshes[0].material.texture.clone();
@@ -151,7 +165,8 @@ pub fn city(side: u32) -> Scene {
         let [column, row] = [i % side, i / side].map(f64::from);
         // Any irregular numbers do.
         let vary = |k: f64| (k * 12.9898 * (1.0 + column) + 78.233 * row * k + k).sin().abs();
-        let centre = (DVec3::new(row, column, 0.0) - 0.5 * f64::from(side - 1) * DVec3::new(1.0, 1.0, 0.0)) * 30.0;
+        let centre =
+            (DVec3::new(row, column, 0.0) - 0.5 * f64::from(side - 1) * DVec3::new(1.0, 1.0, 0.0)) * 30.0;
         let half_m = [4.0 + 4.0 * vary(1.0), 4.0 + 4.0 * vary(2.0)];
         scene.meshes.push(tower(&texture, centre, half_m, 6.0 + 24.0 * vary(3.0), 90.0 * vary(4.0)));
     }
@@ -159,7 +174,13 @@ pub fn city(side: u32) -> Scene {
 }
 
 /// Walls and roof of a box, its floor centred at `centre_ned_m`.
-fn tower(texture: &Arc<Texture>, centre_ned_m: DVec3, half_m: [f64; 2], height_m: f64, turn_deg: f64) -> Mesh {
+fn tower(
+    texture: &Arc<Texture>,
+    centre_ned_m: DVec3,
+    half_m: [f64; 2],
+    height_m: f64,
+    turn_deg: f64,
+) -> Mesh {
     let (sin, cos) = turn_deg.to_radians().sin_cos();
     let at = |n: f64, e: f64, down: f64| {
         let (n, e) = (n * half_m[0], e * half_m[1]);
@@ -169,8 +190,14 @@ fn tower(texture: &Arc<Texture>, centre_ned_m: DVec3, half_m: [f64; 2], height_m
     let mut shape = camsim_core::scene::Shape::default();
     let mut face = |positions: [[f32; 3]; 4], first_uv: f32| {
         let base = shape.vertices.len() as u32;
-        let uvs = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]].map(|[u, v]: [f32; 2]| [u + first_uv, v + 0.5 * first_uv]);
-        shape.vertices.extend(positions.iter().zip(uvs).map(|(&position_m, uv)| camsim_core::scene::MeshVertex::new(position_m, uv)));
+        let uvs = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]]
+            .map(|[u, v]: [f32; 2]| [u + first_uv, v + 0.5 * first_uv]);
+        shape.vertices.extend(
+            positions
+                .iter()
+                .zip(uvs)
+                .map(|(&position_m, uv)| camsim_core::scene::MeshVertex::new(position_m, uv)),
+        );
         shape.indices.extend([0, 1, 2, 0, 2, 3].map(|i: u32| base + i));
     };
     for k in 0..4 {

@@ -27,8 +27,10 @@ const NEAR_PX: i64 = 3;
 /// Colour and number of the surface that a ray meets first.
 pub fn cast(scene: &Scene, origin: DVec3, direction: DVec3) -> (DVec3, usize) {
     let mut best = (f64::INFINITY, DVec3::from_array(scene.sky_linear.map(f64::from)), 0);
-    if let Some((terrain, hit)) =
-        scene.terrain.as_ref().and_then(|terrain| Some((terrain, terrain.intersect(origin, direction, f64::INFINITY)?)))
+    if let Some((terrain, hit)) = scene
+        .terrain
+        .as_ref()
+        .and_then(|terrain| Some((terrain, terrain.intersect(origin, direction, f64::INFINITY)?)))
     {
         // Slopes to either side of a ridge are different surfaces where one hides the other.
         best = (hit.t, texel(&terrain.texture, hit.uv), 1 + usize::from(hit.normal_ned.x > 0.0));
@@ -55,8 +57,15 @@ pub fn texel(texture: &Texture, uv: [f64; 2]) -> DVec3 {
     load(0.0, 0.0).lerp(load(1.0, 0.0), t.x).lerp(load(0.0, 1.0).lerp(load(1.0, 1.0), t.x), t.y)
 }
 
-/// The ray of a place on the sensor at an exposure phase in [-0.5, 0.5]; lines keep their own time all over their pixels.
-pub fn cast_at(sequence: &Sequence, plan: &FramePlan, [x, y]: [u32; 2], offset: DVec2, phase: f64) -> Option<(DVec3, usize)> {
+/// The ray of a place on the sensor at an exposure phase in [-0.5, 0.5]; lines keep their own time all over
+/// their pixels.
+pub fn cast_at(
+    sequence: &Sequence,
+    plan: &FramePlan,
+    [x, y]: [u32; 2],
+    offset: DVec2,
+    phase: f64,
+) -> Option<(DVec3, usize)> {
     let uv = plan.camera.unproject(DVec2::new(f64::from(x), f64::from(y)) + offset)?;
     let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + phase * plan.shutter.exposure_s();
     let pose = sequence.path.pose(t_s);
@@ -85,18 +94,24 @@ pub fn expected(sequence: &Sequence, plan: &FramePlan) -> Vec<(usize, DVec3)> {
         .map(|i| {
             [-0.5, 0.0, 0.5]
                 .iter()
-                .filter_map(|&phase| Some(cast_at(sequence, plan, pixel(i % width, i / width), DVec2::ZERO, phase)?.1))
+                .filter_map(|&phase| {
+                    Some(cast_at(sequence, plan, pixel(i % width, i / width), DVec2::ZERO, phase)?.1)
+                })
                 .collect()
         })
         .collect();
     let near = |x: i64, y: i64| {
-        let mut around = (-NEAR_PX..=NEAR_PX).flat_map(|dy| (-NEAR_PX..=NEAR_PX).map(move |dx| (x + dx, y + dy)));
+        let mut around =
+            (-NEAR_PX..=NEAR_PX).flat_map(|dy| (-NEAR_PX..=NEAR_PX).map(move |dx| (x + dx, y + dy)));
         let first = surfaces[(y * width + x) as usize].first();
         around.any(|(x, y)| surfaces[(y * width + x) as usize].iter().any(|s| Some(s) != first))
     };
     let inner = (NEAR_PX..height - NEAR_PX).flat_map(|y| (NEAR_PX..width - NEAR_PX).map(move |x| (x, y)));
     let chosen: Vec<(i64, i64)> = inner.filter(|&(x, y)| near(x, y)).collect();
-    chosen.into_par_iter().filter_map(|(x, y)| Some(((y * width + x) as usize, reference(sequence, plan, pixel(x, y))?))).collect()
+    chosen
+        .into_par_iter()
+        .filter_map(|(x, y)| Some(((y * width + x) as usize, reference(sequence, plan, pixel(x, y))?)))
+        .collect()
 }
 
 /// A level square above the ground, turned by 17 degrees.
@@ -133,14 +148,19 @@ impl CastFrame {
     pub fn new(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, scale: u32) -> Self {
         let size_px = plan.ideal.size_px;
         let corners = |[width, height]: [u32; 2]| {
-            (0..width * height).into_par_iter().map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
+            (0..width * height)
+                .into_par_iter()
+                .map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
         };
         let samples: Vec<Centre> = corners(size_px.map(|side| side * scale))
-            .flat_map_iter(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5))
+            .flat_map_iter(|corner| {
+                FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5)
+            })
             .map(|at_px| look(sequence, plan, key, at_px))
             .collect();
         // The renderer keeps colours of samples only where they are many.
-        let sample_colors = if scale > 1 { samples.iter().map(|sample| sample.color).collect() } else { Vec::new() };
+        let sample_colors =
+            if scale > 1 { samples.iter().map(|sample| sample.color).collect() } else { Vec::new() };
         let samples: Vec<f64> = samples.iter().map(|sample| sample.inverse_depth).collect();
         let centres: Vec<Centre> = corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
         let marks = marks(size_px, scale, &centres, &samples);
@@ -161,7 +181,12 @@ impl CastFrame {
 fn look(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, at_px: DVec2) -> Centre {
     let ray = key.ned_from_camera * ((at_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
     let origin = key.position_ned_m;
-    let hits = sequence.scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY)).map(|hit| hit.0);
+    let hits = sequence
+        .scene
+        .meshes
+        .iter()
+        .filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY))
+        .map(|hit| hit.0);
     let first = hits.min_by(f64::total_cmp);
     let depth_m = first.map(|t| (key.ned_from_camera.inverse() * (t * ray)).z);
     Centre { inverse_depth: depth_m.map_or(0.0, |z| 1.0 / z), color: cast(&sequence.scene, origin, ray).0 }

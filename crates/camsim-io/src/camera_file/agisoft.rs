@@ -1,6 +1,7 @@
-//! Agisoft XML: Metashape and PhotoScan since 1.2 (`f`, principal point from the image centre, P1 and P2 the other way round than in OpenCV),
-//! and Agisoft Lens (`fx`, `fy`, absolute principal point, P1 and P2 as in OpenCV). Image corners are at whole pixels in both. Either a
-//! calibration alone, or the cameras of a project (`cameras.xml`), whose sensors hold one each.
+//! Agisoft XML: Metashape and PhotoScan since 1.2 (`f`, principal point from the image centre, P1 and P2 the
+//! other way round than in OpenCV), and Agisoft Lens (`fx`, `fy`, absolute principal point, P1 and P2 as in
+//! OpenCV). Image corners are at whole pixels in both. Either a calibration alone, or the cameras of a
+//! project (`cameras.xml`), whose sensors hold one each.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
@@ -23,7 +24,11 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("f", Use::Applied, "fy; fx is f + b1"),
     Key::new("fx", Use::Applied, "Agisoft Lens; without `f` alone"),
     Key::new("fy", Use::Applied, "Agisoft Lens; without `f` alone"),
-    Key::new("cx", Use::Applied, "from the middle of the picture; with fx and fy from its corner. Half a pixel is taken off"),
+    Key::new(
+        "cx",
+        Use::Applied,
+        "from the middle of the picture; with fx and fy from its corner. Half a pixel is taken off",
+    ),
     Key::new("cy", Use::Applied, "as cx"),
     Key::new("b1", Use::Applied, "fx - fy"),
     Key::new("b2", Use::Refused(Neutral::Zero), SKEW),
@@ -44,7 +49,11 @@ pub(super) const KEYS: &[Key] = &[
 
 /// Of a sensor, below its place.
 pub(super) const SENSOR_KEYS: &[Key] = &[
-    Key::new("calibration.**", Use::Applied, "as a calibration alone; of several the one of class `adjusted`"),
+    Key::new(
+        "calibration.**",
+        Use::Applied,
+        "as a calibration alone; of several the one of class `adjusted`",
+    ),
     Key::new("type", Use::Applied, "where the calibration names none"),
     Key::new(
         "rolling_shutter",
@@ -67,20 +76,27 @@ pub(super) const SENSOR_KEYS: &[Key] = &[
     Key::new("location.**", Use::Named(Neutral::Never), "place in a rig: set mount by hand"),
     Key::new("black_level", Use::Silent, "radiometry"),
     Key::new("sensitivity", Use::Silent, "radiometry"),
-    Key::new("vignetting.**", Use::Named(Neutral::Never), "draw it as a picture and set photometric.vignette"),
+    Key::new(
+        "vignetting.**",
+        Use::Named(Neutral::Never),
+        "draw it as a picture and set photometric.vignette",
+    ),
     Key::new("covariance.**", Use::Silent, "how well it fitted"),
     Key::new("meta.**", Use::Silent, "free text"),
 ];
 
 pub(super) fn fits(document: &Document) -> bool {
-    let alone = document.root == "calibration" && ["f", "fx"].iter().any(|key| find(&document.value, key).is_some());
+    let alone =
+        document.root == "calibration" && ["f", "fx"].iter().any(|key| find(&document.value, key).is_some());
     alone || document.root == "document" && find(&document.value, "chunk").is_some()
 }
 
 /// An element that may be there once or several times.
 fn each<'a>(value: &'a Value, key: &str) -> Vec<(String, &'a Value)> {
     match value.get(key) {
-        Some(Value::Array(list)) => list.iter().enumerate().map(|(index, item)| (format!("{key}[{index}]"), item)).collect(),
+        Some(Value::Array(list)) => {
+            list.iter().enumerate().map(|(index, item)| (format!("{key}[{index}]"), item)).collect()
+        }
         Some(single) => vec![(key.to_owned(), single)],
         None => Vec::new(),
     }
@@ -97,12 +113,20 @@ pub(super) fn entries(document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
                 let id = sensor.get("id").map(Value::to_string).unwrap_or_default();
                 let id = id.trim_end_matches(".0").to_owned();
                 let name = word(sensor, "label").map_or_else(|| format!("sensor {id}"), str::to_owned);
-                entries.push(Entry { name, also: vec![id], value: sensor, roots: vec![format!("{chunk_at}.{sensors_at}.{at}")] });
+                entries.push(Entry {
+                    name,
+                    also: vec![id],
+                    value: sensor,
+                    roots: vec![format!("{chunk_at}.{sensors_at}.{at}")],
+                });
             }
         }
     }
     if entries.is_empty() {
-        return Err(Problem::new("chunk.sensors", "there is none: export the cameras after they are aligned, or the calibration alone"));
+        return Err(Problem::new(
+            "chunk.sensors",
+            "there is none: export the cameras after they are aligned, or the calibration alone",
+        ));
     }
     Ok(entries)
 }
@@ -111,20 +135,25 @@ pub(super) fn import(document: &Document, value: &Value) -> Result<ImportedCamer
     if document.root == "calibration" {
         return calibration(value, None);
     }
-    let found = calibration_of(value).ok_or_else(|| Problem::new("calibration", "is missing: align the cameras before you export them"))?;
-    calibration(found, Some(value)).map_err(|problem| Problem { key: format!("calibration.{}", problem.key), ..problem })
+    let found = calibration_of(value)
+        .ok_or_else(|| Problem::new("calibration", "is missing: align the cameras before you export them"))?;
+    calibration(found, Some(value))
+        .map_err(|problem| Problem { key: format!("calibration.{}", problem.key), ..problem })
 }
 
 /// Of several the adjusted one.
 pub(super) fn calibration_of(sensor: &Value) -> Option<&Value> {
     let all = each(sensor, "calibration");
-    let adjusted = all.iter().rfind(|(_, calibration)| word(calibration, "class") == Some("adjusted")).or(all.last());
+    let adjusted =
+        all.iter().rfind(|(_, calibration)| word(calibration, "class") == Some("adjusted")).or(all.last());
     adjusted.map(|(_, found)| *found)
 }
 
 /// Width and height of a calibration or a sensor.
 fn resolution(value: &Value) -> Option<Result<[f64; 2], Problem>> {
-    let of = |prefix: &str| Ok([number(value, &format!("{prefix}width"))?, number(value, &format!("{prefix}height"))?]);
+    let of = |prefix: &str| {
+        Ok([number(value, &format!("{prefix}width"))?, number(value, &format!("{prefix}height"))?])
+    };
     if find(value, "resolution").is_some() {
         return Some(of("resolution."));
     }
@@ -151,17 +180,30 @@ fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, 
         ([number(value, "fx")?, number(value, "fy")?], [number(value, "cx")?, number(value, "cy")?], [p1, p2])
     };
     let principal_point_px = [corner_based[0] - 0.5, corner_based[1] - 0.5];
-    let named = word(value, "projection").or_else(|| word(value, "type")).or_else(|| sensor.and_then(|sensor| word(sensor, "type")));
+    let named = word(value, "projection")
+        .or_else(|| word(value, "type"))
+        .or_else(|| sensor.and_then(|sensor| word(sensor, "type")));
     let (model, coefficients) = match named.unwrap_or("frame") {
         "frame" if k4 != 0.0 => {
-            return Err(Problem::new("k4", "is not zero: a radial term in r^8 is not modelled; recalibrate with K4 off"));
+            return Err(Problem::new(
+                "k4",
+                "is not zero: a radial term in r^8 is not modelled; recalibrate with K4 off",
+            ));
         }
         "frame" => (LensModel::BrownConrady, vec![k1, k2, p1, p2, k3]),
         "fisheye" | "equidistant_fisheye" if p1 != 0.0 || p2 != 0.0 => {
-            return Err(Problem::new("p1", "is not zero: a fisheye here has no tangential terms; recalibrate with P1 and P2 off"));
+            return Err(Problem::new(
+                "p1",
+                "is not zero: a fisheye here has no tangential terms; recalibrate with P1 and P2 off",
+            ));
         }
         "fisheye" | "equidistant_fisheye" => (LensModel::KannalaBrandt, vec![k1, k2, k3, k4]),
-        other => return Err(Problem::new("projection", format!("is `{other}`: frame and fisheye (equidistant) can be imported"))),
+        other => {
+            return Err(Problem::new(
+                "projection",
+                format!("is `{other}`: frame and fisheye (equidistant) can be imported"),
+            ));
+        }
     };
     Ok(camera(CameraFormat::Agisoft, size_px, focal_px, principal_point_px, model, coefficients))
 }

@@ -12,19 +12,55 @@ const IMU: &str = "the IMU";
 const CLOCK: &str = "clock of one sensor against another's, ns: it shifts all stamps alike";
 
 pub(super) const KEYS: &[Key] = &[
-    Key::new("value0.intrinsics.camera_type", Use::Applied, "pinhole, kb4, pinhole-radtan8; ds, eucm, ucm, fov are refused"),
+    Key::new(
+        "value0.intrinsics.camera_type",
+        Use::Applied,
+        "pinhole, kb4, pinhole-radtan8; ds, eucm, ucm, fov are refused",
+    ),
     Key::new("value0.intrinsics.intrinsics.fx", Use::Applied, "px"),
     Key::new("value0.intrinsics.intrinsics.fy", Use::Applied, "px"),
     Key::new("value0.intrinsics.intrinsics.cx", Use::Applied, "px"),
     Key::new("value0.intrinsics.intrinsics.cy", Use::Applied, "px"),
-    Key::new("value0.intrinsics.intrinsics.k1", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.k2", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.k3", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.k4", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.k5", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.k6", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.p1", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
-    Key::new("value0.intrinsics.intrinsics.p2", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new(
+        "value0.intrinsics.intrinsics.k1",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.k2",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.k3",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.k4",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.k5",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.k6",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.p1",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
+    Key::new(
+        "value0.intrinsics.intrinsics.p2",
+        Use::Applied,
+        "coefficient; refused unless zero where camera_type has it not",
+    ),
     Key::new(
         "value0.intrinsics.intrinsics.rpmax",
         Use::Named(Neutral::Zero),
@@ -45,7 +81,11 @@ pub(super) const KEYS: &[Key] = &[
         Use::Named(Neutral::Never),
         "a spline of the vignette over the radius: draw it as a picture and set photometric.vignette",
     ),
-    Key::new("value0.T_imu_cam.**", Use::Named(Neutral::Never), "pose of the camera to the IMU: set mount by hand"),
+    Key::new(
+        "value0.T_imu_cam.**",
+        Use::Named(Neutral::Never),
+        "pose of the camera to the IMU: set mount by hand",
+    ),
     Key::new("value0.cam_time_offset_ns", Use::Named(Neutral::Zero), CLOCK),
     Key::new("value0.mocap_*", Use::Named(Neutral::Zero), CLOCK),
     Key::new("value0.T_mocap_world.**", Use::Silent, "motion capture"),
@@ -62,10 +102,17 @@ pub(super) fn fits(document: &Document) -> bool {
 }
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
-    let list = find(&document.value, "value0.intrinsics").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-    let roots = |index: usize| ["intrinsics", "T_imu_cam", "vignette"].map(|key| format!("value0.{key}[{index}]")).to_vec();
-    let entry =
-        |(index, value): (usize, _)| Entry { name: format!("cam{index}"), also: vec![index.to_string()], value, roots: roots(index) };
+    let list =
+        find(&document.value, "value0.intrinsics").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let roots = |index: usize| {
+        ["intrinsics", "T_imu_cam", "vignette"].map(|key| format!("value0.{key}[{index}]")).to_vec()
+    };
+    let entry = |(index, value): (usize, _)| Entry {
+        name: format!("cam{index}"),
+        also: vec![index.to_string()],
+        value,
+        roots: roots(index),
+    };
     list.iter().enumerate().map(entry).collect()
 }
 
@@ -88,12 +135,17 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
         }
     };
     let coefficients = all(names)?;
-    for key in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "xi", "alpha", "beta", "w"].iter().filter(|key| !names.contains(key)) {
+    for key in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "xi", "alpha", "beta", "w"]
+        .iter()
+        .filter(|key| !names.contains(key))
+    {
         let key = format!("intrinsics.{key}");
         if optional_number(value, &key)?.is_some_and(|number| number != 0.0) {
             return Err(Problem::new(
                 key,
-                format!("is not zero, but camera_type `{kind}` has no such parameter: name the model that is meant"),
+                format!(
+                    "is not zero, but camera_type `{kind}` has no such parameter: name the model that is meant"
+                ),
             ));
         }
     }
@@ -109,7 +161,14 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
         ));
     };
     let size_px = size("value0.resolution", [width, height])?;
-    Ok(camera(CameraFormat::Basalt, size_px, [get("fx")?, get("fy")?], [get("cx")?, get("cy")?], model, coefficients))
+    Ok(camera(
+        CameraFormat::Basalt,
+        size_px,
+        [get("fx")?, get("fy")?],
+        [get("cx")?, get("cy")?],
+        model,
+        coefficients,
+    ))
 }
 
 fn as_pair(value: &Value) -> Result<Vec<f64>, Problem> {

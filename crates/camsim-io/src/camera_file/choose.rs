@@ -34,14 +34,19 @@ impl<'a> Entry<'a> {
     /// A problem with the whole path of its key.
     pub(super) fn placed(&self, document: &Document, problem: Problem) -> Problem {
         match self.roots.first() {
-            Some(root) if !std::ptr::eq(self.value, &document.value) => Problem { key: format!("{root}.{}", problem.key), ..problem },
+            Some(root) if !std::ptr::eq(self.value, &document.value) => {
+                Problem { key: format!("{root}.{}", problem.key), ..problem }
+            }
             _ => problem,
         }
     }
 
     /// Whether a place in the tree is below one of its roots.
     pub(super) fn holds(&self, path: &str) -> bool {
-        self.roots.iter().any(|root| path.strip_prefix(root.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '['])))
+        self.roots.iter().any(|root| {
+            path.strip_prefix(root.as_str())
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        })
     }
 }
 
@@ -57,18 +62,28 @@ pub(super) fn choose(entries: &[Entry<'_>], wanted: Option<&str>) -> Result<usiz
             1 => Ok(0),
             count => Err(Problem::new(
                 "cameras",
-                format!("there are {count} ({}): name the one that is meant, as in `--camera {}`", names(), quoted(&entries[0].name)),
+                format!(
+                    "there are {count} ({}): name the one that is meant, as in `--camera {}`",
+                    names(),
+                    quoted(&entries[0].name)
+                ),
             )),
         };
     };
-    let mut called = entries.iter().enumerate().filter(|(_, entry)| entry.is_called(wanted)).map(|(index, _)| index);
+    let mut called =
+        entries.iter().enumerate().filter(|(_, entry)| entry.is_called(wanted)).map(|(index, _)| index);
     match (called.next(), called.next()) {
         (Some(index), None) => Ok(index),
-        (Some(_), Some(_)) => Err(Problem::new("cameras", format!("several are called `{wanted}`: rename them in the file"))),
-        (None, _) if entries.iter().all(|entry| entry.name.is_empty()) => {
-            Err(Problem::new("cameras", format!("there is one, without a name, and no `{wanted}`: leave `--camera` out")))
+        (Some(_), Some(_)) => {
+            Err(Problem::new("cameras", format!("several are called `{wanted}`: rename them in the file")))
         }
-        (None, _) => Err(Problem::new("cameras", format!("none is called `{wanted}`; there are {}", names()))),
+        (None, _) if entries.iter().all(|entry| entry.name.is_empty()) => Err(Problem::new(
+            "cameras",
+            format!("there is one, without a name, and no `{wanted}`: leave `--camera` out"),
+        )),
+        (None, _) => {
+            Err(Problem::new("cameras", format!("none is called `{wanted}`; there are {}", names())))
+        }
     }
 }
 

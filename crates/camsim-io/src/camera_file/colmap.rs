@@ -1,4 +1,5 @@
-//! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. There the centre of the first pixel is (0.5, 0.5).
+//! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. There the centre of the first pixel is
+//! (0.5, 0.5).
 
 use camsim_core::scenario::LensModel;
 use serde_json::{Value, json};
@@ -21,7 +22,10 @@ pub(super) const KEYS: &[Key] = &[
 ];
 
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+    text.lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
 fn is_camera(line: &str) -> bool {
@@ -42,7 +46,9 @@ pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
     let mut cameras = Vec::new();
     for (line_number, line) in lines(text) {
         if !is_camera(line) {
-            let message = format!("`{line}` is no camera: CAMERA_ID MODEL WIDTH HEIGHT and the parameters, with blanks between");
+            let message = format!(
+                "`{line}` is no camera: CAMERA_ID MODEL WIDTH HEIGHT and the parameters, with blanks between"
+            );
             return Err(SyntaxProblem { line: Some(line_number), message });
         }
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -58,8 +64,9 @@ pub(super) fn fits(document: &Document) -> bool {
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
     let list = document.value.get("cameras").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-    let entry =
-        |(index, value): (usize, _)| Entry::new(word(value, "id").unwrap_or_default().to_owned(), value, format!("cameras[{index}]"));
+    let entry = |(index, value): (usize, _)| {
+        Entry::new(word(value, "id").unwrap_or_default().to_owned(), value, format!("cameras[{index}]"))
+    };
     list.iter().enumerate().map(entry).collect()
 }
 
@@ -72,7 +79,9 @@ fn names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
         "SIMPLE_RADIAL" => (BrownConrady, &["f", "cx", "cy", "k1"]),
         "RADIAL" => (BrownConrady, &["f", "cx", "cy", "k1", "k2"]),
         "OPENCV" => (BrownConrady, &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"]),
-        "FULL_OPENCV" => (BrownConrady, &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
+        "FULL_OPENCV" => {
+            (BrownConrady, &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"])
+        }
         "OPENCV_FISHEYE" => (KannalaBrandt, &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"]),
         "SIMPLE_RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1"]),
         "RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1", "k2"]),
@@ -92,10 +101,16 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     })?;
     let params = numbers(value, "params")?;
     if params.len() != names.len() {
-        let text = format!("has {} parameters where {model} has {} ({})", params.len(), names.len(), names.join(", "));
+        let text = format!(
+            "has {} parameters where {model} has {} ({})",
+            params.len(),
+            names.len(),
+            names.join(", ")
+        );
         return Err(Problem::new("PARAMS", text));
     }
-    let get = |name: &str| names.iter().position(|known| *known == name).and_then(|at| params.get(at).copied());
+    let get =
+        |name: &str| names.iter().position(|known| *known == name).and_then(|at| params.get(at).copied());
     let or_zero = |name: &str| get(name).unwrap_or(0.0);
     let f = or_zero("f");
     let coefficients = match lens {
@@ -104,7 +119,17 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     };
     let size_px = size("WIDTH", [number(value, "width")?, number(value, "height")?])?;
     let focal_px = [get("fx").unwrap_or(f), get("fy").unwrap_or(f)];
-    let mut imported = camera(CameraFormat::Colmap, size_px, focal_px, [or_zero("cx") - 0.5, or_zero("cy") - 0.5], lens, coefficients);
-    imported.notes.push("the principal point was shifted by half a pixel: COLMAP's image corners are at whole numbers".to_owned());
+    let mut imported = camera(
+        CameraFormat::Colmap,
+        size_px,
+        focal_px,
+        [or_zero("cx") - 0.5, or_zero("cy") - 0.5],
+        lens,
+        coefficients,
+    );
+    imported.notes.push(
+        "the principal point was shifted by half a pixel: COLMAP's image corners are at whole numbers"
+            .to_owned(),
+    );
     Ok(imported)
 }

@@ -33,8 +33,8 @@ pub(crate) struct SyntaxProblem {
     pub(crate) message: String,
 }
 
-/// The value at a path of keys `a.b`; null counts as absent. A repeated XML element counts by its last appearance. A key may itself be
-/// called `a.b`, as in ORB-SLAM's settings.
+/// The value at a path of keys `a.b`; null counts as absent. A repeated XML element counts by its last
+/// appearance. A key may itself be called `a.b`, as in ORB-SLAM's settings.
 pub(crate) fn find<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
     if let Some(found) = value.get(path) {
         return (!found.is_null()).then_some(found);
@@ -55,7 +55,9 @@ pub(crate) fn number(value: &Value, path: &str) -> Result<f64, Problem> {
 pub(crate) fn optional_number(value: &Value, path: &str) -> Result<Option<f64>, Problem> {
     match find(value, path) {
         None => Ok(None),
-        Some(found) => as_number(found).map(Some).ok_or_else(|| Problem::new(path, format!("is {found}, not a finite number"))),
+        Some(found) => as_number(found)
+            .map(Some)
+            .ok_or_else(|| Problem::new(path, format!("is {found}, not a finite number"))),
     }
 }
 
@@ -79,14 +81,19 @@ pub(crate) fn one_of<'n>(value: &Value, names: &[&'n str]) -> Result<Option<&'n 
     let Some(first) = used.next() else { return Ok(None) };
     match used.find(|other| find(value, other) != find(value, first)) {
         None => Ok(Some(first)),
-        Some(other) => Err(Problem::new(*other, format!("says another thing than {first}, which means the same: delete one of the two"))),
+        Some(other) => Err(Problem::new(
+            *other,
+            format!("says another thing than {first}, which means the same: delete one of the two"),
+        )),
     }
 }
 
 /// Yes or no, as a truth value, a number or a word.
 pub(crate) fn flag(value: &Value, path: &str) -> Result<Option<bool>, Problem> {
     let Some(found) = find(value, path) else { return Ok(None) };
-    as_flag(found).map(Some).ok_or_else(|| Problem::new(path, format!("is {found}, neither yes (1, true) nor no (0, false)")))
+    as_flag(found)
+        .map(Some)
+        .ok_or_else(|| Problem::new(path, format!("is {found}, neither yes (1, true) nor no (0, false)")))
 }
 
 pub(crate) fn as_flag(value: &Value) -> Option<bool> {
@@ -99,7 +106,8 @@ pub(crate) fn as_flag(value: &Value) -> Option<bool> {
     }
 }
 
-/// A list of finite numbers: a list, a matrix as list of rows, `{rows, cols, data}`, or (XML) text with blanks between.
+/// A list of finite numbers: a list, a matrix as list of rows, `{rows, cols, data}`, or (XML) text with
+/// blanks between.
 pub(crate) fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, Problem> {
     let found = find(value, path).ok_or_else(|| Problem::new(path, "is missing"))?;
     let wrong = || Problem::new(path, "is not a list of finite numbers");
@@ -147,10 +155,16 @@ pub(crate) fn camera_matrix(value: &Value, path: &str) -> Result<([f64; 2], [f64
     }
     if skew != 0.0 || zero != 0.0 {
         let skew = if skew == 0.0 { zero } else { skew };
-        return Err(Problem::new(path, format!("has a skew of {skew}, which a camera here cannot have: recalibrate without skew")));
+        return Err(Problem::new(
+            path,
+            format!("has a skew of {skew}, which a camera here cannot have: recalibrate without skew"),
+        ));
     }
     if last != [0.0, 0.0, 1.0] {
-        return Err(Problem::new(path, format!("has the last row {last:?} instead of [0, 0, 1]: this is no camera matrix")));
+        return Err(Problem::new(
+            path,
+            format!("has the last row {last:?} instead of [0, 0, 1]: this is no camera matrix"),
+        ));
     }
     Ok(([fx, fy], [cx, cy]))
 }
@@ -160,7 +174,10 @@ pub(crate) fn size(key: &str, [width, height]: [f64; 2]) -> Result<[u32; 2], Pro
     let whole = |x: f64| (x.fract() == 0.0 && (1.0..=65_535.0).contains(&x)).then_some(x as u32);
     match (whole(width), whole(height)) {
         (Some(width), Some(height)) => Ok([width, height]),
-        _ => Err(Problem::new(key, format!("is {width} x {height}: an image size is two whole numbers of pixels"))),
+        _ => Err(Problem::new(
+            key,
+            format!("is {width} x {height}: an image size is two whole numbers of pixels"),
+        )),
     }
 }
 
@@ -170,11 +187,19 @@ pub(crate) fn word<'a>(value: &'a Value, path: &str) -> Option<&'a str> {
 }
 
 /// Refuses coefficients beyond what the Brown-Conrady model has, unless they are zero.
-pub(crate) fn at_most(key: &str, mut coefficients: Vec<f64>, max: usize, what: &str) -> Result<Vec<f64>, Problem> {
+pub(crate) fn at_most(
+    key: &str,
+    mut coefficients: Vec<f64>,
+    max: usize,
+    what: &str,
+) -> Result<Vec<f64>, Problem> {
     if coefficients.iter().skip(max).any(|k| *k != 0.0) {
         return Err(Problem::new(
             key,
-            format!("has {} numbers: {what}, which a lens here has not; recalibrate without", coefficients.len()),
+            format!(
+                "has {} numbers: {what}, which a lens here has not; recalibrate without",
+                coefficients.len()
+            ),
         ));
     }
     coefficients.truncate(max);

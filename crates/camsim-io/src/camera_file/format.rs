@@ -6,7 +6,8 @@ use super::choose::Entry;
 use super::document::{Document, Problem, find};
 use super::keys::{Key, Part, leaves};
 use super::{
-    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, okvis, opencv, opensfm, orb_slam, reference, ros, vikit,
+    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, okvis, opencv, opensfm,
+    orb_slam, reference, ros, vikit,
 };
 
 /// Formats that can be imported.
@@ -157,9 +158,12 @@ impl CameraFormat {
             Self::NCamera => ncamera::entries(document),
             Self::Agisoft => return agisoft::entries(document),
             Self::OpenSfm => return opensfm::entries(document),
-            Self::Euroc | Self::RosCameraInfo | Self::Camodocal | Self::Reference | Self::Gyroflow | Self::Vikit => {
-                Entry::only(&document.value)
-            }
+            Self::Euroc
+            | Self::RosCameraInfo
+            | Self::Camodocal
+            | Self::Reference
+            | Self::Gyroflow
+            | Self::Vikit => Entry::only(&document.value),
         })
     }
 
@@ -173,7 +177,10 @@ impl CameraFormat {
             Self::RosIni => &[("", ros::INI_KEYS)],
             Self::Camodocal => &[("", camodocal::KEYS)],
             Self::Reference => &[("", reference::KEYS)],
-            Self::Agisoft => &[("a calibration", agisoft::KEYS), ("a sensor of a project, below its place", agisoft::SENSOR_KEYS)],
+            Self::Agisoft => &[
+                ("a calibration", agisoft::KEYS),
+                ("a sensor of a project, below its place", agisoft::SENSOR_KEYS),
+            ],
             Self::Gyroflow => &[("", gyroflow::KEYS)],
             Self::Colmap => &[("", colmap::KEYS)],
             Self::OrbSlam => &[("", orb_slam::KEYS)],
@@ -186,25 +193,41 @@ impl CameraFormat {
     }
 
     /// What of the file is about the chosen camera, with the tables that it is judged by.
-    pub(super) fn parts<'a>(self, document: &'a Document, entries: &[Entry<'a>], chosen: &Entry<'a>) -> Vec<Part<'a>> {
+    pub(super) fn parts<'a>(
+        self,
+        document: &'a Document,
+        entries: &[Entry<'a>],
+        chosen: &Entry<'a>,
+    ) -> Vec<Part<'a>> {
         let keys = self.tables()[0].1;
         match self {
             // What else is in such a file are poses and points.
             Self::OpenSfm => vec![Part { keys, leaves: leaves(chosen.value) }],
             Self::Agisoft if document.root == "document" => {
-                let calibration = agisoft::calibration_of(chosen.value).map(|value| Part { keys, leaves: leaves(value) });
-                calibration.into_iter().chain([Part { keys: agisoft::SENSOR_KEYS, leaves: leaves(chosen.value) }]).collect()
+                let calibration =
+                    agisoft::calibration_of(chosen.value).map(|value| Part { keys, leaves: leaves(value) });
+                calibration
+                    .into_iter()
+                    .chain([Part { keys: agisoft::SENSOR_KEYS, leaves: leaves(chosen.value) }])
+                    .collect()
             }
             _ => {
                 let mut leaves = leaves(&document.value);
-                leaves.retain(|leaf| chosen.holds(&leaf.path) || !entries.iter().any(|other| other.holds(&leaf.path)));
+                leaves.retain(|leaf| {
+                    chosen.holds(&leaf.path) || !entries.iter().any(|other| other.holds(&leaf.path))
+                });
                 vec![Part { keys, leaves }]
             }
         }
     }
 
     /// `asked` is whether the user named the format.
-    pub(super) fn import(self, document: &Document, entry: &Entry<'_>, asked: bool) -> Result<ImportedCamera, Problem> {
+    pub(super) fn import(
+        self,
+        document: &Document,
+        entry: &Entry<'_>,
+        asked: bool,
+    ) -> Result<ImportedCamera, Problem> {
         let value = entry.value;
         match self {
             Self::OpenCv | Self::OpenCvFisheye => opencv::import(entry, self, asked),
@@ -234,9 +257,14 @@ pub(super) fn all_titles() -> String {
 /// A word on files that are near a camera file.
 pub(super) fn hint(document: &Document) -> Option<String> {
     let value = &document.value;
-    let calibrations: Vec<&str> = (0..8).filter_map(|index| find(value, &format!("cam{index}_calib")).and_then(Value::as_str)).collect();
+    let calibrations: Vec<&str> = (0..8)
+        .filter_map(|index| find(value, &format!("cam{index}_calib")).and_then(Value::as_str))
+        .collect();
     if !calibrations.is_empty() {
-        return Some(format!("this names its cameras in files of their own: import one of those ({})", calibrations.join(", ")));
+        return Some(format!(
+            "this names its cameras in files of their own: import one of those ({})",
+            calibrations.join(", ")
+        ));
     }
     if document.root == "lensdatabase" {
         return Some("this is a data base of lenses without the size of a picture, not a camera".to_owned());
@@ -251,7 +279,8 @@ pub(super) fn hint(document: &Document) -> Option<String> {
                     image_height in a YAML file";
         return Some(text.to_owned());
     }
-    if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some() {
+    if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some()
+    {
         let text = "there is a matrix of another program's (MATLAB's is transposed and counts pixels from 1, KITTI's P0 to P3 are of rectified pictures): write \
                     camera_matrix, distortion_coefficients, image_width and image_height in a YAML file";
         return Some(text.to_owned());

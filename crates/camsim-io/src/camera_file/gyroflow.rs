@@ -3,7 +3,9 @@
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::document::{Document, Problem, at_most, camera_matrix, find, flag, number, numbers, optional_number, size, word};
+use super::document::{
+    Document, Problem, at_most, camera_matrix, find, flag, number, numbers, optional_number, size, word,
+};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera};
 
@@ -20,16 +22,36 @@ pub(super) const KEYS: &[Key] = &[
         "focal lengths; the principal point counts where `asymmetrical` is true, as in Gyroflow",
     ),
     Key::new("fisheye_params.distortion_coeffs", Use::Applied, "k1 k2 k3 k4"),
-    Key::new("fisheye_params.radial_distortion_limit", Use::Named(Neutral::Never), "where the lens folds is found by itself"),
-    Key::new("calib_params.camera_matrix", Use::Applied, "used in place of fisheye_params where use_opencv_standard is true"),
+    Key::new(
+        "fisheye_params.radial_distortion_limit",
+        Use::Named(Neutral::Never),
+        "where the lens folds is found by itself",
+    ),
+    Key::new(
+        "calib_params.camera_matrix",
+        Use::Applied,
+        "used in place of fisheye_params where use_opencv_standard is true",
+    ),
     Key::new("calib_params.distortion_coeffs", Use::Applied, "k1 k2 p1 p2 k3 k4 k5 k6"),
-    Key::new("calib_params.radial_distortion_limit", Use::Named(Neutral::Never), "where the lens folds is found by itself"),
+    Key::new(
+        "calib_params.radial_distortion_limit",
+        Use::Named(Neutral::Never),
+        "where the lens folds is found by itself",
+    ),
     Key::new("use_opencv_standard", Use::Applied, "which of the two counts"),
     Key::new("use_opencv_fisheye", Use::Applied, "false, without use_opencv_standard, is refused"),
-    Key::new("asymmetrical", Use::Applied, "false or missing: the principal point is the middle (w/2, h/2), whatever the matrix says"),
+    Key::new(
+        "asymmetrical",
+        Use::Applied,
+        "false or missing: the principal point is the middle (w/2, h/2), whatever the matrix says",
+    ),
     Key::new("crop", Use::Applied, "divides the focal lengths"),
     Key::new("distortion_model", Use::Applied, "opencv_fisheye; others are refused"),
-    Key::new("distortion_model_id", Use::Refused(Neutral::Zero), "not OpenCV's fisheye, the only model of Gyroflow that can be imported"),
+    Key::new(
+        "distortion_model_id",
+        Use::Refused(Neutral::Zero),
+        "not OpenCV's fisheye, the only model of Gyroflow that can be imported",
+    ),
     Key::new("digital_lens", Use::Refused(Neutral::Never), BENT),
     Key::new("digital_lens_params", Use::Named(Neutral::Never), BENT),
     Key::new("is_superview", Use::Refused(Neutral::Zero), BENT),
@@ -37,8 +59,16 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("input_vertical_stretch", Use::Refused(Neutral::UpToOne), STRETCHED),
     Key::new("fps", Use::Rate, "frames a second"),
     Key::new("frame_readout_time", Use::Readout(1.0), "ms a frame; negative: from the last row to the first"),
-    Key::new("interpolations", Use::Named(Neutral::Never), "calibrations at other focal lengths; the profile's own is taken"),
-    Key::new("interpolations.**", Use::Named(Neutral::Never), "calibrations at other focal lengths; the profile's own is taken"),
+    Key::new(
+        "interpolations",
+        Use::Named(Neutral::Never),
+        "calibrations at other focal lengths; the profile's own is taken",
+    ),
+    Key::new(
+        "interpolations.**",
+        Use::Named(Neutral::Never),
+        "calibrations at other focal lengths; the profile's own is taken",
+    ),
     Key::new(
         "compatible_settings.**",
         Use::Named(Neutral::Never),
@@ -76,18 +106,28 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     if let Some(model) = word(value, "distortion_model")
         && model != "opencv_fisheye"
     {
-        return Err(Problem::new("distortion_model", format!("is `{model}`: only opencv_fisheye can be imported")));
+        return Err(Problem::new(
+            "distortion_model",
+            format!("is `{model}`: only opencv_fisheye can be imported"),
+        ));
     }
     let [width, height] = [number(value, "calib_dimension.w")?, number(value, "calib_dimension.h")?];
     let size_px = size("calib_dimension", [width, height])?;
-    let (standard, fisheye) = (flag(value, "use_opencv_standard")?.unwrap_or(false), flag(value, "use_opencv_fisheye")?);
+    let (standard, fisheye) =
+        (flag(value, "use_opencv_standard")?.unwrap_or(false), flag(value, "use_opencv_fisheye")?);
     let (section, model, max) = match (standard, fisheye) {
         (true, Some(true)) => {
-            return Err(Problem::new("use_opencv_standard", "is true, and so is use_opencv_fisheye: which of the two is meant?"));
+            return Err(Problem::new(
+                "use_opencv_standard",
+                "is true, and so is use_opencv_fisheye: which of the two is meant?",
+            ));
         }
         (true, _) => ("calib_params", LensModel::BrownConrady, 8),
         (false, Some(false)) => {
-            return Err(Problem::new("use_opencv_fisheye", "is false, and so is use_opencv_standard: no model is left"));
+            return Err(Problem::new(
+                "use_opencv_fisheye",
+                "is false, and so is use_opencv_standard: no model is left",
+            ));
         }
         (false, _) => ("fisheye_params", LensModel::KannalaBrandt, 4),
     };
@@ -95,7 +135,10 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     let key = format!("{section}.distortion_coeffs");
     let mut coefficients = at_most(&key, numbers(value, &key)?, max, "more coefficients than its model has")?;
     if model == LensModel::KannalaBrandt && coefficients.len() < 4 {
-        let text = format!("has {} numbers: k1 k2 k3 k4 are meant; write the ones that are zero too", coefficients.len());
+        let text = format!(
+            "has {} numbers: k1 k2 k3 k4 are meant; write the ones that are zero too",
+            coefficients.len()
+        );
         return Err(Problem::new(key, text));
     }
     if model == LensModel::BrownConrady {
@@ -107,7 +150,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     if crop <= 0.0 {
         return Err(Problem::new("crop", format!("is {crop}: a factor above 0 is meant")));
     }
-    let mut imported = camera(CameraFormat::Gyroflow, size_px, focal_px.map(|f| f / crop), point, model, coefficients);
+    let mut imported =
+        camera(CameraFormat::Gyroflow, size_px, focal_px.map(|f| f / crop), point, model, coefficients);
     if !asymmetrical && in_matrix != point {
         let text = format!(
             "the principal point is the middle, {point:?}, as `asymmetrical` is not true: Gyroflow does not use the matrix's {in_matrix:?} then"
@@ -120,7 +164,10 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     if find(value, "orig_dimension").is_some() {
         let original = [number(value, "orig_dimension.w")?, number(value, "orig_dimension.h")?];
         if original != [width, height] {
-            let text = format!("orig_dimension is {original:?}, but the calibration is of {:?}, which is the size here", [width, height]);
+            let text = format!(
+                "orig_dimension is {original:?}, but the calibration is of {:?}, which is the size here",
+                [width, height]
+            );
             imported.notes.push(text);
         }
     }

@@ -8,8 +8,7 @@ use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
 const POSE: &str = "pose of the camera to an IMU or to another camera, whose axes are not the body's here: set mount by hand";
-const OFFSET: &str =
-    "clock of the camera against that of an IMU, s: it shifts all stamps alike; set shutter.delay_ms if the pictures are to lag";
+const OFFSET: &str = "clock of the camera against that of an IMU, s: it shifts all stamps alike; set shutter.delay_ms if the pictures are to lag";
 
 pub(super) const KEYS: &[Key] = &[
     Key::new("cam*.camera_model", Use::Applied, "pinhole; omni, ds, eucm and ucm are refused"),
@@ -19,11 +18,19 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("cam*.distortion_coefficients", Use::Applied, "the same"),
     Key::new("cam*.resolution", Use::Applied, "width, height"),
     Key::new("cam*.line_delay", Use::LineDelay(1e3), "s a row; times the rows it is the readout"),
-    Key::new("cam*.line_delay_nanoseconds", Use::LineDelay(1e-6), "ns a row; times the rows it is the readout"),
+    Key::new(
+        "cam*.line_delay_nanoseconds",
+        Use::LineDelay(1e-6),
+        "ns a row; times the rows it is the readout",
+    ),
     Key::new("cam*.rate_hz", Use::Rate, "frames a second"),
     Key::new("cam*.timeshift_cam_imu", Use::Named(Neutral::Zero), OFFSET),
     Key::new("cam*.T_*", Use::Named(Neutral::Identity), POSE),
-    Key::new("cam*.mask*", Use::Named(Neutral::Never), "pixels that are not to be used; set photometric.vignette if they are dark"),
+    Key::new(
+        "cam*.mask*",
+        Use::Named(Neutral::Never),
+        "pixels that are not to be used; set photometric.vignette if they are dark",
+    ),
     Key::new("cam*.cam_overlaps", Use::Silent, "which cameras see the same"),
     Key::new("cam*.rostopic", Use::Silent, "a name"),
     Key::new("imu*.**", Use::Silent, "an IMU"),
@@ -33,7 +40,11 @@ pub(super) const EUROC_KEYS: &[Key] = &[
     Key::new("camera_model", Use::Applied, "pinhole; others are refused"),
     Key::new("intrinsics", Use::Applied, "fx fy cx cy"),
     Key::new("distortion_model", Use::Applied, "radial-tangential, equidistant, none; others are refused"),
-    Key::new("distortion_coefficients", Use::Applied, "k1 k2 p1 p2 (radial-tangential) or k1 k2 k3 k4 (equidistant)"),
+    Key::new(
+        "distortion_coefficients",
+        Use::Applied,
+        "k1 k2 p1 p2 (radial-tangential) or k1 k2 k3 k4 (equidistant)",
+    ),
     Key::new("distortion_coeffs", Use::Applied, "the same"),
     Key::new("resolution", Use::Applied, "width, height"),
     Key::new("rate_hz", Use::Rate, "frames a second"),
@@ -46,12 +57,17 @@ pub(super) const EUROC_KEYS: &[Key] = &[
 
 /// `cam0`, `cam1`, ...
 fn is_camera(key: &str) -> bool {
-    key.strip_prefix("cam").is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
+    key.strip_prefix("cam")
+        .is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
-    let cameras =
-        document.value.as_object().into_iter().flatten().filter(|(key, value)| is_camera(key) && find(value, "intrinsics").is_some());
+    let cameras = document
+        .value
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter(|(key, value)| is_camera(key) && find(value, "intrinsics").is_some());
     cameras.map(|(key, value)| Entry::new(key.clone(), value, key.clone())).collect()
 }
 
@@ -60,7 +76,10 @@ pub(super) fn fits_camchain(document: &Document) -> bool {
 }
 
 pub(super) fn fits_euroc(document: &Document) -> bool {
-    document.root.is_empty() && ["intrinsics", "resolution", "distortion_model"].iter().all(|key| find(&document.value, key).is_some())
+    document.root.is_empty()
+        && ["intrinsics", "resolution", "distortion_model"]
+            .iter()
+            .all(|key| find(&document.value, key).is_some())
 }
 
 pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCamera, Problem> {

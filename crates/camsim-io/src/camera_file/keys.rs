@@ -1,7 +1,8 @@
-//! What each importer knows of its format: a table of keys, which decides what becomes of each number of a file.
+//! What each importer knows of its format: a table of keys, which decides what becomes of each number of a
+//! file.
 //!
-//! A key that changes the picture is applied, or the file is refused, or the key is named in a note. A number whose key is in no table is
-//! named too: nothing goes unsaid.
+//! A key that changes the picture is applied, or the file is refused, or the key is named in a note. A number
+//! whose key is in no table is named too: nothing goes unsaid.
 
 use std::borrow::Cow;
 
@@ -12,7 +13,8 @@ use super::document::{Problem, as_number};
 /// A key of a format.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Key {
-    /// Its path: `*` stands for any part of one name, a last `**` for everything below. Indices of lists are left out.
+    /// Its path: `*` stands for any part of one name, a last `**` for everything below. Indices of lists are
+    /// left out.
     pub(super) path: &'static str,
     /// What becomes of it.
     pub(super) use_: Use,
@@ -65,7 +67,9 @@ pub(super) enum Neutral {
 impl Neutral {
     pub(super) fn is(self, value: &Value) -> bool {
         let numbers = flat(value);
-        let all = |test: fn(f64) -> bool| value != &Value::Bool(true) && numbers.as_ref().is_some_and(|list| list.iter().all(|x| test(*x)));
+        let all = |test: fn(f64) -> bool| {
+            value != &Value::Bool(true) && numbers.as_ref().is_some_and(|list| list.iter().all(|x| test(*x)))
+        };
         match (self, value) {
             (_, Value::Null) => true,
             (_, Value::String(text)) if text.trim().is_empty() => true,
@@ -95,7 +99,8 @@ impl Neutral {
 
 fn is_identity(list: &[f64]) -> bool {
     let size = (list.len() as f64).sqrt() as usize;
-    size * size == list.len() && list.iter().enumerate().all(|(at, x)| *x == if at % (size + 1) == 0 { 1.0 } else { 0.0 })
+    size * size == list.len()
+        && list.iter().enumerate().all(|(at, x)| *x == if at % (size + 1) == 0 { 1.0 } else { 0.0 })
 }
 
 /// Every key in every format, by its bare name. What a format's own table says comes first.
@@ -105,7 +110,11 @@ pub(super) const EVERYWHERE: &[Key] = &[
         Use::Refused(Neutral::Zero),
         "the mirror parameter of the MEI (omnidirectional) or double-sphere model, which no lens here is: calibrate with a Brown-Conrady or an equidistant fisheye (Kannala-Brandt) model",
     ),
-    Key::new("skew", Use::Refused(Neutral::Zero), "skew between the axes, which a camera here cannot have: recalibrate without"),
+    Key::new(
+        "skew",
+        Use::Refused(Neutral::Zero),
+        "skew between the axes, which a camera here cannot have: recalibrate without",
+    ),
     Key::new(
         "binning_x",
         Use::Refused(Neutral::UpToOne),
@@ -170,7 +179,9 @@ pub(super) fn leaves(value: &Value) -> Vec<Leaf<'_>> {
                 open.extend(map.iter().rev().map(|(key, value)| (join(key), value)));
             }
             Value::Array(list) if list.iter().any(Value::is_object) => {
-                open.extend(list.iter().enumerate().rev().map(|(index, value)| (format!("{path}[{index}]"), value)));
+                open.extend(
+                    list.iter().enumerate().rev().map(|(index, value)| (format!("{path}[{index}]"), value)),
+                );
             }
             _ => found.push(Leaf { path, value }),
         }
@@ -179,7 +190,8 @@ pub(super) fn leaves(value: &Value) -> Vec<Leaf<'_>> {
 }
 
 fn is_matrix(value: &Value) -> bool {
-    value.get("data").is_some() && ["rows", "cols", "dt", "type_id"].iter().any(|key| value.get(key).is_some())
+    value.get("data").is_some()
+        && ["rows", "cols", "dt", "type_id"].iter().any(|key| value.get(key).is_some())
 }
 
 /// Its numbers, if there are any and nothing else. Truth values count as 0 and 1.
@@ -192,7 +204,8 @@ fn flat(value: &Value) -> Option<Vec<f64>> {
         Value::Object(map) => flat(map.get("data")?),
         Value::Bool(yes) => Some(vec![f64::from(u8::from(*yes))]),
         Value::String(text) => {
-            let list: Option<Vec<f64>> = text.split_whitespace().map(|word| as_number(&Value::String(word.to_owned()))).collect();
+            let list: Option<Vec<f64>> =
+                text.split_whitespace().map(|word| as_number(&Value::String(word.to_owned()))).collect();
             list.filter(|list| !list.is_empty())
         }
         single => as_number(single).map(|number| vec![number]),
@@ -221,7 +234,9 @@ fn matches(pattern: &str, path: &str) -> bool {
 fn fits(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((start, end)) => name.len() >= start.len() + end.len() && name.starts_with(start) && name.ends_with(end),
+        Some((start, end)) => {
+            name.len() >= start.len() + end.len() && name.starts_with(start) && name.ends_with(end)
+        }
     }
 }
 
@@ -248,7 +263,9 @@ pub(super) fn refuse(keys: &'static [Key], leaves: &[Leaf<'_>]) -> Result<(), Pr
 /// `k4`, `p3`, `s1`, `tauX`: what calibrations call their coefficients.
 fn is_coefficient(name: &str) -> bool {
     let digits = name.trim_start_matches(['k', 'p', 's', 'b']);
-    let numbered = name.len() - digits.len() == 1 && !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
+    let numbered = name.len() - digits.len() == 1
+        && !digits.is_empty()
+        && digits.bytes().all(|byte| byte.is_ascii_digit());
     numbered || ["taux", "tauy", "tau_x", "tau_y"].contains(&name.to_ascii_lowercase().as_str())
 }
 
@@ -276,18 +293,31 @@ pub(super) fn left_out(keys: &'static [Key], leaves: &[Leaf<'_>], done: &[String
             _ => {}
         }
     }
-    let mut notes: Vec<String> = notes.into_iter().map(|(about, names)| format!("left out: {names} ({about})")).collect();
+    let mut notes: Vec<String> =
+        notes.into_iter().map(|(about, names)| format!("left out: {names} ({about})")).collect();
     if !unknown.is_empty() {
-        let more = if unknown.len() > 12 { format!(" and {} more", unknown.len() - 12) } else { String::new() };
+        let more =
+            if unknown.len() > 12 { format!(" and {} more", unknown.len() - 12) } else { String::new() };
         unknown.truncate(12);
-        notes.push(format!("left out, as camsim does not know what it is in this format: {}{more}", unknown.join(", ")));
+        notes.push(format!(
+            "left out, as camsim does not know what it is in this format: {}{more}",
+            unknown.join(", ")
+        ));
     }
     notes
 }
 
 /// Names whose words change what the numbers beside them mean.
-const MEANING_WORDS: &[&str] =
-    &["orientation", "pixel_origin", "origin", "convention", "color_encoding", "coordinate_system", "axes", "rotation"];
+const MEANING_WORDS: &[&str] = &[
+    "orientation",
+    "pixel_origin",
+    "origin",
+    "convention",
+    "color_encoding",
+    "coordinate_system",
+    "axes",
+    "rotation",
+];
 
 /// Anything that may be a number of the camera; of words, those that may be a model.
 fn is_telling(leaf: &Leaf<'_>) -> bool {
@@ -296,9 +326,12 @@ fn is_telling(leaf: &Leaf<'_>) -> bool {
         Value::Bool(yes) => *yes,
         Value::String(text) if flat(leaf.value).is_none() => {
             !text.trim().is_empty()
-                && (["model", "distort", "project", "lens", "shutter", "crop", "type", "mask", "vignet", "unit"]
-                    .iter()
-                    .any(|part| name.contains(part))
+                && ([
+                    "model", "distort", "project", "lens", "shutter", "crop", "type", "mask", "vignet",
+                    "unit",
+                ]
+                .iter()
+                .any(|part| name.contains(part))
                     || MEANING_WORDS.contains(&name.as_str()))
         }
         other => flat(other).is_some(),

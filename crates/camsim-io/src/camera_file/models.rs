@@ -6,22 +6,35 @@ use serde_json::Value;
 
 use super::document::{Problem, at_most, find, numbers};
 
-/// Model and coefficients in the order that camsim has, out of a model's name; radial-tangential coefficients are in OpenCV's order.
-pub(super) fn by_name(model_key: &str, model: &str, key: &str, coefficients: Vec<f64>) -> Result<(LensModel, Vec<f64>), Problem> {
-    let plain: String = model.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+/// Model and coefficients in the order that camsim has, out of a model's name; radial-tangential coefficients
+/// are in OpenCV's order.
+pub(super) fn by_name(
+    model_key: &str,
+    model: &str,
+    key: &str,
+    coefficients: Vec<f64>,
+) -> Result<(LensModel, Vec<f64>), Problem> {
+    let plain: String =
+        model.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
     match plain.as_str() {
-        "none" | "nodistortion" | "" if coefficients.iter().all(|k| *k == 0.0) => Ok((LensModel::BrownConrady, Vec::new())),
+        "none" | "nodistortion" | "" if coefficients.iter().all(|k| *k == 0.0) => {
+            Ok((LensModel::BrownConrady, Vec::new()))
+        }
         "none" | "nodistortion" | "" => {
             let said = if plain.is_empty() { "says nothing" } else { "says that there is none" };
-            Err(Problem::new(key, format!("has coefficients, but {model_key} {said}: name their model there, or delete them")))
+            Err(Problem::new(
+                key,
+                format!("has coefficients, but {model_key} {said}: name their model there, or delete them"),
+            ))
         }
-        "radtan" | "radialtangential" | "plumbbob" | "radtan5" => Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 5)?)),
+        "radtan" | "radialtangential" | "plumbbob" | "radtan5" => {
+            Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 5)?))
+        }
         "radialtangential8" | "radtan8" | "rationalpolynomial" | "rational" => {
             Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 8)?))
         }
-        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4" | "kannalabrandt8" | "kb4" => {
-            Ok((LensModel::KannalaBrandt, equidistant(key, coefficients)?))
-        }
+        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4" | "kannalabrandt8"
+        | "kb4" => Ok((LensModel::KannalaBrandt, equidistant(key, coefficients)?)),
         other => {
             let which = unknown(other).map_or(String::new(), |name| format!(" ({name})"));
             let text = format!(
@@ -33,19 +46,28 @@ pub(super) fn by_name(model_key: &str, model: &str, key: &str, coefficients: Vec
     }
 }
 
-/// The coefficients at `key`; a file that names a model must have them, and one without a model's name must say that it has none.
-pub(super) fn stated(value: &Value, model_key: &str, model: &str, key: Option<&str>) -> Result<Vec<f64>, Problem> {
+/// The coefficients at `key`; a file that names a model must have them, and one without a model's name must
+/// say that it has none.
+pub(super) fn stated(
+    value: &Value,
+    model_key: &str,
+    model: &str,
+    key: Option<&str>,
+) -> Result<Vec<f64>, Problem> {
     match key.filter(|key| find(value, key).is_some()) {
         Some(key) => numbers(value, key),
         None if model == "none" => Ok(Vec::new()),
-        None if model.is_empty() => {
-            Err(Problem::new(model_key, "is missing, and so are coefficients: write `none` if the lens has no distortion"))
-        }
+        None if model.is_empty() => Err(Problem::new(
+            model_key,
+            "is missing, and so are coefficients: write `none` if the lens has no distortion",
+        )),
         None => {
             let key = key.unwrap_or("distortion_coeffs");
             Err(Problem::new(
                 key,
-                format!("is missing, but {model_key} is `{model}`: add it, or write `none` there if the lens has no distortion"),
+                format!(
+                    "is missing, but {model_key} is `{model}`: add it, or write `none` there if the lens has no distortion"
+                ),
             ))
         }
     }
@@ -76,7 +98,11 @@ pub(super) fn radial_tangential(key: &str, coefficients: Vec<f64>, max: usize) -
             key,
             coefficients,
             max,
-            if max == 8 { "those after the eighth are OpenCV's thin-prism and tilt terms" } else { "its model has five" },
+            if max == 8 {
+                "those after the eighth are OpenCV's thin-prism and tilt terms"
+            } else {
+                "its model has five"
+            },
         ),
         count => {
             let text = format!(
@@ -92,6 +118,9 @@ pub(super) fn equidistant(key: &str, coefficients: Vec<f64>) -> Result<Vec<f64>,
     match coefficients.len() {
         4 => Ok(coefficients),
         count if count > 4 => at_most(key, coefficients, 4, "a fisheye has four"),
-        count => Err(Problem::new(key, format!("has {count} numbers: k1 k2 k3 k4 are meant; write the ones that are zero too"))),
+        count => Err(Problem::new(
+            key,
+            format!("has {count} numbers: k1 k2 k3 k4 are meant; write the ones that are zero too"),
+        )),
     }
 }

@@ -7,17 +7,24 @@ use super::document::{Document, Problem, find, numbers_n, size, word};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
-const DELAY: &str =
-    "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag";
+const DELAY: &str = "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag";
 const ESTIMATOR: &str = "a setting of the estimator";
 
 pub(super) const KEYS: &[Key] = &[
     Key::new("cameras.image_dimension", Use::Applied, "width, height"),
     Key::new("cameras.focal_length", Use::Applied, "fx, fy"),
     Key::new("cameras.principal_point", Use::Applied, "cx, cy"),
-    Key::new("cameras.distortion_type", Use::Applied, "radialtangential, radialtangential8, equidistant, none; others are refused"),
+    Key::new(
+        "cameras.distortion_type",
+        Use::Applied,
+        "radialtangential, radialtangential8, equidistant, none; others are refused",
+    ),
     Key::new("cameras.distortion_coefficients", Use::Applied, "in OpenCV's order"),
-    Key::new("cameras.T_SC", Use::Named(Neutral::Identity), "pose of the camera to the IMU: set mount by hand"),
+    Key::new(
+        "cameras.T_SC",
+        Use::Named(Neutral::Identity),
+        "pose of the camera to the IMU: set mount by hand",
+    ),
     Key::new("cameras.cam_model", Use::Applied, "pinhole; others are refused"),
     Key::new("cameras.camera_model", Use::Applied, "pinhole; others are refused"),
     Key::new("cameras.slam_use", Use::Silent, ESTIMATOR),
@@ -45,7 +52,8 @@ fn list(document: &Document) -> &[Value] {
 }
 
 pub(super) fn fits(document: &Document) -> bool {
-    let is_camera = |value: &Value| find(value, "focal_length").is_some() || find(value, "image_dimension").is_some();
+    let is_camera =
+        |value: &Value| find(value, "focal_length").is_some() || find(value, "image_dimension").is_some();
     document.root.is_empty() && list(document).iter().any(is_camera)
 }
 
@@ -64,12 +72,22 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         if let Some(model) = word(value, key)
             && model != "pinhole"
         {
-            return Err(Problem::new(key, format!("is `{model}`: only `pinhole` can be imported; calibrate with it")));
+            return Err(Problem::new(
+                key,
+                format!("is `{model}`: only `pinhole` can be imported; calibrate with it"),
+            ));
         }
     }
     let size_px = size("image_dimension", numbers_n(value, "image_dimension")?)?;
     let kind = word(value, "distortion_type").unwrap_or_default();
     let list = models::stated(value, "distortion_type", kind, Some("distortion_coefficients"))?;
     let (model, list) = models::by_name("distortion_type", kind, "distortion_coefficients", list)?;
-    Ok(camera(CameraFormat::Okvis, size_px, numbers_n(value, "focal_length")?, numbers_n(value, "principal_point")?, model, list))
+    Ok(camera(
+        CameraFormat::Okvis,
+        size_px,
+        numbers_n(value, "focal_length")?,
+        numbers_n(value, "principal_point")?,
+        model,
+        list,
+    ))
 }

@@ -1,11 +1,13 @@
-//! OpenCV FileStorage (YAML, XML, JSON), and the like as Python scripts write it: a camera matrix, distortion coefficients and an image size
-//! under one of their usual names.
+//! OpenCV FileStorage (YAML, XML, JSON), and the like as Python scripts write it: a camera matrix, distortion
+//! coefficients and an image size under one of their usual names.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
 use super::choose::Entry;
-use super::document::{Document, Problem, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size, word};
+use super::document::{
+    Document, Problem, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size, word,
+};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models, ros};
 
@@ -78,29 +80,121 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("model", Use::Applied, "the same"),
     Key::new("DistModel", Use::Applied, "the same"),
     Key::new("dist_model", Use::Applied, "the same"),
-    Key::new("image_shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
-    Key::new("img_shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
-    Key::new("shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
-    Key::new("new_camera_matrix", Use::Named(Neutral::Never), "the matrix of undistorted pictures; those that come out are distorted"),
-    Key::new("newcameramtx", Use::Named(Neutral::Never), "the matrix of undistorted pictures; those that come out are distorted"),
-    Key::new("roi", Use::Named(Neutral::Zero), "the valid part of undistorted pictures; those that come out are distorted"),
-    Key::new("R", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("R1", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("R2", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("R_L", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("R_R", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P2", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P_L", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P_R", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("T_L", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("T_R", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("T", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("E", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("F", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P1", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("Q", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("*_projection", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new(
+        "image_shape",
+        Use::Refused(Neutral::Never),
+        "rows first or columns first? Write image_width and image_height instead",
+    ),
+    Key::new(
+        "img_shape",
+        Use::Refused(Neutral::Never),
+        "rows first or columns first? Write image_width and image_height instead",
+    ),
+    Key::new(
+        "shape",
+        Use::Refused(Neutral::Never),
+        "rows first or columns first? Write image_width and image_height instead",
+    ),
+    Key::new(
+        "new_camera_matrix",
+        Use::Named(Neutral::Never),
+        "the matrix of undistorted pictures; those that come out are distorted",
+    ),
+    Key::new(
+        "newcameramtx",
+        Use::Named(Neutral::Never),
+        "the matrix of undistorted pictures; those that come out are distorted",
+    ),
+    Key::new(
+        "roi",
+        Use::Named(Neutral::Zero),
+        "the valid part of undistorted pictures; those that come out are distorted",
+    ),
+    Key::new(
+        "R",
+        Use::Named(Neutral::Identity),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "R1",
+        Use::Named(Neutral::Identity),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "R2",
+        Use::Named(Neutral::Identity),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "R_L",
+        Use::Named(Neutral::Identity),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "R_R",
+        Use::Named(Neutral::Identity),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "P",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "P2",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "P_L",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "P_R",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "T_L",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "T_R",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "T",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "E",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "F",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "P1",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "Q",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
+    Key::new(
+        "*_projection",
+        Use::Named(Neutral::Zero),
+        "stereo or rectification geometry, which a single camera has not",
+    ),
     Key::new("CameraExtrinsicMat", Use::Named(Neutral::Identity), "pose of the camera: set mount by hand"),
     Key::new("extrinsic_parameters", Use::Silent, "poses of the calibration board"),
     Key::new("image_points", Use::Silent, "corners that were found"),
@@ -170,7 +264,8 @@ pub(super) const SIZES: [(&str, &str); 6] = [
     ("img_width", "img_height"),
     ("camera_width", "camera_height"),
 ];
-pub(super) const SIZE_LISTS: [&str; 7] = ["image_size", "imageSize", "ImageSize", "img_size", "size", "resolution", "image_resolution"];
+pub(super) const SIZE_LISTS: [&str; 7] =
+    ["image_size", "imageSize", "ImageSize", "img_size", "size", "resolution", "image_resolution"];
 
 /// Names of matrix and coefficients of each camera. Two sets of one camera are refused by `entries`.
 fn pairs(document: &Document) -> Vec<(String, Option<String>)> {
@@ -179,7 +274,10 @@ fn pairs(document: &Document) -> Vec<(String, Option<String>)> {
     for suffix in SUFFIXES {
         for matrix in MATRICES.map(|name| format!("{name}{suffix}")) {
             if numbers(value, &matrix).is_ok_and(|list| list.len() == 9) {
-                let coefficients = COEFFICIENTS.map(|name| format!("{name}{suffix}")).into_iter().find(|name| find(value, name).is_some());
+                let coefficients = COEFFICIENTS
+                    .map(|name| format!("{name}{suffix}"))
+                    .into_iter()
+                    .find(|name| find(value, name).is_some());
                 found.push((matrix, coefficients));
             }
         }
@@ -204,8 +302,13 @@ pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
     pairs(document).into_iter().map(entry).collect()
 }
 
-/// `asked` is whether the user named the format: then four coefficients without a model's name are radial-tangential.
-pub(super) fn import(entry: &Entry<'_>, format: CameraFormat, asked: bool) -> Result<ImportedCamera, Problem> {
+/// `asked` is whether the user named the format: then four coefficients without a model's name are
+/// radial-tangential.
+pub(super) fn import(
+    entry: &Entry<'_>,
+    format: CameraFormat,
+    asked: bool,
+) -> Result<ImportedCamera, Problem> {
     let value = entry.value;
     let matrix = entry.name.as_str();
     let (focal_px, principal_point_px) = camera_matrix(value, matrix)?;
@@ -224,7 +327,10 @@ pub(super) fn import(entry: &Entry<'_>, format: CameraFormat, asked: bool) -> Re
     let named = model(value)?;
     let lens = match (format, named) {
         (CameraFormat::OpenCvFisheye, Some((said_by, LensModel::BrownConrady))) => {
-            return Err(Problem::new(said_by, "says that the model is no fisheye: use `--format opencv`, or correct the file"));
+            return Err(Problem::new(
+                said_by,
+                "says that the model is no fisheye: use `--format opencv`, or correct the file",
+            ));
         }
         (CameraFormat::OpenCvFisheye, _) => LensModel::KannalaBrandt,
         (_, Some((_, model))) => model,
@@ -246,7 +352,9 @@ pub(super) fn import(entry: &Entry<'_>, format: CameraFormat, asked: bool) -> Re
 fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
     let mut named: Option<(&'static str, LensModel)> = None;
     let mut say = |key: &'static str, model: LensModel| match named {
-        Some((before, other)) if other != model => Err(Problem::new(key, format!("says another model than {before}: delete one"))),
+        Some((before, other)) if other != model => {
+            Err(Problem::new(key, format!("says another model than {before}: delete one")))
+        }
         _ => {
             named = Some((key, model));
             Ok(())
@@ -257,14 +365,26 @@ fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
             say(key, if fisheye { LensModel::KannalaBrandt } else { LensModel::BrownConrady })?;
         }
     }
-    for key in ["model_type", "camera_model", "distortion_type", "lens_model", "projection_type", "model", "DistModel", "dist_model"] {
+    for key in [
+        "model_type",
+        "camera_model",
+        "distortion_type",
+        "lens_model",
+        "projection_type",
+        "model",
+        "DistModel",
+        "dist_model",
+    ] {
         let Some(word) = word(value, key) else { continue };
-        let plain: String = word.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+        let plain: String =
+            word.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
         let has = |parts: &[&str]| parts.iter().any(|part| plain.contains(part));
         if let Some(other) = models::unknown(&plain) {
             return Err(Problem::new(
                 key,
-                format!("is `{word}` ({other}), which no lens here is: calibrate with OpenCV's calib3d or fisheye model"),
+                format!(
+                    "is `{word}` ({other}), which no lens here is: calibrate with OpenCV's calib3d or fisheye model"
+                ),
             ));
         } else if has(&["fisheye", "equidist", "kannala", "kb4"]) {
             say(key, LensModel::KannalaBrandt)?;
@@ -278,9 +398,14 @@ fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
 /// The size, however it is called; two that differ are refused.
 pub(super) fn image_size(value: &Value) -> Result<[u32; 2], Problem> {
     let mut found: Option<(&str, [u32; 2])> = None;
-    let apart = SIZES.iter().filter(|(width, height)| find(value, width).is_some() || find(value, height).is_some());
-    let apart = apart.map(|(width, height)| Ok((*width, size(width, [number(value, width)?, number(value, height)?])?)));
-    let lists = SIZE_LISTS.iter().filter(|key| find(value, key).is_some()).map(|key| Ok((*key, size(key, numbers_n(value, key)?)?)));
+    let apart =
+        SIZES.iter().filter(|(width, height)| find(value, width).is_some() || find(value, height).is_some());
+    let apart = apart
+        .map(|(width, height)| Ok((*width, size(width, [number(value, width)?, number(value, height)?])?)));
+    let lists = SIZE_LISTS
+        .iter()
+        .filter(|key| find(value, key).is_some())
+        .map(|key| Ok((*key, size(key, numbers_n(value, key)?)?)));
     for one in apart.chain(lists) {
         let (key, size_px): (&str, [u32; 2]) = one?;
         match found {
@@ -294,6 +419,11 @@ pub(super) fn image_size(value: &Value) -> Result<[u32; 2], Problem> {
             _ => found = Some((key, size_px)),
         }
     }
-    let missing = || Problem::new("image_width", "is missing: add `image_width` and `image_height` of the pictures that were calibrated");
+    let missing = || {
+        Problem::new(
+            "image_width",
+            "is missing: add `image_width` and `image_height` of the pictures that were calibrated",
+        )
+    };
     found.map(|(_, size_px)| size_px).ok_or_else(missing)
 }

@@ -1,5 +1,5 @@
-//! OpenSfM and OpenDroneMap: `camera_models.json`, `cameras.json`, `reconstruction.json`. Lengths are fractions of the longer side, counted
-//! from the middle of the picture.
+//! OpenSfM and OpenDroneMap: `camera_models.json`, `cameras.json`, `reconstruction.json`. Lengths are
+//! fractions of the longer side, counted from the middle of the picture.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
@@ -18,14 +18,22 @@ pub(super) const KEYS: &[Key] = &[
         Use::Applied,
         "perspective (also where it is missing), simple_radial, radial, brown, fisheye, fisheye_opencv; others are refused",
     ),
-    Key::new("width", Use::Applied, "must be there; the data base of cameras that ships with OpenSfM has none"),
+    Key::new(
+        "width",
+        Use::Applied,
+        "must be there; the data base of cameras that ships with OpenSfM has none",
+    ),
     Key::new("height", Use::Applied, "must be there"),
     Key::new("focal", Use::Applied, FRACTION),
     Key::new("focal_x", Use::Applied, FRACTION),
     Key::new("focal_y", Use::Applied, "fraction of the longer side, of fx and fy alike"),
     Key::new("c_x", Use::Applied, "fraction of the longer side, from the middle"),
     Key::new("c_y", Use::Applied, "fraction of the longer side, from the middle"),
-    Key::new("k1", Use::Applied, "coefficient; refused unless zero where the projection has it not, like the following"),
+    Key::new(
+        "k1",
+        Use::Applied,
+        "coefficient; refused unless zero where the projection has it not, like the following",
+    ),
     Key::new("k2", Use::Applied, "coefficient"),
     Key::new("k3", Use::Applied, "coefficient"),
     Key::new("k4", Use::Applied, "coefficient"),
@@ -61,7 +69,9 @@ fn is_data_base(document: &Document) -> bool {
 pub(super) fn fits(document: &Document) -> bool {
     let named = cameras(document).is_some_and(|(map, _)| map.values().any(is_camera));
     document.root.is_empty()
-        && (named || is_camera(&document.value) && find(&document.value, "projection_type").is_some() || is_data_base(document))
+        && (named
+            || is_camera(&document.value) && find(&document.value, "projection_type").is_some()
+            || is_data_base(document))
 }
 
 pub(super) fn entries(document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
@@ -73,7 +83,8 @@ pub(super) fn entries(document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
     if is_camera(&document.value) {
         return Ok(Entry::only(&document.value));
     }
-    let (map, prefix) = cameras(document).ok_or_else(|| Problem::new("cameras", "there is none in the file"))?;
+    let (map, prefix) =
+        cameras(document).ok_or_else(|| Problem::new("cameras", "there is none in the file"))?;
     let cameras = map.iter().filter(|(_, value)| is_camera(value));
     Ok(cameras.map(|(name, value)| Entry::new(name.clone(), value, format!("{prefix}{name}"))).collect())
 }
@@ -100,7 +111,9 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         "fisheye_opencv" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"], "k1 to k4"),
         other => {
             let which = models::unknown(other).map_or(String::new(), |name| format!(" ({name})"));
-            let text = format!("is `{other}`{which}, which no lens here is: reconstruct with perspective, brown or fisheye_opencv");
+            let text = format!(
+                "is `{other}`{which}, which no lens here is: reconstruct with perspective, brown or fisheye_opencv"
+            );
             return Err(Problem::new("projection_type", text));
         }
     };
@@ -108,15 +121,23 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         if !coefficients.contains(&key) && or_zero(key)? != 0.0 {
             return Err(Problem::new(
                 key,
-                format!("is not zero, but `{kind}` has {names} alone: delete it, or name the projection that is meant"),
+                format!(
+                    "is not zero, but `{kind}` has {names} alone: delete it, or name the projection that is meant"
+                ),
             ));
         }
     }
     let focal = match one_of(value, &["focal_x", "focal"])? {
-        Some(key) => [number(value, key)?, optional_number(value, "focal_y")?.map_or_else(|| number(value, key), Ok)?],
+        Some(key) => {
+            [number(value, key)?, optional_number(value, "focal_y")?.map_or_else(|| number(value, key), Ok)?]
+        }
         None => return Err(Problem::new("focal", "is missing")),
     };
-    let order: &[&str] = if model == LensModel::KannalaBrandt { &["k1", "k2", "k3", "k4"] } else { &["k1", "k2", "p1", "p2", "k3"] };
+    let order: &[&str] = if model == LensModel::KannalaBrandt {
+        &["k1", "k2", "k3", "k4"]
+    } else {
+        &["k1", "k2", "p1", "p2", "k3"]
+    };
     let list = order.iter().map(|key| or_zero(key)).collect::<Result<Vec<f64>, _>>()?;
     let middle = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
     let point = [middle[0] + longer * or_zero("c_x")?, middle[1] + longer * or_zero("c_y")?];

@@ -12,7 +12,11 @@ const POSE: &str = "pose of the camera, or of one to another: set mount by hand"
 const COEFFICIENT: &str = "a coefficient; k1 k2 p1 p2 k3 of PinHole, k1 k2 k3 k4 of KannalaBrandt8";
 
 pub(super) const KEYS: &[Key] = &[
-    Key::new("Camera.type", Use::Applied, "PinHole (also where it is missing), KannalaBrandt8, Rectified; others are refused"),
+    Key::new(
+        "Camera.type",
+        Use::Applied,
+        "PinHole (also where it is missing), KannalaBrandt8, Rectified; others are refused",
+    ),
     Key::new("Camera.width", Use::Applied, "width; must be added to ORB-SLAM2's files, which have none"),
     Key::new("Camera.height", Use::Applied, "height"),
     Key::new("Camera.fps", Use::Rate, "frames a second"),
@@ -52,8 +56,16 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("Stereo.T_c1_c2", Use::Named(Neutral::Identity), POSE),
     Key::new("Stereo.b", Use::Named(Neutral::Zero), "the stereo baseline, which a single camera has not"),
     Key::new("Stereo.ThDepth", Use::Silent, "a setting of that program"),
-    Key::new("LEFT.**", Use::Named(Neutral::Never), "the rectified pair: import each camera's own calibration"),
-    Key::new("RIGHT.**", Use::Named(Neutral::Never), "the rectified pair: import each camera's own calibration"),
+    Key::new(
+        "LEFT.**",
+        Use::Named(Neutral::Never),
+        "the rectified pair: import each camera's own calibration",
+    ),
+    Key::new(
+        "RIGHT.**",
+        Use::Named(Neutral::Never),
+        "the rectified pair: import each camera's own calibration",
+    ),
     Key::new("ThDepth", Use::Silent, "a setting of that program"),
     Key::new("*DepthMapFactor", Use::Silent, "scale of depth pictures"),
     Key::new("RGBD.DepthMapFactor", Use::Silent, "scale of depth pictures"),
@@ -68,18 +80,31 @@ pub(super) const KEYS: &[Key] = &[
 const CAMERAS: [&str; 3] = ["Camera", "Camera1", "Camera2"];
 
 pub(super) fn fits(document: &Document) -> bool {
-    document.root.is_empty() && CAMERAS.iter().any(|camera| find(&document.value, &format!("{camera}.fx")).is_some())
+    document.root.is_empty()
+        && CAMERAS.iter().any(|camera| find(&document.value, &format!("{camera}.fx")).is_some())
 }
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
     let there = CAMERAS.into_iter().filter(|camera| find(&document.value, &format!("{camera}.fx")).is_some());
-    let own = |camera: &str| ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2"].map(|key| format!("{camera}.{key}")).to_vec();
-    there.map(|camera| Entry { name: camera.to_owned(), also: Vec::new(), value: &document.value, roots: own(camera) }).collect()
+    let own = |camera: &str| {
+        ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2"]
+            .map(|key| format!("{camera}.{key}"))
+            .to_vec()
+    };
+    there
+        .map(|camera| Entry {
+            name: camera.to_owned(),
+            also: Vec::new(),
+            value: &document.value,
+            roots: own(camera),
+        })
+        .collect()
 }
 
 pub(super) fn import(value: &Value, name: &str) -> Result<ImportedCamera, Problem> {
     let get = |key: &str| number(value, &format!("{name}.{key}"));
-    let or_zero = |key: &str| optional_number(value, &format!("{name}.{key}")).map(|found| found.unwrap_or(0.0));
+    let or_zero =
+        |key: &str| optional_number(value, &format!("{name}.{key}")).map(|found| found.unwrap_or(0.0));
     let (focal_px, principal_point_px) = ([get("fx")?, get("fy")?], [get("cx")?, get("cy")?]);
     if find(value, "Camera.width").is_none() {
         let text = "is missing: add `Camera.width` and `Camera.height` of the pictures that were calibrated (ORB-SLAM2 takes them from the pictures)";
@@ -106,11 +131,19 @@ pub(super) fn import(value: &Value, name: &str) -> Result<ImportedCamera, Proble
         }
         "kannalabrandt8" | "kannalabrandt" => {
             if or_zero("p1")? != 0.0 || or_zero("p2")? != 0.0 {
-                return Err(Problem::new(format!("{name}.p1"), "is not zero: KannalaBrandt8 has no tangential terms"));
+                return Err(Problem::new(
+                    format!("{name}.p1"),
+                    "is not zero: KannalaBrandt8 has no tangential terms",
+                ));
             }
             (LensModel::KannalaBrandt, vec![get("k1")?, get("k2")?, get("k3")?, get("k4")?])
         }
-        _ => return Err(Problem::new("Camera.type", format!("is `{kind}`: PinHole, KannalaBrandt8 and Rectified can be imported"))),
+        _ => {
+            return Err(Problem::new(
+                "Camera.type",
+                format!("is `{kind}`: PinHole, KannalaBrandt8 and Rectified can be imported"),
+            ));
+        }
     };
     Ok(camera(CameraFormat::OrbSlam, size_px, focal_px, principal_point_px, model, coefficients))
 }

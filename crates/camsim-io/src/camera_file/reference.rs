@@ -1,5 +1,5 @@
-//! XML of the paper's reference program (`<simParams>`). Of repeated elements the last one counts, as there; elements whose name ends
-//! in 0 are its way of commenting out.
+//! XML of the paper's reference program (`<simParams>`). Of repeated elements the last one counts, as there;
+//! elements whose name ends in 0 are its way of commenting out.
 
 use std::path::PathBuf;
 
@@ -41,14 +41,22 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("camInAcEu.roll", Use::Applied, "mount.angles_deg"),
     Key::new("camInAcEu.pitch", Use::Applied, "mount.angles_deg"),
     Key::new("camInAcEu.yaw", Use::Applied, "mount.angles_deg"),
-    Key::new("camInAcEu.*Err", Use::Named(Neutral::Zero), "an error that program adds to what it tells its estimator"),
+    Key::new(
+        "camInAcEu.*Err",
+        Use::Named(Neutral::Zero),
+        "an error that program adds to what it tells its estimator",
+    ),
     Key::new("sensorParams.cameraFps", Use::Applied, "fps"),
     Key::new("sensorParams.phasePercent", Use::Applied, "phase; a fraction, in spite of its name"),
     Key::new("dynamicParams.td", Use::Applied, "s: shutter.delay_ms"),
     Key::new("dynamicParams.tr", Use::Applied, "s: shutter.readout_ms"),
     Key::new("dynamicParams.te", Use::Applied, "s: shutter.exposure_ms"),
     Key::new("dynamicParams.ti", Use::Applied, "s: shutter.interlace_ms"),
-    Key::new("dynamicParams.tdErr", Use::Named(Neutral::Zero), "an error that program adds to what it tells its estimator"),
+    Key::new(
+        "dynamicParams.tdErr",
+        Use::Named(Neutral::Zero),
+        "an error that program adds to what it tells its estimator",
+    ),
     Key::new("dynamicParams.motionBlurExtraSamples", Use::Silent, "how finely it draws blur"),
     Key::new("signalParams.dayLight", Use::Applied, "photometric.light"),
     Key::new("signalParams.noiseAmp", Use::Applied, "photometric.noise_sigma"),
@@ -102,7 +110,14 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     for name in ["k1", "k2", "t1", "t2", "k3", "k4", "k5", "k6"] {
         coefficients.push(or_zero(&format!("staticParams.{name}"))?);
     }
-    let mut imported = camera(CameraFormat::Reference, size_px, focal_px, principal_point_px, LensModel::BrownConrady, coefficients);
+    let mut imported = camera(
+        CameraFormat::Reference,
+        size_px,
+        focal_px,
+        principal_point_px,
+        LensModel::BrownConrady,
+        coefficients,
+    );
     let spec = &mut imported.spec;
 
     match optional_number(value, "sensorParams.cameraFps")? {
@@ -111,7 +126,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     }
     // Called a percentage, used as a fraction of the frame period.
     spec.phase = or_zero("sensorParams.phasePercent")?;
-    spec.mount.angles_deg = [or_zero("camInAcEu.roll")?, or_zero("camInAcEu.pitch")?, or_zero("camInAcEu.yaw")?];
+    spec.mount.angles_deg =
+        [or_zero("camInAcEu.roll")?, or_zero("camInAcEu.pitch")?, or_zero("camInAcEu.yaw")?];
     // Seconds there, and td counts as here: positive is older.
     spec.shutter.delay_ms = 1e3 * or_zero("dynamicParams.td")?;
     spec.shutter.readout_ms = 1e3 * or_zero("dynamicParams.tr")?;
@@ -119,18 +135,23 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     spec.shutter.interlace_ms = FieldOr::Ms(1e3 * or_zero("dynamicParams.ti")?);
     if let Some(file) = word(value, "vignetParams.vignetFile").filter(|file| !file.is_empty()) {
         spec.photometric.vignette = Some(PathBuf::from(file));
-        spec.photometric.vignette_thresholds = [number(value, "vignetParams.vignetThresh1")?, number(value, "vignetParams.vignetThresh2")?];
+        spec.photometric.vignette_thresholds =
+            [number(value, "vignetParams.vignetThresh1")?, number(value, "vignetParams.vignetThresh2")?];
     }
     spec.photometric.light = optional_number(value, "signalParams.dayLight")?.unwrap_or(1.0);
-    spec.photometric.noise_sigma =
-        optional_number(value, "signalParams.noiseAmpDynamic")?.or(optional_number(value, "signalParams.noiseAmp")?).unwrap_or(0.0);
+    spec.photometric.noise_sigma = optional_number(value, "signalParams.noiseAmpDynamic")?
+        .or(optional_number(value, "signalParams.noiseAmp")?)
+        .unwrap_or(0.0);
     if find(value, "camInAcEu").is_none() {
         imported.notes.push(
             "the file has no camInAcEu: the camera looks along the nose; the run parameters' own default is straight down (pitch -90)"
                 .to_owned(),
         );
     }
-    imported.notes.push("the principal point was shifted by half a pixel: there, image corners are at whole numbers".to_owned());
+    imported.notes.push(
+        "the principal point was shifted by half a pixel: there, image corners are at whole numbers"
+            .to_owned(),
+    );
     Ok(imported)
 }
 
@@ -144,7 +165,9 @@ fn intrinsics(value: &Value) -> Result<Intrinsics, Problem> {
     let (width, height) = (number(value, &key("width"))?, number(value, &key("height"))?);
     let (width, height) = (width.trunc(), height.trunc());
     // From a field of view about the image centre.
-    let focal = |field_deg: Option<f64>, size: f64| field_deg.map(|field_deg| 0.5 * size / (0.5 * field_deg).to_radians().tan());
+    let focal = |field_deg: Option<f64>, size: f64| {
+        field_deg.map(|field_deg| 0.5 * size / (0.5 * field_deg).to_radians().tan())
+    };
     let (by_x, by_y) = (focal(get("fovX")?, width), focal(get("fovY")?, height));
     let f = get("f")?;
     let missing = || Problem::new(key("f"), "is missing: f, fx and fy, fovX or fovY gives the focal length");

@@ -1,4 +1,5 @@
-//! ROS camera_info: the YAML file of `camera_calibration`, the message as `rostopic echo` and `ros2 topic echo` print it, and the `.ini` file.
+//! ROS camera_info: the YAML file of `camera_calibration`, the message as `rostopic echo` and `ros2 topic
+//! echo` print it, and the `.ini` file.
 //!
 //! Matrix and region of interest are those of the full sensor; the pictures are the region, binned.
 
@@ -6,7 +7,9 @@ use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
 use super::choose::Entry;
-use super::document::{Document, Problem, camera_matrix, find, flag, number, numbers, one_of, optional_number, size, word};
+use super::document::{
+    Document, Problem, camera_matrix, find, flag, number, numbers, one_of, optional_number, size, word,
+};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
@@ -17,10 +20,18 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("image_height", Use::Applied, "height of the full sensor; `height` in a message"),
     Key::new("width", Use::Applied, "as image_width"),
     Key::new("height", Use::Applied, "as image_height"),
-    Key::new("camera_matrix", Use::Applied, "focal lengths and principal point of the full sensor; `K` or `k` in a message"),
+    Key::new(
+        "camera_matrix",
+        Use::Applied,
+        "focal lengths and principal point of the full sensor; `K` or `k` in a message",
+    ),
     Key::new("K", Use::Applied, "as camera_matrix"),
     Key::new("k", Use::Applied, "as camera_matrix"),
-    Key::new("distortion_model", Use::Applied, "plumb_bob, rational_polynomial, equidistant; others are refused"),
+    Key::new(
+        "distortion_model",
+        Use::Applied,
+        "plumb_bob, rational_polynomial, equidistant; others are refused",
+    ),
     Key::new("distortion_coefficients", Use::Applied, "`D` or `d` in a message"),
     Key::new("D", Use::Applied, "as distortion_coefficients"),
     Key::new("d", Use::Applied, "as distortion_coefficients"),
@@ -34,7 +45,11 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("rectification_matrix", Use::Named(Neutral::Identity), RECTIFIED),
     Key::new("R", Use::Named(Neutral::Identity), RECTIFIED),
     Key::new("r", Use::Named(Neutral::Identity), RECTIFIED),
-    Key::new("projection_matrix", Use::Applied, "named where it differs from camera_matrix: it is that of the rectified pictures"),
+    Key::new(
+        "projection_matrix",
+        Use::Applied,
+        "named where it differs from camera_matrix: it is that of the rectified pictures",
+    ),
     Key::new("P", Use::Applied, "as projection_matrix"),
     Key::new("p", Use::Applied, "as projection_matrix"),
     Key::new("camera_name", Use::Silent, "a name"),
@@ -46,14 +61,18 @@ const MATRICES: [&str; 3] = ["camera_matrix", "K", "k"];
 
 pub(super) fn fits(document: &Document) -> bool {
     let has = |key: &str| find(&document.value, key).is_some();
-    (document.root.is_empty() && MATRICES.iter().any(|key| has(key)) && has("distortion_model")) || document.root == "ini"
+    (document.root.is_empty() && MATRICES.iter().any(|key| has(key)) && has("distortion_model"))
+        || document.root == "ini"
 }
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
     match find(&document.value, "cameras").and_then(Value::as_array) {
         Some(list) if document.root == "ini" => {
             let name = |value: &Value| word(value, "camera_name").unwrap_or_default().to_owned();
-            list.iter().enumerate().map(|(index, value)| Entry::new(name(value), value, format!("cameras[{index}]"))).collect()
+            list.iter()
+                .enumerate()
+                .map(|(index, value)| Entry::new(name(value), value, format!("cameras[{index}]")))
+                .collect()
         }
         _ => Entry::only(&document.value),
     }
@@ -81,11 +100,14 @@ pub(super) const INI_KEYS: &[Key] = &[
 pub(super) fn import(value: &Value, ini: bool) -> Result<ImportedCamera, Problem> {
     let matrix = one_of(value, &MATRICES)?.ok_or_else(|| Problem::new("camera_matrix", "is missing"))?;
     if numbers(value, matrix)?.iter().all(|x| *x == 0.0) {
-        return Err(Problem::new(matrix, "is all zeros, which means in ROS that the camera was never calibrated"));
+        return Err(Problem::new(
+            matrix,
+            "is all zeros, which means in ROS that the camera was never calibrated",
+        ));
     }
     let (focal_px, principal_point_px) = camera_matrix(value, matrix)?;
-    let [width, height] =
-        [&["image_width", "width"], &["image_height", "height"]].map(|names| one_of(value, names).map(|name| name.unwrap_or(names[0])));
+    let [width, height] = [&["image_width", "width"], &["image_height", "height"]]
+        .map(|names| one_of(value, names).map(|name| name.unwrap_or(names[0])));
     let full = [number(value, width?)?, number(value, height?)?];
     size("image_width", full)?;
     let coefficients = one_of(value, &["distortion_coefficients", "D", "d"])?;
@@ -93,7 +115,12 @@ pub(super) fn import(value: &Value, ini: bool) -> Result<ImportedCamera, Problem
     let list = match coefficients {
         Some(key) => numbers(value, key)?,
         None if ini => return Err(Problem::new("distortion", "is missing: five zeros are no distortion")),
-        None => models::stated(value, "distortion_model", word(value, "distortion_model").unwrap_or_default(), Some(key))?,
+        None => models::stated(
+            value,
+            "distortion_model",
+            word(value, "distortion_model").unwrap_or_default(),
+            Some(key),
+        )?,
     };
     let (model, list) = if ini {
         by_count(list)?
@@ -101,7 +128,8 @@ pub(super) fn import(value: &Value, ini: bool) -> Result<ImportedCamera, Problem
         models::by_name("distortion_model", word(value, "distortion_model").unwrap_or_default(), key, list)?
     };
     let region = Region::read(value, full)?;
-    let size_px = size("roi and binning", [region.size[0] / region.binning[0], region.size[1] / region.binning[1]])?;
+    let size_px =
+        size("roi and binning", [region.size[0] / region.binning[0], region.size[1] / region.binning[1]])?;
     let focal_px = [focal_px[0] / region.binning[0], focal_px[1] / region.binning[1]];
     let point = [0, 1].map(|axis| (principal_point_px[axis] - region.offset[axis]) / region.binning[axis]);
     let format = if ini { CameraFormat::RosIni } else { CameraFormat::RosCameraInfo };
@@ -140,14 +168,24 @@ impl Region {
         let size = [or_zero("roi.width")?, or_zero("roi.height")?];
         flag(value, "roi.do_rectify")?;
         // 0 is as good as 1 there.
-        let binning = [or_zero("binning_x")?, or_zero("binning_y")?].map(|binning| if binning == 0.0 { 1.0 } else { binning });
+        let binning = [or_zero("binning_x")?, or_zero("binning_y")?]
+            .map(|binning| if binning == 0.0 { 1.0 } else { binning });
         let size = match size {
             [0.0, 0.0] if offset == [0.0, 0.0] => full,
-            [0.0, 0.0] => return Err(Problem::new("roi", "has an offset but no size: write its width and height, or no region at all")),
+            [0.0, 0.0] => {
+                return Err(Problem::new(
+                    "roi",
+                    "has an offset but no size: write its width and height, or no region at all",
+                ));
+            }
             size => size,
         };
-        let inside =
-            |axis: usize| offset[axis] >= 0.0 && size[axis] > 0.0 && offset[axis] + size[axis] <= full[axis] && offset[axis].fract() == 0.0;
+        let inside = |axis: usize| {
+            offset[axis] >= 0.0
+                && size[axis] > 0.0
+                && offset[axis] + size[axis] <= full[axis]
+                && offset[axis].fract() == 0.0
+        };
         if !(inside(0) && inside(1)) {
             let text = format!(
                 "reaches from {offset:?} over {size:?} px, not within the sensor of {full:?}: offsets and sizes are in pixels of the full, unbinned sensor"
@@ -180,8 +218,9 @@ fn rectified(value: &Value, matrix: &str) -> Result<Option<String>, Problem> {
     if projection.len() != 12 {
         return Err(Problem::new(key, format!("has {} numbers instead of 3 x 4", projection.len())));
     }
-    let same = (0..3).all(|row| (0..3).all(|column| (projection[4 * row + column] - camera[3 * row + column]).abs() < 1e-6))
-        && projection[3] == 0.0
+    let same = (0..3).all(|row| {
+        (0..3).all(|column| (projection[4 * row + column] - camera[3 * row + column]).abs() < 1e-6)
+    }) && projection[3] == 0.0
         && projection[7] == 0.0;
     let unused = same || projection.iter().all(|x| *x == 0.0);
     Ok((!unused).then(|| format!("left out: {key}, which differs from {matrix} ({RECTIFIED})")))

@@ -1,4 +1,5 @@
-//! ROS `.ini` (`camera_calibration_parsers`): a section of the image, then one of each camera, in which a name stands above its numbers.
+//! ROS `.ini` (`camera_calibration_parsers`): a section of the image, then one of each camera, in which a
+//! name stands above its numbers.
 //!
 //! The tree that comes out has the keys of ROS's YAML file, so that `ros` reads both.
 
@@ -25,24 +26,32 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 fn section(line: &str) -> Option<&str> {
-    line.strip_prefix('[')?.strip_suffix(']').filter(|name| !name.contains([',', '[', '{', ':'])).map(str::trim)
+    line.strip_prefix('[')?
+        .strip_suffix(']')
+        .filter(|name| !name.contains([',', '[', '{', ':']))
+        .map(str::trim)
 }
 
 pub(super) fn looks_so(text: &str) -> bool {
-    lines(text).next().is_some_and(|(_, line)| section(line).is_some()) && lines(text).any(|(_, line)| line == "camera matrix")
+    lines(text).next().is_some_and(|(_, line)| section(line).is_some())
+        && lines(text).any(|(_, line)| line == "camera matrix")
 }
 
-/// `{cameras: [{camera_name, image_width, camera_matrix, ...}]}`; what stands in a section of no camera keeps the section's name.
+/// `{cameras: [{camera_name, image_width, camera_matrix, ...}]}`; what stands in a section of no camera keeps
+/// the section's name.
 pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
     let mut sections: Vec<(String, Map<String, Value>)> = Vec::new();
     let mut key: Option<(usize, String)> = None;
     let mut numbers: Vec<f64> = Vec::new();
     let stray = |line: usize, text: &str| SyntaxProblem {
         line: Some(line),
-        message: format!("`{text}`: numbers stand below a name (`width`, `camera matrix`, `distortion`, ...) in a section `[name]`"),
+        message: format!(
+            "`{text}`: numbers stand below a name (`width`, `camera matrix`, `distortion`, ...) in a section `[name]`"
+        ),
     };
     for (number, line) in lines(text).chain([(0, "[]")]) {
-        let parsed: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let parsed: Option<Vec<f64>> =
+            line.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
         if let Some(parsed) = parsed {
             key.as_ref().ok_or_else(|| stray(number, line))?;
             numbers.extend(parsed);
@@ -52,9 +61,13 @@ pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
             let (_, map) = sections.last_mut().ok_or_else(|| stray(at, &name))?;
             let value = if let [single] = numbers[..] { json!(single) } else { json!(numbers) };
             numbers.clear();
-            let known = NAMES.iter().find(|(there, _)| *there == name).map_or(name.as_str(), |(_, here)| here);
+            let known =
+                NAMES.iter().find(|(there, _)| *there == name).map_or(name.as_str(), |(_, here)| here);
             if map.insert(known.to_owned(), value).is_some() {
-                return Err(SyntaxProblem { line: Some(at), message: format!("`{name}` is there twice in its section: delete one") });
+                return Err(SyntaxProblem {
+                    line: Some(at),
+                    message: format!("`{name}` is there twice in its section: delete one"),
+                });
             }
         }
         match section(line) {

@@ -1,4 +1,5 @@
-//! Text into a tree of values: YAML (OpenCV's dialect too), JSON, XML; ROS `.ini` and COLMAP's `cameras.txt` in files of their own.
+//! Text into a tree of values: YAML (OpenCV's dialect too), JSON, XML; ROS `.ini` and COLMAP's `cameras.txt`
+//! in files of their own.
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
@@ -7,7 +8,8 @@ use super::document::{Document, SyntaxProblem};
 use super::{colmap, ros_ini};
 
 impl Document {
-    /// Parses by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a COLMAP camera line COLMAP; anything else YAML.
+    /// Parses by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a COLMAP camera line
+    /// COLMAP; anything else YAML.
     pub(crate) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
         if ros_ini::looks_so(text) {
             return ros_ini::parse(text);
@@ -41,7 +43,10 @@ impl Document {
                 let text = error.without_snippet().to_string();
                 let first = text.lines().next().unwrap_or_default();
                 // It counts lines from the document's beginning; `line` does from the file's.
-                SyntaxProblem { line, message: format!("YAML: {}", first.split(" at line ").next().unwrap_or(first)) }
+                SyntaxProblem {
+                    line,
+                    message: format!("YAML: {}", first.split(" at line ").next().unwrap_or(first)),
+                }
             })?;
             match &parsed {
                 None => parsed = Some(value),
@@ -66,10 +71,12 @@ impl Document {
     }
 }
 
-/// The documents of a YAML text with the lines before each, as plain YAML: OpenCV's first line `%YAML:1.0` is no YAML directive (those have
-/// a space), its matrix tag is no type that matters here, and its own reader wants no blank after a colon.
+/// The documents of a YAML text with the lines before each, as plain YAML: OpenCV's first line `%YAML:1.0` is
+/// no YAML directive (those have a space), its matrix tag is no type that matters here, and its own reader
+/// wants no blank after a colon.
 fn documents(text: &str) -> Vec<(usize, String)> {
-    let opencv = text.lines().next().is_some_and(|line| line.trim_start_matches('\u{feff}').starts_with("%YAML"));
+    let opencv =
+        text.lines().next().is_some_and(|line| line.trim_start_matches('\u{feff}').starts_with("%YAML"));
     let mut parts = vec![(0, String::new())];
     for (index, line) in text.lines().enumerate() {
         if line.trim_end() == "---" {
@@ -83,7 +90,9 @@ fn documents(text: &str) -> Vec<(usize, String)> {
             part.push('\n');
         }
     }
-    parts.retain(|(_, part)| part.lines().any(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#')));
+    parts.retain(|(_, part)| {
+        part.lines().any(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+    });
     parts
 }
 
@@ -170,10 +179,12 @@ impl<'de> Visitor<'de> for UniqueVisitor {
     }
 }
 
-/// Deeper elements are ignored: no calibration file nests that far, and a hostile one must not exhaust the stack.
+/// Deeper elements are ignored: no calibration file nests that far, and a hostile one must not exhaust the
+/// stack.
 const MAX_DEPTH: usize = 64;
 
-/// An element without attributes and children is its text, as a number where it is one; else a map, repeated names being a list.
+/// An element without attributes and children is its text, as a number where it is one; else a map, repeated
+/// names being a list.
 fn xml_value(element: roxmltree::Node<'_, '_>, depth: usize) -> Value {
     let children = || element.children().filter(roxmltree::Node::is_element);
     if element.attributes().len() == 0 && children().next().is_none() {

@@ -76,9 +76,11 @@ fn kalibr_and_euroc() {
     assert_eq!(euroc.spec.lens, imported.spec.lens);
     let fisheye = import_of("chain.yaml", &EUROC_CHAIN.replace("radtan", "equidistant"), "cam0").unwrap();
     assert_eq!(fisheye.spec.lens.model, LensModel::KannalaBrandt);
-    let error = import_of("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni"), "cam0").unwrap_err().to_string();
+    let error =
+        import_of("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni"), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.camera_model") && error.contains("omni"), "{error}");
-    let error = import_of("chain.yaml", &EUROC_CHAIN.replace("458.654, ", ""), "cam0").unwrap_err().to_string();
+    let error =
+        import_of("chain.yaml", &EUROC_CHAIN.replace("458.654, ", ""), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.intrinsics: has 3 numbers"), "{error}");
 }
 
@@ -142,12 +144,17 @@ fn the_reference_programs_pixels_are_half_a_pixel_off() {
     assert!(matches!(spec.shutter.interlace_ms, FieldOr::Ms(ms) if (ms - 20.0).abs() < 1e-9));
     assert_eq!(spec.photometric.vignette, Some(PathBuf::from("vignet-S3LowOffset.bmp")));
     // A 70 degree field over 640 px, scaled down to a quarter of the pixels.
-    let fov =
-        import("ideal.xml", r#"<simParams><idealParams resolutionScale="0.5" width="640" height="480" fovX="70."/></simParams>"#).unwrap();
+    let fov = import(
+        "ideal.xml",
+        r#"<simParams><idealParams resolutionScale="0.5" width="640" height="480" fovX="70."/></simParams>"#,
+    )
+    .unwrap();
     assert_eq!((fov.spec.size_px, fov.spec.principal_point_px), ([320, 240], Some([159.5, 119.5])));
     assert!((fov.spec.focal_px[1] - 160.0 / 35.0_f64.to_radians().tan()).abs() < 1e-9);
     assert_eq!(fov.spec.lens.model, LensModel::Pinhole);
-    let run = import("run.xml", r#"<simParams><includeParams includeFile="a.xml"/></simParams>"#).unwrap_err().to_string();
+    let run = import("run.xml", r#"<simParams><includeParams includeFile="a.xml"/></simParams>"#)
+        .unwrap_err()
+        .to_string();
     assert!(run.contains("idealParams"), "{run}");
 }
 
@@ -188,9 +195,18 @@ fn what_is_no_camera_is_refused() {
         ("broken.json", "{\"a\": "),
         ("broken.yaml", "a: [1, 2\nb: }"),
         ("mei.yaml", "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nmirror_parameters:\n   xi: 1.8\n"),
-        ("nan.yaml", "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [.nan, 1, 1, 1]\n  resolution: [4, 4]\n"),
-        ("zero.yaml", "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [0, 1, 1, 1]\n  resolution: [4, 4]\n"),
-        ("size.yaml", "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [1, 1, 1, 1]\n  resolution: [-4, 4.5]\n"),
+        (
+            "nan.yaml",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [.nan, 1, 1, 1]\n  resolution: [4, 4]\n",
+        ),
+        (
+            "zero.yaml",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [0, 1, 1, 1]\n  resolution: [4, 4]\n",
+        ),
+        (
+            "size.yaml",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [1, 1, 1, 1]\n  resolution: [-4, 4.5]\n",
+        ),
     ] {
         let error = import(name, text).unwrap_err().to_string();
         assert!(error.contains(name), "{error}");
@@ -206,9 +222,16 @@ fn camodocal() {
     let imported = import("cam0_pinhole.yaml", pinhole).unwrap();
     assert_eq!(imported.format, CameraFormat::Camodocal);
     let spec = &imported.spec;
-    assert_eq!((spec.size_px, spec.focal_px, spec.principal_point_px), ([752, 480], [461.1, 459.7], Some([362.6, 248.5])));
-    assert_eq!((spec.lens.model, spec.lens.coefficients.as_slice()), (LensModel::BrownConrady, &[-0.295, 0.0866, 2e-6, 1.4e-5][..]));
-    // TUM VI's first camera as VINS has it, whose numbers are those of the data set's own Kalibr file (equidistant).
+    assert_eq!(
+        (spec.size_px, spec.focal_px, spec.principal_point_px),
+        ([752, 480], [461.1, 459.7], Some([362.6, 248.5]))
+    );
+    assert_eq!(
+        (spec.lens.model, spec.lens.coefficients.as_slice()),
+        (LensModel::BrownConrady, &[-0.295, 0.0866, 2e-6, 1.4e-5][..])
+    );
+    // TUM VI's first camera as VINS has it, whose numbers are those of the data set's own Kalibr file
+    // (equidistant).
     let fisheye = "%YAML:1.0\nimu_topic: \"/imu0\"\nmodel_type: KANNALA_BRANDT\nimage_width: 512\nimage_height: 512\nprojection_parameters:\n   \
                    k2: 0.0034823894022493434\n   k3: 0.0007150348452162257\n   k4: -0.0020532361418706202\n   k5: 0.00020293673591811182\n   \
                    mu: 190.97847715128717\n   mv: 190.9733070521226\n   u0: 254.93170605935475\n   v0: 256.8974428996504\n\
@@ -216,7 +239,10 @@ fn camodocal() {
     let kalibr = "cam0:\n  camera_model: pinhole\n  distortion_model: equidistant\n  resolution: [512, 512]\n  \
                   distortion_coeffs: [0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182]\n  \
                   intrinsics: [190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504]\n";
-    assert_eq!(import("tum_config.yaml", fisheye).unwrap().spec, import("camchain.yaml", kalibr).unwrap().spec);
+    assert_eq!(
+        import("tum_config.yaml", fisheye).unwrap().spec,
+        import("camchain.yaml", kalibr).unwrap().spec
+    );
     for (name, from, to, told) in [
         ("mirror", "PINHOLE", "MEI", "model_type: is `MEI`"),
         ("missing", "   fx: 461.1\n", "", "projection_parameters.fx: is missing"),

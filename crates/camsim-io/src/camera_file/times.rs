@@ -36,7 +36,8 @@ struct Found {
     no_rate: bool,
 }
 
-/// Sets frame rate and shutter; gives the paths of the keys that it used. A note says what was looked for and not found.
+/// Sets frame rate and shutter; gives the paths of the keys that it used. A note says what was looked for and
+/// not found.
 pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result<Vec<String>, Problem> {
     let rows = f64::from(imported.spec.size_px[1]);
     let (mut found, mut done, mut spoken_of) = (Found::default(), Vec::new(), false);
@@ -58,13 +59,19 @@ pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result
     if let Some((path, ms)) = &found.readout_ms {
         match &found.rolling {
             Some((why, false)) if *ms != 0.0 => {
-                imported.notes.push(format!("left out: {path} ({} ms), as {why} says that the shutter is global", ms.abs()));
+                imported.notes.push(format!(
+                    "left out: {path} ({} ms), as {why} says that the shutter is global",
+                    ms.abs()
+                ));
             }
             _ => spec.shutter.readout_ms = ms.abs(),
         }
         spec.shutter.readout = turned(found.direction.unwrap_or_default(), *ms < 0.0);
         if *ms < 0.0 {
-            imported.notes.push(format!("{path} is negative: rows are read the other way round, {:?}", spec.shutter.readout));
+            imported.notes.push(format!(
+                "{path} is negative: rows are read the other way round, {:?}",
+                spec.shutter.readout
+            ));
         }
     }
     if let Some((path, true)) = &found.rolling
@@ -76,22 +83,40 @@ pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result
     }
     let period_ms = 1e3 / spec.fps;
     if found.fps.is_some() && spec.shutter.readout_ms > 1.001 * period_ms {
-        imported.notes.push(format!("the readout of {} ms is longer than the frame period of {period_ms:.3} ms", spec.shutter.readout_ms));
+        imported.notes.push(format!(
+            "the readout of {} ms is longer than the frame period of {period_ms:.3} ms",
+            spec.shutter.readout_ms
+        ));
     }
     let no_shutter = found.readout_ms.is_none() && found.rolling.is_none() && !spoken_of;
     match (found.fps.is_none() && !found.no_rate && !spoken_of, no_shutter) {
-        (true, true) => imported.notes.push("no frame rate and no shutter times are in the file: fps is 30, the shutter global".to_owned()),
+        (true, true) => imported.notes.push(
+            "no frame rate and no shutter times are in the file: fps is 30, the shutter global".to_owned(),
+        ),
         (true, false) => imported.notes.push("no frame rate is in the file: fps is 30".to_owned()),
-        (false, true) => imported.notes.push("no shutter times are in the file: the shutter is global".to_owned()),
+        (false, true) => {
+            imported.notes.push("no shutter times are in the file: the shutter is global".to_owned())
+        }
         (false, false) => {}
     }
     Ok(done)
 }
 
-fn take(leaf: &Leaf<'_>, time: Time, rows: f64, found: &mut Found, notes: &mut Vec<String>) -> Result<(), Problem> {
-    let number = || as_number(leaf.value).ok_or_else(|| Problem::new(&leaf.path, format!("is {}, not a finite number", leaf.value)));
+fn take(
+    leaf: &Leaf<'_>,
+    time: Time,
+    rows: f64,
+    found: &mut Found,
+    notes: &mut Vec<String>,
+) -> Result<(), Problem> {
+    let number = || {
+        as_number(leaf.value)
+            .ok_or_else(|| Problem::new(&leaf.path, format!("is {}, not a finite number", leaf.value)))
+    };
     let yes = || {
-        as_flag(leaf.value).ok_or_else(|| Problem::new(&leaf.path, format!("is {}, neither yes (1, true) nor no (0, false)", leaf.value)))
+        as_flag(leaf.value).ok_or_else(|| {
+            Problem::new(&leaf.path, format!("is {}, neither yes (1, true) nor no (0, false)", leaf.value))
+        })
     };
     match time {
         Time::Readout(unit) => {
@@ -118,10 +143,14 @@ fn take(leaf: &Leaf<'_>, time: Time, rows: f64, found: &mut Found, notes: &mut V
         Time::Kind => match leaf.value.as_str().map(str::to_ascii_lowercase).unwrap_or_default() {
             word if word.contains("rolling") => yes_at(leaf, Ok(true), found),
             word if word.contains("global") => yes_at(leaf, Ok(false), found),
-            word => Err(Problem::new(&leaf.path, format!("is `{word}`: rolling or global is meant; delete it if it is something else"))),
+            word => Err(Problem::new(
+                &leaf.path,
+                format!("is `{word}`: rolling or global is meant; delete it if it is something else"),
+            )),
         },
         Time::Direction => {
-            let word: String = leaf.value.as_str().unwrap_or_default().chars().filter(char::is_ascii_alphabetic).collect();
+            let word: String =
+                leaf.value.as_str().unwrap_or_default().chars().filter(char::is_ascii_alphabetic).collect();
             found.direction = Some(match word.to_ascii_lowercase().as_str() {
                 "toptobottom" => Readout::TopToBottom,
                 "bottomtotop" => Readout::BottomToTop,
@@ -130,7 +159,10 @@ fn take(leaf: &Leaf<'_>, time: Time, rows: f64, found: &mut Found, notes: &mut V
                 _ => {
                     return Err(Problem::new(
                         &leaf.path,
-                        format!("is {}, which is no direction (TopToBottom, BottomToTop, LeftToRight, RightToLeft)", leaf.value),
+                        format!(
+                            "is {}, which is no direction (TopToBottom, BottomToTop, LeftToRight, RightToLeft)",
+                            leaf.value
+                        ),
                     ));
                 }
             });
@@ -142,9 +174,10 @@ fn take(leaf: &Leaf<'_>, time: Time, rows: f64, found: &mut Found, notes: &mut V
 fn yes_at(leaf: &Leaf<'_>, rolling: Result<bool, Problem>, found: &mut Found) -> Result<(), Problem> {
     let rolling = rolling?;
     match &found.rolling {
-        Some((other, before)) if *before != rolling => {
-            Err(Problem::new(&leaf.path, format!("says another thing of the shutter than {other}: delete one")))
-        }
+        Some((other, before)) if *before != rolling => Err(Problem::new(
+            &leaf.path,
+            format!("says another thing of the shutter than {other}: delete one"),
+        )),
         _ => {
             found.rolling = Some((leaf.path.clone(), rolling));
             Ok(())
@@ -155,9 +188,10 @@ fn yes_at(leaf: &Leaf<'_>, rolling: Result<bool, Problem>, found: &mut Found) ->
 /// Keeps a number; a second one that is another is refused.
 fn once(slot: &mut Option<(String, f64)>, leaf: &Leaf<'_>, number: f64, unit: &str) -> Result<(), Problem> {
     match slot {
-        Some((other, before)) if (*before - number).abs() > 5e-3 * before.abs() => {
-            Err(Problem::new(&leaf.path, format!("is {number} {unit}, but {other} is {before}: delete the one that is not meant")))
-        }
+        Some((other, before)) if (*before - number).abs() > 5e-3 * before.abs() => Err(Problem::new(
+            &leaf.path,
+            format!("is {number} {unit}, but {other} is {before}: delete the one that is not meant"),
+        )),
         _ => {
             slot.get_or_insert((leaf.path.clone(), number));
             Ok(())
@@ -165,7 +199,8 @@ fn once(slot: &mut Option<(String, f64)>, leaf: &Leaf<'_>, number: f64, unit: &s
     }
 }
 
-/// A readout in milliseconds. Without a stated unit the one in which a sensor can be that fast: there is never more than one.
+/// A readout in milliseconds. Without a stated unit the one in which a sensor can be that fast: there is
+/// never more than one.
 fn in_ms(leaf: &Leaf<'_>, readout: f64, unit: Option<f64>, notes: &mut Vec<String>) -> Result<f64, Problem> {
     if readout == 0.0 {
         return Ok(0.0);
@@ -177,7 +212,11 @@ fn in_ms(leaf: &Leaf<'_>, readout: f64, unit: Option<f64>, notes: &mut Vec<Strin
         } else {
             Err(Problem::new(
                 &leaf.path,
-                format!("is {}: a readout of {:.3} s, which no sensor takes; check its unit", leaf.value, ms * 1e-3),
+                format!(
+                    "is {}: a readout of {:.3} s, which no sensor takes; check its unit",
+                    leaf.value,
+                    ms * 1e-3
+                ),
             ))
         };
     }
@@ -235,21 +274,45 @@ fn plain(name: &str) -> String {
 /// Words that speak of times, in `plain` spelling.
 fn may_be_a_time(name: &str) -> bool {
     let name = plain(name);
-    ["shutter", "readout", "linedelay", "rowdelay", "linetime", "rowtime", "exposure", "fps", "framerate", "framehz"]
-        .iter()
-        .any(|word| name.contains(word))
+    [
+        "shutter",
+        "readout",
+        "linedelay",
+        "rowdelay",
+        "linetime",
+        "rowtime",
+        "exposure",
+        "fps",
+        "framerate",
+        "framehz",
+    ]
+    .iter()
+    .any(|word| name.contains(word))
 }
 
 pub(super) fn by_name(path: &str) -> Option<Time> {
-    let path = path.split('[').map(|part| part.split_once(']').map_or(part, |(_, rest)| rest)).collect::<String>();
+    let path =
+        path.split('[').map(|part| part.split_once(']').map_or(part, |(_, rest)| rest)).collect::<String>();
     // Rates and times of other sensors.
-    if ["imu", "gyro", "gps", "lidar", "publish"].iter().any(|other| path.to_ascii_lowercase().contains(other)) {
+    if ["imu", "gyro", "gps", "lidar", "publish"]
+        .iter()
+        .any(|other| path.to_ascii_lowercase().contains(other))
+    {
         return None;
     }
     let mut names = path.rsplit('.').map(plain);
     let name = names.next()?;
     let of_name = |name: &str| {
-        for word in ["linedelay", "rowdelay", "linetime", "rowtime", "lineperiod", "rowperiod", "linereadout", "rowreadout"] {
+        for word in [
+            "linedelay",
+            "rowdelay",
+            "linetime",
+            "rowtime",
+            "lineperiod",
+            "rowperiod",
+            "linereadout",
+            "rowreadout",
+        ] {
             if let Some((_, rest)) = name.split_once(word) {
                 return unit(rest).map(Time::LineDelay);
             }
@@ -269,9 +332,15 @@ pub(super) fn by_name(path: &str) -> Option<Time> {
         }
         match name {
             _ if name.ends_with("globalshutter") => Some(Time::Global),
-            _ if name.ends_with("shutter") || name.ends_with("shuttertype") || name.ends_with("shuttermode") => Some(Time::Kind),
-            "fps" | "framerate" | "ratehz" | "framespersecond" | "camerafps" | "camfps" | "camerarate" | "camrate" | "imagerate"
-            | "cameraframerate" | "frameratehz" | "cameraratehz" | "imageratehz" => Some(Time::Rate),
+            _ if name.ends_with("shutter")
+                || name.ends_with("shuttertype")
+                || name.ends_with("shuttermode") =>
+            {
+                Some(Time::Kind)
+            }
+            "fps" | "framerate" | "ratehz" | "framespersecond" | "camerafps" | "camfps" | "camerarate"
+            | "camrate" | "imagerate" | "cameraframerate" | "frameratehz" | "cameraratehz"
+            | "imageratehz" => Some(Time::Rate),
             _ => None,
         }
     };
@@ -279,7 +348,8 @@ pub(super) fn by_name(path: &str) -> Option<Time> {
     of_name(&name).or_else(|| of_name(&format!("{}{name}", names.next()?)))
 }
 
-/// Milliseconds a unit of what stands behind the word; `Some(None)` if it is not said, `None` if it is something else.
+/// Milliseconds a unit of what stands behind the word; `Some(None)` if it is not said, `None` if it is
+/// something else.
 fn unit(rest: &str) -> Option<Option<f64>> {
     let rest = rest.strip_prefix("time").or_else(|| rest.strip_prefix("duration")).unwrap_or(rest);
     let rest = rest.strip_prefix("in").filter(|unit| !unit.is_empty()).unwrap_or(rest);

@@ -32,32 +32,48 @@ pub(super) const KEYS: &[Key] = &[
 ];
 
 pub(super) fn fits(document: &Document) -> bool {
-    document.root.is_empty() && ["cam_model", "cam_width"].iter().all(|key| find(&document.value, key).is_some())
+    document.root.is_empty()
+        && ["cam_model", "cam_width"].iter().all(|key| find(&document.value, key).is_some())
 }
 
 pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     let or_zero = |key: &str| optional_number(value, key).map(|found| found.unwrap_or(0.0));
     let size_px = size("cam_width", [number(value, "cam_width")?, number(value, "cam_height")?])?;
-    let unread = |keys: &[&str], model: &str| match keys.iter().find(|key| or_zero(key).is_ok_and(|k| k != 0.0)) {
-        Some(key) => Err(Problem::new(*key, format!("is not zero, but {model} does not read it: delete it, or name the other model"))),
-        None => Ok(()),
-    };
+    let unread =
+        |keys: &[&str], model: &str| match keys.iter().find(|key| or_zero(key).is_ok_and(|k| k != 0.0)) {
+            Some(key) => Err(Problem::new(
+                *key,
+                format!("is not zero, but {model} does not read it: delete it, or name the other model"),
+            )),
+            None => Ok(()),
+        };
     let (model, coefficients) = match word(value, "cam_model").unwrap_or_default() {
         model @ "Pinhole" => {
             unread(&["k1", "k2", "k3", "k4"], model)?;
             (
                 LensModel::BrownConrady,
-                ["cam_d0", "cam_d1", "cam_d2", "cam_d3", "cam_d4"].into_iter().map(or_zero).collect::<Result<Vec<f64>, _>>()?,
+                ["cam_d0", "cam_d1", "cam_d2", "cam_d3", "cam_d4"]
+                    .into_iter()
+                    .map(or_zero)
+                    .collect::<Result<Vec<f64>, _>>()?,
             )
         }
         model @ "EquidistantCamera" => {
             unread(&["cam_d0", "cam_d1", "cam_d2", "cam_d3", "cam_d4"], model)?;
-            (LensModel::KannalaBrandt, ["k1", "k2", "k3", "k4"].into_iter().map(|key| number(value, key)).collect::<Result<Vec<f64>, _>>()?)
+            (
+                LensModel::KannalaBrandt,
+                ["k1", "k2", "k3", "k4"]
+                    .into_iter()
+                    .map(|key| number(value, key))
+                    .collect::<Result<Vec<f64>, _>>()?,
+            )
         }
         other => {
             return Err(Problem::new(
                 "cam_model",
-                format!("is `{other}`: Pinhole and EquidistantCamera can be imported; calibrate with one of them"),
+                format!(
+                    "is `{other}`: Pinhole and EquidistantCamera can be imported; calibrate with one of them"
+                ),
             ));
         }
     };

@@ -26,7 +26,10 @@ pub(super) fn names_a_flight(header: &Header) -> bool {
     use Meaning::*;
     let any = |is: &dyn Fn(Meaning) -> bool| !header.all(is).is_empty();
     let has = |meaning: Meaning| any(&|other| other == meaning);
-    let plane = (has(Latitude) && has(Longitude)) || has(LatitudeLongitude) || (has(North) && has(East)) || (has(X) && has(Y));
+    let plane = (has(Latitude) && has(Longitude))
+        || has(LatitudeLongitude)
+        || (has(North) && has(East))
+        || (has(X) && has(Y));
     any(&is_time) && ((plane && (any(&is_height) || has(Down) || has(Z))) || any(&|meaning| meaning == Grid))
 }
 
@@ -56,13 +59,21 @@ pub(super) fn time_columns(header: &Header, notes: &mut Vec<Note>) -> Result<Tim
     let texts = header.all(|meaning| meaning == Meaning::DateTime);
     // `time, ms` are two parts of one time, `time, time_ms` two times.
     let is_bare_unit = |column: usize| header.means(column).is_some_and(|means| means.is_bare_unit);
-    let with_unit: Vec<usize> = times.iter().copied().filter(|&column| header.factor(column).is_some() && !is_bare_unit(column)).collect();
+    let with_unit: Vec<usize> = times
+        .iter()
+        .copied()
+        .filter(|&column| header.factor(column).is_some() && !is_bare_unit(column))
+        .collect();
     let column = match (&times[..], &with_unit[..], &parts[..], &texts[..]) {
         ([column], ..) => *column,
         ([_, ..], [column], ..) => {
             information(
                 notes,
-                format!("of the times {} the one that names its unit counts: `{}`", header.list(&times), header.name(*column)),
+                format!(
+                    "of the times {} the one that names its unit counts: `{}`",
+                    header.list(&times),
+                    header.name(*column)
+                ),
             );
             *column
         }
@@ -73,7 +84,11 @@ pub(super) fn time_columns(header: &Header, notes: &mut Vec<Note>) -> Result<Tim
         ([], _, _, _) => return Err(header.two(&parts)),
     };
     header.check(column)?;
-    let unit_ns = if times.is_empty() && !parts.is_empty() { Some(names::NANOSECONDS.factor) } else { header.factor(column) };
+    let unit_ns = if times.is_empty() && !parts.is_empty() {
+        Some(names::NANOSECONDS.factor)
+    } else {
+        header.factor(column)
+    };
     let time_parts = header.all(|meaning| meaning == Meaning::TimePart);
     if is_bare_unit(column) && !time_parts.is_empty() {
         return Err(format!(
@@ -103,14 +118,20 @@ pub(super) fn attitude_columns(header: &Header, notes: &mut Vec<Note>) -> Result
         return Ok(AttitudeColumns::Quaternion(columns));
     }
     if !has_angles {
-        let some: Vec<usize> = header.all(|meaning| matches!(meaning, Roll | Pitch | Yaw | MagneticYaw | Qx | Qy | Qz | Qw));
+        let some: Vec<usize> =
+            header.all(|meaning| matches!(meaning, Roll | Pitch | Yaw | MagneticYaw | Qx | Qy | Qz | Qw));
         if !some.is_empty() {
             information(
                 notes,
-                format!("an attitude needs roll, pitch and yaw, or qx, qy, qz and qw: {} alone is none", header.list(&some)),
+                format!(
+                    "an attitude needs roll, pitch and yaw, or qx, qy, qz and qw: {} alone is none",
+                    header.list(&some)
+                ),
             );
         }
-        let numbered = named(header, |name| ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name));
+        let numbered = named(header, |name| {
+            ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name)
+        });
         if !numbered.is_empty() {
             warning(
                 notes,
@@ -125,7 +146,13 @@ pub(super) fn attitude_columns(header: &Header, notes: &mut Vec<Note>) -> Result
     let &[yaw] = &yaws[..] else { return Err(header.two(&yaws)) };
     header.check(yaw)?;
     if any(MagneticYaw) {
-        warning(notes, format!("`{}` is from magnetic north, but taken as from true north: add the declination", header.name(yaw)));
+        warning(
+            notes,
+            format!(
+                "`{}` is from magnetic north, but taken as from true north: add the declination",
+                header.name(yaw)
+            ),
+        );
     }
     let [roll, pitch] = header.all_of([Roll, Pitch])?.unwrap_or_default();
     Ok(AttitudeColumns::Euler([roll, pitch, yaw].map(|column| Source::whole(column, header.factor(column)))))
@@ -147,7 +174,10 @@ pub(super) fn position_columns(
     if has_geodetic && has_height && matches!(format, LogFormat::Auto | LogFormat::CsvLla) {
         let letters = header.all(|meaning| meaning == Meaning::Hemisphere);
         if !letters.is_empty() {
-            return Err(format!("{} say the hemisphere by letters: write signed degrees and remove these columns", header.list(&letters)));
+            return Err(format!(
+                "{} say the hemisphere by letters: write signed degrees and remove these columns",
+                header.list(&letters)
+            ));
         }
         let is_part = |name: &str| {
             let part = name
@@ -155,7 +185,9 @@ pub(super) fn position_columns(
                 .or(name.strip_prefix("longitude_"))
                 .or(name.strip_prefix("lat_"))
                 .or(name.strip_prefix("lon_"));
-            part.is_some_and(|part| ["min", "mins", "minute", "minutes", "sec", "secs", "second", "seconds"].contains(&part))
+            part.is_some_and(|part| {
+                ["min", "mins", "minute", "minutes", "sec", "secs", "second", "seconds"].contains(&part)
+            })
         };
         let parts = named(header, is_part);
         if !parts.is_empty() {
@@ -174,7 +206,10 @@ pub(super) fn position_columns(
         return Ok((Frame::Geodetic, [plane[0], plane[1], source(height)]));
     }
     let named_otherwise = || {
-        format!("flight.format is \"{}\" but the columns are named otherwise; remove the key or rename the columns", format_name(format))
+        format!(
+            "flight.format is \"{}\" but the columns are named otherwise; remove the key or rename the columns",
+            format_name(format)
+        )
     };
     if format == LogFormat::CsvLla {
         return Err(named_otherwise());
@@ -182,7 +217,9 @@ pub(super) fn position_columns(
     if any(North) && any(East) && (any(Down) || has_height) {
         let Some([north, east]) = header.all_of([North, East])? else { return Err(what_is_missing(header)) };
         let (frame, vertical) = match header.one(Down)? {
-            Some(_) if has_height && format == LogFormat::CsvXya => (Frame::NorthEastUp, height_column(header, None, notes)?),
+            Some(_) if has_height && format == LogFormat::CsvXya => {
+                (Frame::NorthEastUp, height_column(header, None, notes)?)
+            }
             Some(down) => (Frame::NorthEastDown, down),
             None => (Frame::NorthEastUp, height_column(header, None, notes)?),
         };
@@ -201,7 +238,9 @@ pub(super) fn position_columns(
             LogFormat::CsvXya => Frame::NorthEastUp,
             LogFormat::CsvNed if z.is_some() => Frame::NorthEastDown,
             LogFormat::Tum | LogFormat::Euroc if z.is_some() => Frame::EastNorthUp,
-            LogFormat::Auto if z.is_some_and(|z| is_known_world(header, table, time, [x, y, z])) => Frame::EastNorthUp,
+            LogFormat::Auto if z.is_some_and(|z| is_known_world(header, table, time, [x, y, z])) => {
+                Frame::EastNorthUp
+            }
             LogFormat::Auto => return Err(axes_unknown(header, &[x, y])),
             _ => return Err(named_otherwise()),
         };
@@ -228,10 +267,13 @@ pub(super) fn position_columns(
 
 /// Columns by their names in lower case.
 fn named(header: &Header, is: impl Fn(&str) -> bool) -> Vec<usize> {
-    (0..header.0.len()).filter(|&column| is(&header.name(column).trim_matches(['"', ' ']).to_lowercase())).collect()
+    (0..header.0.len())
+        .filter(|&column| is(&header.name(column).trim_matches(['"', ' ']).to_lowercase()))
+        .collect()
 }
 
-/// EuRoC's names, TUM's names, or TUM's order of plain names between blanks: worlds of which it is known that z points up.
+/// EuRoC's names, TUM's names, or TUM's order of plain names between blanks: worlds of which it is known that
+/// z points up.
 fn is_known_world(header: &Header, table: &Table<'_>, time: usize, [x, y, z]: [usize; 3]) -> bool {
     use Meaning::{Qw, Qx, Qy, Qz};
     let quaternion = header.all_of([Qx, Qy, Qz, Qw]).ok().flatten();
@@ -257,7 +299,11 @@ fn axes_unknown(header: &Header, columns: &[usize]) -> String {
 }
 
 /// The column that is the height; `reference` is what `flight.height` says, where that matters.
-fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mut Vec<Note>) -> Result<usize, String> {
+fn height_column(
+    header: &Header,
+    reference: Option<HeightReference>,
+    notes: &mut Vec<Note>,
+) -> Result<usize, String> {
     let wanted = reference.map(|height| match height {
         HeightReference::Msl => Datum::MeanSeaLevel,
         HeightReference::Ellipsoid => Datum::Ellipsoid,
@@ -267,9 +313,18 @@ fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mu
     let other = |datum: Datum| if datum == Datum::Ellipsoid { Datum::MeanSeaLevel } else { Datum::Ellipsoid };
     let key = |datum: Option<Datum>| if datum == Some(Datum::Ellipsoid) { "ellipsoid" } else { "msl" };
     let column = match (all.len(), wanted) {
-        (0, _) => match (header.one(Meaning::PressureHeight)?, header.all(|meaning| meaning == Meaning::RelativeHeight).first().copied()) {
+        (0, _) => match (
+            header.one(Meaning::PressureHeight)?,
+            header.all(|meaning| meaning == Meaning::RelativeHeight).first().copied(),
+        ) {
             (Some(column), _) => {
-                warning(notes, format!("the only height, `{}`, is by air pressure: it may be off by 100 m and more", header.name(column)));
+                warning(
+                    notes,
+                    format!(
+                        "the only height, `{}`, is by air pressure: it may be off by 100 m and more",
+                        header.name(column)
+                    ),
+                );
                 column
             }
             (None, Some(column)) => {
@@ -282,7 +337,8 @@ fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mu
         },
         (1, _) => all[0],
         (_, Some(wanted)) => {
-            // The one that states what flight.height says; or a sole one that states nothing beside one that states the contrary.
+            // The one that states what flight.height says; or a sole one that states nothing beside one that
+            // states the contrary.
             let column = match (&of(Some(wanted))[..], &of(None)[..], &of(Some(other(wanted)))[..]) {
                 ([column], ..) => *column,
                 ([], [column], [_]) => *column,
@@ -319,12 +375,24 @@ fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mu
     }
     let pressure = header.all(|meaning| meaning == Meaning::PressureHeight);
     if !all.is_empty() && !pressure.is_empty() {
-        information(notes, format!("the height is `{}`, not {}, which is by air pressure", header.name(column), header.list(&pressure)));
+        information(
+            notes,
+            format!(
+                "the height is `{}`, not {}, which is by air pressure",
+                header.name(column),
+                header.list(&pressure)
+            ),
+        );
     }
     Ok(column)
 }
 
-pub(super) fn say_what_is_not_used(header: &Header, frame: Frame, attitude: AttitudeColumns, notes: &mut Vec<Note>) {
+pub(super) fn say_what_is_not_used(
+    header: &Header,
+    frame: Frame,
+    attitude: AttitudeColumns,
+    notes: &mut Vec<Note>,
+) {
     use Meaning::{Course, Gimbal};
     let says_how = |name: &str| {
         let stem = ["_unit", "_units", "_datum", "_frame"].iter().find_map(|end| name.strip_suffix(end));
@@ -340,22 +408,34 @@ pub(super) fn say_what_is_not_used(header: &Header, frame: Frame, attitude: Atti
             ),
         );
     }
-    let declination = named(header, |name| name.starts_with("declination") || name.starts_with("magnetic_declination"));
+    let declination =
+        named(header, |name| name.starts_with("declination") || name.starts_with("magnetic_declination"));
     if !declination.is_empty() && matches!(attitude, AttitudeColumns::Euler(_)) {
-        warning(notes, format!("{} is not applied: yaw is taken as from true north", header.list(&declination)));
+        warning(
+            notes,
+            format!("{} is not applied: yaw is taken as from true north", header.list(&declination)),
+        );
     }
     let gimbal = header.all(|meaning| meaning == Gimbal);
     if !gimbal.is_empty() {
-        warning(notes, format!("{} are not used: camera.mount says where the camera looks", header.list(&gimbal)));
+        warning(
+            notes,
+            format!("{} are not used: camera.mount says where the camera looks", header.list(&gimbal)),
+        );
     }
     let course = header.all(|meaning| meaning == Course);
     if !course.is_empty() && attitude == AttitudeColumns::None {
         information(
             notes,
-            format!("{} is where the aircraft moves, not where its nose points: no part of an attitude", header.list(&course)),
+            format!(
+                "{} is where the aircraft moves, not where its nose points: no part of an attitude",
+                header.list(&course)
+            ),
         );
     }
-    if matches!(frame, Frame::Geodetic | Frame::NorthEastUp) && matches!(attitude, AttitudeColumns::Quaternion(_)) {
+    if matches!(frame, Frame::Geodetic | Frame::NorthEastUp)
+        && matches!(attitude, AttitudeColumns::Quaternion(_))
+    {
         warning(
             notes,
             "quaternions beside heights that count up are taken as turning forward-right-down bodies to north-east-down, as PX4 writes; ROS writes others".to_owned(),

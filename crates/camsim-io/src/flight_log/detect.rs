@@ -24,15 +24,19 @@ pub(super) fn format(path: &Path, table: &Table<'_>, spec: &FlightSpec) -> Resul
     let value = |index: usize, field: &str| match table.number(field) {
         Some(value) if index == 0 => value * time_factor,
         Some(value) => value,
-        None => time::date_time_ns(field).or_else(|| time::clock_ns(field)).map_or(f64::NAN, |ns| ns as f64 * 1e-9),
+        None => time::date_time_ns(field)
+            .or_else(|| time::clock_ns(field))
+            .map_or(f64::NAN, |ns| ns as f64 * 1e-9),
     };
     let sample: Vec<Vec<f64>> = table
         .sample(SAMPLE_ROWS)
         .map(|row| table.fields(row).iter().enumerate().map(|(index, field)| value(index, field)).collect())
         .collect();
     if table.columns >= 8 && has_quaternions(&sample) {
-        let first_time = table.rows.first().and_then(|row| table.number(table.fields(row).first().copied().unwrap_or("")));
-        // TUM writes seconds between blanks, EuRoC nanoseconds between commas; whoever mixes them may have mixed the order too.
+        let first_time =
+            table.rows.first().and_then(|row| table.number(table.fields(row).first().copied().unwrap_or("")));
+        // TUM writes seconds between blanks, EuRoC nanoseconds between commas; whoever mixes them may have
+        // mixed the order too.
         return match (first_time.is_some_and(|time| time >= NANOSECONDS_FROM), table.separator) {
             (true, Separator::Comma) => Ok(LogFormat::Euroc),
             (false, Separator::Space) => Ok(LogFormat::Tum),
@@ -42,28 +46,40 @@ pub(super) fn format(path: &Path, table: &Table<'_>, spec: &FlightSpec) -> Resul
     if table.columns != 4 && table.columns != 7 {
         return Err(FlightLogError::UnknownLayout { path: path.to_owned(), columns: table.columns });
     }
-    if only_geodetic_fits(&sample) { Ok(LogFormat::CsvLla) } else { Err(ambiguous(metric_candidates(&sample))) }
+    if only_geodetic_fits(&sample) {
+        Ok(LogFormat::CsvLla)
+    } else {
+        Err(ambiguous(metric_candidates(&sample)))
+    }
 }
 
 /// Whether columns 4 to 7 are quaternions: of length 1, or, while they change, all of another one.
 fn has_quaternions(sample: &[Vec<f64>]) -> bool {
-    let lengths: Vec<f64> =
-        sample.iter().filter(|row| row.len() >= 8).map(|row| row[4..8].iter().map(|q| q * q).sum::<f64>().sqrt()).collect();
-    let share_near =
-        |length: f64, within: f64| lengths.iter().filter(|other| (*other / length - 1.0).abs() < within).count() * 10 >= sample.len() * 9;
+    let lengths: Vec<f64> = sample
+        .iter()
+        .filter(|row| row.len() >= 8)
+        .map(|row| row[4..8].iter().map(|q| q * q).sum::<f64>().sqrt())
+        .collect();
+    let share_near = |length: f64, within: f64| {
+        lengths.iter().filter(|other| (*other / length - 1.0).abs() < within).count() * 10 >= sample.len() * 9
+    };
     let changes = || sample.iter().filter(|row| row.len() >= 8).any(|row| row[4..8] != sample[0][4..8]);
-    share_near(1.0, 0.01) || lengths.first().is_some_and(|&first| first > 0.0 && share_near(first, 1e-4) && changes())
+    share_near(1.0, 0.01)
+        || lengths.first().is_some_and(|&first| first > 0.0 && share_near(first, 1e-4) && changes())
 }
 
 fn can_be_geodetic(sample: &[Vec<f64>]) -> bool {
     // Written so that missing values pass.
-    sample.iter().all(|row| row.len() < 4 || !(row[1].abs() > 90.0 || row[2].abs() > 360.0 || row[3] < -1000.0 || row[3] > 1e5))
+    sample.iter().all(|row| {
+        row.len() < 4 || !(row[1].abs() > 90.0 || row[2].abs() > 360.0 || row[3] < -1000.0 || row[3] > 1e5)
+    })
 }
 
-/// Whether the columns can be latitude and longitude and cannot be metres, judged by the upper quartile of their change per second.
+/// Whether the columns can be latitude and longitude and cannot be metres, judged by the upper quartile of
+/// their change per second.
 ///
-/// A flight of 0.05 to 333 m/s changes its degrees by 4.5e-7 to 3e-3 a second. Read as metres that would be at most 3 mm/s, which is no flight. A log
-/// that moves faster or not at all is not decided.
+/// A flight of 0.05 to 333 m/s changes its degrees by 4.5e-7 to 3e-3 a second. Read as metres that would be
+/// at most 3 mm/s, which is no flight. A log that moves faster or not at all is not decided.
 fn only_geodetic_fits(sample: &[Vec<f64>]) -> bool {
     let mut rates: Vec<f64> = sample
         .windows(2)
@@ -89,12 +105,15 @@ pub(super) fn refuse_pose_matrices(path: &Path, table: &Table<'_>) -> Result<(),
     let is_matrix = |row: &Line<'_>| {
         let values: Option<Vec<f64>> = table.fields(row).iter().map(|field| table.number(field)).collect();
         values.is_some_and(|v| {
-            let axes: Vec<DVec3> = v.chunks(4).map(|row| DVec3::from_slice(row.get(..3).unwrap_or(&[f64::NAN; 3]))).collect();
+            let axes: Vec<DVec3> =
+                v.chunks(4).map(|row| DVec3::from_slice(row.get(..3).unwrap_or(&[f64::NAN; 3]))).collect();
             v.len() == 12
                 && axes.iter().all(|axis| (axis.length() - 1.0).abs() < 1e-2)
                 && (axes[0].cross(axes[1]) - axes[2]).length() < 1e-2
         })
     };
-    let (rows, matrices) = table.sample(20).fold((0, 0), |(rows, matrices), row| (rows + 1, matrices + usize::from(is_matrix(row))));
+    let (rows, matrices) = table
+        .sample(20)
+        .fold((0, 0), |(rows, matrices), row| (rows + 1, matrices + usize::from(is_matrix(row))));
     if rows == matrices { Err(FlightLogError::PoseMatrices { path: path.to_owned() }) } else { Ok(()) }
 }

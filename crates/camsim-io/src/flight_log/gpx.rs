@@ -19,7 +19,11 @@ use super::{FlightLogError, RawLog, columns::format_name, sniff, time};
 
 /// Reads the rows of XML text, if it is GPX.
 pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let other = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat { path: path.to_owned(), what, advice };
+    let other = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
+        path: path.to_owned(),
+        what,
+        advice,
+    };
     let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
     let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
     match document.root_element().tag_name().name() {
@@ -28,18 +32,31 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         _ => return Err(other(sniff::OTHER_XML)),
     }
     if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
-        return Err(problem(format!("flight.format is \"{}\" but the file is GPX; remove the key", format_name(spec.format))));
+        return Err(problem(format!(
+            "flight.format is \"{}\" but the file is GPX; remove the key",
+            format_name(spec.format)
+        )));
     }
-    let points: Vec<Node<'_, '_>> = document.descendants().filter(|node| node.has_tag_name_of("trkpt")).collect();
+    let points: Vec<Node<'_, '_>> =
+        document.descendants().filter(|node| node.has_tag_name_of("trkpt")).collect();
     if points.is_empty() {
-        return Err(problem("the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown".to_owned()));
+        return Err(problem(
+            "the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown"
+                .to_owned(),
+        ));
     }
     let child = |point: &Node<'_, '_>, name: &str| {
-        point.children().find(|node| node.has_tag_name_of(name)).and_then(|node| node.text()).map(|text| text.trim().to_owned())
+        point
+            .children()
+            .find(|node| node.has_tag_name_of(name))
+            .and_then(|node| node.text())
+            .map(|text| text.trim().to_owned())
     };
     for (name, advice) in [("time", "record the track with times"), ("ele", "add heights (ele)")] {
         if points.iter().all(|point| child(point, name).is_none()) {
-            return Err(problem(format!("no track point has a `{name}`: a flight needs times and heights; {advice}")));
+            return Err(problem(format!(
+                "no track point has a `{name}`: a flight needs times and heights; {advice}"
+            )));
         }
     }
     let mut rows = Vec::with_capacity(points.len());
@@ -54,17 +71,19 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
             None | Some("") => Ok(f64::NAN),
             Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
         };
-        let (latitude, longitude) = (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
+        let (latitude, longitude) =
+            (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
         if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
-            return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
+            return Err(problem(format!(
+                "line {line}: latitude {latitude}, longitude {longitude} is no place"
+            )));
         }
         let height_m = number("ele", child(point, "ele").as_deref())?;
         let t_ns = match child(point, "time") {
             None => None,
-            Some(text) => Some(
-                time::date_time_ns(&text)
-                    .ok_or_else(|| problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z")))?,
-            ),
+            Some(text) => Some(time::date_time_ns(&text).ok_or_else(|| {
+                problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
+            })?),
         };
         rows.push(RawRow {
             line,
@@ -83,11 +102,17 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
         notes.push(Note { is_warning: true, text: text.to_owned() });
     }
     if spec.time_unit != TimeUnit::Auto {
-        notes.push(Note { is_warning: true, text: "flight.time_unit is not used: the times of GPX are dates".to_owned() });
+        notes.push(Note {
+            is_warning: true,
+            text: "flight.time_unit is not used: the times of GPX are dates".to_owned(),
+        });
     }
     let used = ["ele", "time", "trkpt", "trk", "trkseg", "gpx"];
     let in_points = points.iter().flat_map(|point| point.descendants());
-    let beside = document.root_element().children().filter(|node| node.has_tag_name_of("wpt") || node.has_tag_name_of("rte"));
+    let beside = document
+        .root_element()
+        .children()
+        .filter(|node| node.has_tag_name_of("wpt") || node.has_tag_name_of("rte"));
     let not_used: BTreeSet<&str> = in_points
         .chain(beside)
         .filter(|node| node.is_element())
@@ -99,7 +124,10 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
         const ATTITUDE: [&str; 6] = ["heading", "yaw", "roll", "pitch", "course", "geoidheight"];
         let is_warning = not_used.iter().any(|name| ATTITUDE.contains(name));
         let list: Vec<&str> = not_used.into_iter().collect();
-        notes.push(Note { is_warning, text: format!("tags of the GPX file that are not used: {}", list.join(", ")) });
+        notes.push(Note {
+            is_warning,
+            text: format!("tags of the GPX file that are not used: {}", list.join(", ")),
+        });
     }
     notes
 }

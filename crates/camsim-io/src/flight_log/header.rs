@@ -1,4 +1,5 @@
-//! A header line: what each name means, in which unit, and which column stands for a quantity where several do.
+//! A header line: what each name means, in which unit, and which column stands for a quantity where several
+//! do.
 
 use super::{
     names::{self, Meaning},
@@ -23,7 +24,8 @@ pub(super) struct Means {
     pub(super) unit: Option<&'static Unit>,
     /// The name is nothing but a unit: it may be a part of a time in several columns.
     pub(super) is_bare_unit: bool,
-    /// Words beside the name that nobody knows, or that contradict each other: an error if the column is used.
+    /// Words beside the name that nobody knows, or that contradict each other: an error if the column is
+    /// used.
     problem: Option<String>,
 }
 
@@ -33,16 +35,30 @@ pub(super) struct Header(pub(super) Vec<Column>);
 
 impl Header {
     pub(super) fn parse(names: &[&str]) -> Self {
-        Self(names.iter().map(|name| Column { name: (*name).to_owned(), means: parse_name(name, None) }).collect())
+        Self(
+            names
+                .iter()
+                .map(|name| Column { name: (*name).to_owned(), means: parse_name(name, None) })
+                .collect(),
+        )
     }
 
     /// The same with a line of units below the names; `None` if that line says anything else.
     pub(super) fn parse_with_units(names: &[&str], words: &[&str]) -> Option<Self> {
-        if names.len() != words.len() || !words.iter().all(|text| units::word(text.trim_matches(['[', ']', '(', ')'])).is_some()) {
+        if names.len() != words.len()
+            || !words.iter().all(|text| units::word(text.trim_matches(['[', ']', '(', ')'])).is_some())
+        {
             return None;
         }
         let columns = names.iter().zip(words);
-        Some(Self(columns.map(|(name, words)| Column { name: (*name).to_owned(), means: parse_name(name, Some(words)) }).collect()))
+        Some(Self(
+            columns
+                .map(|(name, words)| Column {
+                    name: (*name).to_owned(),
+                    means: parse_name(name, Some(words)),
+                })
+                .collect(),
+        ))
     }
 
     pub(super) fn name(&self, column: usize) -> &str {
@@ -72,7 +88,10 @@ impl Header {
     }
 
     /// All of these, or `None` if one is missing.
-    pub(super) fn all_of<const N: usize>(&self, meanings: [Meaning; N]) -> Result<Option<[usize; N]>, String> {
+    pub(super) fn all_of<const N: usize>(
+        &self,
+        meanings: [Meaning; N],
+    ) -> Result<Option<[usize; N]>, String> {
         if meanings.iter().any(|&meaning| self.all(|other| other == meaning).is_empty()) {
             return Ok(None);
         }
@@ -92,11 +111,15 @@ impl Header {
 
     /// Of one quantity several columns.
     pub(super) fn two(&self, columns: &[usize]) -> String {
-        format!("the columns {} are of one quantity: remove or rename all but the right one", self.list(columns))
+        format!(
+            "the columns {} are of one quantity: remove or rename all but the right one",
+            self.list(columns)
+        )
     }
 
     pub(super) fn list(&self, columns: &[usize]) -> String {
-        let named: Vec<String> = columns.iter().map(|&column| format!("{} (`{}`)", column + 1, self.name(column))).collect();
+        let named: Vec<String> =
+            columns.iter().map(|&column| format!("{} (`{}`)", column + 1, self.name(column))).collect();
         named.join(" and ")
     }
 
@@ -111,18 +134,24 @@ fn dimension(meaning: Meaning) -> Option<Dimension> {
     use Meaning::*;
     match meaning {
         Time | NanosecondsPart => Some(Dimension::Time),
-        Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => Some(Dimension::Angle),
-        Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid | X | Y | Z => Some(Dimension::Length),
+        Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
+            Some(Dimension::Angle)
+        }
+        Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid | X | Y | Z => {
+            Some(Dimension::Length)
+        }
         DateTime | Date | Hemisphere | TimePart | Vehicle | Qx | Qy | Qz | Qw => None,
     }
 }
 
-/// `timestamp [ns]`, `lat_deg`, `p_RS_R_x [m]`, `Yaw(rad)`, `lat, deg`, `latE7`, `TimeUS`; `below` is what a line of units says.
+/// `timestamp [ns]`, `lat_deg`, `p_RS_R_x [m]`, `Yaw(rad)`, `lat, deg`, `latE7`, `TimeUS`; `below` is what a
+/// line of units says.
 fn parse_name(name: &str, below: Option<&str>) -> Option<Means> {
     let name = name.trim_matches(['"', '\'', ' ']);
     let (bare, mut beside) = without_brackets(name);
     let (bare, after_comma) = bare.split_once(',').map_or((bare.as_str(), ""), |(bare, rest)| (bare, rest));
-    beside.extend([after_comma.to_owned(), below.unwrap_or("").trim_matches(['[', ']', '(', ')']).to_owned()]);
+    beside
+        .extend([after_comma.to_owned(), below.unwrap_or("").trim_matches(['[', ']', '(', ')']).to_owned()]);
 
     let normal = normal_form(bare);
     let (known, stem, mut words) = known_and_suffixes(&normal)?;
@@ -148,13 +177,21 @@ fn parse_name(name: &str, below: Option<&str>) -> Option<Means> {
                 });
             }
             Word::Unit(other) if unit.is_some_and(|unit| unit != other) => {
-                problem = Some(format!("it names two units, {} and {}", unit.map_or("", |unit| unit.name), other.name));
+                problem = Some(format!(
+                    "it names two units, {} and {}",
+                    unit.map_or("", |unit| unit.name),
+                    other.name
+                ));
             }
             Word::Unit(other) => unit = Some(other),
             Word::Datum(datum) => match meaning {
                 Meaning::Height(None) => meaning = Meaning::Height(Some(datum)),
-                Meaning::Height(Some(other)) if other != datum => problem = Some("it names two vertical datums".to_owned()),
-                Meaning::PressureHeight if datum == Datum::Ellipsoid => problem = Some("air pressure knows no ellipsoid".to_owned()),
+                Meaning::Height(Some(other)) if other != datum => {
+                    problem = Some("it names two vertical datums".to_owned())
+                }
+                Meaning::PressureHeight if datum == Datum::Ellipsoid => {
+                    problem = Some("air pressure knows no ellipsoid".to_owned())
+                }
                 _ => {}
             },
             Word::Magnetic if meaning == Meaning::Yaw => meaning = Meaning::MagneticYaw,
@@ -271,21 +308,41 @@ mod tests {
             ("north_km", North, "km"),
         ] {
             let means = parse_name(name, None).unwrap_or_else(|| panic!("{name}"));
-            assert_eq!((means.meaning, means.unit.unwrap().name, means.problem), (meaning, unit, None), "{name}");
+            assert_eq!(
+                (means.meaning, means.unit.unwrap().name, means.problem),
+                (meaning, unit, None),
+                "{name}"
+            );
         }
-        for (name, meaning) in
-            [("timestamp(s)", Time), ("q_RS_w []", Qw), ("alt_ellipsoid", Height(Some(Datum::Ellipsoid))), ("datetime(utc)", DateTime)]
-        {
+        for (name, meaning) in [
+            ("timestamp(s)", Time),
+            ("q_RS_w []", Qw),
+            ("alt_ellipsoid", Height(Some(Datum::Ellipsoid))),
+            ("datetime(utc)", DateTime),
+        ] {
             let means = parse_name(name, None).unwrap();
             assert_eq!((means.meaning, means.problem), (meaning, None), "{name}");
         }
-        for name in ["delta_alt", "max_altitude(feet)", "alt_min", "timestamp_sample", "imu_x", "gps_h", "rollRate", "vx", "", "ImageFile"]
-        {
+        for name in [
+            "delta_alt",
+            "max_altitude(feet)",
+            "alt_min",
+            "timestamp_sample",
+            "imu_x",
+            "gps_h",
+            "rollRate",
+            "vx",
+            "",
+            "ImageFile",
+        ] {
             assert_eq!(parse_name(name, None), None, "{name}");
         }
-        for (name, problem) in
-            [("alt [furlong]", "furlong"), ("alt_m [ft]", "two units"), ("lat [m]", "no unit of angle"), ("alt [m/s]", "m/s")]
-        {
+        for (name, problem) in [
+            ("alt [furlong]", "furlong"),
+            ("alt_m [ft]", "two units"),
+            ("lat [m]", "no unit of angle"),
+            ("alt [m/s]", "m/s"),
+        ] {
             assert!(parse_name(name, None).unwrap().problem.unwrap().contains(problem), "{name}");
         }
         assert_eq!(parse_name("alt", Some("[ft]")).unwrap().unit.unwrap().name, "ft");

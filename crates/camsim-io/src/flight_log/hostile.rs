@@ -1,4 +1,5 @@
-//! Logs as nobody should write them: each gives the right flight or is refused with words that help; none is silently another flight.
+//! Logs as nobody should write them: each gives the right flight or is refused with words that help; none is
+//! silently another flight.
 
 #![allow(clippy::unwrap_used)]
 
@@ -35,7 +36,8 @@ fn read_with(content: &[u8], spec: &FlightSpec) -> Result<FlightLog, String> {
     read_flight_log(&path, spec, HeightConversion::None).map_err(|error| error.to_string())
 }
 
-/// A header and 21 rows of 20 s, 200 m north, 20 m up, by a pattern: `T` seconds, `LAT`, `LON`, `N` metres north, `H` metres up.
+/// A header and 21 rows of 20 s, 200 m north, 20 m up, by a pattern: `T` seconds, `LAT`, `LON`, `N` metres
+/// north, `H` metres up.
 fn log(header: &str, pattern: &str) -> String {
     scaled(header, pattern, 1.0)
 }
@@ -64,18 +66,26 @@ fn assert_flies(what: &str, content: &str, spec: &FlightSpec, warning: &str) {
         Err(error) => return fault(format!("{what}: {error}")),
     };
     let moved = log.rows.last().unwrap().position_ned_m - log.rows[0].position_ned_m;
-    if !((log.duration_s() - 20.0).abs() < 1e-6 && (moved.x - 200.0).abs() < 0.1 && (moved.z + 20.0).abs() < 0.1) {
+    if !((log.duration_s() - 20.0).abs() < 1e-6
+        && (moved.x - 200.0).abs() < 0.1
+        && (moved.z + 20.0).abs() < 0.1)
+    {
         fault(format!("{what}: {moved} in {} s", log.duration_s()));
     }
-    let warnings: Vec<&str> = log.notes.iter().filter(|note| note.is_warning).map(|note| note.text.as_str()).collect();
-    if warnings.is_empty() != warning.is_empty() || !(warning.is_empty() || warnings.iter().any(|text| text.contains(warning))) {
+    let warnings: Vec<&str> =
+        log.notes.iter().filter(|note| note.is_warning).map(|note| note.text.as_str()).collect();
+    if warnings.is_empty() != warning.is_empty()
+        || !(warning.is_empty() || warnings.iter().any(|text| text.contains(warning)))
+    {
         fault(format!("{what}: {warnings:?}"));
     }
 }
 
 fn assert_refused(what: &str, content: &[u8], spec: &FlightSpec, words: &[&str]) {
     match read_with(content, spec) {
-        Ok(log) => fault(format!("{what}: read, {} rows, {} s, {:?}", log.rows.len(), log.duration_s(), log.notes)),
+        Ok(log) => {
+            fault(format!("{what}: read, {} rows, {} s, {:?}", log.rows.len(), log.duration_s(), log.notes))
+        }
         Err(error) => {
             for word in words.iter().filter(|word| !error.contains(**word)) {
                 fault(format!("{what}: `{error}` lacks `{word}`"));

@@ -9,7 +9,10 @@ use camsim_core::{
 
 use super::{
     FlightLogError,
-    choose::{attitude_columns, names_a_flight, position_columns, say_what_is_not_used, stem, time_columns, what_is_missing},
+    choose::{
+        attitude_columns, names_a_flight, position_columns, say_what_is_not_used, stem, time_columns,
+        what_is_missing,
+    },
     columns::{AttitudeColumns, Frame, Source, TimeColumns},
     detect,
     header::Header,
@@ -33,19 +36,23 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn find(path: &Path, table: &Table<'_>, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<Self, FlightLogError> {
+    pub(super) fn find(
+        path: &Path,
+        table: &Table<'_>,
+        spec: &FlightSpec,
+        notes: &mut Vec<Note>,
+    ) -> Result<Self, FlightLogError> {
         detect::refuse_pose_matrices(path, table)?;
         // The header nearest to the data counts; prose in comments names no columns.
         for (index, line) in table.headers.iter().enumerate().rev() {
             let above = index.checked_sub(1).and_then(|above| table.headers.get(above));
             let Some(header) = header_of(path, table, line, above)? else { continue };
-            return Self::from_header(&header, table, spec, notes).map_err(|problem| FlightLogError::Header {
-                path: path.to_owned(),
-                line: line.number,
-                problem,
+            return Self::from_header(&header, table, spec, notes).map_err(|problem| {
+                FlightLogError::Header { path: path.to_owned(), line: line.number, problem }
             });
         }
-        let format = if spec.format == LogFormat::Auto { detect::format(path, table, spec)? } else { spec.format };
+        let format =
+            if spec.format == LogFormat::Auto { detect::format(path, table, spec)? } else { spec.format };
         Ok(Self::without_header(table, format))
     }
 
@@ -54,33 +61,57 @@ impl Layout {
             LogFormat::CsvXya => (Frame::NorthEastUp, ["north", "east", "altitude"]),
             LogFormat::CsvNed => (Frame::NorthEastDown, ["north", "east", "down"]),
             LogFormat::Tum | LogFormat::Euroc => (Frame::EastNorthUp, ["x", "y", "z"]),
-            LogFormat::CsvLla | LogFormat::Auto | LogFormat::Gpx => (Frame::Geodetic, ["latitude", "longitude", "height"]),
+            LogFormat::CsvLla | LogFormat::Auto | LogFormat::Gpx => {
+                (Frame::Geodetic, ["latitude", "longitude", "height"])
+            }
         };
         let (attitude, attitude_names) = match format {
             LogFormat::Tum => (AttitudeColumns::Quaternion([4, 5, 6, 7]), &["qx", "qy", "qz", "qw"][..]),
             LogFormat::Euroc => (AttitudeColumns::Quaternion([5, 6, 7, 4]), &["qw", "qx", "qy", "qz"][..]),
-            _ if table.columns >= 7 => {
-                (AttitudeColumns::Euler([4, 5, 6].map(|column| Source::whole(column, None))), &["roll", "pitch", "yaw"][..])
-            }
+            _ if table.columns >= 7 => (
+                AttitudeColumns::Euler([4, 5, 6].map(|column| Source::whole(column, None))),
+                &["roll", "pitch", "yaw"][..],
+            ),
             _ => (AttitudeColumns::None, &[][..]),
         };
         Self {
             format,
-            time: TimeColumns { column: 0, unit_ns: None, whole_are_ns: format == LogFormat::Euroc, date: None, nanoseconds: None },
+            time: TimeColumns {
+                column: 0,
+                unit_ns: None,
+                whole_are_ns: format == LogFormat::Euroc,
+                date: None,
+                nanoseconds: None,
+            },
             frame,
             position: [1, 2, 3].map(|column| Source::whole(column, None)),
             attitude,
-            names: ["time"].iter().chain(&position).chain(attitude_names).map(|name| (*name).to_owned()).collect(),
+            names: ["time"]
+                .iter()
+                .chain(&position)
+                .chain(attitude_names)
+                .map(|name| (*name).to_owned())
+                .collect(),
             has_header: false,
             vehicle: None,
         }
     }
 
-    fn from_header(header: &Header, table: &Table<'_>, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<Self, String> {
+    fn from_header(
+        header: &Header,
+        table: &Table<'_>,
+        spec: &FlightSpec,
+        notes: &mut Vec<Note>,
+    ) -> Result<Self, String> {
         let time = time_columns(header, notes)?;
-        let attitude = if spec.attitude == AttitudeSource::Track { AttitudeColumns::None } else { attitude_columns(header, notes)? };
+        let attitude = if spec.attitude == AttitudeSource::Track {
+            AttitudeColumns::None
+        } else {
+            attitude_columns(header, notes)?
+        };
         let (frame, position) = position_columns(header, table, spec, time.column, notes)?;
-        let is_euroc = spec.format == LogFormat::Euroc || stem(header, position[0].column).starts_with("p_rs_r");
+        let is_euroc =
+            spec.format == LogFormat::Euroc || stem(header, position[0].column).starts_with("p_rs_r");
         let format = match frame {
             Frame::Geodetic => LogFormat::CsvLla,
             Frame::NorthEastUp => LogFormat::CsvXya,
@@ -108,7 +139,9 @@ impl Layout {
 
     /// ` (`name`)`, for messages about a column.
     pub(super) fn named(&self, column: usize) -> String {
-        self.names.get(column).map_or(String::new(), |name| if self.has_header { format!(" (`{name}`)") } else { format!(" ({name})") })
+        self.names.get(column).map_or(String::new(), |name| {
+            if self.has_header { format!(" (`{name}`)") } else { format!(" ({name})") }
+        })
     }
 }
 /// The header that a line is, with its line of units; `None` if it is prose.
@@ -119,11 +152,14 @@ fn header_of(
     above: Option<&HeaderLine<'_>>,
 ) -> Result<Option<Header>, FlightLogError> {
     let names = table.names(line.text);
-    let units = |above: &HeaderLine<'_>| Header::parse_with_units(&table.names(above.text), &names).filter(names_a_flight);
+    let units = |above: &HeaderLine<'_>| {
+        Header::parse_with_units(&table.names(above.text), &names).filter(names_a_flight)
+    };
     if let Some(header) = above.and_then(units) {
         return Ok(Some(header));
     }
-    let problem = |problem: String| FlightLogError::Header { path: path.to_owned(), line: line.number, problem };
+    let problem =
+        |problem: String| FlightLogError::Header { path: path.to_owned(), line: line.number, problem };
     let mut header = Header::parse(&names);
     let is_whole = table.fits(names.len()) && names_a_flight(&header);
     if line.is_comment
@@ -145,7 +181,8 @@ fn header_of(
     Ok(Some(header))
 }
 
-/// `# format: timestamp tx ty ...`, `# columns are t x y ...`: the names behind a colon, or the last ones, as many as there are columns.
+/// `# format: timestamp tx ty ...`, `# columns are t x y ...`: the names behind a colon, or the last ones, as
+/// many as there are columns.
 fn without_prose(table: &Table<'_>, text: &str) -> Option<Header> {
     let behind = text.match_indices([':', '=']).map(|(at, _)| &text[at + 1..]);
     let mut headers = behind.map(|text| Header::parse(&table.names(text.trim())));
@@ -153,7 +190,10 @@ fn without_prose(table: &Table<'_>, text: &str) -> Option<Header> {
     headers.find(fits).or_else(|| {
         let names = table.names(text);
         let prose = names.len().checked_sub(table.columns)?;
-        let is_prose = names.get(..prose)?.iter().all(|word| Header::parse(&[word]).0.iter().all(|column| column.means.is_none()));
+        let is_prose = names
+            .get(..prose)?
+            .iter()
+            .all(|word| Header::parse(&[word]).0.iter().all(|column| column.means.is_none()));
         is_prose.then(|| Header::parse(&names[prose..])).filter(fits)
     })
 }

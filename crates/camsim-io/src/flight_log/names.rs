@@ -64,7 +64,12 @@ pub(super) struct Known {
     pub(super) use_of_it: &'static str,
 }
 
-const fn known(meaning: Meaning, names: &'static [&'static str], what: &'static str, use_of_it: &'static str) -> Known {
+const fn known(
+    meaning: Meaning,
+    names: &'static [&'static str],
+    what: &'static str,
+    use_of_it: &'static str,
+) -> Known {
     Known { meaning, names, unit: None, what, use_of_it }
 }
 
@@ -73,8 +78,21 @@ const fn time_in(unit: &'static Unit, names: &'static [&'static str], what: &'st
 }
 
 /// Prefixes that say which message or device a column is from.
-pub(super) const PREFIXES: &[&str] =
-    &["osd_", "gps_", "att_", "ahr2_", "pos_", "uav_", "drone_", "aircraft_", "vehicle_", "ins_", "imu_", "nav_", "gnss_"];
+pub(super) const PREFIXES: &[&str] = &[
+    "osd_",
+    "gps_",
+    "att_",
+    "ahr2_",
+    "pos_",
+    "uav_",
+    "drone_",
+    "aircraft_",
+    "vehicle_",
+    "ins_",
+    "imu_",
+    "nav_",
+    "gnss_",
+];
 
 /// Every name known.
 pub(super) static KNOWN: &[Known] = &[
@@ -116,7 +134,12 @@ pub(super) static KNOWN: &[Known] = &[
         "date and time as text",
         "applied where no other column is a time",
     ),
-    known(Meaning::Date, &["date", "day", "utc_date", "date_utc"], "date, `year-month-day`", "applied to clock times"),
+    known(
+        Meaning::Date,
+        &["date", "day", "utc_date", "date_utc"],
+        "date, `year-month-day`",
+        "applied to clock times",
+    ),
     known(
         Meaning::LatitudeLongitude,
         &["gps", "coordinates", "gps_coordinates", "latlon", "lat_lon", "latlng", "gps_position"],
@@ -133,7 +156,15 @@ pub(super) static KNOWN: &[Known] = &[
     ),
     known(
         Meaning::Height(Some(Datum::MeanSeaLevel)),
-        &["msl", "amsl", "asl", "altitude_above_sea_level", "altitude_above_sealevel", "height_above_sea_level", "orthometric_height"],
+        &[
+            "msl",
+            "amsl",
+            "asl",
+            "altitude_above_sea_level",
+            "altitude_above_sealevel",
+            "height_above_sea_level",
+            "orthometric_height",
+        ],
         "height above mean sea level",
         "applied; a warning where flight.height says otherwise",
     ),
@@ -193,12 +224,28 @@ pub(super) static KNOWN: &[Known] = &[
         "height of the ground",
         "not used",
     ),
-    known(Meaning::North, &["n", "north", "pn", "pos_n", "pos_north", "position_north"], "local north", "applied"),
+    known(
+        Meaning::North,
+        &["n", "north", "pn", "pos_n", "pos_north", "position_north"],
+        "local north",
+        "applied",
+    ),
     known(Meaning::East, &["e", "east", "pe", "pos_e", "pos_east", "position_east"], "local east", "applied"),
     known(Meaning::Down, &["d", "down", "pd", "pos_d", "pos_down", "position_down"], "local down", "applied"),
     known(
         Meaning::Grid,
-        &["easting", "northing", "utm_e", "utm_n", "utm_x", "utm_y", "utm_east", "utm_north", "utm_easting", "utm_northing"],
+        &[
+            "easting",
+            "northing",
+            "utm_e",
+            "utm_n",
+            "utm_x",
+            "utm_y",
+            "utm_east",
+            "utm_north",
+            "utm_easting",
+            "utm_northing",
+        ],
         "grid coordinates, whose north is not true north",
         "refused as the only position",
     ),
@@ -336,7 +383,17 @@ pub(super) static KNOWN: &[Known] = &[
     ),
     known(
         Meaning::Course,
-        &["course", "track", "cog", "course_over_ground", "ground_course", "gcrs", "gps_heading", "gps_hdg", "gps_yaw"],
+        &[
+            "course",
+            "track",
+            "cog",
+            "course_over_ground",
+            "ground_course",
+            "gcrs",
+            "gps_heading",
+            "gps_hdg",
+            "gps_yaw",
+        ],
         "direction of motion",
         "not used: it is no heading",
     ),
@@ -393,7 +450,15 @@ pub(super) static KNOWN: &[Known] = &[
     ),
     known(
         Meaning::Gimbal,
-        &["gimbal_heading", "gimbal_yaw", "gimbal_pitch", "gimbal_roll", "camera_yaw", "camera_pitch", "camera_roll"],
+        &[
+            "gimbal_heading",
+            "gimbal_yaw",
+            "gimbal_pitch",
+            "gimbal_roll",
+            "camera_yaw",
+            "camera_pitch",
+            "camera_roll",
+        ],
         "attitude of a gimbal",
         "not used, with a warning: camera.mount says where the camera looks",
     ),
@@ -402,14 +467,20 @@ pub(super) static KNOWN: &[Known] = &[
 /// The meaning of a whole name, with the unit that it implies.
 pub(super) fn find(name: &str) -> Option<&'static Known> {
     let exact = |name: &str| KNOWN.iter().find(|known| known.names.contains(&name));
-    // An `imu_x` is no position, and a `gps_h` may be an accuracy: behind a prefix only words count, and only these.
+    // An `imu_x` is no position, and a `gps_h` may be an accuracy: behind a prefix only words count, and only
+    // these.
     let behind_prefix = |name: &str| {
         use Meaning::{Height, Latitude, LatitudeLongitude, Longitude, Pitch, Roll, Time, Yaw};
-        let may =
-            |known: &&Known| matches!(known.meaning, Time | Latitude | Longitude | LatitudeLongitude | Height(_) | Roll | Pitch | Yaw);
+        let may = |known: &&Known| {
+            matches!(
+                known.meaning,
+                Time | Latitude | Longitude | LatitudeLongitude | Height(_) | Roll | Pitch | Yaw
+            )
+        };
         (name.len() > 2).then(|| exact(name).filter(may)).flatten()
     };
-    exact(name).or_else(|| PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix).and_then(behind_prefix)))
+    exact(name)
+        .or_else(|| PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix).and_then(behind_prefix)))
 }
 
 /// The unit that goes with [`Meaning::NanosecondsPart`] alone.

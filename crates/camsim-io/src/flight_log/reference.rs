@@ -35,7 +35,10 @@ const KEYS: &[(&str, &str)] = &[
     ),
     ("angles", "whether angles wrap or count turns"),
     ("attitude", "`track`: columns of the attitude are not read at all"),
-    ("height", "what heights are above; decides between several height columns, and warns where the column says otherwise"),
+    (
+        "height",
+        "what heights are above; decides between several height columns, and warns where the column says otherwise",
+    ),
 ];
 
 /// What else is done, or not.
@@ -76,12 +79,18 @@ const RULES: &[(&str, &str)] = &[
         "Numbers",
         "with a decimal point; with a decimal comma throughout where semicolons, tabs or blanks separate. Only columns that are used must be numbers",
     ),
-    ("Quaternions", "of length 1 within 1 %; of another length throughout: brought to 1, with a warning; of varying lengths: refused"),
+    (
+        "Quaternions",
+        "of length 1 within 1 %; of another length throughout: brought to 1, with a warning; of varying lengths: refused",
+    ),
     (
         "GPX",
         "all tracks and segments are one log; `ele` is taken as flight.height says, with a warning unless that is \"msl\"; other tags are named",
     ),
-    ("Jumps", "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with the place"),
+    (
+        "Jumps",
+        "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with the place",
+    ),
 ];
 
 /// Names, units, formats and rules of flight logs, as Markdown.
@@ -108,7 +117,13 @@ pub fn reference() -> String {
         let factor = unit.factor / scale;
         let factor = if (1e-3..1e6).contains(&factor) { format!("{factor}") } else { format!("{factor:e}") };
         let spellings: Vec<String> = unit.spellings.iter().map(|name| format!("`{name}`")).collect();
-        let _ = writeln!(text, "| {} | {} | {factor} {base} | {} |", unit.dimension.name(), unit.name, spellings.join(", "));
+        let _ = writeln!(
+            text,
+            "| {} | {} | {factor} {base} | {} |",
+            unit.dimension.name(),
+            unit.name,
+            spellings.join(", ")
+        );
     }
     text += "\nBeside a height, msl, amsl, asl, orthometric, geoid, egm96 say that it is above mean sea level; ellipsoid, ellipsoidal, hae, wgs84 that it is above the ellipsoid.\n";
     text += "\n## Formats\n\nBy flight.format, or detected where only one fits.\n\n| format | columns | numbers |\n|---|---|---|\n";

@@ -59,11 +59,19 @@ struct Motion {
 }
 
 /// Nanoseconds of the unit of the times.
-pub(super) fn time_unit_ns(rows: &Rows, layout: &Layout, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<f64, String> {
+pub(super) fn time_unit_ns(
+    rows: &Rows,
+    layout: &Layout,
+    spec: &FlightSpec,
+    notes: &mut Vec<Note>,
+) -> Result<f64, String> {
     let key = unit_of_key(spec.time_unit);
     if rows.kind != Kind::Number {
         if key.is_some() {
-            notes.push(Note { is_warning: true, text: "flight.time_unit is not used: the times are clock times or dates".to_owned() });
+            notes.push(Note {
+                is_warning: true,
+                text: "flight.time_unit is not used: the times are clock times or dates".to_owned(),
+            });
         }
         return Ok(1.0);
     }
@@ -96,7 +104,9 @@ pub(super) fn time_unit_ns(rows: &Rows, layout: &Layout, spec: &FlightSpec, note
         return if good {
             Ok(NANOSECOND.factor)
         } else {
-            Err(asked("by EuRoC's format they would be nanoseconds, but then the rows lie less than 0.1 ms apart"))
+            Err(asked(
+                "by EuRoC's format they would be nanoseconds, but then the rows lie less than 0.1 ms apart",
+            ))
         };
     }
     guess(&motion, notes)
@@ -106,16 +116,23 @@ pub(super) fn time_unit_ns(rows: &Rows, layout: &Layout, spec: &FlightSpec, note
 fn say_if_odd(motion: &Motion, unit_ns: f64, whose: &str, notes: &mut Vec<Note>) {
     let taken = motion.in_unit(unit_ns);
     if !taken.is_sound() {
-        notes.push(Note { is_warning: true, text: format!("in {whose} unit of time there are {}: check it", taken.describe()) });
+        notes.push(Note {
+            is_warning: true,
+            text: format!("in {whose} unit of time there are {}: check it", taken.describe()),
+        });
     }
 }
 
 /// Whether the numbers are `hhmmss`: no 60th second or minute, and from 59 the next row's step leads to 100.
 fn are_digits_of_clocks(rows: &Rows, motion: &Motion) -> bool {
     let times: Vec<f64> = rows.rows.iter().filter_map(|row| row.time).map(time::to_units).collect();
-    let is_clock = |time: f64| (0.0..240_000.0).contains(&time) && time % 100.0 < 60.0 && (time / 100.0).floor() % 100.0 < 60.0;
+    let is_clock = |time: f64| {
+        (0.0..240_000.0).contains(&time) && time % 100.0 < 60.0 && (time / 100.0).floor() % 100.0 < 60.0
+    };
     let Some(step) = motion.step.filter(|step| *step <= 10.0) else { return false };
-    let leaps = |a: f64, b: f64| (40.0..=40.0 + 3.0 * step).contains(&(b - a)) && (b / 100.0).floor() > (a / 100.0).floor();
+    let leaps = |a: f64, b: f64| {
+        (40.0..=40.0 + 3.0 * step).contains(&(b - a)) && (b / 100.0).floor() > (a / 100.0).floor()
+    };
     times.iter().all(|&time| is_clock(time)) && times.windows(2).any(|pair| leaps(pair[0], pair[1]))
 }
 
@@ -127,14 +144,17 @@ fn asked(why: &str) -> String {
 
 fn guess(motion: &Motion, notes: &mut Vec<Note>) -> Result<f64, String> {
     let seconds = motion.in_unit(SECOND.factor);
-    let is_date_s = THIS_CENTURY_S.contains(&motion.largest) && motion.step.is_none_or(|step| step < FAR_APART_S);
+    let is_date_s =
+        THIS_CENTURY_S.contains(&motion.largest) && motion.step.is_none_or(|step| step < FAR_APART_S);
     let (step_s, speed) = (seconds.step_s, seconds.speed_m_s);
     let impossible = motion.largest > THIS_CENTURY_S.end
         || (motion.all_whole && step_s.is_some_and(|step| step >= 1e5))
         || (!is_date_s && speed.is_some_and(|speed| !(STANDING_M_S..=IMPOSSIBLE_M_S).contains(&speed)));
     let doubtful = !is_date_s
         && match (speed, step_s) {
-            (None, step) => step.is_some_and(|step| step >= FAR_APART_S || (motion.all_whole && motion.rows > FEW_ROWS && step >= APART_S)),
+            (None, step) => step.is_some_and(|step| {
+                step >= FAR_APART_S || (motion.all_whole && motion.rows > FEW_ROWS && step >= APART_S)
+            }),
             (Some(speed), step) => {
                 (speed > FAST_M_S && (motion.is_geodetic || !motion.all_whole))
                     || (motion.all_whole && speed < CREEPING_M_S)
@@ -145,9 +165,14 @@ fn guess(motion: &Motion, notes: &mut Vec<Note>) -> Result<f64, String> {
         return Ok(SECOND.factor);
     }
     let others = [&MILLISECOND, &MICROSECOND, &NANOSECOND, &MINUTE, &HOUR];
-    let as_date = others.into_iter().find(|unit| THIS_CENTURY_S.contains(&(motion.largest * unit.factor * 1e-9)) && unit.factor < 1e9);
+    let as_date = others
+        .into_iter()
+        .find(|unit| THIS_CENTURY_S.contains(&(motion.largest * unit.factor * 1e-9)) && unit.factor < 1e9);
     let mut infer = |unit: &'static Unit, why: String| {
-        let text = format!("the times are read as {}: their column names no unit, and {why}; flight.time_unit decides", unit.name);
+        let text = format!(
+            "the times are read as {}: their column names no unit, and {why}; flight.time_unit decides",
+            unit.name
+        );
         notes.push(Note { is_warning: true, text });
         Ok(unit.factor)
     };
@@ -155,13 +180,18 @@ fn guess(motion: &Motion, notes: &mut Vec<Note>) -> Result<f64, String> {
         let year = 1970.0 + (motion.largest * unit.factor * 1e-9 / 31_556_952.0).floor();
         return infer(unit, format!("only so they are dates of this century ({year})"));
     }
-    let plausible: Vec<&'static Unit> = others.into_iter().filter(|unit| motion.in_unit(unit.factor).is_flight()).collect();
+    let plausible: Vec<&'static Unit> =
+        others.into_iter().filter(|unit| motion.in_unit(unit.factor).is_flight()).collect();
     match &plausible[..] {
         [unit] if impossible => {
             let taken = motion.in_unit(unit.factor);
             infer(unit, format!("only so rows and speed are those of a flight ({})", taken.describe()))
         }
-        _ => Err(asked(&format!("as seconds, {} would be {}", seconds.describe(), if impossible { "no flight" } else { "an odd flight" }))),
+        _ => Err(asked(&format!(
+            "as seconds, {} would be {}",
+            seconds.describe(),
+            if impossible { "no flight" } else { "an odd flight" }
+        ))),
     }
 }
 
@@ -196,7 +226,11 @@ impl InUnit {
 }
 
 fn short(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) { format!("{value:.1e}") } else { format!("{}", (value * 1e3).round() / 1e3) }
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
+        format!("{value:.1e}")
+    } else {
+        format!("{}", (value * 1e3).round() / 1e3)
+    }
 }
 
 impl Motion {
@@ -217,20 +251,23 @@ fn motion(rows: &Rows, layout: &Layout) -> Motion {
         largest = largest.max(time.abs());
     }
     let all_whole = rows.rows.iter().filter_map(|row| row.time).all(time::is_whole);
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    let mut steps: Vec<f64> =
+        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     let step = median(&mut steps);
 
     let geodetic = layout.frame == Frame::Geodetic;
     let is_null = |position: &[f64; 3]| geodetic && (position[0] == 0.0 || position[1] == 0.0);
     let places = rows.rows.iter().filter(|row| row.has_position() && !is_null(&row.position));
-    let places: Vec<(f64, [f64; 3])> = places.filter_map(|row| row.time.map(|time| (time::to_units(time), row.position))).collect();
+    let places: Vec<(f64, [f64; 3])> =
+        places.filter_map(|row| row.time.map(|time| (time::to_units(time), row.position))).collect();
     let mut moves: Vec<(f64, f64)> = places
         .windows(2)
         .map(|pair| (pair[1].0 - pair[0].0, distance_m(pair[0].1, pair[1].1, geodetic)))
         .filter(|(step, distance)| *step > 0.0 && distance.is_finite())
         .collect();
     // A spike is no speed, and a gap none either.
-    let mut distances: Vec<f64> = moves.iter().map(|(_, distance)| *distance).filter(|distance| *distance > 0.0).collect();
+    let mut distances: Vec<f64> =
+        moves.iter().map(|(_, distance)| *distance).filter(|distance| *distance > 0.0).collect();
     let usual = median(&mut distances).unwrap_or(0.0);
     let mut paces: Vec<f64> = moves.iter().map(|(step, _)| *step).collect();
     let usual_step = median(&mut paces).unwrap_or(0.0);
@@ -255,10 +292,18 @@ fn median(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Brings roll, pitch and yaw to degrees where the header names no unit.
-pub(super) fn angles_to_degrees(rows: &mut Rows, layout: &Layout, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<(), String> {
+pub(super) fn angles_to_degrees(
+    rows: &mut Rows,
+    layout: &Layout,
+    spec: &FlightSpec,
+    notes: &mut Vec<Note>,
+) -> Result<(), String> {
     let AttitudeColumns::Euler(sources) = layout.attitude else {
         if spec.angle_unit != AngleUnit::Auto {
-            notes.push(Note { is_warning: true, text: "flight.angle_unit is not used: no roll, pitch and yaw are read".to_owned() });
+            notes.push(Note {
+                is_warning: true,
+                text: "flight.angle_unit is not used: no roll, pitch and yaw are read".to_owned(),
+            });
         }
         return Ok(());
     };
@@ -299,27 +344,37 @@ fn guess_angles(
     notes: &mut Vec<Note>,
 ) -> Result<f64, String> {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
-    let column = |axis: usize| rows.rows.iter().map(move |row| row.attitude[axis]).filter(|value| value.is_finite());
+    let column =
+        |axis: usize| rows.rows.iter().map(move |row| row.attitude[axis]).filter(|value| value.is_finite());
     if spec.angles != AngleKind::Continuous {
         for &axis in open {
             let steps = column(axis).zip(column(axis).skip(1)).map(|(a, b)| (b - a).abs());
-            if column(axis).next().is_some_and(|first| first.abs() > 720.0) || steps.into_iter().any(|step| step > 10_000.0) {
+            if column(axis).next().is_some_and(|first| first.abs() > 720.0)
+                || steps.into_iter().any(|step| step > 10_000.0)
+            {
                 return Err(format!(
                     "column {}{} holds {}, which is no angle in degrees: name the unit in the header (yaw_cdeg), or set flight.angles = \"continuous\" if turns count",
                     columns[axis] + 1,
                     layout.named(columns[axis]),
-                    short(column(axis).fold(0.0, |most: f64, value| if value.abs() > most.abs() { value } else { most }))
+                    short(column(axis).fold(0.0, |most: f64, value| if value.abs() > most.abs() {
+                        value
+                    } else {
+                        most
+                    }))
                 ));
             }
         }
     }
     const SLACK: f64 = 0.005;
     let domain = [-PI..=PI, -FRAC_PI_2..=FRAC_PI_2, -PI..=TAU];
-    let within = |axis: usize| column(axis).all(|value| (domain[axis].start() - SLACK..=domain[axis].end() + SLACK).contains(&value));
+    let within = |axis: usize| {
+        column(axis).all(|value| (domain[axis].start() - SLACK..=domain[axis].end() + SLACK).contains(&value))
+    };
     let all_zero = open.iter().all(|&axis| column(axis).all(|value| value == 0.0));
     if all_zero || !open.iter().all(|&axis| within(axis)) {
         let most = |axis: usize| column(axis).fold(0.0, |most: f64, value| most.max(value.abs()));
-        let (low, high) = column(2).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), yaw| (yaw.min(low), yaw.max(high)));
+        let (low, high) = column(2)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), yaw| (yaw.min(low), yaw.max(high)));
         let tilt = most(0).max(most(1));
         if open.len() == 3 && tilt > 0.0 && tilt <= 1.6 && high - low > 6.3 {
             notes.push(Note {
@@ -332,9 +387,12 @@ fn guess_angles(
         }
         return Ok(1.0);
     }
-    let wraps = |a: f64, b: f64| (b - a).abs() > 5.2 && ((a.abs() > 2.6 && b.abs() > 2.6 && a * b < 0.0) || (a - b).abs() > 5.5);
+    let wraps = |a: f64, b: f64| {
+        (b - a).abs() > 5.2 && ((a.abs() > 2.6 && b.abs() > 2.6 && a * b < 0.0) || (a - b).abs() > 5.5)
+    };
     let is_open_yaw = open.contains(&2);
-    let jumps = if is_open_yaw { column(2).zip(column(2).skip(1)).filter(|&(a, b)| wraps(a, b)).count() } else { 0 };
+    let jumps =
+        if is_open_yaw { column(2).zip(column(2).skip(1)).filter(|&(a, b)| wraps(a, b)).count() } else { 0 };
     if jumps > 0 {
         notes.push(Note {
             is_warning: true,
@@ -358,11 +416,15 @@ pub(super) fn check_degrees(rows: &Rows, layout: &Layout) -> Result<(), String> 
     if layout.frame != Frame::Geodetic || latitude.factor.is_some() || longitude.factor.is_some() {
         return Ok(());
     }
-    let column = |axis: usize| rows.rows.iter().filter(|row| row.has_position()).map(move |row| row.position[axis]);
+    let column =
+        |axis: usize| rows.rows.iter().filter(|row| row.has_position()).map(move |row| row.position[axis]);
     let mut latitudes: Vec<f64> = column(0).map(f64::abs).filter(|value| *value > 0.0).collect();
     // In degrees that is the Gulf of Guinea and no land; close to the equator it is a made-up place.
     let far_from_equator = median(&mut latitudes).is_some_and(|latitude| latitude > 0.05);
-    if far_from_equator && column(0).all(|value| value.abs() <= FRAC_PI_2) && column(1).all(|value| value.abs() <= PI) {
+    if far_from_equator
+        && column(0).all(|value| value.abs() <= FRAC_PI_2)
+        && column(1).all(|value| value.abs() <= PI)
+    {
         return Err(format!(
             "latitude and longitude (columns {} and {}) name no unit and stay within pi: name them lat_rad and lon_rad, or lat_deg and lon_deg, in a header line",
             latitude.column + 1,

@@ -187,7 +187,8 @@ impl<'a> Fields<'a, '_> {
             None => self.reader.table.number(field).ok_or_else(bad)?,
             Some(_) if text::is_missing(field) => f64::NAN,
             Some(part) => {
-                let parts: Vec<&str> = field.split([' ', ',', ';', '/']).filter(|part| !part.is_empty()).collect();
+                let parts: Vec<&str> =
+                    field.split([' ', ',', ';', '/']).filter(|part| !part.is_empty()).collect();
                 let number = |text: &str| text::number(text, false);
                 if parts.len() == 2 { number(parts[part]).ok_or_else(bad)? } else { return Err(bad()) }
             }
@@ -239,7 +240,9 @@ impl<'a> Fields<'a, '_> {
                 advice,
             })
         };
-        for (source, what, value, limit) in [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)] {
+        for (source, what, value, limit) in
+            [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)]
+        {
             if value.is_finite() && value.abs() > limit {
                 let advice = if value.abs() > 1e5 && source.factor.is_none() && value.fract() == 0.0 {
                     "are these 1e-7 degrees? Then name the columns lat_e7 and lon_e7"

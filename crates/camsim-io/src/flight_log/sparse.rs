@@ -1,8 +1,9 @@
 //! Tables merged from streams of several rates, in which no row has everything.
 //!
-//! Each quantity is interpolated linearly over time between the rows that state it: height where only latitude and longitude are, then the position
-//! where only an attitude is. Rows outside of what is known are left as they are, and dropped by the cleaning. Attitudes are interpolated there too, as
-//! rotations. So no row that states something is lost.
+//! Each quantity is interpolated linearly over time between the rows that state it: height where only
+//! latitude and longitude are, then the position where only an attitude is. Rows outside of what is known are
+//! left as they are, and dropped by the cleaning. Attitudes are interpolated there too, as rotations. So no
+//! row that states something is lost.
 
 use camsim_core::flight_log::Note;
 
@@ -10,7 +11,8 @@ use super::rows::Row;
 
 /// Fills positions of a sparse table. Times are nanoseconds.
 pub(super) fn fill(rows: &mut Vec<Row>, reads_attitude: bool, notes: &mut Vec<Note>) {
-    let has_plane = |row: &Row| row.time.is_some() && row.position[0].is_finite() && row.position[1].is_finite();
+    let has_plane =
+        |row: &Row| row.time.is_some() && row.position[0].is_finite() && row.position[1].is_finite();
     let has_height = |row: &Row| row.time.is_some() && row.position[2].is_finite();
     let count = |rows: &[Row], has: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| has(row)).count();
     let mut filled = Vec::new();
@@ -50,9 +52,17 @@ pub(super) fn fill(rows: &mut Vec<Row>, reads_attitude: bool, notes: &mut Vec<No
     }
 }
 
-fn interpolate(rows: &mut [Row], axes: std::ops::Range<usize>, is_known: &dyn Fn(&Row) -> bool, is_wanted: &dyn Fn(&Row) -> bool) {
-    let mut known: Vec<(i128, [f64; 3])> =
-        rows.iter().filter(|row| is_known(row)).filter_map(|row| row.time.map(|time| (time, row.position))).collect();
+fn interpolate(
+    rows: &mut [Row],
+    axes: std::ops::Range<usize>,
+    is_known: &dyn Fn(&Row) -> bool,
+    is_wanted: &dyn Fn(&Row) -> bool,
+) {
+    let mut known: Vec<(i128, [f64; 3])> = rows
+        .iter()
+        .filter(|row| is_known(row))
+        .filter_map(|row| row.time.map(|time| (time, row.position)))
+        .collect();
     known.sort_by_key(|(time, _)| *time);
     for row in rows.iter_mut() {
         let Some(time) = row.time.filter(|_| is_wanted(row)) else { continue };

@@ -82,7 +82,9 @@ fn headers_name_columns_in_any_order() {
     assert_eq!(ned(&raw(xyz, LogFormat::CsvNed).unwrap()[0]), DVec3::new(1.0, 2.0, 3.0));
     assert_eq!(ned(&raw(xyz, LogFormat::CsvXya).unwrap()[0]), DVec3::new(1.0, 2.0, -3.0));
     assert!(raw(xyz, LogFormat::CsvLla).is_err());
-    assert!(raw("t,lat,lon,alt\n0,1,2,3\n", LogFormat::CsvNed).unwrap_err().to_string().contains("flight.format"));
+    assert!(
+        raw("t,lat,lon,alt\n0,1,2,3\n", LogFormat::CsvNed).unwrap_err().to_string().contains("flight.format")
+    );
     assert!(raw("foo,bar\n1,2\n", LogFormat::Auto).unwrap_err().to_string().contains("line 1"));
 }
 
@@ -98,7 +100,10 @@ fn auto_refuses_what_fits_two_layouts() {
         assert!(matches!(error, FlightLogError::Ambiguous { .. }), "{content}: {error}");
         assert!(error.to_string().contains("flight.format"), "{error}");
     }
-    assert!(matches!(raw("0,1,2,3,4\n", LogFormat::Auto), Err(FlightLogError::UnknownLayout { columns: 5, .. })));
+    assert!(matches!(
+        raw("0,1,2,3,4\n", LogFormat::Auto),
+        Err(FlightLogError::UnknownLayout { columns: 5, .. })
+    ));
     assert_eq!(raw(one_row, LogFormat::CsvLla).unwrap().len(), 1);
 }
 
@@ -133,7 +138,10 @@ fn bad_files_get_one_clear_error() {
     assert!(matches!(raw("", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
     assert!(matches!(raw("# only words\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
     assert!(matches!(raw("t,lat,lon,alt\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
-    assert!(matches!(raw_bytes(b"0,1\xff,2", LogFormat::Auto), Err(FlightLogError::NotText { offset: 3, .. })));
+    assert!(matches!(
+        raw_bytes(b"0,1\xff,2", LogFormat::Auto),
+        Err(FlightLogError::NotText { offset: 3, .. })
+    ));
     let error = text(raw(&LLA.replace("501", "5o1"), LogFormat::Auto));
     assert!(error.contains("line 2, column 4 (height): `5o1` is not a number"), "{error}");
     let error = text(raw(&format!("{LLA}1.5,47.0,8.0\n"), LogFormat::Auto));
@@ -147,7 +155,9 @@ fn bad_files_get_one_clear_error() {
 
 #[test]
 fn missing_values_are_left_to_cleaning() {
-    let rows = raw("0,47,8,500,1,2,3\n,47,8,500,1,2,3\n1,nan,8,500,1,,3\n1e30,47,8,inf,1,2,3\n", LogFormat::CsvLla).unwrap();
+    let rows =
+        raw("0,47,8,500,1,2,3\n,47,8,500,1,2,3\n1,nan,8,500,1,,3\n1e30,47,8,inf,1,2,3\n", LogFormat::CsvLla)
+            .unwrap();
     assert_eq!(rows[1].t_ns, None);
     assert_eq!(rows[3].t_ns, None);
     assert!(matches!(rows[2].attitude, RawAttitude::EulerDeg([_, pitch, _]) if pitch.is_nan()));
@@ -155,8 +165,9 @@ fn missing_values_are_left_to_cleaning() {
 
 #[test]
 fn times_are_exact_decimals() {
-    let time_ns =
-        |field: &str, unit: &units::Unit| time::number(field, false).map(|value| value.and_then(|value| time::to_ns(value, unit.factor)));
+    let time_ns = |field: &str, unit: &units::Unit| {
+        time::number(field, false).map(|value| value.and_then(|value| time::to_ns(value, unit.factor)))
+    };
     let [s, ms, ns, min] = [&units::SECOND, &units::MILLISECOND, &units::NANOSECOND, &units::MINUTE];
     assert_eq!(time_ns("-1.5", s), Some(Some(-1_500_000_000)));
     assert_eq!(time_ns("+.25", ms), Some(Some(250_000)));
@@ -176,9 +187,13 @@ fn times_are_exact_decimals() {
         assert_eq!(time::clock_ns(bad), None, "{bad}");
     }
     // `date -u -d 2024-02-29T23:59:59Z +%s`
-    for same in
-        ["2024-02-29T23:59:59Z", "2024-02-29 23:59:59", "2024/02/29 23:59:59.000", "2024-03-01T01:29:59+01:30", "2024-02-29T18:59:59-0500"]
-    {
+    for same in [
+        "2024-02-29T23:59:59Z",
+        "2024-02-29 23:59:59",
+        "2024/02/29 23:59:59.000",
+        "2024-03-01T01:29:59+01:30",
+        "2024-02-29T18:59:59-0500",
+    ] {
         assert_eq!(time::date_time_ns(same), Some(1_709_251_199_000_000_000), "{same}");
     }
     assert_eq!(time::date_ns("1970-01-01"), Some(0));
@@ -194,7 +209,11 @@ fn real_flights() {
     };
     let read = |file: &str, format, attitude| {
         let start = std::time::Instant::now();
-        let result = read_flight_log(&data.join(file), &FlightSpec { attitude, ..spec(format) }, HeightConversion::None);
+        let result = read_flight_log(
+            &data.join(file),
+            &FlightSpec { attitude, ..spec(format) },
+            HeightConversion::None,
+        );
         match &result {
             Ok(log) => eprintln!(
                 "{file}: {} rows, {:.1} s, {:.2} m/s, {:.1} deg/s, {:.0} ms; {}",
@@ -214,7 +233,8 @@ fn real_flights() {
     let start = std::time::Instant::now();
     let lawnmower = log("camsim/path_lawnmower.csv");
     assert!(start.elapsed().as_secs_f64() < 0.5, "reading took {:?}", start.elapsed());
-    // NUMERICS.md names 44849 for the last one; the file's odd row is the one before: -170.4 between 179.8 and -180.0.
+    // NUMERICS.md names 44849 for the last one; the file's odd row is the one before: -170.4 between 179.8
+    // and -180.0.
     assert_eq!(lawnmower.report.attitude_glitches.lines, [7190, 22762, 23060, 37732, 44551, 44848]);
     assert_eq!(lawnmower.report.position_spikes.count, 0);
     assert_eq!(lawnmower.report.rows_read, 51_753);
@@ -232,15 +252,27 @@ fn real_flights() {
     ] {
         let report = log(file).report;
         assert_eq!(report.rows_read, rows, "{file}");
-        assert_eq!((report.attitude_glitches.count, report.position_spikes.count), (0, 0), "{file}: {report}");
+        assert_eq!(
+            (report.attitude_glitches.count, report.position_spikes.count),
+            (0, 0),
+            "{file}: {report}"
+        );
     }
     let desk = log("flights/tumrgbd_fr2_desk_groundtruth.txt").report;
     assert_eq!((desk.gaps.count, desk.duplicates.count), (5, 1));
     assert!((desk.longest_step_s - 12.0).abs() < 0.1, "{}", desk.longest_step_s);
-    assert!(read("flights/glider_9crx3101.csv", LogFormat::Auto, AttitudeSource::Log).unwrap_err().to_string().contains("track"));
+    assert!(
+        read("flights/glider_9crx3101.csv", LogFormat::Auto, AttitudeSource::Log)
+            .unwrap_err()
+            .to_string()
+            .contains("track")
+    );
     read("flights/glider_9crx3101.csv", LogFormat::Auto, AttitudeSource::Track).unwrap();
     read("flights/rpng_neighborhood_01_gps.txt", LogFormat::Auto, AttitudeSource::Track).unwrap();
-    assert!(matches!(read("flights/kitti_00_gt.txt", LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::PoseMatrices { .. })));
+    assert!(matches!(
+        read("flights/kitti_00_gt.txt", LogFormat::Auto, AttitudeSource::Log),
+        Err(FlightLogError::PoseMatrices { .. })
+    ));
     assert!(read("flights/kitti_00_gt_times.txt", LogFormat::Auto, AttitudeSource::Log).is_err());
 
     for (file, rows) in [
@@ -249,7 +281,10 @@ fn real_flights() {
         ("camsim/path-chessboard-S3fisheye-lowoffset-opencv+posetracker.csv", 60),
         ("camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv", 60),
     ] {
-        assert!(matches!(read(file, LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::Ambiguous { .. })), "{file}");
+        assert!(
+            matches!(read(file, LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::Ambiguous { .. })),
+            "{file}"
+        );
         let log = read(file, LogFormat::CsvNed, AttitudeSource::Log).unwrap();
         assert_eq!(log.rows.len(), rows, "{file}");
         assert!(log.report.is_clean(), "{file}: {}", log.report);

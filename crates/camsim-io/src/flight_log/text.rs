@@ -68,7 +68,9 @@ impl Separator {
                 return;
             }
             // A quote that nothing closes is a character like others.
-            let quoted = rest.strip_prefix('"').and_then(|inner| closing_quote(inner).map(|end| (&inner[..end], &inner[end + 1..])));
+            let quoted = rest
+                .strip_prefix('"')
+                .and_then(|inner| closing_quote(inner).map(|end| (&inner[..end], &inner[end + 1..])));
             let after = match quoted {
                 Some((field, after)) => {
                     fields.push(field.trim());
@@ -135,7 +137,8 @@ impl<'a> Table<'a> {
     pub(super) fn new(content: &'a str) -> Self {
         // Lines of old end in a carriage return alone.
         let is_old = !content.contains('\n');
-        let texts: Box<dyn Iterator<Item = &'a str>> = if is_old { Box::new(content.split('\r')) } else { Box::new(content.lines()) };
+        let texts: Box<dyn Iterator<Item = &'a str>> =
+            if is_old { Box::new(content.split('\r')) } else { Box::new(content.lines()) };
         // Not tabs: one at the beginning of a line is an empty field.
         let lines: Vec<Line<'a>> = texts
             .enumerate()
@@ -144,7 +147,8 @@ impl<'a> Table<'a> {
             .collect();
         let is_comment = |line: &Line<'_>| line.text.starts_with(['#', '%']);
         let body: Vec<&str> = lines.iter().filter(|line| !is_comment(line)).map(|line| line.text).collect();
-        let sample: Vec<&str> = body.iter().copied().step_by(body.len().div_ceil(SAMPLE_LINES).max(1)).collect();
+        let sample: Vec<&str> =
+            body.iter().copied().step_by(body.len().div_ceil(SAMPLE_LINES).max(1)).collect();
         // Where a header is half of the sample, it shall not decide.
         let last = body.last().into_iter().copied();
         let separator = Separator::of(&sample.into_iter().chain(last).collect::<Vec<_>>());
@@ -171,8 +175,12 @@ impl<'a> Table<'a> {
             let (rows, columns) = widths.entry(fields.len()).or_default();
             *rows += 1;
             *columns = used.max(*columns);
-            commas += fields.iter().filter(|field| number(field, false).is_none() && number(field, true).is_some()).count();
-            points += fields.iter().filter(|field| field.contains('.') && number(field, false).is_some()).count();
+            commas += fields
+                .iter()
+                .filter(|field| number(field, false).is_none() && number(field, true).is_some())
+                .count();
+            points +=
+                fields.iter().filter(|field| field.contains('.') && number(field, false).is_some()).count();
         }
         // Most rows are right; a field too many in some of them is found when they are read.
         if let Some((&width, &(_, columns))) = widths.iter().max_by_key(|(_, (rows, _))| *rows) {
@@ -193,13 +201,19 @@ impl<'a> Table<'a> {
         let mut names = Vec::new();
         let mut split = |separator: Separator| {
             separator.split(text, &mut names);
-            if separator == Separator::Space { with_brackets(&names, text) } else { without_last_blank(&names) }
+            if separator == Separator::Space {
+                with_brackets(&names, text)
+            } else {
+                without_last_blank(&names)
+            }
         };
         let first = split(self.separator);
         if self.fits(first.len()) {
             return first;
         }
-        let others = Separator::ALL.into_iter().filter(|&separator| separator != self.separator && text.contains(separator.character()));
+        let others = Separator::ALL
+            .into_iter()
+            .filter(|&separator| separator != self.separator && text.contains(separator.character()));
         others.map(split).find(|names| self.fits(names.len())).unwrap_or(first)
     }
 
@@ -244,25 +258,31 @@ fn without_last_blank<'a>(names: &[&'a str]) -> Vec<&'a str> {
 fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) -> bool {
     separator.split(line, fields);
     let is_word = |field: &str| !is_missing(field) && !is_value(field, separator != Separator::Comma);
-    fields.iter().any(|field| is_word(field)) && fields.iter().all(|field| is_word(field) || is_missing(field))
+    fields.iter().any(|field| is_word(field))
+        && fields.iter().all(|field| is_word(field) || is_missing(field))
 }
 
 /// A number or a time that is there.
 fn is_value(field: &str, may_have_decimal_comma: bool) -> bool {
     !is_missing(field)
-        && (number(field, false).is_some() || (may_have_decimal_comma && number(field, true).is_some()) || time::is_time(field))
+        && (number(field, false).is_some()
+            || (may_have_decimal_comma && number(field, true).is_some())
+            || time::is_time(field))
 }
 
 /// What loggers write where they have no value.
 pub(super) fn is_missing(field: &str) -> bool {
     const WORDS: [&str; 8] = ["na", "n/a", "#n/a", "nan", "null", "none", "nil", "-nan"];
-    field.is_empty() || field.bytes().all(|byte| byte == b'-') || WORDS.iter().any(|word| field.eq_ignore_ascii_case(word))
+    field.is_empty()
+        || field.bytes().all(|byte| byte == b'-')
+        || WORDS.iter().any(|word| field.eq_ignore_ascii_case(word))
 }
 
 /// A field's value: `None` if it is no number, NaN if it is missing.
 pub(super) fn number(field: &str, has_decimal_comma: bool) -> Option<f64> {
     // Rust also reads `infinity`; a column of that name is none of numbers.
-    let may_be_number = field.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | 'i' | 'I'));
+    let may_be_number =
+        field.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | 'i' | 'I'));
     if may_be_number
         && !has_decimal_comma
         && let Ok(value) = field.parse()

@@ -36,8 +36,8 @@ pub(super) fn is_time(field: &str) -> bool {
     clock_ns(field).is_some() || date_time_ns(field).is_some() || date_ns(field).is_some()
 }
 
-/// A number of a time column, in 1e-12 of its unit: exact for decimals, because seconds since 1970 in f64 are only good to 0.2 us.
-/// `None` if it is no number, `Some(None)` if it is not finite or beyond all use.
+/// A number of a time column, in 1e-12 of its unit: exact for decimals, because seconds since 1970 in f64 are
+/// only good to 0.2 us. `None` if it is no number, `Some(None)` if it is not finite or beyond all use.
 pub(super) fn number(field: &str, has_decimal_comma: bool) -> Option<Option<i128>> {
     let value = text::number(field, has_decimal_comma)?;
     if !value.is_finite() {
@@ -115,8 +115,8 @@ pub(super) fn clock_ns(field: &str) -> Option<i128> {
     Some((hours * 3600 + minutes * 60) * 1_000_000_000 + seconds / 1000)
 }
 
-/// Nanoseconds since 1970 of `2023-05-01T10:00:59.5Z`; a blank for the T, an offset for the Z, `/` for `-` are right too.
-/// Without an offset it is taken as UTC: only differences count.
+/// Nanoseconds since 1970 of `2023-05-01T10:00:59.5Z`; a blank for the T, an offset for the Z, `/` for `-`
+/// are right too. Without an offset it is taken as UTC: only differences count.
 pub(super) fn date_time_ns(field: &str) -> Option<i128> {
     let field = field.trim();
     let (date, rest) = field.split_once(['T', 't', ' ', '_'])?;
@@ -130,7 +130,8 @@ pub(super) fn date_time_ns(field: &str) -> Option<i128> {
 }
 
 fn offset_ns(text: &str) -> Option<i128> {
-    let (sign, digits) = if let Some(rest) = text.strip_prefix('-') { (-1, rest) } else { (1, text.strip_prefix('+')?) };
+    let (sign, digits) =
+        if let Some(rest) = text.strip_prefix('-') { (-1, rest) } else { (1, text.strip_prefix('+')?) };
     let (hours, minutes) = match digits.split_once(':') {
         Some((hours, minutes)) => (whole(hours, 2)?, whole(minutes, 2)?),
         None if digits.len() == 4 => (whole(digits.get(..2)?, 2)?, whole(digits.get(2..)?, 2)?),
@@ -139,7 +140,8 @@ fn offset_ns(text: &str) -> Option<i128> {
     (hours <= 14 && minutes <= 59).then_some(sign * (hours * 60 + minutes) * 60_000_000_000)
 }
 
-/// Nanoseconds since 1970 at the beginning of `2023-05-01`, also with slashes or dots. Day and month first are not guessed.
+/// Nanoseconds since 1970 at the beginning of `2023-05-01`, also with slashes or dots. Day and month first
+/// are not guessed.
 pub(super) fn date_ns(field: &str) -> Option<i128> {
     let separator = ['-', '/', '.'].into_iter().find(|&c| field.matches(c).count() == 2)?;
     let mut parts = field.split(separator);
@@ -159,11 +161,13 @@ fn days_from_1970(year: i128, month: i128, day: i128) -> i128 {
 }
 
 fn whole(text: &str, most_digits: usize) -> Option<i128> {
-    ((1..=most_digits).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit())).then(|| text.parse().ok())?
+    ((1..=most_digits).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit()))
+        .then(|| text.parse().ok())?
 }
 
 /// Seconds with decimals, in 1e-12 s.
 fn seconds(text: &str) -> Option<i128> {
     let digits = text.split('.').next()?;
-    ((1..=2).contains(&digits.len()) && text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.')).then(|| decimal(text))?
+    ((1..=2).contains(&digits.len()) && text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.'))
+        .then(|| decimal(text))?
 }

@@ -31,56 +31,116 @@ pub(super) struct Unit {
     pub(super) factor: f64,
 }
 
-const fn unit(name: &'static str, dimension: Dimension, factor: f64, spellings: &'static [&'static str]) -> Unit {
+const fn unit(
+    name: &'static str,
+    dimension: Dimension,
+    factor: f64,
+    spellings: &'static [&'static str],
+) -> Unit {
     Unit { name, spellings, dimension, factor }
 }
 
 pub(super) static SECOND: Unit = unit("s", Dimension::Time, 1e9, &["s", "sec", "secs", "second", "seconds"]);
-pub(super) static MILLISECOND: Unit =
-    unit("ms", Dimension::Time, 1e6, &["ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"]);
+pub(super) static MILLISECOND: Unit = unit(
+    "ms",
+    Dimension::Time,
+    1e6,
+    &["ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"],
+);
 pub(super) static MICROSECOND: Unit = unit(
     "us",
     Dimension::Time,
     1e3,
     &["us", "usec", "usecs", "µs", "μs", "micros", "microsec", "microsecs", "microsecond", "microseconds"],
 );
-pub(super) static NANOSECOND: Unit =
-    unit("ns", Dimension::Time, 1.0, &["ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"]);
+pub(super) static NANOSECOND: Unit = unit(
+    "ns",
+    Dimension::Time,
+    1.0,
+    &["ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"],
+);
 pub(super) static MINUTE: Unit = unit("min", Dimension::Time, 60e9, &["min", "mins", "minute", "minutes"]);
 pub(super) static HOUR: Unit = unit("h", Dimension::Time, 3600e9, &["h", "hr", "hrs", "hour", "hours"]);
 static DAY: Unit = unit("days", Dimension::Time, 86_400e9, &["day", "days"]);
-static METRE: Unit = unit("m", Dimension::Length, 1.0, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]);
+static METRE: Unit =
+    unit("m", Dimension::Length, 1.0, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]);
 static FOOT: Unit = unit("ft", Dimension::Length, 0.3048, &["ft", "foot", "feet"]);
 static SURVEY_FOOT: Unit = unit(
     "US survey foot",
     Dimension::Length,
     1200.0 / 3937.0,
-    &["usft", "ftus", "ussft", "ussurveyft", "ussurveyfoot", "ussurveyfeet", "surveyft", "surveyfoot", "surveyfeet", "usfoot", "usfeet"],
+    &[
+        "usft",
+        "ftus",
+        "ussft",
+        "ussurveyft",
+        "ussurveyfoot",
+        "ussurveyfeet",
+        "surveyft",
+        "surveyfoot",
+        "surveyfeet",
+        "usfoot",
+        "usfeet",
+    ],
 );
-static MILLIMETRE: Unit = unit("mm", Dimension::Length, 1e-3, &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]);
-static CENTIMETRE: Unit = unit("cm", Dimension::Length, 1e-2, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]);
-static DECIMETRE: Unit = unit("dm", Dimension::Length, 0.1, &["dm", "decimeter", "decimeters", "decimetre", "decimetres"]);
-static KILOMETRE: Unit = unit("km", Dimension::Length, 1e3, &["km", "kilometer", "kilometers", "kilometre", "kilometres"]);
+static MILLIMETRE: Unit =
+    unit("mm", Dimension::Length, 1e-3, &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]);
+static CENTIMETRE: Unit =
+    unit("cm", Dimension::Length, 1e-2, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]);
+static DECIMETRE: Unit =
+    unit("dm", Dimension::Length, 0.1, &["dm", "decimeter", "decimeters", "decimetre", "decimetres"]);
+static KILOMETRE: Unit =
+    unit("km", Dimension::Length, 1e3, &["km", "kilometer", "kilometers", "kilometre", "kilometres"]);
 static INCH: Unit = unit("inch", Dimension::Length, 0.0254, &["inch", "inches"]);
 static YARD: Unit = unit("yd", Dimension::Length, 0.9144, &["yd", "yds", "yard", "yards"]);
 static MILE: Unit = unit("mi", Dimension::Length, 1609.344, &["mi", "mile", "miles"]);
 static DEGREE: Unit = unit("deg", Dimension::Angle, 1.0, &["deg", "degs", "degree", "degrees", "°", "@"]);
-static RADIAN: Unit = unit("rad", Dimension::Angle, 180.0 / std::f64::consts::PI, &["rad", "rads", "radian", "radians"]);
-static MILLIRADIAN: Unit = unit("mrad", Dimension::Angle, 0.18 / std::f64::consts::PI, &["mrad", "mrads", "milliradian", "milliradians"]);
-static DECIDEGREE: Unit = unit("0.1 deg", Dimension::Angle, 0.1, &["ddeg", "decideg", "decidegree", "decidegrees", "dege1", "01deg"]);
-static CENTIDEGREE: Unit =
-    unit("cdeg", Dimension::Angle, 1e-2, &["cdeg", "cdegs", "centideg", "centidegs", "centidegree", "centidegrees", "dege2", "001deg"]);
-static MILLIDEGREE: Unit = unit("mdeg", Dimension::Angle, 1e-3, &["mdeg", "millideg", "millidegree", "millidegrees"]);
+static RADIAN: Unit =
+    unit("rad", Dimension::Angle, 180.0 / std::f64::consts::PI, &["rad", "rads", "radian", "radians"]);
+static MILLIRADIAN: Unit = unit(
+    "mrad",
+    Dimension::Angle,
+    0.18 / std::f64::consts::PI,
+    &["mrad", "mrads", "milliradian", "milliradians"],
+);
+static DECIDEGREE: Unit = unit(
+    "0.1 deg",
+    Dimension::Angle,
+    0.1,
+    &["ddeg", "decideg", "decidegree", "decidegrees", "dege1", "01deg"],
+);
+static CENTIDEGREE: Unit = unit(
+    "cdeg",
+    Dimension::Angle,
+    1e-2,
+    &["cdeg", "cdegs", "centideg", "centidegs", "centidegree", "centidegrees", "dege2", "001deg"],
+);
+static MILLIDEGREE: Unit =
+    unit("mdeg", Dimension::Angle, 1e-3, &["mdeg", "millideg", "millidegree", "millidegrees"]);
 static DEGREE_E7: Unit = unit(
     "1e-7 deg",
     Dimension::Angle,
     1e-7,
-    &["dege7", "deg1e7", "1e7deg", "1e7degree", "1e7degrees", "degreese7", "degrees1e7", "e7", "1e7", "deg10^7"],
+    &[
+        "dege7",
+        "deg1e7",
+        "1e7deg",
+        "1e7degree",
+        "1e7degrees",
+        "degreese7",
+        "degrees1e7",
+        "e7",
+        "1e7",
+        "deg10^7",
+    ],
 );
-static ARC_MINUTE: Unit = unit("arcmin", Dimension::Angle, 1.0 / 60.0, &["arcmin", "arcminute", "arcminutes"]);
-static ARC_SECOND: Unit = unit("arcsec", Dimension::Angle, 1.0 / 3600.0, &["arcsec", "arcsecond", "arcseconds"]);
+static ARC_MINUTE: Unit =
+    unit("arcmin", Dimension::Angle, 1.0 / 60.0, &["arcmin", "arcminute", "arcminutes"]);
+static ARC_SECOND: Unit =
+    unit("arcsec", Dimension::Angle, 1.0 / 3600.0, &["arcsec", "arcsecond", "arcseconds"]);
 static GON: Unit = unit("gon", Dimension::Angle, 0.9, &["gon", "gons"]);
-static SEMICIRCLE: Unit = unit("semicircles", Dimension::Angle, 180.0 / 2_147_483_648.0, &["semicircle", "semicircles"]);
+static SEMICIRCLE: Unit =
+    unit("semicircles", Dimension::Angle, 180.0 / 2_147_483_648.0, &["semicircle", "semicircles"]);
 
 /// Every unit known.
 pub(super) static UNITS: &[&Unit] = &[
@@ -134,18 +194,21 @@ pub(super) enum Word {
 
 /// Words of a header's brackets and suffixes; `None` for those that say nothing known.
 pub(super) fn word(text: &str) -> Option<Word> {
-    let key: String = text.to_lowercase().chars().filter(|c| !matches!(c, ' ' | '_' | '.' | '-' | '+' | '±' | '*' | '·' | '×')).collect();
+    let key: String = text
+        .to_lowercase()
+        .chars()
+        .filter(|c| !matches!(c, ' ' | '_' | '.' | '-' | '+' | '±' | '*' | '·' | '×'))
+        .collect();
     if let Some(unit) = UNITS.iter().find(|unit| unit.spellings.contains(&key.as_str())) {
         return Some(Word::Unit(unit));
     }
     Some(match key.as_str() {
-        "msl" | "amsl" | "asl" | "sealevel" | "abovesealevel" | "abovemeansealevel" | "orthometric" | "geoid" | "egm96" => {
-            Word::Datum(Datum::MeanSeaLevel)
-        }
+        "msl" | "amsl" | "asl" | "sealevel" | "abovesealevel" | "abovemeansealevel" | "orthometric"
+        | "geoid" | "egm96" => Word::Datum(Datum::MeanSeaLevel),
         "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "aboveellipsoid" => Word::Datum(Datum::Ellipsoid),
         "magnetic" | "mag" => Word::Magnetic,
-        "" | "utc" | "gmt" | "local" | "gps" | "unix" | "epoch" | "true" | "1" | "unitless" | "0360" | "360" | "180" | "180180"
-        | "180to180" | "0to360" | "frd" | "body" | "decimal" | "dd" => Word::Noise,
+        "" | "utc" | "gmt" | "local" | "gps" | "unix" | "epoch" | "true" | "1" | "unitless" | "0360"
+        | "360" | "180" | "180180" | "180to180" | "0to360" | "frd" | "body" | "decimal" | "dd" => Word::Noise,
         _ => return None,
     })
 }

@@ -37,7 +37,8 @@ const TIMES: &[(&str, f64)] = &[
     ("min", 60.0),
 ];
 /// Names of units of length and what they are in metres.
-const LENGTHS: &[(&str, f64)] = &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km", 1e3), ("ft", 0.3048), ("in", 0.0254)];
+const LENGTHS: &[(&str, f64)] =
+    &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km", 1e3), ("ft", 0.3048), ("in", 0.0254)];
 
 const TIME_NAMES: &[&str] = &["t", "time", "timestamp", "stamp"];
 
@@ -45,7 +46,9 @@ const TIME_NAMES: &[&str] = &["t", "time", "timestamp", "stamp"];
 pub(crate) fn column(cell: &str) -> Column {
     let cell = cell.trim_start_matches('\u{feff}').trim().trim_matches('"').trim().to_lowercase();
     let (name, unit) = split(&cell);
-    let factor = |units: &[(&str, f64)]| units.iter().find(|(known, _)| Some(*known) == unit).map(|(_, factor)| Unit { factor: *factor });
+    let factor = |units: &[(&str, f64)]| {
+        units.iter().find(|(known, _)| Some(*known) == unit).map(|(_, factor)| Unit { factor: *factor })
+    };
     if TIME_NAMES.contains(&name) {
         return match (unit, factor(TIMES)) {
             (None, _) => Column::Time(None),
@@ -54,7 +57,9 @@ pub(crate) fn column(cell: &str) -> Column {
         };
     }
     let axis = |names: &[&str]| names.iter().position(|known| *known == name);
-    if let Some(axis) = axis(&["x", "y", "z"]).or_else(|| axis(&["tx", "ty", "tz"])).or_else(|| axis(&["px", "py", "pz"])) {
+    if let Some(axis) =
+        axis(&["x", "y", "z"]).or_else(|| axis(&["tx", "ty", "tz"])).or_else(|| axis(&["px", "py", "pz"]))
+    {
         return match (unit, factor(LENGTHS)) {
             (None, _) => Column::Position(axis, Unit { factor: 1.0 }),
             (_, Some(unit)) => Column::Position(axis, unit),

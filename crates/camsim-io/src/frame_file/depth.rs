@@ -21,7 +21,8 @@ const PER_METRE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 /// No camera sees anything nearer, metres. Its inverse and the slant of any ray fit an f32.
 const NEAREST_M: f64 = 1e-6;
 
-/// What is at least as far is no depth, metres, unless `depth_max_m` says less: no scene is as large, and Blender's background is 1e10.
+/// What is at least as far is no depth, metres, unless `depth_max_m` says less: no scene is as large, and
+/// Blender's background is 1e10.
 const FARTHEST_M: f64 = 1e9;
 
 /// Numbers of a camera that looks farther than this are no metres where all of them are whole.
@@ -50,10 +51,15 @@ pub(super) fn read_depth(
         let [w, h] = geometry.size_px;
         return Err(failure(
             path,
-            format!("is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place", size_px[0], size_px[1]),
+            format!(
+                "is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place",
+                size_px[0], size_px[1]
+            ),
         ));
     }
-    let in_metres = |value: f64| if spec.depth_kind == DepthKind::Inverse { per_metre / value } else { value / per_metre };
+    let in_metres = |value: f64| {
+        if spec.depth_kind == DepthKind::Inverse { per_metre / value } else { value / per_metre }
+    };
     refuse_without_any(&values, in_metres, path)?;
     let most_m = spec.depth_max_m.unwrap_or(FARTHEST_M).min(FARTHEST_M);
     let planar = |(i, value): (usize, f64)| {
@@ -70,8 +76,17 @@ pub(super) fn read_depth(
 }
 
 /// The numbers of a depth picture, in whatever kind of file.
-fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, frame_path: &Path) -> Result<Stored, FrameFileError> {
-    let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
+fn stored(
+    path: &Path,
+    spec: &FrameSpec,
+    color_origin_px: Option<[i32; 2]>,
+    frame_path: &Path,
+) -> Result<Stored, FrameFileError> {
+    let fail = |key, message: &str| FrameFileError::Key {
+        path: frame_path.into(),
+        key,
+        message: message.to_owned(),
+    };
     let packing = match spec.depth_encoding {
         DepthEncoding::Plain => None,
         DepthEncoding::Packed24 => Some(Packing::Packed24),
@@ -81,18 +96,29 @@ fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, fram
     if let (false, Some(key)) = (exr, spec.depth_key()) {
         return Err(fail(key, "is for EXR, and depth is none; leave it out"));
     }
-    let floats = if exr { Some(read_exr_depth(path, spec, color_origin_px)?) } else { floats::read(path, spec, frame_path)? };
+    let floats = if exr {
+        Some(read_exr_depth(path, spec, color_origin_px)?)
+    } else {
+        floats::read(path, spec, frame_path)?
+    };
     let found = match floats {
         None if !exr => read_npy(path)?,
         floats => floats,
     };
     if let Some(found) = found {
         let Some(packing) = packing else { return Ok(found) };
-        let message = format!("\"{}\" is of 8-bit RGB pictures, and depth is an EXR, PFM, TIFF or .npy; leave it out", packing.word());
+        let message = format!(
+            "\"{}\" is of 8-bit RGB pictures, and depth is an EXR, PFM, TIFF or .npy; leave it out",
+            packing.word()
+        );
         return Err(fail("depth_encoding", &message));
     }
     let (picture, format) = open(path)?;
-    let note = if format == ImageFormat::Png && packing.is_none() { PngChunks::read(path).depth_note() } else { None };
+    let note = if format == ImageFormat::Png && packing.is_none() {
+        PngChunks::read(path).depth_note()
+    } else {
+        None
+    };
     let size_px = [picture.width(), picture.height()];
     let (values, unit) = match packing {
         Some(packing) => (packed::metres(&picture, format, packing, path)?, Unit::Packed),
@@ -109,9 +135,15 @@ fn read_npy(path: &Path) -> Result<Option<Stored>, FrameFileError> {
     Ok(Some(Stored { size_px, values: array.values, unit, notes: Vec::new() }))
 }
 
-fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>) -> Result<Stored, FrameFileError> {
+fn read_exr_depth(
+    path: &Path,
+    spec: &FrameSpec,
+    color_origin_px: Option<[i32; 2]>,
+) -> Result<Stored, FrameFileError> {
     let picture = read_exr(path)?;
-    let plane = picture.depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref()).map_err(|message| failure(path, message))?;
+    let plane = picture
+        .depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref())
+        .map_err(|message| failure(path, message))?;
     if color_origin_px.is_some_and(|origin_px| origin_px != plane.origin_px) {
         let message = format!(
             "{}: begins at pixel {:?} of its file, the colour elsewhere: they must cover the same pixels",
@@ -119,11 +151,20 @@ fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2
         );
         return Err(failure(path, message));
     }
-    // What is far from near becomes near from far: a file that names its channel so must not be read as metres.
+    // What is far from near becomes near from far: a file that names its channel so must not be read as
+    // metres.
     let lower = plane.name.to_lowercase();
-    if let Some(word) = ["disp", "inv"].into_iter().find(|word| lower.contains(word)).filter(|_| spec.depth_kind != DepthKind::Inverse) {
-        let fix = "set depth_kind = \"inverse\" if it is of 1/z, or name the channel of metres with depth_channel";
-        return Err(failure(path, format!("{}: is a disparity or an inverse depth by its name (`{word}`): {fix}", plane.name)));
+    if let Some(word) = ["disp", "inv"]
+        .into_iter()
+        .find(|word| lower.contains(word))
+        .filter(|_| spec.depth_kind != DepthKind::Inverse)
+    {
+        let fix =
+            "set depth_kind = \"inverse\" if it is of 1/z, or name the channel of metres with depth_channel";
+        return Err(failure(
+            path,
+            format!("{}: is a disparity or an inverse depth by its name (`{word}`): {fix}", plane.name),
+        ));
     }
     Ok(Stored {
         size_px: plane.size_px,
@@ -162,7 +203,8 @@ fn per_metre(spec: &FrameSpec, stored: &Stored, frame_path: &Path) -> Result<f64
     Err(FrameFileError::Key { path: frame_path.into(), key: "depth_per_metre", message })
 }
 
-/// The least and the largest depth where all are whole and more than any camera that stores metres would round so: it may be millimetres.
+/// The least and the largest depth where all are whole and more than any camera that stores metres would
+/// round so: it may be millimetres.
 fn whole_numbers_between(values: &[f64]) -> Option<[f64; 2]> {
     let known = || values.iter().copied().filter(|&z| usable(z) && z < FARTHEST_M);
     let whole = known().all(|z| z.fract() == 0.0 && z > WHOLE_ABOVE);
@@ -175,8 +217,9 @@ fn usable(depth_m: f64) -> bool {
     depth_m.is_finite() && depth_m > NEAREST_M
 }
 
-/// Gives each pixel without depth that of the nearest one with, counted in steps to the four neighbours; of several at one distance the farthest
-/// surface, since what hides from a depth camera is behind what it sees. Without any depth nothing changes.
+/// Gives each pixel without depth that of the nearest one with, counted in steps to the four neighbours; of
+/// several at one distance the farthest surface, since what hides from a depth camera is behind what it sees.
+/// Without any depth nothing changes.
 pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
     let (width, height) = (width as usize, height as usize);
     let mut front: Vec<usize> = (0..inverse_depth.len()).filter(|&i| inverse_depth[i] > 0.0).collect();
@@ -190,7 +233,13 @@ pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
                 (y > 0).then(|| i - width),
                 (y + 1 < height).then_some(i + width),
             ];
-            found.extend(neighbours.into_iter().flatten().filter(|&at| inverse_depth[at] == 0.0).map(|at| (at, inverse_depth[i])));
+            found.extend(
+                neighbours
+                    .into_iter()
+                    .flatten()
+                    .filter(|&at| inverse_depth[at] == 0.0)
+                    .map(|at| (at, inverse_depth[i])),
+            );
         }
         // Of a pixel that is found several times the smallest inverse depth stays.
         found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -200,13 +249,19 @@ pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
     }
 }
 
-/// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is in another sign or unit.
-fn refuse_without_any(values: &[f64], in_metres: impl Fn(f64) -> f64, path: &Path) -> Result<(), FrameFileError> {
+/// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is
+/// in another sign or unit.
+fn refuse_without_any(
+    values: &[f64],
+    in_metres: impl Fn(f64) -> f64,
+    path: &Path,
+) -> Result<(), FrameFileError> {
     if values.iter().any(|value| usable(in_metres(*value))) {
         return Ok(());
     }
     let count = |what: &dyn Fn(f64) -> bool| values.iter().filter(|value| what(**value)).count();
-    let (negative, nan, near) = (count(&|z| z < 0.0), count(&f64::is_nan), count(&|z| z > 0.0 && z.is_finite()));
+    let (negative, nan, near) =
+        (count(&|z| z < 0.0), count(&f64::is_nan), count(&|z| z > 0.0 && z.is_finite()));
     if negative + nan + near == 0 {
         return Ok(());
     }

@@ -1,7 +1,8 @@
 //! Planes of EXR files by name, of every layer and part.
 //!
-//! A plane's whole name is `layer.channel`, as Blender's multilayer files have it (`ViewLayer.Depth.Z`); in a file of several parts the
-//! part's name comes before, unless the channel has it already. A name is found whole, or by its end where only one ends so.
+//! A plane's whole name is `layer.channel`, as Blender's multilayer files have it (`ViewLayer.Depth.Z`); in a
+//! file of several parts the part's name comes before, unless the channel has it already. A name is found
+//! whole, or by its end where only one ends so.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,8 @@ const NO_DEPTH: [&str; 2] = ["Mist", "Denoising Depth"];
 /// All planes of a file.
 pub(super) struct Planes {
     pub(super) planes: Vec<Plane>,
-    /// Middle of the display window, in the file's own pixels: where the optical axis is, whatever part of the picture the file holds.
+    /// Middle of the display window, in the file's own pixels: where the optical axis is, whatever part of
+    /// the picture the file holds.
     pub(super) display_centre_px: [f64; 2],
     /// Width of a pixel over its height.
     pixel_aspect: f64,
@@ -53,13 +55,21 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
     let several = image.layer_data.len() > 1;
     let display = image.attributes.display_window;
     let middle = |from: i32, length: usize| f64::from(from) + 0.5 * (length as f64 - 1.0);
-    let display_centre_px = [middle(display.position.0, display.size.0), middle(display.position.1, display.size.1)];
+    let display_centre_px =
+        [middle(display.position.0, display.size.0), middle(display.position.1, display.size.1)];
     let mut planes = Vec::new();
     for part in &image.layer_data {
-        let part_name = part.attributes.layer_name.as_ref().filter(|_| several).map(ToString::to_string).unwrap_or_default();
+        let part_name = part
+            .attributes
+            .layer_name
+            .as_ref()
+            .filter(|_| several)
+            .map(ToString::to_string)
+            .unwrap_or_default();
         for channel in &part.channel_data.list {
             let name = channel.name.to_string();
-            let whole = part_name.is_empty() || name.strip_prefix(&part_name).is_some_and(|rest| rest.starts_with('.'));
+            let whole = part_name.is_empty()
+                || name.strip_prefix(&part_name).is_some_and(|rest| rest.starts_with('.'));
             planes.push(Plane {
                 name: if whole { name } else { format!("{part_name}.{name}") },
                 size_px: [part.size.0 as u32, part.size.1 as u32],
@@ -108,7 +118,10 @@ impl Planes {
             // Channels are sorted by name: X before Y, U before V, but R after G.
             [a, b] if a.name.ends_with('G') && b.name.ends_with('R') => Ok([whole(b)?, whole(a)?]),
             [a, b] => Ok([whole(a)?, whole(b)?]),
-            _ => Err(format!("has the channels {}: say with motion.flow_channels which two are the flow right and down", self.list())),
+            _ => Err(format!(
+                "has the channels {}: say with motion.flow_channels which two are the flow right and down",
+                self.list()
+            )),
         }
     }
 
@@ -132,19 +145,32 @@ impl Planes {
     }
 
     /// Red, green and blue: those asked for (one is grey), or the only ones there are.
-    pub(super) fn colors(&self, channels: Option<&[String]>, layer: Option<&str>) -> Result<[&Plane; 3], String> {
+    pub(super) fn colors(
+        &self,
+        channels: Option<&[String]>,
+        layer: Option<&str>,
+    ) -> Result<[&Plane; 3], String> {
         let full = |name: &str| layer.map_or_else(|| name.to_owned(), |layer| format!("{layer}.{name}"));
         let colors = match channels {
             Some([gray]) => [self.named(&full(gray))?; 3],
             Some([r, g, b]) => [self.named(&full(r))?, self.named(&full(g))?, self.named(&full(b))?],
-            Some(_) => return Err("takes one channel (grey) or three (red, green, blue) in color_channels".to_owned()),
+            Some(_) => {
+                return Err(
+                    "takes one channel (grey) or three (red, green, blue) in color_channels".to_owned()
+                );
+            }
             None => {
                 let layer = match layer {
                     Some(layer) => layer.to_owned(),
                     None => self.color_layer()?,
                 };
-                let of_layer =
-                    |channel: &str| self.named(&if layer.is_empty() { channel.to_owned() } else { format!("{layer}.{channel}") });
+                let of_layer = |channel: &str| {
+                    self.named(&if layer.is_empty() {
+                        channel.to_owned()
+                    } else {
+                        format!("{layer}.{channel}")
+                    })
+                };
                 match of_layer("R") {
                     Ok(r) => [r, of_layer("G")?, of_layer("B")?],
                     Err(error) => of_layer("Y").map(|gray| [gray; 3]).map_err(|_| error)?,
@@ -158,9 +184,12 @@ impl Planes {
         Ok(colors)
     }
 
-    /// The layer with R G B (or Y alone), where one can be told from the others: without a name, or Blender's `Combined`.
+    /// The layer with R G B (or Y alone), where one can be told from the others: without a name, or Blender's
+    /// `Combined`.
     fn color_layer(&self) -> Result<String, String> {
-        let has = |layer: &str, channel: &str| self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, channel));
+        let has = |layer: &str, channel: &str| {
+            self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, channel))
+        };
         let mut layers: Vec<&str> = self.planes.iter().map(|plane| plane.layer_and_channel().0).collect();
         layers.sort_unstable();
         layers.dedup();
@@ -172,11 +201,16 @@ impl Planes {
             found = layers.into_iter().filter(gray).collect();
         }
         if found.is_empty() {
-            return Err(format!("has no channels R G B or Y, but {}; name them with color_channels", self.list()));
+            return Err(format!(
+                "has no channels R G B or Y, but {}; name them with color_channels",
+                self.list()
+            ));
         }
         only(&found, |layer| layer.is_empty(), |layer| last(layer) == "Combined")
             .map(|layer| (*layer).to_owned())
-            .ok_or_else(|| format!("has several layers with colour: {}; choose one with color_layer", found.join(", ")))
+            .ok_or_else(|| {
+                format!("has several layers with colour: {}; choose one with color_layer", found.join(", "))
+            })
     }
 
     /// Depth: the channel asked for, or the only one that can be it.
@@ -184,7 +218,9 @@ impl Planes {
         match (channel, layer) {
             (Some(channel), Some(layer)) => return self.named(&format!("{layer}.{channel}")),
             (Some(channel), None) => return self.named(channel),
-            (None, Some(layer)) => return self.named(&format!("{layer}.Z")).or_else(|_| self.named(&format!("{layer}.V"))),
+            (None, Some(layer)) => {
+                return self.named(&format!("{layer}.Z")).or_else(|_| self.named(&format!("{layer}.V")));
+            }
             (None, None) => {}
         }
         if let [plane] = &self.planes[..] {
@@ -194,8 +230,8 @@ impl Planes {
             let layer = plane.layer_and_channel().0;
             self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, other))
         };
-        // A Z beside an X is a coordinate. Blender's depth pass is called `Depth.V` when it has a file of its own; its mist is a Z too, and
-        // no depth.
+        // A Z beside an X is a coordinate. Blender's depth pass is called `Depth.V` when it has a file of its
+        // own; its mist is a Z too, and no depth.
         let is = |plane: &&Plane, channel: &str, not_beside: &str| {
             let (layer, name) = plane.layer_and_channel();
             name == channel && !beside(plane, not_beside) && !NO_DEPTH.contains(&last(layer))
@@ -210,7 +246,10 @@ impl Planes {
         let layer = |plane: &&Plane| plane.layer_and_channel().0.to_owned();
         match only(&found, |plane| layer(plane).is_empty(), |plane| last(&layer(plane)) == "Depth") {
             Some(plane) => whole(plane),
-            None => Err(format!("has several channels that may be depth: {}; choose one with depth_channel", names(&found))),
+            None => Err(format!(
+                "has several channels that may be depth: {}; choose one with depth_channel",
+                names(&found)
+            )),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Depth in PFM files (AirSim) and TIFF files (what OpenCV makes of an array of floats, or of 16-bit numbers).
+//! Depth in PFM files (AirSim) and TIFF files (what OpenCV makes of an array of floats, or of 16-bit
+//! numbers).
 
 use std::path::Path;
 
@@ -32,8 +33,16 @@ pub(super) enum Unit {
 }
 
 /// The numbers of a PFM or a TIFF file, told by content; `None` if it is neither.
-pub(super) fn read(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Option<Stored>, FrameFileError> {
-    let key = |message: &str| FrameFileError::Key { path: frame_path.into(), key: "depth_rows", message: message.to_owned() };
+pub(super) fn read(
+    path: &Path,
+    spec: &FrameSpec,
+    frame_path: &Path,
+) -> Result<Option<Stored>, FrameFileError> {
+    let key = |message: &str| FrameFileError::Key {
+        path: frame_path.into(),
+        key: "depth_rows",
+        message: message.to_owned(),
+    };
     // What cannot be opened is told of by whoever reads pictures.
     let Ok(tiff) = is_tiff(path) else { return Ok(None) };
     let pfm = !tiff && begins_as_pfm(path);
@@ -54,9 +63,13 @@ fn read_tiff(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Stored,
         TerrainFileError::Meaning { path, problem } => failure(&path, problem),
         other => failure(path, other.to_string()),
     })?;
-    read_mask_beside(path, &mut raster).map_err(|error| failure(path, format!("has a mask beside it that {}", error.reason())))?;
+    read_mask_beside(path, &mut raster)
+        .map_err(|error| failure(path, format!("has a mask beside it that {}", error.reason())))?;
     let Some(whole) = raster.depth_is_whole() else {
-        return Err(failure(path, "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of these"));
+        return Err(failure(
+            path,
+            "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of these",
+        ));
     };
     let unit = if whole { Unit::Whole } else { Unit::Floats };
     let pixels = raster.size[0] as usize * raster.size[1] as usize;
@@ -64,20 +77,33 @@ fn read_tiff(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Stored,
     let [scale, offset] = stated.as_ref().map_or([1.0, 0.0], |stated| stated.metres);
     // GDAL's mark for what is not known, of the number before its scale.
     let known = |value: f64| if raster.geo.nodata == Some(value) { f64::NAN } else { scale * value + offset };
-    let values = (0..pixels).map(|pixel| if raster.is_valid(pixel) { known(raster.value(pixel)) } else { f64::NAN }).collect();
+    let values = (0..pixels)
+        .map(|pixel| if raster.is_valid(pixel) { known(raster.value(pixel)) } else { f64::NAN })
+        .collect();
     let unit = if stated.is_some() && spec.depth_kind != DepthKind::Inverse { Unit::Stated } else { unit };
-    Ok(Stored { size_px: raster.size, values, unit, notes: stated.map(|stated| stated.note).into_iter().collect() })
+    Ok(Stored {
+        size_px: raster.size,
+        values,
+        unit,
+        notes: stated.map(|stated| stated.note).into_iter().collect(),
+    })
 }
 
 /// What a TIFF states of its numbers.
 struct Stated {
-    /// Depth in metres is the first times the number stored, and the second more; of inverse depth, what depth_per_metre is for.
+    /// Depth in metres is the first times the number stored, and the second more; of inverse depth, what
+    /// depth_per_metre is for.
     metres: [f64; 2],
     note: String,
 }
 
 /// Scale, offset and unit of GDAL, from the file or from beside it; `None` where it states none.
-fn stated(raster: &Raster, path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Option<Stated>, FrameFileError> {
+fn stated(
+    raster: &Raster,
+    path: &Path,
+    spec: &FrameSpec,
+    frame_path: &Path,
+) -> Result<Option<Stated>, FrameFileError> {
     let Some(band) = raster.geo.bands.first() else { return Ok(None) };
     if band.scale.is_none() && band.offset.is_none() && band.unit.is_none() {
         return Ok(None);
@@ -100,7 +126,10 @@ fn stated(raster: &Raster, path: &Path, spec: &FrameSpec, frame_path: &Path) -> 
     let name = path.display();
     if spec.depth_kind == DepthKind::Inverse {
         if let Some(Some(_)) = unit_m {
-            return Err(key("depth_kind", format!("is \"inverse\", but {name} states a length: {said}; correct one of them")));
+            return Err(key(
+                "depth_kind",
+                format!("is \"inverse\", but {name} states a length: {said}; correct one of them"),
+            ));
         }
         let note = format!("{name}: its {said} are applied ahead of depth_per_metre");
         return Ok(Some(Stated { metres: [scale, offset], note }));
@@ -109,20 +138,28 @@ fn stated(raster: &Raster, path: &Path, spec: &FrameSpec, frame_path: &Path) -> 
         // The key says what the unit's name does not.
         (Some(None), Some(_)) if plain => return Ok(None),
         (Some(None), _) => {
-            let fix = "write the unit as m, cm, mm, km or ft, or take these marks away and set depth_per_metre";
+            let fix =
+                "write the unit as m, cm, mm, km or ft, or take these marks away and set depth_per_metre";
             return Err(failure(path, format!("states a unit that is not known: {said}: {fix}")));
         }
         (unit_m, _) => unit_m.flatten().unwrap_or(1.0),
     };
     let metres = [unit_m * scale, unit_m * offset];
-    if let Some(per_metre) = spec.depth_per_metre.filter(|per_metre| offset != 0.0 || (per_metre * metres[0] - 1.0).abs() > 1e-6) {
+    if let Some(per_metre) =
+        spec.depth_per_metre.filter(|per_metre| offset != 0.0 || (per_metre * metres[0] - 1.0).abs() > 1e-6)
+    {
         return Err(key(
             "depth_per_metre",
-            format!("is {per_metre}, but {name} states another: {said}; leave the key out, or take these marks out of the file"),
+            format!(
+                "is {per_metre}, but {name} states another: {said}; leave the key out, or take these marks out of the file"
+            ),
         ));
     }
     let unit = if band.unit.is_none() { "; without a unit they are metres" } else { "" };
-    let note = format!("{name}: its {said} are applied: depth in metres is {} times the number stored plus {}{unit}", metres[0], metres[1]);
+    let note = format!(
+        "{name}: its {said} are applied: depth in metres is {} times the number stored plus {}{unit}",
+        metres[0], metres[1]
+    );
     Ok(Some(Stated { metres, note }))
 }
 
@@ -133,11 +170,13 @@ fn begins_as_pfm(path: &Path) -> bool {
     read.is_ok() && matches!(start, [b'P', b'f' | b'F', next] if next.is_ascii_whitespace())
 }
 
-/// `Pf`, width, height, a number whose sign tells the byte order and whose magnitude is a factor, one white space, and the rows.
+/// `Pf`, width, height, a number whose sign tells the byte order and whose magnitude is a factor, one white
+/// space, and the rows.
 fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
     let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}")))?;
     let wrong = |message: String| failure(path, message);
-    let (words, data) = header(&bytes).ok_or_else(|| wrong("is a PFM that ends within its header".to_owned()))?;
+    let (words, data) =
+        header(&bytes).ok_or_else(|| wrong("is a PFM that ends within its header".to_owned()))?;
     if words[0] == "PF" {
         return Err(wrong("is a PFM of three channels (PF): depth is of one (Pf)".to_owned()));
     }
@@ -145,11 +184,16 @@ fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
     let order = words[3].parse::<f64>().ok().filter(|scale| scale.is_finite() && *scale != 0.0);
     let (Some(width), Some(height), Some(order)) = (side(words[1]), side(words[2]), order) else {
         let [_, width, height, scale] = words;
-        return Err(wrong(format!("is a PFM of `{width}` by `{height}` pixels and scale `{scale}`: that is no header of one")));
+        return Err(wrong(format!(
+            "is a PFM of `{width}` by `{height}` pixels and scale `{scale}`: that is no header of one"
+        )));
     };
     let pixels = u64::from(width) * u64::from(height);
     if pixels.checked_mul(4) != Some(data.len() as u64) {
-        return Err(wrong(format!("says {width}x{height} pixels and holds {} bytes of them: it is cut off or damaged", data.len())));
+        return Err(wrong(format!(
+            "says {width}x{height} pixels and holds {} bytes of them: it is cut off or damaged",
+            data.len()
+        )));
     }
     let number = |b: &[u8]| {
         let bytes = [b[0], b[1], b[2], b[3]];
@@ -160,9 +204,15 @@ fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
         lines.reverse();
     }
     let factor = order.abs();
-    let values = lines.into_iter().flat_map(|line| line.chunks_exact(4).map(|bytes| factor * number(bytes))).collect();
-    let scaled =
-        || format!("{}: the scale {} of its header is applied: depth is {factor} times the numbers stored", path.display(), words[3]);
+    let values =
+        lines.into_iter().flat_map(|line| line.chunks_exact(4).map(|bytes| factor * number(bytes))).collect();
+    let scaled = || {
+        format!(
+            "{}: the scale {} of its header is applied: depth is {factor} times the numbers stored",
+            path.display(),
+            words[3]
+        )
+    };
     let notes = if factor == 1.0 { Vec::new() } else { vec![scaled()] };
     Ok(Stored { size_px: [width, height], values, unit: Unit::Floats, notes })
 }

@@ -20,7 +20,10 @@ const FLO_TAG: f32 = 202_021.25;
 const UNKNOWN_PX: f32 = 1e9;
 
 /// Reads `motion.flow`, whose keys have been checked; with the place of an EXR's first pixel.
-pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<(FlowField, Option<[i32; 2]>), FrameFileError> {
+pub(super) fn read_flow(
+    path: &Path,
+    motion: &MotionSpec,
+) -> Result<(FlowField, Option<[i32; 2]>), FrameFileError> {
     let (size_px, values, origin_px) = if is_exr(path) {
         read_exr_flow(path, motion)?
     } else if let Some(array) = npy::read(path)? {
@@ -32,16 +35,22 @@ pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<(FlowField, 
     let scale = motion.flow_scale.unwrap_or([1.0; 2]);
     let known = |[u, v]: [f32; 2]| u.abs() <= UNKNOWN_PX && v.abs() <= UNKNOWN_PX;
     let scaled = |uv: [f32; 2]| [0, 1].map(|k: usize| (f64::from(uv[k]) * scale[k]) as f32);
-    let px: Vec<[f32; 2]> = values.into_iter().map(|uv| if known(uv) { scaled(uv) } else { [f32::NAN; 2] }).collect();
+    let px: Vec<[f32; 2]> =
+        values.into_iter().map(|uv| if known(uv) { scaled(uv) } else { [f32::NAN; 2] }).collect();
     // An infinity may stand for what is not known; a number that becomes one may not.
     if px.iter().any(|uv| !uv[0].is_nan() && !known(*uv)) {
         return Err(failure(
             path,
-            format!("times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what the file holds"),
+            format!(
+                "times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what the file holds"
+            ),
         ));
     }
     if px.iter().all(|uv| uv[0].is_nan()) {
-        return Err(failure(path, "has no pixel whose flow is known: values are pixels, and more than 1e9 is none"));
+        return Err(failure(
+            path,
+            "has no pixel whose flow is known: values are pixels, and more than 1e9 is none",
+        ));
     }
     Ok((FlowField { size_px, px, interval_s: 1e-3 * motion.flow_interval_ms.unwrap_or_default() }, origin_px))
 }
@@ -56,17 +65,25 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<Values, FrameFileEr
     if u.name == v.name {
         return Err(failure(
             path,
-            format!("has one channel {} for both names of motion.flow_channels: give that to the right, and that down", u.name),
+            format!(
+                "has one channel {} for both names of motion.flow_channels: give that to the right, and that down",
+                u.name
+            ),
         ));
     }
     if u.size_px != v.size_px || u.origin_px != v.origin_px {
-        return Err(failure(path, format!("has flow channels of different sizes or places: {} {}", u.name, v.name)));
+        return Err(failure(
+            path,
+            format!("has flow channels of different sizes or places: {} {}", u.name, v.name),
+        ));
     }
     Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect(), Some(u.origin_px)))
 }
 
 fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
-    let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
+    let bytes = std::fs::read(path).map_err(|error| {
+        failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
+    })?;
     let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
     if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
         return Err(failure(
@@ -80,7 +97,13 @@ fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
     let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
     if pixels == 0 || pixels.checked_mul(2) != Some(values.len() as u64) || bytes.len() % 4 != 0 {
         let [width, height] = size_px;
-        return Err(failure(path, format!("says {width}x{height} pixels and holds {} numbers: it is cut off or damaged", values.len())));
+        return Err(failure(
+            path,
+            format!(
+                "says {width}x{height} pixels and holds {} numbers: it is cut off or damaged",
+                values.len()
+            ),
+        ));
     }
     Ok((size_px, values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect(), None))
 }

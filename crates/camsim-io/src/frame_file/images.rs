@@ -17,7 +17,8 @@ pub(super) struct Color {
     pub(super) size_px: [u32; 2],
     /// Of an EXR: where its first pixel is in the file's own pixels.
     pub(super) origin_px: Option<[i32; 2]>,
-    /// Where the optical axis is if nothing else is said: the middle of the whole picture, of which an EXR may hold a part, or more.
+    /// Where the optical axis is if nothing else is said: the middle of the whole picture, of which an EXR
+    /// may hold a part, or more.
     pub(super) centre_px: [f64; 2],
     pub(super) rgba: Vec<f32>,
     /// What there is to say about the file.
@@ -50,10 +51,16 @@ pub(super) fn read_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Re
     }
     let decoded = if exr { read_exr_color(path, spec)? } else { read_encoded_color(path, spec, frame_path)? };
     let default = if exr { ColorSpace::Linear } else { ColorSpace::Srgb };
-    let linear = |v: f32| if spec.color_space.unwrap_or(default) == ColorSpace::Srgb { linear_from_srgb(v) } else { v };
-    let rgba: Vec<f32> = decoded.rgb.chunks_exact(3).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2]), 1.0]).collect();
+    let linear = |v: f32| {
+        if spec.color_space.unwrap_or(default) == ColorSpace::Srgb { linear_from_srgb(v) } else { v }
+    };
+    let rgba: Vec<f32> =
+        decoded.rgb.chunks_exact(3).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2]), 1.0]).collect();
     if rgba.iter().any(|v| !v.is_finite()) {
-        return Err(failure(path, "holds a NaN or an infinity, which blur would spread; clean the picture before"));
+        return Err(failure(
+            path,
+            "holds a NaN or an infinity, which blur would spread; clean the picture before",
+        ));
     }
     let Decoded { size_px, origin_px, centre_px, notes, .. } = decoded;
     Ok(Color { size_px, origin_px, centre_px, rgba, notes })
@@ -61,17 +68,27 @@ pub(super) fn read_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Re
 
 fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Decoded, FrameFileError> {
     let Opened { picture, format, icc } = decode(path)?;
-    let unsaid = |message: String| FrameFileError::Key { path: frame_path.into(), key: "color_space", message };
+    let unsaid =
+        |message: String| FrameFileError::Key { path: frame_path.into(), key: "color_space", message };
     let needed = "set \"linear\" or \"srgb\"";
-    if spec.color_space.is_none() && matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
-        return Err(unsaid(format!("is missing: {} holds floats, which may be linear light or sRGB values: {needed}", path.display())));
+    if spec.color_space.is_none()
+        && matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_))
+    {
+        return Err(unsaid(format!(
+            "is missing: {} holds floats, which may be linear light or sRGB values: {needed}",
+            path.display()
+        )));
     }
     let chunks = if format == ImageFormat::Png { PngChunks::read(path) } else { PngChunks::default() };
     if let (None, Some(curve)) = (spec.color_space, chunks.other_curve()) {
         return Err(unsaid(format!("is missing: {} says {curve}: {needed}", path.display())));
     }
-    let mut notes: Vec<String> =
-        chunks.color_note().into_iter().chain(few_bits(&picture)).map(|note| format!("{}: {note}", path.display())).collect();
+    let mut notes: Vec<String> = chunks
+        .color_note()
+        .into_iter()
+        .chain(few_bits(&picture))
+        .map(|note| format!("{}: {note}", path.display()))
+        .collect();
     if let Some(icc) = icc.filter(|icc| !icc.windows(4).any(|part| part == b"sRGB")) {
         let bytes = icc.len();
         notes.push(format!(
@@ -80,7 +97,11 @@ fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Resul
         ));
     }
     if let Some(share) = clear_share(&picture) {
-        notes.push(format!("{}: its alpha is not read: {:.1} % of the pixels are not opaque", path.display(), 100.0 * share));
+        notes.push(format!(
+            "{}: its alpha is not read: {:.1} % of the pixels are not opaque",
+            path.display(),
+            100.0 * share
+        ));
     }
     let size_px = [picture.width(), picture.height()];
     let centre_px = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
@@ -119,11 +140,14 @@ struct Opened {
 }
 
 fn decode(path: &Path) -> Result<Opened, FrameFileError> {
-    let reader = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
+    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|error| {
+        failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
+    })?;
     let Some(format) = reader.format() else {
-        return Err(failure(path, "is no EXR, PNG, JPEG, BMP, PGM, TIFF or WebP file (depth may be PFM or .npy too)"));
+        return Err(failure(
+            path,
+            "is no EXR, PNG, JPEG, BMP, PGM, TIFF or WebP file (depth may be PFM or .npy too)",
+        ));
     };
     let undecoded = |error: image::ImageError| failure(path, format!("cannot be decoded: {error}"));
     let mut decoder = reader.into_decoder().map_err(undecoded)?;
@@ -142,12 +166,18 @@ fn decode(path: &Path) -> Result<Opened, FrameFileError> {
     // A few bytes must not ask for all memory.
     image::Limits::default().reserve(decoder.total_bytes()).map_err(undecoded)?;
     let picture = DynamicImage::from_decoder(decoder).map_err(undecoded)?;
-    if picture.width() == 0 || picture.height() == 0 { Err(failure(path, "has no pixel")) } else { Ok(Opened { picture, format, icc }) }
+    if picture.width() == 0 || picture.height() == 0 {
+        Err(failure(path, "has no pixel"))
+    } else {
+        Ok(Opened { picture, format, icc })
+    }
 }
 
 fn read_exr_color(path: &Path, spec: &FrameSpec) -> Result<Decoded, FrameFileError> {
     let picture = read_exr(path)?;
-    let colors = picture.colors(spec.color_channels.as_deref(), spec.color_layer.as_deref()).map_err(|message| failure(path, message))?;
+    let colors = picture
+        .colors(spec.color_channels.as_deref(), spec.color_layer.as_deref())
+        .map_err(|message| failure(path, message))?;
     let rgb = (0..colors[0].values.len()).flat_map(|i| colors.map(|plane| plane.values[i])).collect();
     let Plane { size_px, origin_px, .. } = *colors[0];
     let centre_px = [0, 1].map(|k| picture.display_centre_px[k] - f64::from(origin_px[k]));

@@ -14,8 +14,8 @@
 //! frames = "associations.txt"        # `time color` or `time color time depth` a line
 //! frames = "frames.csv"              # columns color (or color_exr, color_png), depth, t_s (t_ms, t_us, t_ns) or stamp_ns: camsim's own too
 //! ```
-//! `fps`, with `motion.stamp_s` for the first, gives times to frames that have none. Times count where there is a trajectory; a twist is
-//! the same for all. A frame's stamp is that of its colour.
+//! `fps`, with `motion.stamp_s` for the first, gives times to frames that have none. Times count where there
+//! is a trajectory; a twist is the same for all. A frame's stamp is that of its colour.
 
 use std::path::{Path, PathBuf};
 
@@ -58,21 +58,40 @@ fn key(path: &Path, key: &'static str, message: impl Into<String>) -> FrameFileE
 /// All frames that `spec` names, in order.
 pub(super) fn frames(spec: &FrameSpec, path: &Path) -> Result<Listed, FrameFileError> {
     let mut listed = match (&spec.frames, &spec.color) {
-        (Some(_), Some(_)) => return Err(key(path, "frames", "is a table that names the pictures: leave color and depth out, or frames")),
-        (Some(_), None) if spec.depth.is_some() => return Err(key(path, "frames", "names depth pictures too: leave depth out, or frames")),
+        (Some(_), Some(_)) => {
+            return Err(key(
+                path,
+                "frames",
+                "is a table that names the pictures: leave color and depth out, or frames",
+            ));
+        }
+        (Some(_), None) if spec.depth.is_some() => {
+            return Err(key(path, "frames", "names depth pictures too: leave depth out, or frames"));
+        }
         (Some(table), None) => {
             let (entries, notes) = read_table(table)?;
             Listed { entries, left_out: 0, several: true, notes }
         }
-        (None, None) => return Err(key(path, "color", "is missing, and has no default; add it, or frames = \"frames.csv\"")),
+        (None, None) => {
+            return Err(key(
+                path,
+                "color",
+                "is missing, and has no default; add it, or frames = \"frames.csv\"",
+            ));
+        }
         (None, Some(color)) => match Pictures::of(color) {
             Pictures::One => return one(spec, color, path),
             pictures => paired(spec, color, &pictures, path)?,
         },
     };
-    let with_names = spec.frames.is_none() && spec.color.as_deref().is_some_and(|color| Pictures::of(color) == Pictures::Pattern);
+    let with_names = spec.frames.is_none()
+        && spec.color.as_deref().is_some_and(|color| Pictures::of(color) == Pictures::Pattern);
     if spec.name_unit.is_some() && !with_names {
-        return Err(key(path, "name_unit", "is for names with a *; a list or table has times of its own: leave it out"));
+        return Err(key(
+            path,
+            "name_unit",
+            "is for names with a *; a list or table has times of its own: leave it out",
+        ));
     }
     give_times(spec, &mut listed.entries, path)?;
     Ok(listed)
@@ -98,9 +117,17 @@ impl Pictures {
 }
 
 fn one(spec: &FrameSpec, color: &Path, path: &Path) -> Result<Listed, FrameFileError> {
-    let several = [("name_unit", spec.name_unit.is_some()), ("fps", spec.fps.is_some()), ("max_gap_ms", spec.max_gap_ms.is_some())];
+    let several = [
+        ("name_unit", spec.name_unit.is_some()),
+        ("fps", spec.fps.is_some()),
+        ("max_gap_ms", spec.max_gap_ms.is_some()),
+    ];
     if let Some((name, _)) = several.into_iter().find(|(_, given)| *given) {
-        return Err(key(path, name, "is for many frames, and color names one picture; leave it out, or write color = \"folder/*.png\""));
+        return Err(key(
+            path,
+            name,
+            "is for many frames, and color names one picture; leave it out, or write color = \"folder/*.png\"",
+        ));
     }
     if spec.depth.as_deref().is_some_and(|depth| Pictures::of(depth) != Pictures::One) {
         return Err(key(path, "depth", "names many pictures, and color names one"));
@@ -110,18 +137,30 @@ fn one(spec: &FrameSpec, color: &Path, path: &Path) -> Result<Listed, FrameFileE
 }
 
 /// Colour and depth from patterns or lists.
-fn paired(spec: &FrameSpec, color: &Path, pictures: &Pictures, path: &Path) -> Result<Listed, FrameFileError> {
+fn paired(
+    spec: &FrameSpec,
+    color: &Path,
+    pictures: &Pictures,
+    path: &Path,
+) -> Result<Listed, FrameFileError> {
     let read = |name, of: &Path| match Pictures::of(of) {
-        Pictures::One => Err(key(path, name, "names one picture, and color many: write it with a *, or as a list")),
+        Pictures::One => {
+            Err(key(path, name, "names one picture, and color many: write it with a *, or as a list"))
+        }
         Pictures::Pattern => read_pattern(of, spec.name_unit, path, name),
         Pictures::List => read_list(of),
     };
     let colors = read("color", color)?;
     let Some(depth) = &spec.depth else {
-        let entries = colors.into_iter().map(|item| Entry { color: item.path, depth: None, stamp_ns: item.stamp_ns }).collect();
+        let entries = colors
+            .into_iter()
+            .map(|item| Entry { color: item.path, depth: None, stamp_ns: item.stamp_ns })
+            .collect();
         return Ok(Listed { entries, left_out: 0, several: true, notes: Vec::new() });
     };
-    let by_name = *pictures == Pictures::Pattern && Pictures::of(depth) == Pictures::Pattern && spec.name_unit.is_none();
+    let by_name = *pictures == Pictures::Pattern
+        && Pictures::of(depth) == Pictures::Pattern
+        && spec.name_unit.is_none();
     if by_name {
         if spec.max_gap_ms.is_some() {
             return Err(key(
@@ -156,17 +195,30 @@ fn by_names(colors: Vec<Item>, depth: &Path, path: &Path) -> Result<Listed, Fram
 }
 
 /// Each depth picture goes to one colour at most, the nearest pairs first.
-fn by_times(colors: Vec<Item>, depths: Vec<Item>, max_gap_ms: f64, path: &Path) -> Result<Listed, FrameFileError> {
+fn by_times(
+    colors: Vec<Item>,
+    depths: Vec<Item>,
+    max_gap_ms: f64,
+    path: &Path,
+) -> Result<Listed, FrameFileError> {
     let mut pairs: Vec<(i64, usize, usize)> = Vec::new();
     for (i, color) in colors.iter().enumerate() {
         let Some(stamp_ns) = color.stamp_ns else {
-            return Err(key(path, "name_unit", "is missing: depth is a list with times, so the colours' names must be times too"));
+            return Err(key(
+                path,
+                "name_unit",
+                "is missing: depth is a list with times, so the colours' names must be times too",
+            ));
         };
         let after = depths.partition_point(|depth| depth.stamp_ns < Some(stamp_ns));
         // Two on each side: the nearest may go to a neighbour.
         for (j, depth) in depths.iter().enumerate().take(after + 2).skip(after.saturating_sub(2)) {
             let Some(depth_ns) = depth.stamp_ns else {
-                return Err(key(path, "name_unit", "is missing: color is a list with times, so the depths' names must be times too"));
+                return Err(key(
+                    path,
+                    "name_unit",
+                    "is missing: color is a list with times, so the depths' names must be times too",
+                ));
             };
             let gap_ns = depth_ns.abs_diff(stamp_ns);
             if gap_ns as f64 <= 1e6 * max_gap_ms {
@@ -184,12 +236,18 @@ fn by_times(colors: Vec<Item>, depths: Vec<Item>, max_gap_ms: f64, path: &Path) 
     }
     let left_out = depth_of.iter().filter(|depth| depth.is_none()).count();
     if left_out == colors.len() {
-        let message = format!("no picture is within {max_gap_ms} ms of a colour: check that both have one clock, or raise max_gap_ms");
+        let message = format!(
+            "no picture is within {max_gap_ms} ms of a colour: check that both have one clock, or raise max_gap_ms"
+        );
         return Err(key(path, "depth", message));
     }
     let with_depth = colors.into_iter().zip(depth_of);
     let entry = |(color, depth): (Item, Option<usize>)| {
-        depth.map(|j| Entry { color: color.path, depth: Some(depths[j].path.clone()), stamp_ns: color.stamp_ns })
+        depth.map(|j| Entry {
+            color: color.path,
+            depth: Some(depths[j].path.clone()),
+            stamp_ns: color.stamp_ns,
+        })
     };
     Ok(Listed { entries: with_depth.filter_map(entry).collect(), left_out, several: true, notes: Vec::new() })
 }
@@ -199,8 +257,7 @@ fn give_times(spec: &FrameSpec, entries: &mut [Entry], path: &Path) -> Result<()
     let timed = entries.iter().any(|entry| entry.stamp_ns.is_some());
     let Some(fps) = spec.fps else {
         if spec.motion.stamp_s.is_some() {
-            let fix =
-                "is of one frame, or of the first one with fps; these frames have times of their own, or none: leave it out, or add fps";
+            let fix = "is of one frame, or of the first one with fps; these frames have times of their own, or none: leave it out, or add fps";
             return Err(key(path, "motion.stamp_s", fix));
         }
         return Ok(());

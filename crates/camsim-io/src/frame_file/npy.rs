@@ -26,11 +26,12 @@ pub(super) fn read(path: &Path) -> Result<Option<Array>, FrameFileError> {
     use std::io::Read;
     let mut start = [0; 6];
     // What cannot be opened is told of by whoever reads pictures.
-    let Ok(()) = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)) else { return Ok(None) };
+    let Ok(()) = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)) else {
+        return Ok(None);
+    };
     let named_npz = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
     if named_npz || start.starts_with(b"PK\x03\x04") {
-        let of =
-            "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", numpy.load(\"FILE.npz\")[\"NAME\"])`";
+        let of = "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", numpy.load(\"FILE.npz\")[\"NAME\"])`";
         return Err(failure(path, of));
     }
     if start != *b"\x93NUMPY" {
@@ -42,32 +43,47 @@ pub(super) fn read(path: &Path) -> Result<Option<Array>, FrameFileError> {
 
 fn parse(bytes: &[u8]) -> Result<Array, String> {
     let cut = || "is a .npy file that ends within its header".to_owned();
-    let word =
-        |at: usize, size: usize| bytes.get(at..at + size).map(|b| b.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte)));
+    let word = |at: usize, size: usize| {
+        bytes
+            .get(at..at + size)
+            .map(|b| b.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte)))
+    };
     let (length, from): (usize, usize) = match bytes.get(6).ok_or_else(cut)? {
         1 => (word(8, 2).ok_or_else(cut)?, 10),
         _ => (word(8, 4).ok_or_else(cut)?, 12),
     };
     let header = from.checked_add(length).and_then(|end| bytes.get(from..end)).ok_or_else(cut)?;
-    let header = std::str::from_utf8(header).map_err(|_| "is a .npy file whose header is no text".to_owned())?;
-    let wrong = |key: &str| format!("is a .npy file whose header has no {key} that can be read: {}", header.trim());
-    let kind = entry(header, "descr").and_then(|text| text.strip_prefix('\'')?.split('\'').next()).ok_or_else(|| wrong("descr"))?;
+    let header =
+        std::str::from_utf8(header).map_err(|_| "is a .npy file whose header is no text".to_owned())?;
+    let wrong =
+        |key: &str| format!("is a .npy file whose header has no {key} that can be read: {}", header.trim());
+    let kind = entry(header, "descr")
+        .and_then(|text| text.strip_prefix('\'')?.split('\'').next())
+        .ok_or_else(|| wrong("descr"))?;
     let fortran = match entry(header, "fortran_order") {
         Some(text) if text.starts_with("True") => true,
         Some(text) if text.starts_with("False") => false,
         _ => return Err(wrong("fortran_order")),
     };
-    let shape = entry(header, "shape").and_then(|text| text.strip_prefix('(')?.split(')').next()).ok_or_else(|| wrong("shape"))?;
+    let shape = entry(header, "shape")
+        .and_then(|text| text.strip_prefix('(')?.split(')').next())
+        .ok_or_else(|| wrong("shape"))?;
     let sides = shape.split(',').map(str::trim).filter(|side| !side.is_empty()).map(str::parse);
     let shape: Vec<usize> = sides.collect::<Result<_, _>>().map_err(|_| wrong("shape"))?;
-    let count = shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side)).filter(|count| (1..=MOST).contains(count));
+    let count = shape
+        .iter()
+        .try_fold(1_usize, |all, side| all.checked_mul(*side))
+        .filter(|count| (1..=MOST).contains(count));
     let count = count.ok_or_else(|| format!("is a .npy file of shape {shape:?}: that is no picture"))?;
     let (size, number, whole) = reader(kind).ok_or_else(|| {
         format!("is a .npy file of elements `{kind}`: floats (f2, f4, f8) and integers (u2, u4, i2, i4, i8) are read; convert with `.astype(\"float32\")`")
     })?;
     let data = &bytes[from + length..];
     if data.len() != count * size {
-        return Err(format!("says {shape:?} elements of {size} bytes and holds {} bytes: it is cut off or damaged", data.len()));
+        return Err(format!(
+            "says {shape:?} elements of {size} bytes and holds {} bytes: it is cut off or damaged",
+            data.len()
+        ));
     }
     let stored: Vec<f64> = data.chunks_exact(size).map(number).collect();
     Ok(Array { values: if fortran { turned(&stored, &shape) } else { stored }, shape, whole })
@@ -85,7 +101,11 @@ type Number = fn(&[u8]) -> f64;
 fn reader(kind: &str) -> Option<(usize, Number, bool)> {
     macro_rules! of {
         ($type:ty, $from:ident, $whole:expr) => {
-            Some((size_of::<$type>(), |b| <$type>::$from(b.try_into().unwrap_or_default()).into_f64(), $whole))
+            Some((
+                size_of::<$type>(),
+                |b| <$type>::$from(b.try_into().unwrap_or_default()).into_f64(),
+                $whole,
+            ))
         };
     }
     match kind {
@@ -129,7 +149,10 @@ fn turned(stored: &[f64], shape: &[usize]) -> Vec<f64> {
     let mut at = vec![0; shape.len()];
     let mut out = Vec::with_capacity(stored.len());
     for _ in 0..stored.len() {
-        let (index, _) = at.iter().zip(shape).fold((0, 1), |(index, stride), (place, side)| (index + place * stride, stride * side));
+        let (index, _) = at
+            .iter()
+            .zip(shape)
+            .fold((0, 1), |(index, stride), (place, side)| (index + place * stride, stride * side));
         out.push(stored[index]);
         for (place, side) in at.iter_mut().zip(shape).rev() {
             *place += 1;

@@ -27,14 +27,18 @@ pub(super) const FORMULAS: &str = "depth_encoding = \"carla\" where metres are 1
                                    (65025 R + 255 G + B) / 255";
 
 /// Metres, 0 where nothing is in reach. Decoded texel by texel: packed bytes must never be filtered.
-pub(super) fn metres(picture: &DynamicImage, format: ImageFormat, packing: Packing, path: &Path) -> Result<Vec<f64>, FrameFileError> {
+pub(super) fn metres(
+    picture: &DynamicImage,
+    format: ImageFormat,
+    packing: Packing,
+    path: &Path,
+) -> Result<Vec<f64>, FrameFileError> {
     if !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
         let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
         return Err(failure(path, message));
     }
     if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
-        let message =
-            "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
+        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
         return Err(failure(path, message));
     }
     Ok(picture.to_rgb8().pixels().map(|pixel| packing.metres(pixel.0.map(f64::from))).collect())

@@ -33,7 +33,9 @@ impl PngChunks {
     }
 
     fn walk(&mut self, bytes: &[u8]) -> Option<()> {
-        let word = |at: usize| bytes.get(at..at.checked_add(4)?).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
+        let word = |at: usize| {
+            bytes.get(at..at.checked_add(4)?).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]))
+        };
         let mut at = 8_usize;
         loop {
             let length = word(at)? as usize;
@@ -62,7 +64,9 @@ impl PngChunks {
     pub(super) fn other_curve(&self) -> Option<String> {
         if let Some(cicp @ [_, transfer, ..]) = self.cicp {
             let differs = cicp[1..] != SRGB_CICP[1..];
-            return differs.then(|| format!("that its values have transfer {transfer} (cICP {cicp:?}), which is not sRGB's"));
+            return differs.then(|| {
+                format!("that its values have transfer {transfer} (cICP {cicp:?}), which is not sRGB's")
+            });
         }
         let gamma = self.gamma.filter(|gamma| !self.is_srgb && (gamma - SRGB_GAMMA).abs() > 0.01)?;
         Some(format!("that its values are light to the power of {gamma} (gAMA), as sRGB is not"))
@@ -71,10 +75,16 @@ impl PngChunks {
     /// What of its colours is not applied.
     pub(super) fn color_note(&self) -> Option<String> {
         if let Some(cicp) = self.cicp {
-            let of = || format!("its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as color_space says");
+            let of = || {
+                format!(
+                    "its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as color_space says"
+                )
+            };
             return (cicp != SRGB_CICP).then(of);
         }
-        let other = |all: &[u32; 8]| all.iter().zip(&SRGB_CHROMATICITIES).any(|(a, b)| a.abs_diff(*b) > CHROMATICITY_SLACK);
+        let other = |all: &[u32; 8]| {
+            all.iter().zip(&SRGB_CHROMATICITIES).any(|(a, b)| a.abs_diff(*b) > CHROMATICITY_SLACK)
+        };
         self.chromaticities.filter(|all| !self.is_srgb && other(all)).map(|all| {
             format!("its primaries (cHRM {all:?}) are not those of sRGB, and are not applied: its colours are taken for those of sRGB")
         })
@@ -83,6 +93,8 @@ impl PngChunks {
     /// What of its numbers is not applied.
     pub(super) fn depth_note(&self) -> Option<String> {
         let names = self.calibration.join(", ");
-        (!names.is_empty()).then(|| format!("its {names} is not applied: depth is the whole number stored over depth_per_metre"))
+        (!names.is_empty()).then(|| {
+            format!("its {names} is not applied: depth is the whole number stored over depth_per_metre")
+        })
     }
 }

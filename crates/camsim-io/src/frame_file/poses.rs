@@ -21,7 +21,11 @@ const LATEST_S: f64 = 1e11;
 type Places = [(usize, f64); 8];
 
 /// Rows with their time from `base_s`, and what there is to say about the table.
-pub(super) fn read_poses(path: &Path, format: TrajectoryFormat, base_s: f64) -> Result<(Vec<PoseRow>, Vec<String>), FrameFileError> {
+pub(super) fn read_poses(
+    path: &Path,
+    format: TrajectoryFormat,
+    base_s: f64,
+) -> Result<(Vec<PoseRow>, Vec<String>), FrameFileError> {
     match format {
         TrajectoryFormat::Csv => read_csv(path, base_s),
         TrajectoryFormat::Tum => Ok((read_tum(path, base_s)?, Vec::new())),
@@ -32,16 +36,22 @@ fn failure(path: &Path, line: Option<u64>, message: impl Into<String>) -> FrameF
     FrameFileError::Poses { path: path.into(), line, message: message.into() }
 }
 
-/// `t x y z qx qy qz qw`, with blanks between and lines of `#` for comments, of which one may name the columns in another order.
+/// `t x y z qx qy qz qw`, with blanks between and lines of `#` for comments, of which one may name the
+/// columns in another order.
 fn read_tum(path: &Path, base_s: f64) -> Result<Vec<PoseRow>, FrameFileError> {
     let fail = |line: Option<u64>, message: String| failure(path, line, message);
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| fail(None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml")))?;
-    let mut places: Places = std::array::from_fn(|slot| (TUM.iter().position(|of| *of == slot).unwrap_or(0), 1.0));
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        fail(None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml"))
+    })?;
+    let mut places: Places =
+        std::array::from_fn(|slot| (TUM.iter().position(|of| *of == slot).unwrap_or(0), 1.0));
     let mut rows: Vec<PoseRow> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let Some(words) = words_of(text) else {
-            if let Some(named) = named_in_comment(text).map_err(|message| fail(Some(line), message))?.filter(|_| rows.is_empty()) {
+            if let Some(named) = named_in_comment(text)
+                .map_err(|message| fail(Some(line), message))?
+                .filter(|_| rows.is_empty())
+            {
                 places = named;
             }
             continue;
@@ -53,12 +63,16 @@ fn read_tum(path: &Path, base_s: f64) -> Result<Vec<PoseRow>, FrameFileError> {
                 "is not the 8 numbers t x y z qx qy qz qw of motion.trajectory_format = \"tum\"; correct it or leave it out".into(),
             )
         })?;
-        rows.push(pose(places.map(|(at, factor)| factor * numbers[at]), base_s).map_err(|message| fail(Some(line), message))?);
+        rows.push(
+            pose(places.map(|(at, factor)| factor * numbers[at]), base_s)
+                .map_err(|message| fail(Some(line), message))?,
+        );
     }
     Ok(rows)
 }
 
-/// The columns that a comment names, if it ends with the names of all of them: `# timestamp tx ty tz qw qx qy qz`.
+/// The columns that a comment names, if it ends with the names of all of them: `# timestamp tx ty tz qw qx qy
+/// qz`.
 fn named_in_comment(line: &str) -> Result<Option<Places>, String> {
     let line = line.trim_start_matches(['\u{feff}', '#', ' ', '\t']).replace(',', " ");
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -74,7 +88,8 @@ fn named_in_comment(line: &str) -> Result<Option<Places>, String> {
     found.try_into().map(Some).map_err(|_| "names a column twice".to_owned())
 }
 
-/// Which of [`COLUMNS`] a column is, and its factor. Without a unit time counts only where it is known to be seconds.
+/// Which of [`COLUMNS`] a column is, and its factor. Without a unit time counts only where it is known to be
+/// seconds.
 fn slot_of(column: Column, seconds: bool) -> Option<(usize, f64)> {
     match column {
         Column::Time(Some(unit)) => Some((0, unit.factor)),
@@ -93,9 +108,15 @@ pub(super) fn words_of(line: &str) -> Option<Vec<&str>> {
 
 fn pose([t_s, x, y, z, qw, qx, qy, qz]: [f64; 8], base_s: f64) -> Result<PoseRow, String> {
     if t_s.abs() > LATEST_S {
-        return Err(format!("its time is {t_s:e} s, which no clock has: give a CSV whose header says the unit, t_ms, t_us or t_ns"));
+        return Err(format!(
+            "its time is {t_s:e} s, which no clock has: give a CSV whose header says the unit, t_ms, t_us or t_ns"
+        ));
     }
-    Ok(PoseRow { t_s: t_s - base_s, position_m: DVec3::new(x, y, z), world_from_camera: DQuat::from_xyzw(qx, qy, qz, qw) })
+    Ok(PoseRow {
+        t_s: t_s - base_s,
+        position_m: DVec3::new(x, y, z),
+        world_from_camera: DQuat::from_xyzw(qx, qy, qz, qw),
+    })
 }
 
 /// The columns of a header by their names.
@@ -107,11 +128,16 @@ fn places_of(header: &csv::StringRecord) -> Result<(Places, Vec<String>), String
             (_, Some((slot, factor))) => {
                 if let Some((before, _)) = places[slot].replace((at, factor)) {
                     let (a, b) = (header.get(before).unwrap_or_default(), cell);
-                    return Err(format!("the header names two columns for {}, `{a}` and `{b}`: leave one out", COLUMNS[slot]));
+                    return Err(format!(
+                        "the header names two columns for {}, `{a}` and `{b}`: leave one out",
+                        COLUMNS[slot]
+                    ));
                 }
             }
             (Column::Time(None), None) => {
-                return Err(format!("the column `{cell}` does not say its unit: call it t_s, t_ms, t_us or t_ns"));
+                return Err(format!(
+                    "the column `{cell}` does not say its unit: call it t_s, t_ms, t_us or t_ns"
+                ));
             }
             (Column::WrongUnit, None) => {
                 let units = "of time s, ms, us, ns and min are known, of length m, mm, cm, km, ft and in";
@@ -133,17 +159,17 @@ fn places_of(header: &csv::StringRecord) -> Result<(Places, Vec<String>), String
 
 fn read_csv(path: &Path, base_s: f64) -> Result<(Vec<PoseRow>, Vec<String>), FrameFileError> {
     let fail = |line: Option<u64>, message: String| failure(path, line, message);
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| fail(None, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(
+            |error| fail(None, format!("cannot be read: {error}; paths are relative to FRAME.toml")),
+        )?;
     let header = reader.headers().map_err(|error| fail(Some(1), error.to_string()))?.clone();
     // The order of quaternions is the classical mistake, so columns go by name.
     let (places, unread) = places_of(&header).map_err(|message| fail(Some(1), message))?;
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
+        let record =
+            record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
         let line = record.position().map(csv::Position::line);
         let mut values = [0.0; 8];
         for (value, (at, factor)) in values.iter_mut().zip(places) {
@@ -156,7 +182,13 @@ fn read_csv(path: &Path, base_s: f64) -> Result<(Vec<PoseRow>, Vec<String>), Fra
         }
         rows.push(pose(values, base_s).map_err(|message| fail(line, message))?);
     }
-    let left_out = || format!("{}: the columns {} are not read: poses are t_s,x,y,z,qw,qx,qy,qz", path.display(), unread.join(", "));
+    let left_out = || {
+        format!(
+            "{}: the columns {} are not read: poses are t_s,x,y,z,qw,qx,qy,qz",
+            path.display(),
+            unread.join(", ")
+        )
+    };
     Ok((rows, if unread.is_empty() { Vec::new() } else { vec![left_out()] }))
 }
 

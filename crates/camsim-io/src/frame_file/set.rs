@@ -50,7 +50,15 @@ pub fn read_frame_set(path: &Path) -> Result<FrameSet, FrameFileError> {
     let listed = frames(&spec, path)?;
     let mut notes = listed.notes;
     let moves = read_moves(&spec, &listed.entries, listed.several, path, &mut notes)?;
-    Ok(FrameSet { path: path.into(), entries: listed.entries, left_out: listed.left_out, several: listed.several, spec, moves, notes })
+    Ok(FrameSet {
+        path: path.into(),
+        entries: listed.entries,
+        left_out: listed.left_out,
+        several: listed.several,
+        spec,
+        moves,
+        notes,
+    })
 }
 
 impl FrameSet {
@@ -104,7 +112,9 @@ impl FrameSet {
             Moves::Poses { table, rows, base_s } => {
                 let stamp_s = self.stamp_s(index).unwrap_or(*base_s);
                 let track = PoseTrack::new(rows.clone(), stamp_s - base_s);
-                Ok(Motion::Poses(track.map_err(|source| FrameFileError::Track { path: table.clone(), source })?))
+                Ok(Motion::Poses(
+                    track.map_err(|source| FrameFileError::Track { path: table.clone(), source })?,
+                ))
             }
         }
     }
@@ -125,20 +135,24 @@ impl FrameSet {
             }
             _ => (self.motion(index)?, None),
         };
-        let (file, color_origin_px) = read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), motion, &self.path)?;
+        let (file, color_origin_px) =
+            read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), motion, &self.path)?;
         if let (Moves::Flow(path), Motion::Flow(flow)) = (&self.moves, &file.motion) {
             let [[w, h], [width, height]] = [flow.size_px, file.frame.geometry.size_px];
             if [w, h] != [width, height] {
                 return Err(failure(
                     path,
-                    format!("is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"),
+                    format!(
+                        "is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"
+                    ),
                 ));
             }
             if let (Some(flow_px), Some(color_px)) = (flow_origin_px, color_origin_px)
                 && flow_px != color_px
             {
-                let message =
-                    format!("begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels");
+                let message = format!(
+                    "begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels"
+                );
                 return Err(failure(path, message));
             }
         }
@@ -157,9 +171,16 @@ fn seconds(stamp_ns: i64) -> f64 {
 }
 
 /// A twist (nothing given is no motion) or a table of poses, not both.
-fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, notes: &mut Vec<String>) -> Result<Moves, FrameFileError> {
+fn read_moves(
+    spec: &FrameSpec,
+    entries: &[Entry],
+    several: bool,
+    path: &Path,
+    notes: &mut Vec<String>,
+) -> Result<Moves, FrameFileError> {
     let motion = &spec.motion;
-    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    let fail =
+        |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
     if let Some(flow) = &motion.flow {
         check_flow(spec, several, path)?;
         return Ok(Moves::Flow(flow.clone()));
@@ -174,9 +195,13 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, n
     }
     let Some(trajectory) = &motion.trajectory else {
         if motion.stamp_s.is_some() && spec.fps.is_none() {
-            return fail("motion.stamp_s", "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out");
+            return fail(
+                "motion.stamp_s",
+                "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out",
+            );
         }
-        let [velocity, rate] = [motion.velocity_m_s, motion.angular_rate_rad_s].map(|v| DVec3::from_array(v.unwrap_or_default()));
+        let [velocity, rate] = [motion.velocity_m_s, motion.angular_rate_rad_s]
+            .map(|v| DVec3::from_array(v.unwrap_or_default()));
         for (key, value) in [("motion.velocity_m_s", velocity), ("motion.angular_rate_rad_s", rate)] {
             if !value.is_finite() {
                 return fail(key, "must be three finite numbers, in camera axes: x right, y down, z forward");
@@ -189,7 +214,12 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, n
     }
     let base_s = match (several, motion.stamp_s) {
         (false, Some(stamp_s)) => stamp_s,
-        (false, None) => return fail("motion.stamp_s", "is missing: give the stamp of the frame on the clock of motion.trajectory"),
+        (false, None) => {
+            return fail(
+                "motion.stamp_s",
+                "is missing: give the stamp of the frame on the clock of motion.trajectory",
+            );
+        }
         (true, _) => match entries.first().and_then(|entry| entry.stamp_ns) {
             Some(stamp_ns) => seconds(stamp_ns),
             None => {
@@ -200,7 +230,10 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, n
         },
     };
     if !base_s.is_finite() {
-        return fail("motion.stamp_s", "must be a finite number of seconds on the clock of motion.trajectory");
+        return fail(
+            "motion.stamp_s",
+            "must be a finite number of seconds on the clock of motion.trajectory",
+        );
     }
     let (rows, of_table) = read_poses(trajectory, motion.trajectory_format, base_s)?;
     notes.extend(of_table);
@@ -211,10 +244,15 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, n
 /// A flow goes with nothing else that moves, over a time that is not 0.
 fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameFileError> {
     let motion = &spec.motion;
-    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
-    let others = motion.velocity_m_s.is_some() || motion.angular_rate_rad_s.is_some() || motion.trajectory.is_some();
+    let fail =
+        |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    let others =
+        motion.velocity_m_s.is_some() || motion.angular_rate_rad_s.is_some() || motion.trajectory.is_some();
     if others || motion.stamp_s.is_some() {
-        return fail("motion.flow", "says where everything goes, the camera's part included; leave twist, trajectory and stamp_s out");
+        return fail(
+            "motion.flow",
+            "says where everything goes, the camera's part included; leave twist, trajectory and stamp_s out",
+        );
     }
     if several {
         return fail("motion.flow", "is of one frame: give each frame a FRAME.toml of its own");

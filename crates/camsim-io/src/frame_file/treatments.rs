@@ -1,11 +1,15 @@
-//! What becomes of each key of a FRAME.toml, and of what its files say of themselves: the tables of `docs/inputs/APPLY.md`.
+//! What becomes of each key of a FRAME.toml, and of what its files say of themselves: the tables of
+//! `docs/inputs/APPLY.md`.
 
 /// A key, what it takes, and what it does.
 type Row = (&'static str, &'static str);
 
 /// Keys of FRAME.toml.
 const KEYS: &[Row] = &[
-    ("frames", "a table of `time color` or `time color time depth`, or a .csv of color, depth and t_s (t_ms, t_us, t_ns, stamp_ns)"),
+    (
+        "frames",
+        "a table of `time color` or `time color time depth`, or a .csv of color, depth and t_s (t_ms, t_us, t_ns, stamp_ns)",
+    ),
     ("name_unit", "`s`, `ms`, `us`, `ns`: what stands for the * in names is a time"),
     ("fps", "times for frames that have none"),
     ("max_gap_ms", "how far depth may be from its colour in time; 20 if left out"),
@@ -35,7 +39,10 @@ const KEYS: &[Row] = &[
     ),
     ("holes", "`far`, `nearest`, `mark`: what is taken where there is no depth"),
     ("focal_px", "of the ideal frame"),
-    ("principal_point_px", "from the first pixel's centre; left out the middle of the picture, of an EXR that of its display window"),
+    (
+        "principal_point_px",
+        "from the first pixel's centre; left out the middle of the picture, of an EXR that of its display window",
+    ),
     ("instant_ms", "when it was taken, from its stamp"),
     ("motion.velocity_m_s", "in camera axes"),
     ("motion.angular_rate_rad_s", "in camera axes"),
@@ -66,7 +73,11 @@ const FILES: &[(&str, &str, &str)] = &[
     ),
     ("TIFF: mask of its own, `.msk`", "applied", "what they leave out is no depth"),
     ("PNG of depth: sBIT, pCAL, sCAL", "named", ""),
-    ("TIFF: kinds of samples", "applied", "16, 32 and 64-bit floats, 16-bit whole numbers; others are refused"),
+    (
+        "TIFF: kinds of samples",
+        "applied",
+        "16, 32 and 64-bit floats, 16-bit whole numbers; others are refused",
+    ),
     (".npy: descr", "applied", "f2, f4, f8, u2, u4, i2, i4, i8 in both byte orders; others are refused"),
     (".npy: fortran_order, shape", "applied", "(H, W), (H, W, 1), (1, H, W); other shapes are refused"),
     (".npz", "refused", "the line of Python that takes an array out of it is in the message"),
@@ -80,12 +91,24 @@ const FILES: &[(&str, &str, &str)] = &[
     ("EXR: pixelAspectRatio", "named", "where it is not 1 and focal_px says otherwise"),
     ("EXR: chromaticities", "named", "where they are not those of sRGB"),
     ("EXR: subsampled or deep channels", "refused", ""),
-    ("EXIF orientation of colour or depth", "refused", "a turned picture and its depth may be of either sense"),
+    (
+        "EXIF orientation of colour or depth",
+        "refused",
+        "a turned picture and its depth may be of either sense",
+    ),
     ("ICC profile", "named", "unless it is one of sRGB"),
     ("PNG: gAMA", "refused", "where it is not that of sRGB and color_space is left out"),
-    ("PNG: cICP", "refused", "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, 0, 1"),
+    (
+        "PNG: cICP",
+        "refused",
+        "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, 0, 1",
+    ),
     ("PNG: cHRM", "named", "where it is not that of sRGB"),
-    ("colours of 16 bits that end below 16384", "named", "as those of 10, 12 or 14 bits do, with their white"),
+    (
+        "colours of 16 bits that end below 16384",
+        "named",
+        "as those of 10, 12 or 14 bits do, with their white",
+    ),
     ("alpha of colour", "named", "where a pixel has some below 1"),
     (
         "poses: header",
@@ -108,7 +131,8 @@ mod tests {
 
     fn page() -> String {
         let keys: String = KEYS.iter().map(|(key, what)| format!("| `{key}` | {what} |\n")).collect();
-        let files: String = FILES.iter().map(|(what, how, note)| format!("| {what} | {how} | {note} |\n")).collect();
+        let files: String =
+            FILES.iter().map(|(what, how, note)| format!("| {what} | {how} | {note} |\n")).collect();
         format!(
             "# What `camsim apply` takes, and what becomes of it\n\n\
              Made from `crates/camsim-io/src/frame_file/treatments.rs`; [APPLY.md](../APPLY.md) tells how it is used.\n\n\

@@ -1,4 +1,5 @@
-//! Numbers out of accessors: any component type, normalised or not, interleaved, sparse. Every reach is checked.
+//! Numbers out of accessors: any component type, normalised or not, interleaved, sparse. Every reach is
+//! checked.
 
 use gltf::accessor::{Accessor, DataType, Dimensions};
 
@@ -14,9 +15,14 @@ pub(super) fn rows(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<[f64;
     let all = numbers(source, accessor)?;
     let width = width(accessor);
     if width > 4 {
-        return Err(source.broken(format!("accessors.{}: is of matrices where vectors should be", accessor.index())));
+        return Err(
+            source.broken(format!("accessors.{}: is of matrices where vectors should be", accessor.index()))
+        );
     }
-    Ok(all.chunks_exact(width).map(|row| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0))).collect())
+    Ok(all
+        .chunks_exact(width)
+        .map(|row| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0)))
+        .collect())
 }
 
 /// 4x4 matrices, column by column.
@@ -66,10 +72,13 @@ pub(super) fn numbers(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<f6
         let mut found = Vec::new();
         for i in 0..sparse.count() {
             let size = size_of(kind);
-            let place = places.get(i * size..(i + 1) * size).ok_or_else(|| wrong("its sparse indices reach beyond their buffer view"))?;
+            let place = places
+                .get(i * size..(i + 1) * size)
+                .ok_or_else(|| wrong("its sparse indices reach beyond their buffer view"))?;
             let place = component(place, kind) as usize;
-            let bytes =
-                given.get(i * element..(i + 1) * element).ok_or_else(|| wrong("its sparse values reach beyond their buffer view"))?;
+            let bytes = given
+                .get(i * element..(i + 1) * element)
+                .ok_or_else(|| wrong("its sparse values reach beyond their buffer view"))?;
             found.clear();
             decode(bytes, accessor, &mut found);
             let to = values

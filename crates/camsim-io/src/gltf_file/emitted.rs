@@ -22,7 +22,8 @@ impl Layer {
     pub fn new(texture: Arc<Texture>, wrap: [Wrap; 2], nearest: bool, rule: UvRule) -> Self {
         let stored = |byte: usize| byte as f32 / 255.0;
         let is_srgb = texture.encoding == Encoding::Srgb;
-        let light = std::array::from_fn(|byte| if is_srgb { linear_from_srgb(stored(byte)) } else { stored(byte) });
+        let light =
+            std::array::from_fn(|byte| if is_srgb { linear_from_srgb(stored(byte)) } else { stored(byte) });
         Self { texture, wrap, nearest, rule, light: Arc::new(light) }
     }
 
@@ -36,7 +37,9 @@ impl Layer {
     /// The same at texture coordinates, as they are shown at full size.
     fn at(&self, uv: [f64; 2]) -> [f32; 4] {
         let size = self.texture.size_px;
-        let texel = |x: f64, y: f64| self.texel(self.wrap[1].texel(y, size[1]) * size[0] as usize + self.wrap[0].texel(x, size[0]));
+        let texel = |x: f64, y: f64| {
+            self.texel(self.wrap[1].texel(y, size[1]) * size[0] as usize + self.wrap[0].texel(x, size[0]))
+        };
         let [x, y] = [0, 1].map(|k| uv[k] * f64::from(size[k]));
         if self.nearest {
             return texel(x.floor(), y.floor());
@@ -55,20 +58,24 @@ fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
 /// sRGB of base light times its factor plus emitted light; more than white is white.
 fn stored(base: [f32; 4], factor: [f32; 3], light: [f32; 4], emitted: [f32; 3]) -> [u8; 4] {
     let byte = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
-    let color = |k: usize| byte(srgb_from_linear((factor[k] * base[k] + emitted[k] * light[k]).clamp(0.0, 1.0)));
+    let color =
+        |k: usize| byte(srgb_from_linear((factor[k] * base[k] + emitted[k] * light[k]).clamp(0.0, 1.0)));
     [color(0), color(1), color(2), byte(base[3])]
 }
 
-/// `base` times its factor plus `light` times its own, of two pictures that lie and are read alike; alpha is the base's. Of pictures of different
-/// size the finer counts, along each side.
+/// `base` times its factor plus `light` times its own, of two pictures that lie and are read alike; alpha is
+/// the base's. Of pictures of different size the finer counts, along each side.
 pub(super) fn on_top(base: &Layer, base_factor: [f32; 3], light: &Layer, emitted: [f32; 3]) -> Texture {
     let size_px: [u32; 2] = std::array::from_fn(|k| base.texture.size_px[k].max(light.texture.size_px[k]));
     let mut rgba8 = Vec::with_capacity(4 * size_px[0] as usize * size_px[1] as usize);
     for y in 0..size_px[1] {
         for x in 0..size_px[0] {
-            let uv = [(f64::from(x) + 0.5) / f64::from(size_px[0]), (f64::from(y) + 0.5) / f64::from(size_px[1])];
+            let uv =
+                [(f64::from(x) + 0.5) / f64::from(size_px[0]), (f64::from(y) + 0.5) / f64::from(size_px[1])];
             let index = y as usize * size_px[0] as usize + x as usize;
-            let of = |layer: &Layer| if layer.texture.size_px == size_px { layer.texel(index) } else { layer.at(uv) };
+            let of = |layer: &Layer| {
+                if layer.texture.size_px == size_px { layer.texel(index) } else { layer.at(uv) }
+            };
             rgba8.extend(stored(of(base), base_factor, of(light), emitted));
         }
     }
@@ -102,22 +109,31 @@ pub(super) struct Baked {
     pub coarser: f64,
 }
 
-/// Brings both pictures into the layout of one of them, in which each place of the surface has a place of its own: `None` where neither has, or
-/// where that takes more than `most_texels`.
+/// Brings both pictures into the layout of one of them, in which each place of the surface has a place of its
+/// own: `None` where neither has, or where that takes more than `most_texels`.
 pub(super) fn bake(shape: &Shape, light_uvs: &[[f32; 2]], of: &Bake, most_texels: usize) -> Option<Baked> {
     let base_uvs: Vec<[f32; 2]> = shape.vertices.iter().map(|vertex| vertex.uv).collect();
     let layout = |uvs: &[[f32; 2]], by: &Layer| {
-        uvs.iter().map(|uv| [0, 1].map(|k: usize| f64::from(uv[k]) * f64::from(by.texture.size_px[k]))).collect()
+        uvs.iter()
+            .map(|uv| [0, 1].map(|k: usize| f64::from(uv[k]) * f64::from(by.texture.size_px[k])))
+            .collect()
     };
     let (base, light): (Vec<_>, Vec<_>) = (layout(&base_uvs, &of.base), layout(light_uvs, &of.light));
     let most = most_texels.min(MOST_TEXELS);
-    in_layout(shape, [&light, &base], [&base, &light], of, most).or_else(|| in_layout(shape, [&base, &light], [&base, &light], of, most))
+    in_layout(shape, [&light, &base], [&base, &light], of, most)
+        .or_else(|| in_layout(shape, [&base, &light], [&base, &light], of, most))
 }
 
 /// Texel coordinates of each corner.
 type Texels = [[f64; 2]];
 
-fn in_layout(shape: &Shape, [layout, other]: [&Texels; 2], [base, light]: [&Texels; 2], of: &Bake, most_texels: usize) -> Option<Baked> {
+fn in_layout(
+    shape: &Shape,
+    [layout, other]: [&Texels; 2],
+    [base, light]: [&Texels; 2],
+    of: &Bake,
+    most_texels: usize,
+) -> Option<Baked> {
     let wanted = triangles(shape)
         .map(|corners| finer(corners.map(|i| layout[i]), corners.map(|i| other[i])))
         .try_fold(1.0_f64, |most, ratio| ratio.map(|ratio| most.max(ratio)))?;
@@ -138,10 +154,18 @@ fn in_layout(shape: &Shape, [layout, other]: [&Texels; 2], [base, light]: [&Texe
         let place = corners.map(|i| [0, 1].map(|k: usize| (layout[i][k] - from[k]) * parts));
         canvas.fill(place, |shares| {
             let along = |texels: &Texels, size: [u32; 2]| {
-                [0, 1].map(|k: usize| (0..3).map(|corner| shares[corner] * texels[corners[corner]][k]).sum::<f64>() / f64::from(size[k]))
+                [0, 1].map(|k: usize| {
+                    (0..3).map(|corner| shares[corner] * texels[corners[corner]][k]).sum::<f64>()
+                        / f64::from(size[k])
+                })
             };
-            let tint = std::array::from_fn(|k| (0..3).map(|corner| shares[corner] as f32 * shape.vertices[corners[corner]].tint[k]).sum());
-            let (below, above) = (of.base.at(along(base, of.base.texture.size_px)), of.light.at(along(light, of.light.texture.size_px)));
+            let tint = std::array::from_fn(|k| {
+                (0..3).map(|corner| shares[corner] as f32 * shape.vertices[corners[corner]].tint[k]).sum()
+            });
+            let (below, above) = (
+                of.base.at(along(base, of.base.texture.size_px)),
+                of.light.at(along(light, of.light.texture.size_px)),
+            );
             stored(below, tint, above, of.emitted)
         });
     }
@@ -171,7 +195,8 @@ fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// How many texels of the other picture lie along one of the layout's, at most; `None` where the layout has no area for what the other has.
+/// How many texels of the other picture lie along one of the layout's, at most; `None` where the layout has
+/// no area for what the other has.
 fn finer([a, b, c]: [[f64; 2]; 3], [p, q, r]: [[f64; 2]; 3]) -> Option<f64> {
     let area = cross(a, b, c);
     if area.abs() < 1e-6 {
@@ -205,7 +230,8 @@ impl Canvas {
         Self { size, rgba8: vec![[0; 4]; texels], is_covered: vec![false; texels], covered: 0, conflicts: 0 }
     }
 
-    /// Every texel whose middle is within a triangle; of an edge between two, within one of them. `color` takes the corners' shares.
+    /// Every texel whose middle is within a triangle; of an edge between two, within one of them. `color`
+    /// takes the corners' shares.
     fn fill(&mut self, [a, b, c]: [[f64; 2]; 3], color: impl Fn([f64; 3]) -> [u8; 4]) {
         let area = cross(a, b, c);
         if area == 0.0 {
@@ -218,7 +244,8 @@ impl Canvas {
         };
         // An edge is of the triangle on one side of it: the same whichever way it is gone along.
         let inside = |from: [f64; 2], to: [f64; 2], at: [f64; 2]| {
-            let (side, [dx, dy]) = (turn * cross(from, to, at), [turn * (to[0] - from[0]), turn * (to[1] - from[1])]);
+            let (side, [dx, dy]) =
+                (turn * cross(from, to, at), [turn * (to[0] - from[0]), turn * (to[1] - from[1])]);
             side > 0.0 || (side == 0.0 && (dy < 0.0 || (dy == 0.0 && dx > 0.0)))
         };
         let (columns, rows) = (range(0), range(1));
@@ -243,7 +270,8 @@ impl Canvas {
         }
     }
 
-    /// What no triangle covers is as the nearest that one does: reads at borders and from smaller versions take it in.
+    /// What no triangle covers is as the nearest that one does: reads at borders and from smaller versions
+    /// take it in.
     fn finish(mut self) -> Texture {
         let [width, height] = self.size;
         let beside = |at: usize| {
@@ -271,7 +299,11 @@ impl Canvas {
             }
             front = next;
         }
-        Texture { size_px: [width as u32, height as u32], rgba8: self.rgba8.into_flattened(), encoding: Encoding::Srgb }
+        Texture {
+            size_px: [width as u32, height as u32],
+            rgba8: self.rgba8.into_flattened(),
+            encoding: Encoding::Srgb,
+        }
     }
 }
 

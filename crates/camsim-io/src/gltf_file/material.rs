@@ -14,9 +14,11 @@ use super::{
     source::Source,
 };
 
-/// From this alpha on a blended surface has depth: a pixel has one, that of the surface most of its light is of.
+/// From this alpha on a blended surface has depth: a pixel has one, that of the surface most of its light is
+/// of.
 const BLEND_CUTOFF: f32 = 0.5;
-/// What has just the alpha of the cut-off is there: it must not be left to what corners' alphas, or half floats of a picture's, round to.
+/// What has just the alpha of the cut-off is there: it must not be left to what corners' alphas, or half
+/// floats of a picture's, round to.
 const AT_CUTOFF: f32 = 1.0 - 5e-4;
 
 /// How a primitive's corners meet its picture.
@@ -81,15 +83,23 @@ impl<'a> Materials<'a> {
         if let Some(known) = self.known.get(&material.index()) {
             return Ok(known.clone());
         }
-        // What files from before metals and roughness call the diffuse colour is the base colour of what shines in no other way.
+        // What files from before metals and roughness call the diffuse colour is the base colour of what
+        // shines in no other way.
         let (diffuse, base) = (material.pbr_specular_glossiness(), material.pbr_metallic_roughness());
         let (key, factor, base_texture) = match &diffuse {
-            Some(of) => ("extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", of.diffuse_factor(), of.diffuse_texture()),
-            None => ("pbrMetallicRoughness.baseColorFactor", base.base_color_factor(), base.base_color_texture()),
+            Some(of) => (
+                "extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor",
+                of.diffuse_factor(),
+                of.diffuse_texture(),
+            ),
+            None => {
+                ("pbrMetallicRoughness.baseColorFactor", base.base_color_factor(), base.base_color_texture())
+            }
         };
         let strength = self.source.emissive_strength(material.index());
         let emitted = material.emissive_factor().map(|part| part * strength);
-        let emitted_key = if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
+        let emitted_key =
+            if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
         self.check_factors(material, [(key, &factor), (emitted_key, &emitted)])?;
         let emitted = emitted.map(|part| part.clamp(0.0, 1.0));
         // What is unlit has its base colour alone, by the definition of that.
@@ -129,7 +139,9 @@ impl<'a> Materials<'a> {
             }
         };
         let with_light = match &on_top {
-            Some(light) => self.with_light(material.index(), (info.as_ref(), light), has_alpha, emitted, &mut rule)?,
+            Some(light) => {
+                self.with_light(material.index(), (info.as_ref(), light), has_alpha, emitted, &mut rule)?
+            }
             None => None,
         };
         let (texture, wrap, nearest) = match (with_light, &info) {
@@ -149,34 +161,59 @@ impl<'a> Materials<'a> {
         };
         let cutoff = cutoff.map(|alpha: f32| AT_CUTOFF * alpha);
         let blends = material.alpha_mode() == AlphaMode::Blend;
-        let made = Material { texture, wrap, nearest, emissive, cutoff, blends, one_sided: !material.double_sided() };
+        let made = Material {
+            texture,
+            wrap,
+            nearest,
+            emissive,
+            cutoff,
+            blends,
+            one_sided: !material.double_sided(),
+        };
         self.known.insert(material.index(), (made.clone(), rule));
         Ok((made, rule))
     }
 
     /// Refuses factors that are no numbers, and says which are beyond what there is.
-    fn check_factors(&mut self, material: &gltf::Material<'_>, factors: [(&str, &[f32]); 2]) -> Result<(), GltfError> {
+    fn check_factors(
+        &mut self,
+        material: &gltf::Material<'_>,
+        factors: [(&str, &[f32]); 2],
+    ) -> Result<(), GltfError> {
         let name = self.source.material_name(material.index());
         for (key, parts) in factors {
             if parts.iter().any(|part| !part.is_finite()) {
-                return Err(self.source.broken(format!("{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1")));
+                return Err(self.source.broken(format!(
+                    "{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1"
+                )));
             }
             if parts.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.notes.push(format!("{name}: {key} is {parts:?}: what is not within 0 to 1 is taken as the nearest that is"));
+                self.notes.push(format!(
+                    "{name}: {key} is {parts:?}: what is not within 0 to 1 is taken as the nearest that is"
+                ));
             }
         }
         let cutoff = material.alpha_cutoff().unwrap_or(0.5);
-        if cutoff.is_finite() { Ok(()) } else { Err(self.source.broken(format!("{name}: alphaCutoff is {cutoff}, which is not finite"))) }
+        if cutoff.is_finite() {
+            Ok(())
+        } else {
+            Err(self.source.broken(format!("{name}: alphaCutoff is {cutoff}, which is not finite")))
+        }
     }
 
-    /// The material on a shape: what is to be blended and has no alpha below 1 anywhere hides what is behind it, and is drawn as what does.
+    /// The material on a shape: what is to be blended and has no alpha below 1 anywhere hides what is behind
+    /// it, and is drawn as what does.
     pub fn on(&mut self, shape: &Shape, material: Material) -> Material {
         let texture = &material.texture;
         let is_clear = || texture.rgba8.chunks_exact(4).any(|pixel| pixel[3] < 255);
         let mixes = material.blends
             && (shape.vertices.iter().any(|vertex| vertex.tint[3] < 1.0)
                 || *self.clear.entry(Arc::as_ptr(texture)).or_insert_with(is_clear));
-        if material.blends && !mixes { Material { blends: false, cutoff: None, ..material } } else { material }
+        if material.blends && !mixes {
+            Material { blends: false, cutoff: None, ..material }
+        } else {
+            material
+        }
     }
 
     /// What is to be done to a shape of this material before it is shown.
@@ -184,7 +221,8 @@ impl<'a> Materials<'a> {
         self.bakes.get(&material.index()).cloned()
     }
 
-    /// The base colour with a picture of emitted light on top; `None` where they do not lie on each other, so that it takes a shape to say what does.
+    /// The base colour with a picture of emitted light on top; `None` where they do not lie on each other, so
+    /// that it takes a shape to say what does.
     fn with_light(
         &mut self,
         material: Option<usize>,
@@ -193,7 +231,8 @@ impl<'a> Materials<'a> {
         emitted: [f32; 3],
         rule: &mut UvRule,
     ) -> Result<Option<Textured>, GltfError> {
-        let layer = |(texture, wrap, nearest): Textured, rule: UvRule| Layer::new(texture, wrap, nearest, rule);
+        let layer =
+            |(texture, wrap, nearest): Textured, rule: UvRule| Layer::new(texture, wrap, nearest, rule);
         let mut of_light = *rule;
         let above = layer(self.textured(light, false, &mut of_light)?, of_light);
         let below = match base {
@@ -203,18 +242,30 @@ impl<'a> Materials<'a> {
                 Layer::new(self.white.clone(), above.wrap, above.nearest, of_light)
             }
         };
-        let place = |of: &Layer| (of.rule.set, of.rule.offset, of.rule.rotation, of.rule.scale, of.wrap, of.nearest);
+        let place =
+            |of: &Layer| (of.rule.set, of.rule.offset, of.rule.rotation, of.rule.scale, of.wrap, of.nearest);
         let [r, g, b, alpha] = rule.factor;
         if place(&below) != place(&above) {
             self.bakes.insert(material, Bake { base: below, light: above, emitted });
             return Ok(None);
         }
         let both = emitted::on_top(&below, [r, g, b], &above, emitted);
-        *rule = UvRule { factor: [1.0, 1.0, 1.0, alpha], vertex_colors: false, loses_colors: true, takes_light: false, ..*rule };
+        *rule = UvRule {
+            factor: [1.0, 1.0, 1.0, alpha],
+            vertex_colors: false,
+            loses_colors: true,
+            takes_light: false,
+            ..*rule
+        };
         Ok(Some((Arc::new(both), below.wrap, below.nearest)))
     }
 
-    fn textured(&mut self, info: &Info<'_>, has_alpha: bool, rule: &mut UvRule) -> Result<Textured, GltfError> {
+    fn textured(
+        &mut self,
+        info: &Info<'_>,
+        has_alpha: bool,
+        rule: &mut UvRule,
+    ) -> Result<Textured, GltfError> {
         rule.set = info.tex_coord();
         if let Some(transform) = info.texture_transform() {
             rule.set = transform.tex_coord().unwrap_or(rule.set);
@@ -229,7 +280,11 @@ impl<'a> Materials<'a> {
             WrappingMode::Repeat => Wrap::Repeat,
         };
         let texture = self.texture(&info.texture().source(), has_alpha)?;
-        Ok((texture, [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())], sampler.mag_filter() == Some(MagFilter::Nearest)))
+        Ok((
+            texture,
+            [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
+            sampler.mag_filter() == Some(MagFilter::Nearest),
+        ))
     }
 
     fn texture(&mut self, image: &gltf::Image<'_>, has_alpha: bool) -> Result<Arc<Texture>, GltfError> {
@@ -240,10 +295,14 @@ impl<'a> Materials<'a> {
         let bytes = self.source.image(image)?;
         let number = image.index();
         let wrong = |reason: String| self.source.broken(format!("images.{number}: {reason}"));
-        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG, JPEG or WebP: {reason}; write it as one of them"));
+        let undecoded = |reason: String| {
+            wrong(format!("cannot be decoded as PNG, JPEG or WebP: {reason}; write it as one of them"))
+        };
         let [width, height] = crate::pictures::size_of_bytes(&bytes).map_err(undecoded)?;
         if width.max(height) > LARGEST_PX {
-            return Err(wrong(format!("is of {width}x{height} px, and at most {LARGEST_PX} on a side can be shown: make it smaller")));
+            return Err(wrong(format!(
+                "is of {width}x{height} px, and at most {LARGEST_PX} on a side can be shown: make it smaller"
+            )));
         }
         if width.max(height) > COMMON_PX || u64::from(width) * u64::from(height) > LARGE_PX {
             let mib = (u64::from(width) * u64::from(height) * 16 / 3).div_ceil(1 << 20);
@@ -253,7 +312,8 @@ impl<'a> Materials<'a> {
         }
         let decoded = crate::pictures::decode_bytes(&bytes).map_err(undecoded)?;
         let size_px = [decoded.width(), decoded.height()];
-        let mut texture = Texture { size_px, rgba8: decoded.into_rgba8().into_raw(), encoding: Encoding::Srgb };
+        let mut texture =
+            Texture { size_px, rgba8: decoded.into_rgba8().into_raw(), encoding: Encoding::Srgb };
         if has_alpha {
             texture.bleed_into_transparent();
         } else {

@@ -38,7 +38,8 @@ fn use_webp(json: &mut Value) {
     }
 }
 
-/// Channels of animations that move no node: those of `KHR_animation_pointer`, which are named, and those without a target, which glTF says to leave.
+/// Channels of animations that move no node: those of `KHR_animation_pointer`, which are named, and those
+/// without a target, which glTF says to leave.
 fn drop_channels(json: &mut Value, notes: &mut Vec<String>) {
     for (number, animation) in each(json, "animations").enumerate() {
         let Some(Value::Array(channels)) = animation.get_mut("channels") else { continue };
@@ -46,13 +47,16 @@ fn drop_channels(json: &mut Value, notes: &mut Vec<String>) {
         let moves = |channel: &Value| {
             let target = channel.get("target");
             target.is_none_or(|target| {
-                target.get("node").is_some_and(|node| !node.is_null()) && target.get("path") != Some(&json!("pointer"))
+                target.get("node").is_some_and(|node| !node.is_null())
+                    && target.get("path") != Some(&json!("pointer"))
             })
         };
         channels.retain(moves);
         let left_out = before - channels.len();
         if left_out > 0 {
-            notes.push(format!("animations.{number}: {left_out} of its {before} channels move no node and are left out"));
+            notes.push(format!(
+                "animations.{number}: {left_out} of its {before} channels move no node and are left out"
+            ));
         }
     }
 }
@@ -68,7 +72,9 @@ fn fill_with_zeros(json: &mut Value, mended: &mut Mended) -> Result<(), String> 
         }
         let count = accessor.get("count").and_then(Value::as_u64).unwrap_or(0);
         if count > MOST_EMPTY as u64 {
-            return Err(format!("accessors.{number}: has {count} elements and no bufferView for them: there are no such data"));
+            return Err(format!(
+                "accessors.{number}: has {count} elements and no bufferView for them: there are no such data"
+            ));
         }
         let width = match accessor.get("type").and_then(Value::as_str) {
             Some("SCALAR") => 1,

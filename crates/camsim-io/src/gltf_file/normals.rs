@@ -1,6 +1,8 @@
-//! Normals for light: those of a file, and those of flat triangles where it has none (glTF 2.0, section 3.7.2.1).
+//! Normals for light: those of a file, and those of flat triangles where it has none (glTF 2.0, section
+//! 3.7.2.1).
 //!
-//! They point outwards as the file's triangles turn. Where a mesh mirrors its triangles are turned back beforehand, so that those turn the other way.
+//! They point outwards as the file's triangles turn. Where a mesh mirrors its triangles are turned back
+//! beforehand, so that those turn the other way.
 
 use std::collections::HashMap;
 
@@ -19,7 +21,8 @@ pub(super) fn flat(vertices: &[MeshVertex], indices: &[u32], mirrored: bool) -> 
         let normal = (normal / STEP).round() * STEP;
         for &corner in triangle {
             let next = shape.vertices.len() as u32;
-            let index = *known.entry((corner, normal.to_array().map(|part| (part + 0.0).to_bits()))).or_insert(next);
+            let index =
+                *known.entry((corner, normal.to_array().map(|part| (part + 0.0).to_bits()))).or_insert(next);
             if index == next {
                 shape.vertices.push(vertices[corner as usize]);
                 shape.normals.push(normal.as_vec3().to_array());
@@ -31,7 +34,12 @@ pub(super) fn flat(vertices: &[MeshVertex], indices: &[u32], mirrored: bool) -> 
 }
 
 /// Given normals at unit length; one that has none, or is no number, is the mean of the triangles around it.
-pub(super) fn mended(given: Vec<DVec3>, vertices: &[MeshVertex], indices: &[u32], mirrored: bool) -> Vec<[f32; 3]> {
+pub(super) fn mended(
+    given: Vec<DVec3>,
+    vertices: &[MeshVertex],
+    indices: &[u32],
+    mirrored: bool,
+) -> Vec<[f32; 3]> {
     let mut normals: Vec<Option<DVec3>> = given.into_iter().map(DVec3::try_normalize).collect();
     if normals.iter().any(Option::is_none) {
         let mut sums = vec![DVec3::ZERO; vertices.len()];
@@ -39,7 +47,10 @@ pub(super) fn mended(given: Vec<DVec3>, vertices: &[MeshVertex], indices: &[u32]
             let normal = across(vertices, triangle, mirrored);
             triangle.iter().for_each(|&corner| sums[corner as usize] += normal);
         }
-        normals.iter_mut().zip(sums).for_each(|(normal, sum)| *normal = normal.or(Some(sum.normalize_or_zero())));
+        normals
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(normal, sum)| *normal = normal.or(Some(sum.normalize_or_zero())));
     }
     normals.into_iter().map(|normal| normal.unwrap_or_default().as_vec3().to_array()).collect()
 }

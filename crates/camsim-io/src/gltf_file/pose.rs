@@ -24,13 +24,20 @@ impl Pose {
     pub fn new(source: &Source, options: GltfOptions) -> Result<Self, GltfError> {
         let mut pose = Self::default();
         if let Some(n) = options.animation.filter(|&n| n >= source.document.animations().count()) {
-            return Err(source.broken(format!("has no animation {n}; it has {}", source.document.animations().count())));
+            return Err(source
+                .broken(format!("has no animation {n}; it has {}", source.document.animations().count())));
         }
         if let Some(time_s) = options.time_s {
-            let chosen = |animation: &gltf::Animation<'_>| options.animation.is_none_or(|n| animation.index() == n);
+            let chosen =
+                |animation: &gltf::Animation<'_>| options.animation.is_none_or(|n| animation.index() == n);
             // By node and property, which animation it was.
             let mut moved = HashMap::new();
-            for channel in source.document.animations().filter(chosen).flat_map(|animation| animation.channels().collect::<Vec<_>>()) {
+            for channel in source
+                .document
+                .animations()
+                .filter(chosen)
+                .flat_map(|animation| animation.channels().collect::<Vec<_>>())
+            {
                 let (node, animation) = (channel.target().node().index(), channel.animation().index());
                 let before = moved.insert((node, channel.target().property() as u8), animation);
                 if let Some(before) = before.filter(|&before| before != animation && pose.note.is_none()) {
@@ -42,7 +49,8 @@ impl Pose {
             }
         }
         if source.document.skins().next().is_some() {
-            let children: Vec<usize> = source.document.nodes().flat_map(|node| node.children().map(|child| child.index())).collect();
+            let children: Vec<usize> =
+                source.document.nodes().flat_map(|node| node.children().map(|child| child.index())).collect();
             for root in source.document.nodes().filter(|node| !children.contains(&node.index())) {
                 pose.stand(source, &root, DAffine3::IDENTITY, 0)?;
             }
@@ -50,9 +58,17 @@ impl Pose {
         Ok(pose)
     }
 
-    fn stand(&mut self, source: &Source, node: &gltf::Node<'_>, model_from_parent: DAffine3, depth: usize) -> Result<(), GltfError> {
+    fn stand(
+        &mut self,
+        source: &Source,
+        node: &gltf::Node<'_>,
+        model_from_parent: DAffine3,
+        depth: usize,
+    ) -> Result<(), GltfError> {
         if depth > DEEPEST {
-            return Err(source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
+            return Err(
+                source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index()))
+            );
         }
         let here = model_from_parent * self.parent_from_node(node);
         if self.model_from_node.insert(node.index(), here).is_some() {
@@ -64,7 +80,8 @@ impl Pose {
     /// From a node's axes to its parent's.
     pub fn parent_from_node(&self, node: &gltf::Node<'_>) -> DAffine3 {
         let i = node.index();
-        let moved = self.shifts.contains_key(&i) || self.turns.contains_key(&i) || self.scales.contains_key(&i);
+        let moved =
+            self.shifts.contains_key(&i) || self.turns.contains_key(&i) || self.scales.contains_key(&i);
         match node.transform() {
             gltf::scene::Transform::Matrix { matrix } if !moved => {
                 let of = DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from)));
@@ -73,7 +90,8 @@ impl Pose {
             transform => {
                 let (shift, turn, scale) = transform.decomposed();
                 let shift = self.shifts.get(&i).map_or(shift.map(f64::from), |&[x, y, z, _]| [x, y, z]);
-                let turn = DQuat::from_array(self.turns.get(&i).copied().unwrap_or(turn.map(f64::from))).normalize();
+                let turn =
+                    DQuat::from_array(self.turns.get(&i).copied().unwrap_or(turn.map(f64::from))).normalize();
                 let scale = self.scales.get(&i).map_or(scale.map(f64::from), |&[x, y, z, _]| [x, y, z]);
                 let turn = if turn.is_finite() { turn } else { DQuat::IDENTITY };
                 let matrix3 = DMat3::from_quat(turn) * DMat3::from_diagonal(DVec3::from_array(scale));
@@ -84,26 +102,39 @@ impl Pose {
 
     /// Weights of a mesh's morph targets at a node.
     pub fn weights(&self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>) -> Vec<f64> {
-        let given = || node.weights().or(mesh.weights()).unwrap_or_default().iter().map(|&w| f64::from(w)).collect();
+        let given =
+            || node.weights().or(mesh.weights()).unwrap_or_default().iter().map(|&w| f64::from(w)).collect();
         self.weights.get(&node.index()).cloned().unwrap_or_else(given)
     }
 
     /// From a skin's bound shape to the model, for each of its joints.
     pub fn joints(&self, source: &Source, skin: &gltf::Skin<'_>) -> Result<Vec<DAffine3>, GltfError> {
-        let inverse = skin.inverse_bind_matrices().map(|accessor| accessor::matrices(source, &accessor)).transpose()?;
+        let inverse =
+            skin.inverse_bind_matrices().map(|accessor| accessor::matrices(source, &accessor)).transpose()?;
         let joint = |(k, node): (usize, gltf::Node<'_>)| {
-            let of = inverse.as_ref().and_then(|all| all.get(k)).map_or(DMat4::IDENTITY, DMat4::from_cols_array);
+            let of =
+                inverse.as_ref().and_then(|all| all.get(k)).map_or(DMat4::IDENTITY, DMat4::from_cols_array);
             let bound = DAffine3 { matrix3: DMat3::from_mat4(of), translation: of.w_axis.truncate() };
             self.model_from_node.get(&node.index()).copied().unwrap_or(DAffine3::IDENTITY) * bound
         };
         Ok(skin.joints().enumerate().map(joint).collect())
     }
 
-    fn channel(&mut self, source: &Source, channel: &gltf::animation::Channel<'_>, time_s: f64) -> Result<(), GltfError> {
+    fn channel(
+        &mut self,
+        source: &Source,
+        channel: &gltf::animation::Channel<'_>,
+        time_s: f64,
+    ) -> Result<(), GltfError> {
         let (sampler, target) = (channel.sampler(), channel.target());
         let times = accessor::numbers(source, &sampler.input())?;
         let output = sampler.output();
-        let wrong = || source.broken(format!("animations.{}: a sampler's input and output do not fit", channel.animation().index()));
+        let wrong = || {
+            source.broken(format!(
+                "animations.{}: a sampler's input and output do not fit",
+                channel.animation().index()
+            ))
+        };
         let Some(last) = times.len().checked_sub(1) else { return Ok(()) };
         let values = accessor::numbers(source, &output)?;
         let cubic = sampler.interpolation() == Interpolation::CubicSpline;
@@ -130,7 +161,9 @@ impl Pose {
                 let quat = |v: &[f64]| DQuat::from_xyzw(v[0], v[1], v[2], v[3]);
                 quat(value(at, 0)).slerp(quat(value(next, 0)), share).to_array().to_vec()
             }
-            Interpolation::Linear => value(at, 0).iter().zip(value(next, 0)).map(|(a, b)| a + share * (b - a)).collect(),
+            Interpolation::Linear => {
+                value(at, 0).iter().zip(value(next, 0)).map(|(a, b)| a + share * (b - a)).collect()
+            }
             Interpolation::CubicSpline => {
                 let (t, t2, t3) = (share, share * share, share.powi(3));
                 let of = |k: usize| {

@@ -34,7 +34,8 @@ pub(super) fn triangle_mode(mode: Mode) -> Option<Triangles> {
 }
 
 fn is_index(accessor: &gltf::Accessor<'_>) -> bool {
-    accessor.dimensions() == Scalar && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32)
+    accessor.dimensions() == Scalar
+        && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32)
 }
 
 /// What a primitive becomes a shape by.
@@ -72,7 +73,8 @@ impl Making<'_> {
         };
         let uvs = of(&Semantic::TexCoords(self.uv.set))?;
         let colors = if self.uv.vertex_colors { of(&Semantic::Colors(0))? } else { None };
-        let with_alpha = primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == Vec4);
+        let with_alpha =
+            primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == Vec4);
         let vertex = |(i, position): (usize, &DVec3)| {
             let [u, v] = uvs.as_ref().map_or([0.0; 2], |rows| [rows[i][0], rows[i][1]]);
             let [r, g, b, a] = colors.as_ref().map_or([1.0; 4], |rows| rows[i]);
@@ -84,8 +86,12 @@ impl Making<'_> {
             MeshVertex { position_m: position.as_vec3().to_array(), uv: self.uv.apply([u, v]), tint }
         };
         let vertices: Vec<MeshVertex> = positions.iter().enumerate().map(vertex).collect();
-        if vertices.iter().any(|vertex| !vertex.position_m.iter().chain(&vertex.uv).chain(&vertex.tint).all(|part| part.is_finite())) {
-            return Err(self.wrong(primitive, "a position, texture coordinate or colour is not a finite number"));
+        if vertices.iter().any(|vertex| {
+            !vertex.position_m.iter().chain(&vertex.uv).chain(&vertex.tint).all(|part| part.is_finite())
+        }) {
+            return Err(
+                self.wrong(primitive, "a position, texture coordinate or colour is not a finite number")
+            );
         }
         let indices = self.indices(primitive, count)?;
         let given = if self.normals { self.given_normals(primitive, count)? } else { None };
@@ -100,11 +106,17 @@ impl Making<'_> {
     }
 
     /// Texture coordinates of each corner by another rule than the shape's own.
-    pub fn uvs(&self, primitive: &gltf::Primitive<'_>, rule: &UvRule, count: usize) -> Result<Vec<[f32; 2]>, GltfError> {
+    pub fn uvs(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        rule: &UvRule,
+        count: usize,
+    ) -> Result<Vec<[f32; 2]>, GltfError> {
         let semantic = Semantic::TexCoords(rule.set);
         let Some(accessor) = primitive.get(&semantic) else { return Ok(vec![rule.apply([0.0; 2]); count]) };
         self.check(primitive, &semantic, &accessor)?;
-        let uvs: Vec<[f32; 2]> = accessor::rows(self.source, &accessor)?.iter().map(|row| rule.apply([row[0], row[1]])).collect();
+        let uvs: Vec<[f32; 2]> =
+            accessor::rows(self.source, &accessor)?.iter().map(|row| rule.apply([row[0], row[1]])).collect();
         if uvs.len() != count {
             return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
         }
@@ -115,7 +127,11 @@ impl Making<'_> {
     }
 
     /// The file's own normals, of any length.
-    fn given_normals(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Option<Vec<DVec3>>, GltfError> {
+    fn given_normals(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        count: usize,
+    ) -> Result<Option<Vec<DVec3>>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };
         self.check(primitive, &Semantic::Normals, &accessor)?;
         let mut normals = self.morphed(primitive, &accessor, |target| target.normals())?;
@@ -124,9 +140,11 @@ impl Making<'_> {
         }
         if let Some(joints) = self.joints {
             let matrices = self.blended(primitive, joints, count, DMat3::ZERO, |joint, _| joint.matrix3)?;
-            normals.iter_mut().zip(matrices).filter(|(_, (_, weight))| *weight > 0.0).for_each(|(normal, (matrix, _))| {
-                *normal = turned_normal(&matrix, *normal);
-            });
+            normals.iter_mut().zip(matrices).filter(|(_, (_, weight))| *weight > 0.0).for_each(
+                |(normal, (matrix, _))| {
+                    *normal = turned_normal(&matrix, *normal);
+                },
+            );
         }
         Ok(Some(normals))
     }
@@ -139,8 +157,11 @@ impl Making<'_> {
         of: impl Fn(&gltf::mesh::MorphTarget<'a>) -> Option<gltf::Accessor<'a>>,
     ) -> Result<Vec<DVec3>, GltfError> {
         let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
-        let mut vectors: Vec<DVec3> = accessor::rows(self.source, accessor)?.into_iter().map(vector).collect();
-        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
+        let mut vectors: Vec<DVec3> =
+            accessor::rows(self.source, accessor)?.into_iter().map(vector).collect();
+        for (target, &weight) in
+            primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0)
+        {
             let Some(accessor) = of(&target) else { continue };
             let shifts = accessor::rows(self.source, &accessor)?;
             if shifts.len() != vectors.len() {
@@ -152,7 +173,12 @@ impl Making<'_> {
     }
 
     /// Refuses what is not of as many numbers as its meaning has.
-    fn check(&self, primitive: &gltf::Primitive<'_>, semantic: &Semantic, accessor: &gltf::Accessor<'_>) -> Result<(), GltfError> {
+    fn check(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        semantic: &Semantic,
+        accessor: &gltf::Accessor<'_>,
+    ) -> Result<(), GltfError> {
         let found = accessor.dimensions();
         let fits = match semantic {
             Semantic::Positions | Semantic::Normals => found == Vec3,
@@ -161,12 +187,17 @@ impl Making<'_> {
             _ => found == Vec4,
         };
         let number = accessor.index();
-        let message = || format!("accessors.{number} is of {found:?}, which is nothing for {}", semantic.to_string());
+        let message =
+            || format!("accessors.{number} is of {found:?}, which is nothing for {}", semantic.to_string());
         if fits { Ok(()) } else { Err(self.wrong(primitive, &message())) }
     }
 
     fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
-        self.source.broken(format!("meshes.{}.primitives.{}: {message}", self.mesh.index(), primitive.index()))
+        self.source.broken(format!(
+            "meshes.{}.primitives.{}: {message}",
+            self.mesh.index(),
+            primitive.index()
+        ))
     }
 
     fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
@@ -179,9 +210,15 @@ impl Making<'_> {
         Ok(positions)
     }
 
-    fn bend(&self, primitive: &gltf::Primitive<'_>, joints: &[DAffine3], positions: &mut [DVec3]) -> Result<(), GltfError> {
-        let bent =
-            self.blended(primitive, joints, positions.len(), DVec3::ZERO, |joint, corner| joint.transform_point3(positions[corner]))?;
+    fn bend(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        joints: &[DAffine3],
+        positions: &mut [DVec3],
+    ) -> Result<(), GltfError> {
+        let bent = self.blended(primitive, joints, positions.len(), DVec3::ZERO, |joint, corner| {
+            joint.transform_point3(positions[corner])
+        })?;
         positions
             .iter_mut()
             .zip(bent)
@@ -190,7 +227,8 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// Each corner goes with up to four joints of each set: what they make of it, times their weights, and the sum of those.
+    /// Each corner goes with up to four joints of each set: what they make of it, times their weights, and
+    /// the sum of those.
     fn blended<T>(
         &self,
         primitive: &gltf::Primitive<'_>,
@@ -205,7 +243,11 @@ impl Making<'_> {
     {
         let mut bent = vec![(zero, 0.0); count];
         for set in 0.. {
-            let (Some(of), Some(by)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else { break };
+            let (Some(of), Some(by)) =
+                (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)))
+            else {
+                break;
+            };
             self.check(primitive, &Semantic::Joints(set), &of)?;
             self.check(primitive, &Semantic::Weights(set), &by)?;
             let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
@@ -214,8 +256,9 @@ impl Making<'_> {
             }
             for (i, sum) in bent.iter_mut().enumerate() {
                 for k in (0..4).filter(|&k| by[i][k] > 0.0) {
-                    let joint =
-                        joints.get(of[i][k] as usize).ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
+                    let joint = joints
+                        .get(of[i][k] as usize)
+                        .ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
                     *sum = (sum.0 + by[i][k] * by_joint(joint, i), sum.1 + by[i][k]);
                 }
             }
@@ -233,7 +276,9 @@ impl Making<'_> {
                     &format!("accessors.{number} is of {many:?} of {kind:?}: indices are whole numbers from 0, one each"),
                 ));
             }
-            Some(accessor) => accessor::numbers(self.source, &accessor)?.into_iter().map(|index| index as u32).collect(),
+            Some(accessor) => {
+                accessor::numbers(self.source, &accessor)?.into_iter().map(|index| index as u32).collect()
+            }
         };
         if let Some(index) = all.iter().find(|&&index| index as usize >= count) {
             return Err(self.wrong(primitive, &format!("an index is {index}, but there are {count} corners")));
@@ -242,10 +287,14 @@ impl Making<'_> {
             Triangles::List => all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
             // Every other triangle of a strip turns the other way.
             Triangles::Strip => {
-                let turned = |(k, t): (usize, &[u32])| if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                let turned = |(k, t): (usize, &[u32])| {
+                    if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] }
+                };
                 all.windows(3).enumerate().map(turned).collect()
             }
-            Triangles::Fan => all.get(1..).unwrap_or_default().windows(2).map(|t| [t[0], t[1], all[0]]).collect(),
+            Triangles::Fan => {
+                all.get(1..).unwrap_or_default().windows(2).map(|t| [t[0], t[1], all[0]]).collect()
+            }
         };
         let turned = |[a, b, c]: [u32; 3]| if self.mirrored { [a, c, b] } else { [a, b, c] };
         Ok(corners.into_iter().filter(|[a, b, c]| a != b && b != c && a != c).flat_map(turned).collect())

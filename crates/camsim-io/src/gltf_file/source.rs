@@ -27,14 +27,16 @@ impl Source {
         }
         let is_glb = bytes.starts_with(b"glTF");
         let (text, blob) = if is_glb { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
-        let mut json: Value = serde_json::from_slice(without_mark(text)).map_err(|error| broken(format!("is no glTF: {error}")))?;
+        let mut json: Value = serde_json::from_slice(without_mark(text))
+            .map_err(|error| broken(format!("is no glTF: {error}")))?;
         checks::check_extensions(path, &json, blob.is_some())?;
         checks::check_version(&json).map_err(broken)?;
         checks::check_numbers(&json).map_err(broken)?;
         let mut notes = treatments::notes(&json);
         let mended = mend::mend(&mut json).map_err(broken)?;
         notes.extend(mended.notes);
-        let root = serde_json::from_value(json.clone()).map_err(|error| broken(format!("is no glTF 2.0: {error}")))?;
+        let root = serde_json::from_value(json.clone())
+            .map_err(|error| broken(format!("is no glTF 2.0: {error}")))?;
         let document = gltf::Document::from_json(root).map_err(|error| broken(checks::in_words(error)))?;
         let mut buffers = Vec::new();
         for buffer in document.buffers() {
@@ -44,13 +46,17 @@ impl Source {
                 gltf::buffer::Source::Bin if index == 0 && is_glb => blob.unwrap_or_default().to_vec(),
                 gltf::buffer::Source::Bin => {
                     let fix = "only the first buffer of a .glb file may have none: give it one, or write the file again";
-                    return Err(broken(format!("buffers.{index}: has no uri, so that its bytes are nowhere; {fix}")));
+                    return Err(broken(format!(
+                        "buffers.{index}: has no uri, so that its bytes are nowhere; {fix}"
+                    )));
                 }
                 gltf::buffer::Source::Uri(uri) => fetch(path, uri, &format!("buffers.{index}"))?,
             };
             if bytes.len() < buffer.length() {
                 let (has, wants) = (bytes.len(), buffer.length());
-                return Err(broken(format!("buffers.{index}: has {has} bytes where {wants} should be: the file is cut off")));
+                return Err(broken(format!(
+                    "buffers.{index}: has {has} bytes where {wants} should be: the file is cut off"
+                )));
             }
             bytes.truncate(buffer.length());
             buffers.push(bytes);
@@ -65,22 +71,34 @@ impl Source {
     /// Bytes of a view from `offset` on.
     pub fn view(&self, view: &gltf::buffer::View<'_>, offset: usize) -> Result<&[u8], GltfError> {
         let of = self.buffers.get(view.buffer().index());
-        let within =
-            view.offset().checked_add(view.length()).and_then(|end| of?.get(view.offset()..end)).and_then(|view| view.get(offset..));
+        let within = view
+            .offset()
+            .checked_add(view.length())
+            .and_then(|end| of?.get(view.offset()..end))
+            .and_then(|view| view.get(offset..));
         within.ok_or_else(|| self.broken(format!("bufferViews.{}: reaches beyond its buffer", view.index())))
     }
 
     /// Bytes of a picture's file.
     pub fn image(&self, image: &gltf::Image<'_>) -> Result<Vec<u8>, GltfError> {
         // The glTF crate takes for granted that a picture in a view says what it is.
-        let of = |key: &str| self.json.pointer(&format!("/images/{}/{key}", image.index())).is_some_and(|value| !value.is_null());
+        let of = |key: &str| {
+            self.json
+                .pointer(&format!("/images/{}/{key}", image.index()))
+                .is_some_and(|value| !value.is_null())
+        };
         let complete = of("uri") || (of("bufferView") && of("mimeType"));
         if !complete {
-            return Err(self.broken(format!("images.{}: has neither a uri nor a bufferView with a mimeType", image.index())));
+            return Err(self.broken(format!(
+                "images.{}: has neither a uri nor a bufferView with a mimeType",
+                image.index()
+            )));
         }
         match image.source() {
             gltf::image::Source::View { view, .. } => Ok(self.view(&view, 0)?.to_vec()),
-            gltf::image::Source::Uri { uri, .. } => fetch(&self.path, uri, &format!("images.{}", image.index())),
+            gltf::image::Source::Uri { uri, .. } => {
+                fetch(&self.path, uri, &format!("images.{}", image.index()))
+            }
         }
     }
 
@@ -98,7 +116,9 @@ impl Source {
 
     /// `KHR_materials_emissive_strength`: what emitted light is multiplied by.
     pub fn emissive_strength(&self, material: Option<usize>) -> f32 {
-        let at = |material| format!("/materials/{material}/extensions/KHR_materials_emissive_strength/emissiveStrength");
+        let at = |material| {
+            format!("/materials/{material}/extensions/KHR_materials_emissive_strength/emissiveStrength")
+        };
         material.and_then(|material| self.json.pointer(&at(material))?.as_f64()).unwrap_or(1.0) as f32
     }
 
@@ -118,8 +138,11 @@ impl Source {
         let of = |name: &str| -> Result<Option<Vec<[f64; 4]>>, GltfError> {
             let Some(index) = attributes.get(name).and_then(Value::as_u64) else { return Ok(None) };
             let accessor = self.document.accessors().nth(index as usize);
-            let accessor = accessor
-                .ok_or_else(|| self.broken(format!("nodes.{node}: {name} of its instances names accessor {index}, which is not there")))?;
+            let accessor = accessor.ok_or_else(|| {
+                self.broken(format!(
+                    "nodes.{node}: {name} of its instances names accessor {index}, which is not there"
+                ))
+            })?;
             accessor::rows(self, &accessor).map(Some)
         };
         let (shifts, turns, scales) = (of("TRANSLATION")?, of("ROTATION")?, of("SCALE")?);
@@ -134,7 +157,10 @@ impl Source {
             let [x, y, z, _] = shifts.as_ref().map_or([0.0; 4], |rows| rows[i]);
             let turn = turns.as_ref().map_or(DQuat::IDENTITY, |rows| DQuat::from_array(rows[i]).normalize());
             let [a, b, c, _] = scales.as_ref().map_or([1.0; 4], |rows| rows[i]);
-            DAffine3 { matrix3: DMat3::from_quat(turn) * DMat3::from_diagonal(DVec3::new(a, b, c)), translation: DVec3::new(x, y, z) }
+            DAffine3 {
+                matrix3: DMat3::from_quat(turn) * DMat3::from_diagonal(DVec3::new(a, b, c)),
+                translation: DVec3::new(x, y, z),
+            }
         };
         Ok(Some((0..count).map(instance).collect()))
     }
@@ -170,7 +196,8 @@ fn read_file(path: &Path) -> Result<Vec<u8>, GltfError> {
 
 /// What a URI of the file stands for: a data URI, or a file beside it.
 fn fetch(path: &Path, uri: &str, key: &str) -> Result<Vec<u8>, GltfError> {
-    let broken = |message: &str| GltfError::Broken { path: path.into(), message: format!("{key}: {message}") };
+    let broken =
+        |message: &str| GltfError::Broken { path: path.into(), message: format!("{key}: {message}") };
     if let Some(data) = uri.strip_prefix("data:") {
         let (head, body) = data.split_once(',').ok_or_else(|| broken("its data URI has no data"))?;
         if !head.ends_with(";base64") {
@@ -182,7 +209,9 @@ fn fetch(path: &Path, uri: &str, key: &str) -> Result<Vec<u8>, GltfError> {
         return Err(broken("lies on another machine: put it beside the file"));
     }
     let beside = beside(path, uri).ok_or_else(|| broken("its uri is no name of a file"))?;
-    std::fs::read(&beside).map_err(|error| broken(&format!("its file {} cannot be read: {error}; put it there", beside.display())))
+    std::fs::read(&beside).map_err(|error| {
+        broken(&format!("its file {} cannot be read: {error}; put it there", beside.display()))
+    })
 }
 
 /// The file that a URI names.
@@ -194,11 +223,17 @@ fn beside(path: &Path, uri: &str) -> Option<PathBuf> {
 /// Files beside a model that it names, as far as it can be read.
 pub fn files_beside(path: &Path) -> Vec<PathBuf> {
     let Ok(bytes) = read_file(path) else { return Vec::new() };
-    let text = if bytes.starts_with(b"glTF") { split_glb(&bytes).map_or(&[][..], |(text, _)| text) } else { &bytes[..] };
+    let text = if bytes.starts_with(b"glTF") {
+        split_glb(&bytes).map_or(&[][..], |(text, _)| text)
+    } else {
+        &bytes[..]
+    };
     let Ok(json) = serde_json::from_slice::<Value>(without_mark(text)) else { return Vec::new() };
     let lists = ["buffers", "images"].into_iter().filter_map(|key| json.get(key)?.as_array());
     let uris = lists.flatten().filter_map(|of| of.get("uri")?.as_str());
-    uris.filter(|uri| !uri.starts_with("data:") && !uri.contains("://")).filter_map(|uri| beside(path, uri)).collect()
+    uris.filter(|uri| !uri.starts_with("data:") && !uri.contains("://"))
+        .filter_map(|uri| beside(path, uri))
+        .collect()
 }
 
 /// A byte order mark is not allowed, and editors write it nevertheless.
@@ -232,7 +267,8 @@ fn percent_decoded(text: &str) -> Option<String> {
     let (mut out, mut rest) = (Vec::new(), text.as_bytes());
     while let Some((&byte, after)) = rest.split_first() {
         rest = after;
-        let pair = after.get(..2).and_then(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
+        let pair =
+            after.get(..2).and_then(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
         match (byte, pair) {
             (b'%', Some(byte)) => {
                 out.push(byte);

@@ -23,7 +23,11 @@ fn model(bytes: &[u8], rest: &str, options: GltfOptions) -> Result<Model, String
     std::fs::write(folder.path().join("a b.bin"), bytes).unwrap();
     let path = folder.path().join("model.gltf");
     let buffers = format!("\"buffers\": [{{ \"byteLength\": {}, \"uri\": \"a%20b.bin\" }}]", bytes.len());
-    std::fs::write(&path, format!("{{ \"asset\": {{ \"version\": \"2.0\" }}, \"scene\": 0, {buffers}, {rest} }}")).unwrap();
+    std::fs::write(
+        &path,
+        format!("{{ \"asset\": {{ \"version\": \"2.0\" }}, \"scene\": 0, {buffers}, {rest} }}"),
+    )
+    .unwrap();
     read_gltf(&path, options).map_err(|error| error.to_string())
 }
 
@@ -49,14 +53,20 @@ fn square_with(mode: u32, more: &str, nodes: &str, options: GltfOptions) -> Resu
 
 /// Corners of a placed model, north-east-down, triangle by triangle.
 fn corners(model: &Model) -> Vec<[DVec3; 3]> {
-    let of =
-        |mesh: Mesh| mesh.shape.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|v| mesh.position_ned_m(v))).collect::<Vec<_>>();
+    let of = |mesh: Mesh| {
+        mesh.shape
+            .indices
+            .chunks_exact(3)
+            .map(|t| [t[0], t[1], t[2]].map(|v| mesh.position_ned_m(v)))
+            .collect::<Vec<_>>()
+    };
     model.place(DVec3::ZERO, 0.0, 1.0).flat_map(of).collect()
 }
 
 #[test]
 fn strips_and_fans_turn_one_way() {
-    let turns = |model: &Model| corners(model).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect::<Vec<_>>();
+    let turns =
+        |model: &Model| corners(model).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect::<Vec<_>>();
     let strip = turns(&square(5, "", r#"{ "mesh": 0 }"#).unwrap());
     assert_eq!(strip.len(), 2);
     // They look along z, which is ahead: north.
@@ -69,8 +79,11 @@ fn strips_and_fans_turn_one_way() {
 
 #[test]
 fn a_time_without_an_animation_is_noted() {
-    let noted =
-        |time_s: Option<f64>| square_with(5, "", r#"{ "mesh": 0 }"#, GltfOptions { time_s, ..GltfOptions::default() }).unwrap().notes;
+    let noted = |time_s: Option<f64>| {
+        square_with(5, "", r#"{ "mesh": 0 }"#, GltfOptions { time_s, ..GltfOptions::default() })
+            .unwrap()
+            .notes
+    };
     assert!(noted(None).is_empty());
     let notes = noted(Some(1.0));
     assert!(notes.len() == 1 && notes[0].starts_with("has no animation for time_s"), "{notes:?}");
@@ -83,7 +96,12 @@ fn what_is_mirrored_keeps_its_outside() {
         assert!((b - a).cross(c - a).normalize().distance(-DVec3::X) < 1e-12);
     }
     // Its neighbour, which is not, shares none of its triangles.
-    let both = square(5, "", r#"{ "mesh": 0, "children": [1], "scale": [1, 1, -1] }, { "mesh": 0, "scale": [-1, 1, 1] }"#).unwrap();
+    let both = square(
+        5,
+        "",
+        r#"{ "mesh": 0, "children": [1], "scale": [1, 1, -1] }, { "mesh": 0, "scale": [-1, 1, 1] }"#,
+    )
+    .unwrap();
     let turns: Vec<f64> = corners(&both).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).x).collect();
     assert_eq!(turns, [-1.0, -1.0, -1.0, -1.0]);
     let meshes: Vec<Mesh> = both.place(DVec3::ZERO, 0.0, 1.0).collect();
@@ -94,7 +112,8 @@ fn what_is_mirrored_keeps_its_outside() {
 fn a_model_stands_with_its_front_to_its_heading() {
     let square = square(5, "", r#"{ "mesh": 0, "translation": [1, 2, 3] }"#).unwrap();
     let at = |heading_deg: f64| {
-        let mesh = square.place(DVec3::new(10.0, 20.0, 30.0), f64::to_radians(heading_deg), 2.0).next().unwrap();
+        let mesh =
+            square.place(DVec3::new(10.0, 20.0, 30.0), f64::to_radians(heading_deg), 2.0).next().unwrap();
         mesh.position_ned_m(0)
     };
     // Left, up, ahead of the origin, twice as large.
@@ -111,27 +130,56 @@ fn files_that_need_more_or_are_wrong_are_named() {
         (wrong("", r#"{ "mesh": 0, "children": [1] }, { "children": [0] }"#), "has two parents"),
         (wrong("", r#"{ "mesh": 9 }"#), "is not valid"),
         (
-            square(4, r#" }] }], "extensionsRequired": ["KHR_draco_mesh_compression"], "x": [{ "y": [{ "z": 1"#, r#"{ "mesh": 0 }"#)
-                .unwrap_err(),
+            square(
+                4,
+                r#" }] }], "extensionsRequired": ["KHR_draco_mesh_compression"], "x": [{ "y": [{ "z": 1"#,
+                r#"{ "mesh": 0 }"#,
+            )
+            .unwrap_err(),
             "KHR_draco_mesh_compression, which is not supported: write the file again without compression",
         ),
         (
-            model(b"", r#""extensionsRequired": ["EXT_meshopt_compression"]"#, GltfOptions::default()).unwrap_err(),
+            model(b"", r#""extensionsRequired": ["EXT_meshopt_compression"]"#, GltfOptions::default())
+                .unwrap_err(),
             "EXT_meshopt_compression",
         ),
-        (model(b"", r#""extensionsRequired": ["KHR_texture_basisu"]"#, GltfOptions::default()).unwrap_err(), "PNG or JPEG"),
-        (model(b"", r#""scenes": [{ "nodes": [] }]"#, GltfOptions { scene: Some(2), ..GltfOptions::default() }).unwrap_err(), "no scene 2"),
+        (
+            model(b"", r#""extensionsRequired": ["KHR_texture_basisu"]"#, GltfOptions::default())
+                .unwrap_err(),
+            "PNG or JPEG",
+        ),
+        (
+            model(
+                b"",
+                r#""scenes": [{ "nodes": [] }]"#,
+                GltfOptions { scene: Some(2), ..GltfOptions::default() },
+            )
+            .unwrap_err(),
+            "no scene 2",
+        ),
     ] {
         assert!(message.contains(wanted) && message.contains("model.gltf"), "{message}");
     }
-    assert!(read_gltf(Path::new("/none/such.glb"), GltfOptions::default()).unwrap_err().to_string().contains("such.glb: cannot be read"));
+    assert!(
+        read_gltf(Path::new("/none/such.glb"), GltfOptions::default())
+            .unwrap_err()
+            .to_string()
+            .contains("such.glb: cannot be read")
+    );
 }
 
 #[test]
 fn malformed_files_of_other_people_are_refused() {
     let Some(data) = data() else { return };
-    for name in ["integer-out-of-bounds", "invalid-buffer-index", "invalid-buffer-view-index", "invalid-primitive-indices"] {
-        let error = read_gltf(&data.join(format!("tinygltf_regression/{name}.gltf")), GltfOptions::default()).unwrap_err().to_string();
+    for name in [
+        "integer-out-of-bounds",
+        "invalid-buffer-index",
+        "invalid-buffer-view-index",
+        "invalid-primitive-indices",
+    ] {
+        let error = read_gltf(&data.join(format!("tinygltf_regression/{name}.gltf")), GltfOptions::default())
+            .unwrap_err()
+            .to_string();
         eprintln!("{error}");
         assert!(error.contains(name), "{error}");
     }
@@ -217,24 +265,32 @@ fn models_of_other_people_have_the_size_that_they_say() {
     ] {
         assert!(size(name, None).distance(DVec3::ONE) < 1e-6, "{name}: {}", size(name, None));
     }
-    // The quantised file is the same cube, to the step of its numbers: weights in bytes move a corner by 2 m / 255 at most.
-    let [cube, quantised] =
-        ["glTF-Binary/AnimatedMorphCube.glb", "glTF-Quantized/AnimatedMorphCube.gltf"].map(|name| format!("AnimatedMorphCube/{name}"));
+    // The quantised file is the same cube, to the step of its numbers: weights in bytes move a corner by 2 m
+    // / 255 at most.
+    let [cube, quantised] = ["glTF-Binary/AnimatedMorphCube.glb", "glTF-Quantized/AnimatedMorphCube.gltf"]
+        .map(|name| format!("AnimatedMorphCube/{name}"));
     for time_s in [None, Some(0.0), Some(1.3), Some(9.0)] {
         let (a, b) = (size(&cube, time_s), size(&quantised, time_s));
         assert!(a.distance(b) < 2.0 / 255.0, "{time_s:?}: {a} {b}");
     }
-    assert!(size(&cube, Some(1.3)).distance(size(&cube, Some(0.0))) > 0.01 * size(&cube, None).length(), "it changes");
+    assert!(
+        size(&cube, Some(1.3)).distance(size(&cube, Some(0.0))) > 0.01 * size(&cube, None).length(),
+        "it changes"
+    );
     // The truck is some 4.8 m long; a fox of 140 units.
     let truck = size("CesiumMilkTruck/glTF-Binary/CesiumMilkTruck.glb", None);
     assert!((4.0..6.0).contains(&truck.max_element()), "{truck}");
     let fox = size("Fox/glTF-Binary/Fox.glb", Some(0.0));
     assert!((100.0..200.0).contains(&fox.max_element()), "{fox}");
     // Eight instances of a box at the corners of a larger one.
-    let many = read_gltf(&data.join("SimpleInstancing/glTF/SimpleInstancing.gltf"), GltfOptions::default()).unwrap();
+    let many =
+        read_gltf(&data.join("SimpleInstancing/glTF/SimpleInstancing.gltf"), GltfOptions::default()).unwrap();
     assert!(many.triangles() > 12 && many.triangles().is_multiple_of(12), "{}", many.triangles());
     let meshes: Vec<Mesh> = many.place(DVec3::ZERO, 0.0, 1.0).collect();
-    assert!(meshes.iter().all(|mesh| Arc::ptr_eq(&mesh.shape, &meshes[0].shape)), "instances share their triangles");
+    assert!(
+        meshes.iter().all(|mesh| Arc::ptr_eq(&mesh.shape, &meshes[0].shape)),
+        "instances share their triangles"
+    );
 }
 
 #[test]
@@ -252,7 +308,10 @@ fn texture_coordinates_are_turned_as_their_extension_says() {
     let at = |rule: material::UvRule, uv: [f64; 2]| DVec2::from_array(rule.apply(uv).map(f64::from));
     assert!(at(rule(0.0, [0.5, -0.25], [2.0, 3.0]), [0.1, 0.2]).distance(DVec2::new(0.7, 0.35)) < 1e-6);
     // A quarter anticlockwise as one sees it, where v goes down: u becomes -v.
-    assert!(at(rule(std::f64::consts::FRAC_PI_2, [0.0; 2], [1.0; 2]), [1.0, 0.0]).distance(DVec2::new(0.0, -1.0)) < 1e-6);
+    assert!(
+        at(rule(std::f64::consts::FRAC_PI_2, [0.0; 2], [1.0; 2]), [1.0, 0.0]).distance(DVec2::new(0.0, -1.0))
+            < 1e-6
+    );
 }
 
 const WITH_NORMALS: GltfOptions = GltfOptions { normals: true, scene: None, time_s: None, animation: None };
@@ -260,7 +319,8 @@ const WITH_NORMALS: GltfOptions = GltfOptions { normals: true, scene: None, time
 /// Normals of a model's corners as it stands.
 fn standing(model: &Model, heading_rad: f64) -> Vec<DVec3> {
     let of = |mesh: Mesh| {
-        let turned = |normal: &[f32; 3]| turned_normal(&mesh.ned_from_shape, DVec3::from_array(normal.map(f64::from)));
+        let turned =
+            |normal: &[f32; 3]| turned_normal(&mesh.ned_from_shape, DVec3::from_array(normal.map(f64::from)));
         mesh.shape.normals.iter().map(turned).collect::<Vec<_>>()
     };
     model.place(DVec3::ZERO, heading_rad, 2.0).flat_map(of).collect()
@@ -289,24 +349,36 @@ fn flat_triangles_look_where_they_turn_to() {
 #[test]
 fn planes_do_not_share_corners_and_given_normals_are_mended() {
     // Two faces of a tent.
-    let at = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|at| MeshVertex::new(at, [0.0; 2]));
+    let at = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        .map(|at| MeshVertex::new(at, [0.0; 2]));
     let shape = normals::flat(&at, &[0, 1, 2, 0, 2, 3], false);
     assert_eq!((shape.vertices.len(), shape.indices.len()), (6, 6));
     let normal = |k: usize| shape.normals[shape.indices[k] as usize];
-    assert_eq!([normal(0), normal(2), normal(3), normal(5)], [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    assert_eq!(
+        [normal(0), normal(2), normal(3), normal(5)],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    );
     let given = vec![DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::NAN, DVec3::new(3.0, 0.0, -4.0)];
     let mended = normals::mended(given, &at, &[0, 1, 2, 0, 2, 3], false);
     let between = 0.5_f32.sqrt();
-    for (found, expected) in mended.into_iter().zip([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [between, 0.0, between], [0.6, 0.0, -0.8]]) {
-        assert!(DVec3::from_array(found.map(f64::from)).distance(DVec3::from_array(expected.map(f64::from))) < 1e-6, "{found:?}");
+    for (found, expected) in
+        mended.into_iter().zip([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [between, 0.0, between], [0.6, 0.0, -0.8]])
+    {
+        assert!(
+            DVec3::from_array(found.map(f64::from)).distance(DVec3::from_array(expected.map(f64::from)))
+                < 1e-6,
+            "{found:?}"
+        );
     }
 }
 
 #[test]
 fn light_falls_on_nothing_that_is_unlit_or_shines() {
-    for (material, lit) in
-        [(r#"{}"#, true), (r#"{ "emissiveFactor": [0.5, 0, 0] }"#, true), (r#"{ "extensions": { "KHR_materials_unlit": {} } }"#, false)]
-    {
+    for (material, lit) in [
+        (r#"{}"#, true),
+        (r#"{ "emissiveFactor": [0.5, 0, 0] }"#, true),
+        (r#"{ "extensions": { "KHR_materials_unlit": {} } }"#, false),
+    ] {
         let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
         let model = square_with(5, &rest, r#"{ "mesh": 0 }"#, WITH_NORMALS).unwrap();
         assert_eq!(!standing(&model, 0.0).is_empty(), lit, "{material}");
@@ -324,7 +396,9 @@ fn normals_of_real_models_look_outwards_wherever_joints_take_them() {
         ("AnimatedMorphCube/glTF-Binary/AnimatedMorphCube.glb", Some(1.1)),
         ("Box/glTF-Binary/Box.glb", None),
     ] {
-        let read = |normals: bool| read_gltf(&data.join(name), GltfOptions { time_s, normals, ..GltfOptions::default() }).unwrap();
+        let read = |normals: bool| {
+            read_gltf(&data.join(name), GltfOptions { time_s, normals, ..GltfOptions::default() }).unwrap()
+        };
         let (model, plain) = (read(true), read(false));
         assert_eq!(corners(&model), corners(&plain), "{name}");
         let (mut outwards, mut all) = (0.0, 0.0);
@@ -334,14 +408,20 @@ fn normals_of_real_models_look_outwards_wherever_joints_take_them() {
                 let [a, b, c] = [0, 1, 2].map(|k| mesh.position_ned_m(triangle[k]));
                 let face = (b - a).cross(c - a);
                 for &corner in triangle {
-                    let normal = turned_normal(&mesh.ned_from_shape, DVec3::from_array(mesh.shape.normals[corner as usize].map(f64::from)));
+                    let normal = turned_normal(
+                        &mesh.ned_from_shape,
+                        DVec3::from_array(mesh.shape.normals[corner as usize].map(f64::from)),
+                    );
                     assert!((normal.length() - 1.0).abs() < 1e-9, "{name}");
                     all += face.length();
                     outwards += if normal.dot(face) > 0.5 * face.length() { face.length() } else { 0.0 };
                 }
             }
         }
-        eprintln!("{name} {time_s:?}: {:.4} of the area has normals within 60 degrees of its faces'", outwards / all);
+        eprintln!(
+            "{name} {time_s:?}: {:.4} of the area has normals within 60 degrees of its faces'",
+            outwards / all
+        );
         assert!(outwards > 0.9 * all, "{name}: {outwards} of {all}");
     }
 }
@@ -354,7 +434,8 @@ fn material_of(material: &str) -> Material {
     model.place(DVec3::ZERO, 0.0, 1.0).next().unwrap().material
 }
 
-/// What cuts at an alpha: just below it, as what has that alpha is there, of which a half float that is rounded down loses up to 2^-11; and no lower.
+/// What cuts at an alpha: just below it, as what has that alpha is there, of which a half float that is
+/// rounded down loses up to 2^-11; and no lower.
 fn cut_at(alpha: f32, cutoff: Option<f32>) -> bool {
     cutoff.is_some_and(|cutoff| cutoff < alpha * (1.0 - 0.5_f32.powi(11)) && cutoff > 0.999 * alpha)
 }
@@ -380,15 +461,24 @@ fn factors_beyond_what_there_is_are_named() {
         let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
         square_with(5, &rest, r#"{ "mesh": 0 }"#, GltfOptions::default())
     };
-    let base = |factor: &str| of(&format!(r#"{{ "alphaMode": "BLEND", "pbrMetallicRoughness": {{ "baseColorFactor": {factor} }} }}"#));
+    let base = |factor: &str| {
+        of(&format!(
+            r#"{{ "alphaMode": "BLEND", "pbrMetallicRoughness": {{ "baseColorFactor": {factor} }} }}"#
+        ))
+    };
     assert!(base("[0, 1, 0.5, 0.25]").unwrap().notes.is_empty());
     for factor in ["[1, 1, 1, 1.5]", "[1, 1, 1, -0.5]", "[2, 1, 1, 0.5]"] {
         let notes = base(factor).unwrap().notes;
-        let named = |note: &String| ["materials.0:", "baseColorFactor", "nearest"].iter().all(|part| note.contains(part));
+        let named = |note: &String| {
+            ["materials.0:", "baseColorFactor", "nearest"].iter().all(|part| note.contains(part))
+        };
         assert!(notes.len() == 1 && notes.iter().all(named), "{factor}: {notes:?}");
     }
     let error = base("[1, 1, 1, 1e39]").unwrap_err().to_string();
-    assert!(["materials.0:", "baseColorFactor", "not finite"].iter().all(|part| error.contains(part)), "{error}");
+    assert!(
+        ["materials.0:", "baseColorFactor", "not finite"].iter().all(|part| error.contains(part)),
+        "{error}"
+    );
     let notes = of(r#"{ "emissiveFactor": [3, 0, 0] }"#).unwrap().notes;
     assert!(notes.len() == 1 && notes[0].starts_with("materials.0: emissiveFactor"), "{notes:?}");
 }
@@ -396,34 +486,52 @@ fn factors_beyond_what_there_is_are_named() {
 #[test]
 fn a_real_model_blends_what_it_says() {
     let Some(data) = data() else { return };
-    let model = read_gltf(&data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"), GltfOptions::default()).unwrap();
-    assert_eq!(model.notes, ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are left out"]);
-    let found: Vec<_> = model.place(DVec3::ZERO, 0.0, 1.0).map(|mesh| (mesh.material.blends, mesh.material.cutoff)).collect();
+    let model = read_gltf(
+        &data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"),
+        GltfOptions::default(),
+    )
+    .unwrap();
+    assert_eq!(
+        model.notes,
+        ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are left out"]
+    );
+    let found: Vec<_> =
+        model.place(DVec3::ZERO, 0.0, 1.0).map(|mesh| (mesh.material.blends, mesh.material.cutoff)).collect();
     for (blends, alpha) in [(true, 0.5), (false, 0.25), (false, 0.5), (false, 0.75)] {
-        assert!(found.iter().any(|found| found.0 == blends && cut_at(alpha, found.1)), "{blends} {alpha} of {found:?}");
+        assert!(
+            found.iter().any(|found| found.0 == blends && cut_at(alpha, found.1)),
+            "{blends} {alpha} of {found:?}"
+        );
     }
     assert!(found.contains(&(false, None)), "{found:?}");
 }
 
 #[test]
 fn the_diffuse_colour_of_older_files_is_their_base_colour() {
-    let material = |rest: &str| format!(r#", "material": 0 }}] }}], "materials": [{{ {rest} }}], "unknown": [{{ "none": [{{ "x": 0"#);
+    let material = |rest: &str| {
+        format!(r#", "material": 0 }}] }}], "materials": [{{ {rest} }}], "unknown": [{{ "none": [{{ "x": 0"#)
+    };
     let diffuse = r#""extensions": { "KHR_materials_pbrSpecularGlossiness": { "diffuseFactor": [0.25, 0.5, 0.75, 1.0] } }"#;
     let tint = |rest: &str| square(4, &material(rest), r#"{ "mesh": 0 }"#).map(|model| corners_tints(&model));
     assert_eq!(tint(diffuse).unwrap(), vec![[0.25, 0.5, 0.75, 1.0]; 4]);
     assert_eq!(tint("").unwrap(), vec![[1.0; 4]; 4]);
     let error = tint(&diffuse.replace("0.25", "1e39")).unwrap_err();
-    assert!(error.contains("materials.0: extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor"), "{error}");
+    assert!(
+        error.contains("materials.0: extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor"),
+        "{error}"
+    );
 }
 
 fn corners_tints(model: &Model) -> Vec<[f32; 4]> {
-    model.place(DVec3::ZERO, 0.0, 1.0).flat_map(|mesh| mesh.shape.vertices.iter().map(|vertex| vertex.tint).collect::<Vec<_>>()).collect()
+    model
+        .place(DVec3::ZERO, 0.0, 1.0)
+        .flat_map(|mesh| mesh.shape.vertices.iter().map(|vertex| vertex.tint).collect::<Vec<_>>())
+        .collect()
 }
 
 #[test]
 fn animations_that_nothing_or_too_much_is_asked_of_are_noted() {
-    let animation =
-        r#"{ "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }], "samplers": [{ "input": 1, "output": 0 }] }"#;
+    let animation = r#"{ "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }], "samplers": [{ "input": 1, "output": 0 }] }"#;
     let read = |count: usize, options: GltfOptions| {
         let bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
         let animations = vec![animation; count].join(", ");
@@ -436,7 +544,11 @@ fn animations_that_nothing_or_too_much_is_asked_of_are_noted() {
         );
         model(&bytes, &rest, options).unwrap().notes
     };
-    let at = |time_s: Option<f64>, animation: Option<usize>| GltfOptions { time_s, animation, ..GltfOptions::default() };
+    let at = |time_s: Option<f64>, animation: Option<usize>| GltfOptions {
+        time_s,
+        animation,
+        ..GltfOptions::default()
+    };
     assert_eq!(read(1, at(Some(1.0), None)), Vec::<String>::new());
     assert_eq!(read(2, at(Some(1.0), Some(1))), Vec::<String>::new());
     let [unasked] = read(1, at(None, Some(0))).try_into().unwrap();
@@ -460,5 +572,8 @@ fn corners_in_a_compressed_buffer_alone_are_named_by_their_extension() {
     let error = model(&bytes, &rest(""), GltfOptions::default()).unwrap_err();
     assert!(error.contains("KHR_draco_mesh_compression") && error.contains("without compression"), "{error}");
     // With what readers without it are given instead.
-    assert_eq!(corners(&model(&bytes, &rest(r#""bufferView": 0,"#), GltfOptions::default()).unwrap()).len(), 2);
+    assert_eq!(
+        corners(&model(&bytes, &rest(r#""bufferView": 0,"#), GltfOptions::default()).unwrap()).len(),
+        2
+    );
 }

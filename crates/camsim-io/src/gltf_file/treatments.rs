@@ -31,8 +31,16 @@ const AS_PNG: &str = "write its pictures as PNG or JPEG";
 pub(super) const EXTENSIONS: &[Treatment] = &[
     ("KHR_mesh_quantization", Applied, "positions, normals and texture coordinates of 8 and 16 bits"),
     ("KHR_texture_transform", Applied, "offset, rotation, scale and set of texture coordinates"),
-    ("KHR_materials_unlit", Applied, "its base colour alone: the scene's light does not fall on it, and nothing is emitted"),
-    ("KHR_materials_pbrSpecularGlossiness", Applied, "its diffuse colour is the base colour; its gloss is named"),
+    (
+        "KHR_materials_unlit",
+        Applied,
+        "its base colour alone: the scene's light does not fall on it, and nothing is emitted",
+    ),
+    (
+        "KHR_materials_pbrSpecularGlossiness",
+        Applied,
+        "its diffuse colour is the base colour; its gloss is named",
+    ),
     ("KHR_materials_emissive_strength", Applied, "times emissiveFactor; more than white is white, and named"),
     ("KHR_node_visibility", Applied, "of what is not visible nothing is shown, its children included"),
     ("EXT_mesh_gpu_instancing", Applied, "TRANSLATION, ROTATION and SCALE"),
@@ -65,7 +73,11 @@ pub(super) const EXTENSIONS: &[Treatment] = &[
 #[cfg(test)]
 pub(super) const PROPERTIES: &[Treatment] = &[
     ("baseColorFactor, baseColorTexture", Applied, "albedo"),
-    ("COLOR_0", Applied, "times albedo; not under a picture of emitted light that lies on the base colour's, which is named"),
+    (
+        "COLOR_0",
+        Applied,
+        "times albedo; not under a picture of emitted light that lies on the base colour's, which is named",
+    ),
     (
         "emissiveFactor, emissiveTexture",
         Applied,
@@ -104,7 +116,9 @@ pub(super) fn treatment(name: &str) -> Option<&'static Treatment> {
 pub(super) fn refuse(path: &Path, name: &str) -> GltfError {
     let fix = match treatment(name) {
         Some((_, Refused, fix)) => fix,
-        Some((_, Named, _)) => "write the file again without it, or take it out of extensionsRequired to have all but what it adds",
+        Some((_, Named, _)) => {
+            "write the file again without it, or take it out of extensionsRequired to have all but what it adds"
+        }
         _ => "write the file again without it",
     };
     GltfError::Extension { path: path.into(), extension: name.into(), fix }
@@ -158,10 +172,13 @@ pub(super) fn notes(json: &Value) -> Vec<String> {
                 }),
             );
             let targets = list(primitive, "targets").iter().filter_map(Value::as_object).flatten();
-            let other = targets.filter(|(name, _)| !matches!(name.as_str(), "POSITION" | "NORMAL" | "TANGENT"));
-            notes.extend(
-                other.map(|(name, _)| format!("meshes.{number}: {name} of its morph targets is left out: they move and turn corners")),
-            );
+            let other =
+                targets.filter(|(name, _)| !matches!(name.as_str(), "POSITION" | "NORMAL" | "TANGENT"));
+            notes.extend(other.map(|(name, _)| {
+                format!(
+                    "meshes.{number}: {name} of its morph targets is left out: they move and turn corners"
+                )
+            }));
         }
     }
     notes
@@ -182,7 +199,13 @@ fn albedo_only(json: &Value) -> BTreeSet<&str> {
             ("normalTexture", there("/normalTexture")),
             ("occlusionTexture", there("/occlusionTexture")),
             ("metallicRoughnessTexture", there("/pbrMetallicRoughness/metallicRoughnessTexture")),
-            ("metallicFactor", material.pointer("/pbrMetallicRoughness/metallicFactor").and_then(Value::as_f64).is_some_and(|f| f > 0.0)),
+            (
+                "metallicFactor",
+                material
+                    .pointer("/pbrMetallicRoughness/metallicFactor")
+                    .and_then(Value::as_f64)
+                    .is_some_and(|f| f > 0.0),
+            ),
         ];
         found.extend(names.into_iter().filter(|(_, there)| *there).map(|(name, _)| name));
     }

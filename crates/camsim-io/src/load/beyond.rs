@@ -26,10 +26,13 @@ pub(super) fn beyond_picture_warning(sequence: &Sequence, summary: &TerrainSumma
         for (x, y) in (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (x, y))) {
             let at = [x, y].map(|n| (f64::from(n) + 0.5) / f64::from(PLACES));
             all += 1;
-            let Some(ray) = camera.unproject(DVec2::new(at[0] * size[0] - 0.5, at[1] * size[1] - 0.5)) else { continue };
+            let Some(ray) = camera.unproject(DVec2::new(at[0] * size[0] - 0.5, at[1] * size[1] - 0.5)) else {
+                continue;
+            };
             let direction = pose.ned_from_camera * ray.extend(1.0);
             let hit = terrain.intersect(pose.position_ned_m, direction, f64::INFINITY);
-            of_frame += u32::from(hit.is_some_and(|hit| (0..2).any(|k| !(low[k]..=high[k]).contains(&hit.uv[k]))));
+            of_frame +=
+                u32::from(hit.is_some_and(|hit| (0..2).any(|k| !(low[k]..=high[k]).contains(&hit.uv[k]))));
         }
         beyond += of_frame;
         worst = worst.max((of_frame, frame));

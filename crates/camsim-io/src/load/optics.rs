@@ -1,4 +1,5 @@
-//! What is between the world and the sensor's numbers: zoom tracks and vignettes, and what there is to say about them.
+//! What is between the world and the sensor's numbers: zoom tracks and vignettes, and what there is to say
+//! about them.
 
 use camsim_core::{
     flight_log::FlightLog,
@@ -40,12 +41,16 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
     };
     if !is_zoom {
         let found = header.iter().collect::<Vec<_>>().join(",");
-        return Err(fail(Some(1), format!("the header is `{found}` and not `t_s,zoom` (or t_ms, t_us, t_ns)")));
+        return Err(fail(
+            Some(1),
+            format!("the header is `{found}` and not `t_s,zoom` (or t_ms, t_us, t_ns)"),
+        ));
     }
     let epoch_s = log.epoch_ns as f64 * 1e-9;
     let mut rows: Vec<(f64, f64)> = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
+        let record =
+            record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
         let line = record.position().map(csv::Position::line);
         let number = |at: usize| {
             let text = record.get(at).unwrap_or_default();
@@ -54,7 +59,10 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
         let (t_s, zoom) = (second_s * number(0)?, number(1)?);
         let at = ((t_s - epoch_s) / scenario.flight.speed, zoom);
         if !at.0.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= at.0) {
-            return Err(fail(line, format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before")));
+            return Err(fail(
+                line,
+                format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before"),
+            ));
         }
         rows.push(at);
     }
@@ -68,10 +76,13 @@ pub(super) fn optics_warnings(sequence: &Sequence) -> Vec<String> {
     zoom_warnings(sequence).into_iter().chain(vignette).collect()
 }
 
-/// Of rows that end before the flight does, and of values that nothing was calibrated for, the nearest is taken.
+/// Of rows that end before the flight does, and of values that nothing was calibrated for, the nearest is
+/// taken.
 fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
     let camera = &sequence.scenario.camera;
-    let (Some(path), Some(first), Some(last)) = (&camera.zoom_track, sequence.zoom_track.first(), sequence.zoom_track.last()) else {
+    let (Some(path), Some(first), Some(last)) =
+        (&camera.zoom_track, sequence.zoom_track.first(), sequence.zoom_track.last())
+    else {
         return Vec::new();
     };
     let path = path.display();
@@ -88,11 +99,13 @@ fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
         ));
     }
     let known = camera.zoom.iter().map(|entry| entry.at);
-    let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| [at.min(least), at.max(most)]);
+    let [least, most] =
+        known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| [at.min(least), at.max(most)]);
     let values = || sequence.zoom_track.iter().map(|row| row.1);
     let beyond = values().filter(|zoom| *zoom < least || *zoom > most).count();
     if beyond > 0 {
-        let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], zoom| [zoom.min(low), zoom.max(high)]);
+        let [low, high] = values()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], zoom| [zoom.min(low), zoom.max(high)]);
         warnings.push(format!(
             "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, {low} to {high} where {least} to {most} are known: the \
              nearest is taken",
@@ -118,7 +131,9 @@ pub fn vignette_warnings(camera: &CameraSpec, map: &GrayImage) -> Vec<String> {
     let shape = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);
     if (shape(map.size_px) / shape(camera.size_px) - 1.0).abs() > SAME_SHAPE {
         let ([w, h], [width, height]) = (map.size_px, camera.size_px);
-        warnings.push(format!("{path}: the vignette is of {w}x{h} pixels and is stretched to the picture's {width}x{height}"));
+        warnings.push(format!(
+            "{path}: the vignette is of {w}x{h} pixels and is stretched to the picture's {width}x{height}"
+        ));
     }
     warnings
 }

@@ -17,7 +17,8 @@ pub(super) struct Placement {
     pub scale: f64,
 }
 
-const COLUMNS: &str = "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, heading_deg and scale";
+const COLUMNS: &str =
+    "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, heading_deg and scale";
 
 /// Reads a table with a header; the heights may be missing `on_ground`.
 pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placement>, LoadError> {
@@ -32,20 +33,24 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
     if let Some(name) = header.iter().find(|name| !known.contains(&name.trim_start_matches('\u{feff}'))) {
         return Err(fail(format!("line 1: the column `{name}` says nothing here; {COLUMNS}")));
     }
-    if let Some(name) = known.into_iter().find(|name| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}') == *name).count() > 1)
+    if let Some(name) = known
+        .into_iter()
+        .find(|name| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}') == *name).count() > 1)
     {
         return Err(fail(format!("line 1: there are two columns `{name}`; leave one out")));
     }
     let column = |name: &str| header.iter().position(|cell| cell.trim_start_matches('\u{feff}') == name);
     let local = [column("n_m"), column("e_m"), column("d_m")];
     let earth = [column("lat_deg"), column("lon_deg"), column("height_m")];
-    let complete = |of: [Option<usize>; 3]| of[0].is_some() && of[1].is_some() && (of[2].is_some() || on_ground);
+    let complete =
+        |of: [Option<usize>; 3]| of[0].is_some() && of[1].is_some() && (of[2].is_some() || on_ground);
     let is_local = match (complete(local), complete(earth)) {
         (true, false) => true,
         (false, true) => false,
         _ => {
-            let missing =
-                [("d_m", local), ("height_m", earth)].into_iter().find(|(_, of)| of[0].is_some() && of[1].is_some() && of[2].is_none());
+            let missing = [("d_m", local), ("height_m", earth)]
+                .into_iter()
+                .find(|(_, of)| of[0].is_some() && of[1].is_some() && of[2].is_none());
             return Err(fail(match missing {
                 Some((name, _)) if !on_ground => {
                     format!(
@@ -65,13 +70,16 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
             let wrong = || fail(format!("line {line}: `{text}` is no finite number"));
             text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
         };
-        let triple =
-            |of: [Option<usize>; 3]| -> Result<[f64; 3], LoadError> { Ok([number(of[0], 0.0)?, number(of[1], 0.0)?, number(of[2], 0.0)?]) };
+        let triple = |of: [Option<usize>; 3]| -> Result<[f64; 3], LoadError> {
+            Ok([number(of[0], 0.0)?, number(of[1], 0.0)?, number(of[2], 0.0)?])
+        };
         let place = match is_local {
             true => (PatternCentre::Ned(triple(local)?), None),
             false => (PatternCentre::Origin, Some(triple(earth)?)),
         };
-        if let Some([lat_deg, lon_deg, _]) = place.1.filter(|[lat_deg, lon_deg, _]| lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0) {
+        if let Some([lat_deg, lon_deg, _]) =
+            place.1.filter(|[lat_deg, lon_deg, _]| lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0)
+        {
             return Err(fail(format!(
                 "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are degrees, latitude -90 to 90"
             )));
@@ -103,7 +111,10 @@ mod tests {
         let of = |place, heading_deg, scale| Placement { place, heading_deg, scale };
         assert_eq!(
             read("\u{feff}e_m,n_m,d_m,heading_deg\r\n# two\r\n1,2,3,90\r\n4,5,6,0\r\n", false).unwrap(),
-            [of((PatternCentre::Ned([2.0, 1.0, 3.0]), None), 90.0, 1.0), of((PatternCentre::Ned([5.0, 4.0, 6.0]), None), 0.0, 1.0)]
+            [
+                of((PatternCentre::Ned([2.0, 1.0, 3.0]), None), 90.0, 1.0),
+                of((PatternCentre::Ned([5.0, 4.0, 6.0]), None), 0.0, 1.0)
+            ]
         );
         let earth = read("lat_deg,lon_deg,scale\n47,8,2.5\n", true).unwrap();
         assert_eq!(earth, [of((PatternCentre::Origin, Some([47.0, 8.0, 0.0])), 0.0, 2.5)]);
@@ -112,13 +123,21 @@ mod tests {
     #[test]
     fn wrong_tables_are_named_by_line() {
         for (text, on_ground, wanted) in [
-            ("n_m,e_m\n1,2\n", false, "line 1: the column `d_m` is missing; give it, or set scene.gltf.on_ground"),
+            (
+                "n_m,e_m\n1,2\n",
+                false,
+                "line 1: the column `d_m` is missing; give it, or set scene.gltf.on_ground",
+            ),
             ("lon_deg,lat_deg\n1,2\n", false, "line 1: the column `height_m` is missing"),
             ("n_m,d_m\n1,2\n", false, "line 1: places are missing"),
             ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
             ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
             ("n_m,e_m,d_m,n_m\n1,2,3,4\n", false, "line 1: there are two columns `n_m`"),
-            ("lat_deg,lon_deg\n47,8\n147,8\n", true, "line 3: latitude 147, longitude 8 are no place on Earth"),
+            (
+                "lat_deg,lon_deg\n47,8\n147,8\n",
+                true,
+                "line 3: latitude 147, longitude 8 are no place on Earth",
+            ),
             ("lat_deg,lon_deg\n47,999\n", true, "line 2: latitude 47, longitude 999"),
             ("n_m,e_m\n1,x\n", true, "line 2: `x` is no finite number"),
             ("n_m,e_m,scale\n1,2,1\n1,2,0\n", true, "line 3: the scale is 0"),

@@ -6,7 +6,10 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
     scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
-    scene::{Encoding, Light, Mesh, Scene, cut_where_blended_cross, linear_from_srgb, ned_from_board, paint_order::MOST_TRIANGLES},
+    scene::{
+        Encoding, Light, Mesh, Scene, cut_where_blended_cross, linear_from_srgb, ned_from_board,
+        paint_order::MOST_TRIANGLES,
+    },
 };
 use glam::DVec3;
 
@@ -22,7 +25,10 @@ use crate::{
 };
 
 /// Reads what `[scene]` names.
-pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>, Vec<String>), LoadError> {
+pub(super) fn load_scene(
+    scenario: &Scenario,
+    log: &FlightLog,
+) -> Result<(Scene, Option<TerrainSummary>, Vec<String>), LoadError> {
     let spec = &scenario.scene;
     let light = spec.light.map(|LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky }| {
         Light::new(sun_azimuth_deg.to_radians(), sun_elevation_deg.to_radians(), sun, sky)
@@ -37,7 +43,8 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
     let mut summary = None;
     if let Some(terrain) = &spec.terrain {
         let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
-        let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
+        let ned =
+            |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
         let (_, shift_terrain) = height_plan(scenario);
         let shift = if shift_terrain { Some(&undulation as HeightShift<'_>) } else { None };
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
@@ -51,7 +58,9 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         scene.meshes.push(Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m));
     }
     if let Some(spec) = &spec.board {
-        scene.meshes.push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
+        scene
+            .meshes
+            .push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
     }
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
         notes.push("scene.light changes nothing: it falls on terrain and models, of which the scene has none; patterns and boards keep their colours".to_owned());
@@ -83,7 +92,12 @@ fn too_many_to_order(scene: &Scene) -> Option<String> {
 }
 
 /// A model wherever it is to stand; gives what there is to say about it.
-fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut Scene) -> Result<Vec<String>, LoadError> {
+fn add_model(
+    scenario: &Scenario,
+    log: &FlightLog,
+    spec: &GltfSpec,
+    scene: &mut Scene,
+) -> Result<Vec<String>, LoadError> {
     let number = |n: Option<u32>| n.map(|n| n as usize);
     let options = GltfOptions {
         scene: number(spec.scene),
@@ -101,11 +115,16 @@ fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut 
         let mut at_ned_m = place(scenario, log, at, geodetic, "a place of scene.gltf")?;
         if spec.on_ground {
             let ground = scene.terrain.as_ref().and_then(|terrain| terrain.down_at(at_ned_m.x, at_ned_m.y));
-            // Where thousands are scattered some may fall beside the terrain; one that is put there is a mistake, and so are all.
+            // Where thousands are scattered some may fall beside the terrain; one that is put there is a
+            // mistake, and so are all.
             let Some(ground_down_m) = ground else {
                 without_ground += 1;
                 if without_ground == all {
-                    return Err(LoadError::NoGround { file: spec.file.clone(), north_m: at_ned_m.x, east_m: at_ned_m.y });
+                    return Err(LoadError::NoGround {
+                        file: spec.file.clone(),
+                        north_m: at_ned_m.x,
+                        east_m: at_ned_m.y,
+                    });
                 }
                 continue;
             };
@@ -115,10 +134,21 @@ fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut 
         if reach_m.is_nan() || reach_m > FARTHEST_M {
             return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
-        scene.meshes.extend(model.place(at_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale));
+        scene.meshes.extend(model.place(
+            at_ned_m,
+            (spec.heading_deg + heading_deg).to_radians(),
+            spec.scale * scale,
+        ));
     }
-    let left_out = (without_ground > 0).then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
-    Ok(model.notes.iter().cloned().chain(left_out).map(|note| format!("{}: {note}", spec.file.display())).collect())
+    let left_out = (without_ground > 0)
+        .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
+    Ok(model
+        .notes
+        .iter()
+        .cloned()
+        .chain(left_out)
+        .map(|note| format!("{}: {note}", spec.file.display()))
+        .collect())
 }
 
 /// Where the middle of a board is.
@@ -157,8 +187,8 @@ fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
     LoadError::NoOrigin { log: scenario.flight.log.clone(), key }
 }
 
-/// Height of the geoid above the ellipsoid. One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each
-/// thread that reads terrain.
+/// Height of the geoid above the ellipsoid. One sum of harmonics a vertex would take minutes; the caches
+/// interpolate a lattice, one for each thread that reads terrain.
 fn undulation(lat_rad: f64, lon_rad: f64) -> f64 {
     thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
     GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
@@ -174,10 +204,15 @@ mod tests {
     fn what_is_too_much_to_order_is_said() {
         let texture = Arc::new(Texture::uniform([255, 255, 255, 99], Encoding::Linear));
         let mut pane = Mesh::level_picture(texture, DVec3::ZERO, 1.0);
-        let note = |mesh: &Mesh, count: usize| too_many_to_order(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() });
+        let note = |mesh: &Mesh, count: usize| {
+            too_many_to_order(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() })
+        };
         assert_eq!(note(&pane, MOST_TRIANGLES), None);
         pane.material.blends = true;
         assert_eq!(note(&pane, MOST_TRIANGLES / 2), None);
-        assert!(note(&pane, MOST_TRIANGLES / 2 + 1).is_some_and(|note| note.contains("16386 triangles are blended")));
+        assert!(
+            note(&pane, MOST_TRIANGLES / 2 + 1)
+                .is_some_and(|note| note.contains("16386 triangles are blended"))
+        );
     }
 }

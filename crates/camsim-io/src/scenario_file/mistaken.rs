@@ -11,7 +11,11 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
     let told = |what: &str, way: String| Some(format!("{shown} is {what}, not a scenario: {way}"));
     if path.is_dir() {
         let run = path.join("run.json");
-        let way = if run.is_file() { format!("its own is {}", run.display()) } else { "name the .toml file in it".to_owned() };
+        let way = if run.is_file() {
+            format!("its own is {}", run.display())
+        } else {
+            "name the .toml file in it".to_owned()
+        };
         return told("a folder", way);
     }
     if let Some(kind) = picture(bytes) {
@@ -24,10 +28,14 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
     if bytes.starts_with(b"II*\0") || bytes.starts_with(b"MM\0*") || bytes.starts_with(b"II+\0") {
         return told(
             "a TIFF",
-            format!("heights go into one as scene.terrain = {{ dem = {name:?} }}, a picture of the ground beside them as ortho"),
+            format!(
+                "heights go into one as scene.terrain = {{ dem = {name:?} }}, a picture of the ground beside them as ortho"
+            ),
         );
     }
-    if bytes.starts_with(b"glTF") || (bytes.starts_with(b"{") && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf")))
+    if bytes.starts_with(b"glTF")
+        || (bytes.starts_with(b"{")
+            && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf")))
     {
         return told("a model", format!("it goes into one as scene.gltf = [{{ file = {name:?} }}]"));
     }
@@ -37,8 +45,14 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(bytes).ok()?.trim_start_matches('\u{feff}');
     if let Ok(root) = text.parse::<toml::Table>() {
         return of_toml(&root).and_then(|kind| match kind {
-            Toml::Frame => told("a FRAME.toml", format!("it goes with a camera: `camsim apply CAMERA.toml {shown} -o out.png`")),
-            Toml::Camera => told("a camera file", format!("name it in one:\n\n{}", lines(&format!("camera = {name:?}\n"), "flight.csv"))),
+            Toml::Frame => told(
+                "a FRAME.toml",
+                format!("it goes with a camera: `camsim apply CAMERA.toml {shown} -o out.png`"),
+            ),
+            Toml::Camera => told(
+                "a camera file",
+                format!("name it in one:\n\n{}", lines(&format!("camera = {name:?}\n"), "flight.csv")),
+            ),
         });
     }
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
@@ -48,11 +62,21 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
         let run = path.with_file_name("run.json");
         return told("the table of a run's frames", format!("the scenario of that run is {}", run.display()));
     }
-    let calibration = ["distortion", "intrinsics", "camera_matrix", "camera_model", "Camera_Matrix", "<calibration", "fisheye_params"];
+    let calibration = [
+        "distortion",
+        "intrinsics",
+        "camera_matrix",
+        "camera_model",
+        "Camera_Matrix",
+        "<calibration",
+        "fisheye_params",
+    ];
     if calibration.iter().any(|mark| text.contains(mark)) {
         return told(
             "a calibration",
-            format!("`camsim camera import {shown} -o CAMERA.toml` makes a camera file of it, and a scenario names that"),
+            format!(
+                "`camsim camera import {shown} -o CAMERA.toml` makes a camera file of it, and a scenario names that"
+            ),
         );
     }
     is_log(text).then(|| told("a flight log", scenario_for(path, &name))).flatten()
@@ -70,7 +94,8 @@ fn picture(bytes: &[u8]) -> Option<&'static str> {
     ];
     let webp = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP");
     // Two letters alone may begin a text; the length of the file stands behind them.
-    let bmp = bytes.starts_with(b"BM") && bytes.get(2..6).is_some_and(|length| length == (bytes.len() as u32).to_le_bytes());
+    let bmp = bytes.starts_with(b"BM")
+        && bytes.get(2..6).is_some_and(|length| length == (bytes.len() as u32).to_le_bytes());
     let known = marks.into_iter().find(|(mark, _)| bytes.starts_with(mark)).map(|(_, kind)| kind);
     known.or(webp.then_some("WebP")).or(bmp.then_some("BMP"))
 }
@@ -83,22 +108,32 @@ enum Toml {
 /// By the keys at the root, if all of them belong to the one.
 fn of_toml(root: &toml::Table) -> Option<Toml> {
     const OF_FRAME: [&str; 4] = ["color", "depth", "frames", "motion"];
-    if root.keys().any(|key| OF_FRAME.contains(&key.as_str())) && !root.contains_key("flight") && !root.contains_key("scene") {
+    if root.keys().any(|key| OF_FRAME.contains(&key.as_str()))
+        && !root.contains_key("flight")
+        && !root.contains_key("scene")
+    {
         return Some(Toml::Frame);
     }
-    let of_camera =
-        |key: &String| KEYS.iter().any(|(known, _)| known.strip_prefix("camera.").is_some_and(|rest| rest.split('.').next() == Some(key)));
+    let of_camera = |key: &String| {
+        KEYS.iter().any(|(known, _)| {
+            known.strip_prefix("camera.").is_some_and(|rest| rest.split('.').next() == Some(key))
+        })
+    };
     (!root.is_empty() && root.keys().all(of_camera)).then_some(Toml::Camera)
 }
 
-/// Whether a text is a table with times and numbers: a row of four numbers or more, below a header at most; or a GPX track.
+/// Whether a text is a table with times and numbers: a row of four numbers or more, below a header at most;
+/// or a GPX track.
 fn is_log(text: &str) -> bool {
     if text.contains("<gpx") || text.contains("<trkpt") {
         return true;
     }
     let numbers = |line: &str| {
-        let cells: Vec<&str> =
-            line.split([',', ';', '\t', ' ']).map(|cell| cell.trim().trim_matches('"')).filter(|cell| !cell.is_empty()).collect();
+        let cells: Vec<&str> = line
+            .split([',', ';', '\t', ' '])
+            .map(|cell| cell.trim().trim_matches('"'))
+            .filter(|cell| !cell.is_empty())
+            .collect();
         cells.len() >= 4 && cells.iter().filter(|cell| cell.parse::<f64>().is_ok()).count() * 2 > cells.len()
     };
     let rows = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with(['#', '%']));
@@ -117,7 +152,9 @@ fn scenario_for(path: &Path, log: &str) -> String {
 }
 
 fn lines(camera: &str, log: &str) -> String {
-    format!("    {camera}    [flight]\n    log = {log:?}\n    [scene]\n    terrain = {{ dem = \"dem.tif\", ortho = \"ortho.tif\" }}\n")
+    format!(
+        "    {camera}    [flight]\n    log = {log:?}\n    [scene]\n    terrain = {{ dem = \"dem.tif\", ortho = \"ortho.tif\" }}\n"
+    )
 }
 
 #[cfg(test)]
@@ -132,8 +169,16 @@ mod tests {
     #[test]
     fn what_a_file_is_and_what_to_do_with_it_is_said() {
         let log = said("dir/flight.csv", b"t,lat,lon,alt,roll,pitch,yaw\n0,46.5,7.2,900,0,0,0\n");
-        assert!(log.starts_with("dir/flight.csv is a flight log, not a scenario: write one beside it, as dir/flight.toml:"), "{log}");
-        assert!(log.contains("log = \"flight.csv\"") && log.contains("`camsim render dir/flight.toml`"), "{log}");
+        assert!(
+            log.starts_with(
+                "dir/flight.csv is a flight log, not a scenario: write one beside it, as dir/flight.toml:"
+            ),
+            "{log}"
+        );
+        assert!(
+            log.contains("log = \"flight.csv\"") && log.contains("`camsim render dir/flight.toml`"),
+            "{log}"
+        );
         // The lines are a scenario.
         let lines: Vec<&str> = log.lines().filter_map(|line| line.strip_prefix("    ")).collect();
         let scenario = lines.join("\n").parse::<toml::Table>().unwrap();
@@ -147,16 +192,32 @@ mod tests {
             ("a.exr", b"\x76\x2f\x31\x01", "is a picture (EXR)"),
             ("a.tif", b"II*\0", "scene.terrain = { dem = \"a.tif\" }"),
             ("a.glb", b"glTF\x02", "scene.gltf = [{ file = \"a.glb\" }]"),
-            ("CAMERA.toml", b"size_px = [640, 480]\n[lens]\nmodel = \"pinhole\"\n", "is a camera file, not a scenario: name it in one:"),
-            ("F.toml", b"color = \"a.png\"\nfocal_px = [1.0, 1.0]\n", "`camsim apply CAMERA.toml F.toml -o out.png`"),
+            (
+                "CAMERA.toml",
+                b"size_px = [640, 480]\n[lens]\nmodel = \"pinhole\"\n",
+                "is a camera file, not a scenario: name it in one:",
+            ),
+            (
+                "F.toml",
+                b"color = \"a.png\"\nfocal_px = [1.0, 1.0]\n",
+                "`camsim apply CAMERA.toml F.toml -o out.png`",
+            ),
             ("out/frames.csv", b"frame,stamp_ns,n,e\n0,0,1,2\n", "the scenario of that run is out/run.json"),
-            ("c.yaml", b"cam0:\n  camera_model: pinhole\n  intrinsics: [1, 2, 3, 4]\n", "`camsim camera import c.yaml -o CAMERA.toml`"),
+            (
+                "c.yaml",
+                b"cam0:\n  camera_model: pinhole\n  intrinsics: [1, 2, 3, 4]\n",
+                "`camsim camera import c.yaml -o CAMERA.toml`",
+            ),
         ] {
             let said = said(name, bytes);
             assert!(said.contains(wanted), "{name}: {said}");
         }
         let folder = tempfile::tempdir().unwrap();
-        assert!(mistaken(folder.path(), b"").unwrap().ends_with("is a folder, not a scenario: name the .toml file in it"));
+        assert!(
+            mistaken(folder.path(), b"")
+                .unwrap()
+                .ends_with("is a folder, not a scenario: name the .toml file in it")
+        );
         std::fs::write(folder.path().join("run.json"), "{}").unwrap();
         assert!(mistaken(folder.path(), b"").unwrap().ends_with("/run.json"));
         for (name, bytes) in [

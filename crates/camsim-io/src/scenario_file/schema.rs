@@ -1,4 +1,5 @@
-//! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml has a table of its own.
+//! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml
+//! has a table of its own.
 
 use camsim_core::{
     scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
@@ -20,8 +21,12 @@ pub(crate) struct Schema {
 }
 
 /// Scenarios, and camera files below `camera`.
-pub(crate) const SCENARIO: Schema =
-    Schema { keys: KEYS, later_words: LATER_WORDS, required: REQUIRED, listing: "`camsim render --print-default` lists all keys" };
+pub(crate) const SCENARIO: Schema = Schema {
+    keys: KEYS,
+    later_words: LATER_WORDS,
+    required: REQUIRED,
+    listing: "`camsim render --print-default` lists all keys",
+};
 
 /// What a key takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +39,8 @@ pub enum Kind {
     Whole,
     /// A whole number from the first to the last.
     Within(u32, u32),
-    /// A whole number of at most 32 bits, or one of these words. The message names the most that makes sense; ranges are checked later.
+    /// A whole number of at most 32 bits, or one of these words. The message names the most that makes sense;
+    /// ranges are checked later.
     CountOr(u32, &'static [&'static str]),
     /// That many numbers.
     Numbers(usize),
@@ -207,7 +213,11 @@ impl Schema {
 
     /// Whether `key` is a table of the schema (`camera.lens`).
     pub(crate) fn is_table(&self, key: &str) -> bool {
-        key.is_empty() || self.keys.iter().any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
+        key.is_empty()
+            || self
+                .keys
+                .iter()
+                .any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
     }
 
     /// The known key that is most like `key`: a sibling first, else anywhere (a key in the wrong table).
@@ -228,7 +238,8 @@ impl Schema {
     }
 }
 
-/// Likeness of a key that is worth naming: `fsp` beside `fps` has 0.82, words of four or five letters that share one have up to 0.79.
+/// Likeness of a key that is worth naming: `fsp` beside `fps` has 0.82, words of four or five letters that
+/// share one have up to 0.79.
 const NEAR: f64 = 0.8;
 
 /// The word of `words` that is most like `word`.

@@ -1,7 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, OutputSpec, QualitySpec, Readout, TrackerSpec,
+    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, OutputSpec, QualitySpec,
+    Readout, TrackerSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -28,11 +29,15 @@ fn the_printed_default_holds_the_defaults() {
     assert_eq!(scenario.output, OutputSpec::default());
 }
 
-/// Schema and structs cannot drift apart: every key in the printed default or in its comments, every word deserialises.
+/// Schema and structs cannot drift apart: every key in the printed default or in its comments, every word
+/// deserialises.
 #[test]
 fn every_word_of_the_schema_is_known_to_the_structs() {
     for (key, kind) in KEYS {
-        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."].iter().any(|table| key.starts_with(table)) {
+        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."]
+            .iter()
+            .any(|table| key.starts_with(table))
+        {
             continue;
         }
         let values: Vec<String> = match kind {
@@ -57,18 +62,36 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
 #[test]
 fn every_key_of_the_structs_is_in_the_schema() {
     let mut text = print_default();
-    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "gltf", "fog_visibility_m", "light"] {
+    for commented in [
+        "window_s",
+        "principal_point_px",
+        "zoom_track",
+        "vignette",
+        "pattern",
+        "board",
+        "gltf",
+        "fog_visibility_m",
+        "light",
+    ] {
         text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
     }
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
     text += "[[camera.mount.vibration]]\naxis = \"roll\"\nhz = 3\n";
     let mut scenario = parse(&text).unwrap();
     let terrain = scenario.scene.terrain.as_mut().unwrap();
-    (terrain.epsg, terrain.height_unit, terrain.ortho_white) = (Some(32632), Some(HeightUnit::UsFt), Some(2047.0));
+    (terrain.epsg, terrain.height_unit, terrain.ortho_white) =
+        (Some(32632), Some(HeightUnit::UsFt), Some(2047.0));
     terrain.beyond = Beyond::Edge;
-    assert_eq!(scenario.scene.board, Some(BoardSpec { kind: Some(BoardKind::Chessboard), ..board(9, 6, 0.05) }));
+    assert_eq!(
+        scenario.scene.board,
+        Some(BoardSpec { kind: Some(BoardKind::Chessboard), ..board(9, 6, 0.05) })
+    );
     let saved = toml::to_string(&scenario).unwrap();
-    assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario, "a saved scenario reads back");
+    assert_eq!(
+        parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(),
+        scenario,
+        "a saved scenario reads back"
+    );
     scenario.camera.name = "left".into();
     scenario.scene.board = Some(BoardSpec {
         target: Some("target.yaml".into()),
@@ -91,13 +114,23 @@ fn every_key_of_the_structs_is_in_the_schema() {
     collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
     for (key, kind) in KEYS {
         let later = matches!(kind, schema::Kind::Later);
-        assert_eq!(seen.iter().any(|s| s == key), !later, "{key} stands in the schema but not in the struct, or the other way round");
+        assert_eq!(
+            seen.iter().any(|s| s == key),
+            !later,
+            "{key} stands in the schema but not in the struct, or the other way round"
+        );
     }
 }
 
 fn board(columns: u32, rows: u32, size_m: f64) -> BoardSpec {
     let count = (Some(columns), Some(rows));
-    BoardSpec { columns: count.0, rows: count.1, size_m: Some(size_m), angles_deg: [0.0, 90.0, 0.0], ..BoardSpec::default() }
+    BoardSpec {
+        columns: count.0,
+        rows: count.1,
+        size_m: Some(size_m),
+        angles_deg: [0.0, 90.0, 0.0],
+        ..BoardSpec::default()
+    }
 }
 
 #[test]
@@ -107,12 +140,18 @@ fn boards_are_read_by_their_keys() {
         parse(&text(&format!("kind = \"{kind}\"\ncolumns = 5\nrows = 4\nsize_m = 0.1"))).unwrap();
     }
     for word in ["4x4", "5x5", "6x6"] {
-        parse(&text(&format!("kind = \"charuco\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\ndictionary = \"{word}\""))).unwrap();
+        parse(&text(&format!(
+            "kind = \"charuco\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\ndictionary = \"{word}\""
+        )))
+        .unwrap();
     }
     for (keys, wanted) in [
         ("kind = \"chesboard\"", "did you mean \"chessboard\"?"),
         ("kind = \"charuco\"\ncolumns = 5\nrows = 4", "scene.board.size_m: is missing"),
-        ("kind = \"circles\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\nmarker_m = 0.1", "s.toml:8: scene.board.marker_m: does not belong"),
+        (
+            "kind = \"circles\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\nmarker_m = 0.1",
+            "s.toml:8: scene.board.marker_m: does not belong",
+        ),
         ("kind = \"circles\"\ncolumns = 500\nrows = 4\nsize_m = 0.1", "1 to 80"),
     ] {
         let error = parse(&text(keys)).unwrap_err().to_string();
@@ -125,7 +164,9 @@ fn collect(value: &toml::Table, prefix: &str, seen: &mut Vec<String>) {
         let key = tree::join(prefix, name);
         match value {
             toml::Value::Table(table) => collect(table, &key, seen),
-            toml::Value::Array(array) => array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, seen)),
+            toml::Value::Array(array) => {
+                array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, seen))
+            }
             _ => {}
         }
         seen.push(key);
@@ -136,34 +177,70 @@ fn collect(value: &toml::Table, prefix: &str, seen: &mut Vec<String>) {
 fn bad_scenarios_are_named_by_file_line_and_key() {
     let cases: &[(&str, &str)] = &[
         ("[camera]\nfsp = 30", "dir/s.toml:7: camera.fsp: unknown key; did you mean `camera.fps`?"),
-        ("[camera.shuter]\nreadout_ms = 3", "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?"),
+        (
+            "[camera.shuter]\nreadout_ms = 3",
+            "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?",
+        ),
         ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
         ("[quality]\nnope = 3", "quality.nope: unknown key; `camsim render --print-default`"),
-        ("[camera]\nresolution = [640, 480]", "camera.resolution: unknown key; `camsim render --print-default`"),
+        (
+            "[camera]\nresolution = [640, 480]",
+            "camera.resolution: unknown key; `camsim render --print-default`",
+        ),
         ("qqqq = 1", "unknown key; `camsim render --print-default`"),
         ("[camera]\nfps = \"thirty\"", "dir/s.toml:7: camera.fps: expected a number, found \"thirty\""),
-        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers up to 32768, found [640, -1]"),
-        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml:7: camera.size_px: expected a list of 2 whole numbers up to 32768, found"),
+        (
+            "[camera]\nsize_px = [640, -1]",
+            "camera.size_px: expected a list of 2 whole numbers up to 32768, found [640, -1]",
+        ),
+        (
+            "[camera]\nsize_px = [640, 99999999999]",
+            "dir/s.toml:7: camera.size_px: expected a list of 2 whole numbers up to 32768, found",
+        ),
         (
             "[quality]\nblur_samples = 4294967296",
             "dir/s.toml:7: quality.blur_samples: expected a whole number up to 4096 or \"auto\", found 4294967296",
         ),
-        ("[quality]\niterations = 4294967296", "dir/s.toml:7: quality.iterations: expected a whole number up to 64 or \"auto\""),
-        ("[quality]\nkey_frames = 4294967296", "dir/s.toml:7: quality.key_frames: expected a whole number up to 4 or \"auto\""),
+        (
+            "[quality]\niterations = 4294967296",
+            "dir/s.toml:7: quality.iterations: expected a whole number up to 64 or \"auto\"",
+        ),
+        (
+            "[quality]\nkey_frames = 4294967296",
+            "dir/s.toml:7: quality.key_frames: expected a whole number up to 4 or \"auto\"",
+        ),
         ("[quality]\nfootprint_taps = 4294967295", "dir/s.toml:7: quality.footprint_taps: must be 1 to 64"),
-        ("[quality]\nframes_per_ideal = 65", "quality.frames_per_ideal: expected a whole number, 1 to 64, found 65"),
-        ("[quality]\nframes_per_ideal = 0", "quality.frames_per_ideal: expected a whole number, 1 to 64, found 0"),
-        ("[scene.terrain]\ndem = \"d.tif\"\nepsg = 65536", "dir/s.toml:8: scene.terrain.epsg: expected a whole number, 0 to 65535"),
+        (
+            "[quality]\nframes_per_ideal = 65",
+            "quality.frames_per_ideal: expected a whole number, 1 to 64, found 65",
+        ),
+        (
+            "[quality]\nframes_per_ideal = 0",
+            "quality.frames_per_ideal: expected a whole number, 1 to 64, found 0",
+        ),
+        (
+            "[scene.terrain]\ndem = \"d.tif\"\nepsg = 65536",
+            "dir/s.toml:8: scene.terrain.epsg: expected a whole number, 0 to 65535",
+        ),
         ("[camera.shutter]\nreadout = \"top-to-botom\"", "did you mean \"top-to-bottom\"?"),
-        ("[camera.shutter]\ninterlace_ms = \"feild\"", "expected a number or \"field\", found \"feild\"; did you mean \"field\"?"),
+        (
+            "[camera.shutter]\ninterlace_ms = \"feild\"",
+            "expected a number or \"field\", found \"feild\"; did you mean \"field\"?",
+        ),
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
         ("[camera.sensor]\ngain = 1", "dir/s.toml:6: camera.sensor: is not supported by this version"),
         ("[quality]\nsolver = \"rk3\"", "did you mean \"rk2\"?"),
         ("[quality]\nsolver = \"rk2\"\niterations = 3", "quality.iterations: counts the depth look-ups"),
-        ("[quality]\npreset = \"paper\"\nsolver = \"linear\"", "dir/s.toml:8: quality.solver: is rk2 with quality.preset"),
+        (
+            "[quality]\npreset = \"paper\"\nsolver = \"linear\"",
+            "dir/s.toml:8: quality.solver: is rk2 with quality.preset",
+        ),
         ("[output]\nchannels = [\"color\", \"flow\"]", "\"flow\" is not supported by this version"),
         ("[camera]\nfps = nan", "dir/s.toml:7: camera.fps: must be a finite number above 0"),
-        ("[camera]\nmount = { vibration = [{ axis = \"roll\" }] }", "camera.mount.vibration.0.hz: is missing"),
+        (
+            "[camera]\nmount = { vibration = [{ axis = \"roll\" }] }",
+            "camera.mount.vibration.0.hz: is missing",
+        ),
         ("[[camera.zoom]]\nat = 1\nfocal_px = [1, 0]", "dir/s.toml:8: camera.zoom.0.focal_px: must be"),
         ("[camera", "dir/s.toml:6: not valid TOML"),
         ("camera = \"no.toml\"", "unknown key"),
@@ -228,13 +305,22 @@ fn a_camera_file_is_read_with_its_own_paths_and_lines() {
 
     std::fs::write(&camera, "fps = 25\nfocal = 3\n").unwrap();
     let error = read_scenario(&file, &[], None).unwrap_err().to_string();
-    assert!(error.contains("c.toml:2: camera.focal: unknown key; did you mean `camera.focal_px`?"), "{error}");
+    assert!(
+        error.contains("c.toml:2: camera.focal: unknown key; did you mean `camera.focal_px`?"),
+        "{error}"
+    );
     // By itself its keys have no table around them.
     let error = read_camera(&camera).unwrap_err().to_string();
     assert!(error.ends_with("c.toml:2: focal: unknown key; did you mean `focal_px`?"), "{error}");
     for (text, expected) in [
-        ("[camera]\nfps = 25\n", "c.toml:1: camera: a CAMERA.toml has the keys of [camera] at its root: write fps = 30"),
-        ("fps = 1\nseed = 1\n[flight]\nlog = \"a.csv\"\n", "c.toml:2: seed: a CAMERA.toml has the keys of [camera] at its root: the rest"),
+        (
+            "[camera]\nfps = 25\n",
+            "c.toml:1: camera: a CAMERA.toml has the keys of [camera] at its root: write fps = 30",
+        ),
+        (
+            "fps = 1\nseed = 1\n[flight]\nlog = \"a.csv\"\n",
+            "c.toml:2: seed: a CAMERA.toml has the keys of [camera] at its root: the rest",
+        ),
     ] {
         std::fs::write(&camera, text).unwrap();
         for error in [read_camera(&camera).unwrap_err(), read_scenario(&file, &[], None).unwrap_err()] {

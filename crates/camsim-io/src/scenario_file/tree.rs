@@ -20,7 +20,8 @@ pub(crate) enum Place {
     File(PathBuf, usize),
     /// `--set key=value`.
     Set(String),
-    /// A run.json; whether its paths are relative to it, or to the working directory as those of early versions.
+    /// A run.json; whether its paths are relative to it, or to the working directory as those of early
+    /// versions.
     Run(PathBuf, bool),
 }
 
@@ -44,8 +45,12 @@ pub(crate) struct Tree {
 impl Tree {
     /// Reads `path`; keys are placed under `prefix`.
     pub(crate) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
-        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
-        let not_text = |error: std::str::Utf8Error| ScenarioError::NotText { path: path.into(), offset: error.valid_up_to() };
+        let bytes =
+            std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
+        let not_text = |error: std::str::Utf8Error| ScenarioError::NotText {
+            path: path.into(),
+            offset: error.valid_up_to(),
+        };
         let text = std::str::from_utf8(&bytes).map_err(not_text)?;
         Self::parse(text.strip_prefix('\u{feff}').unwrap_or(text), path, prefix)
     }
@@ -57,24 +62,32 @@ impl Tree {
             return Err(ScenarioError::Problems(vec![what]));
         }
         // No TOML file begins so.
-        if bytes.trim_ascii_start().first() == Some(&b'{') { Self::read_run(path) } else { Self::read(path, "") }
+        if bytes.trim_ascii_start().first() == Some(&b'{') {
+            Self::read_run(path)
+        } else {
+            Self::read(path, "")
+        }
     }
 
     fn read_run(path: &Path) -> Result<Self, ScenarioError> {
         let wrong = |message: String| ScenarioError::Problems(vec![format!("{}: {message}", path.display())]);
-        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
-        let run: serde_json::Value = serde_json::from_slice(&bytes).map_err(|error| wrong(format!("neither TOML nor JSON: {error}")))?;
+        let bytes =
+            std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
+        let run: serde_json::Value = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("neither TOML nor JSON: {error}")))?;
         let Some(Value::Table(root)) = run.get("scenario").and_then(from_json) else {
             return Err(wrong(
                 "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds a scenario".into(),
             ));
         };
-        let is_portable = run.get("paths").and_then(serde_json::Value::as_str) == Some(crate::manifest::PATHS);
+        let is_portable =
+            run.get("paths").and_then(serde_json::Value::as_str) == Some(crate::manifest::PATHS);
         let places = root.keys().map(|key| (key.clone(), Place::Run(path.into(), is_portable))).collect();
         Ok(Self { file: path.into(), root, places })
     }
 
-    /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its header, is refused as a whole.
+    /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its
+    /// header, is refused as a whole.
     pub(crate) fn read_camera(path: &Path) -> Result<Self, ScenarioError> {
         let tree = Self::read(path, "camera")?;
         let mut of_scenario = KEYS.iter().filter_map(|(key, _)| key.split('.').next());
@@ -87,13 +100,16 @@ impl Tree {
                     "the rest belongs into a scenario"
                 };
                 let place = tree.place(&join("camera", name));
-                Err(ScenarioError::Problems(vec![format!("{place}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}")]))
+                Err(ScenarioError::Problems(vec![format!(
+                    "{place}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}"
+                )]))
             }
         }
     }
 
     pub(crate) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
-        let line_of = |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
+        let line_of =
+            |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
         let syntax = |error: toml::de::Error| ScenarioError::Syntax {
             path: path.into(),
             line: error.span().map_or(1, |span| line_of(span.start)),
@@ -128,7 +144,9 @@ impl Tree {
         let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
         let path = self.resolve("camera", name);
         let camera = Self::read_camera(&path).map_err(|error| match error {
-            ScenarioError::Read { path, source } => ScenarioError::ReadCamera { path, scenario: self.file.clone(), source },
+            ScenarioError::Read { path, source } => {
+                ScenarioError::ReadCamera { path, scenario: self.file.clone(), source }
+            }
             other => other,
         })?;
         self.root.insert("camera".into(), Value::Table(camera.root));
@@ -137,10 +155,13 @@ impl Tree {
         Ok(())
     }
 
-    /// A path written at `key`, against the folder of its file; a path of `--set` stays relative to the working directory.
+    /// A path written at `key`, against the folder of its file; a path of `--set` stays relative to the
+    /// working directory.
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
         match self.place(key) {
-            Place::File(file, _) | Place::Run(file, true) => file.parent().unwrap_or(Path::new("")).join(path),
+            Place::File(file, _) | Place::Run(file, true) => {
+                file.parent().unwrap_or(Path::new("")).join(path)
+            }
             Place::Set(_) | Place::Run(_, false) => path.into(),
         }
     }
@@ -159,12 +180,17 @@ impl Tree {
         while let Some(step) = steps.next() {
             let mut next = table.entry(step).or_insert_with(|| Value::Table(Table::new()));
             if let Value::Array(array) = next {
-                let (length, index) = (array.len(), steps.next().and_then(|index| index.parse::<usize>().ok()));
-                next = index
-                    .and_then(|index| array.get_mut(index))
-                    .ok_or_else(|| fail(format!("`{step}` is a list of {length}; name one by its number from 0, as in {step}.0.{leaf}")))?;
+                let (length, index) =
+                    (array.len(), steps.next().and_then(|index| index.parse::<usize>().ok()));
+                next = index.and_then(|index| array.get_mut(index)).ok_or_else(|| {
+                    fail(format!(
+                        "`{step}` is a list of {length}; name one by its number from 0, as in {step}.0.{leaf}"
+                    ))
+                })?;
             }
-            table = next.as_table_mut().ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
+            table = next
+                .as_table_mut()
+                .ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
         }
         table.insert(leaf.into(), value(text));
         let below = format!("{key}.");
@@ -183,10 +209,14 @@ fn from_json(json: &serde_json::Value) -> Option<Value> {
     Some(match json {
         Json::Null => return None,
         Json::Bool(value) => Value::Boolean(*value),
-        Json::Number(number) => number.as_i64().map(Value::Integer).or_else(|| number.as_f64().map(Value::Float))?,
+        Json::Number(number) => {
+            number.as_i64().map(Value::Integer).or_else(|| number.as_f64().map(Value::Float))?
+        }
         Json::String(text) => Value::String(text.clone()),
         Json::Array(list) => Value::Array(list.iter().filter_map(from_json).collect()),
-        Json::Object(map) => Value::Table(map.iter().filter_map(|(key, value)| Some((key.clone(), from_json(value)?))).collect()),
+        Json::Object(map) => Value::Table(
+            map.iter().filter_map(|(key, value)| Some((key.clone(), from_json(value)?))).collect(),
+        ),
     })
 }
 

@@ -72,15 +72,17 @@ impl ColorBands {
             },
         };
         let used = |band: usize| rgb.contains(&band) || alpha == Some(band);
-        let left: Vec<String> = (0..image.bands).filter(|&band| !used(band)).map(|band| (band + 1).to_string()).collect();
+        let left: Vec<String> =
+            (0..image.bands).filter(|&band| !used(band)).map(|band| (band + 1).to_string()).collect();
         if !left.is_empty() {
-            notes.push(format!("its bands {} are neither colours nor alpha, and are left out", left.join(", ")));
+            notes.push(format!(
+                "its bands {} are neither colours nor alpha, and are left out",
+                left.join(", ")
+            ));
         }
-        if let Some(band) = meanings
-            .iter()
-            .take(image.bands)
-            .find(|band| band.scale.is_some_and(|scale| scale != 1.0) || band.offset.is_some_and(|offset| offset != 0.0))
-        {
+        if let Some(band) = meanings.iter().take(image.bands).find(|band| {
+            band.scale.is_some_and(|scale| scale != 1.0) || band.offset.is_some_and(|offset| offset != 0.0)
+        }) {
             notes.push(format!(
                 "a band's scale {} and offset {} (GDAL_METADATA) are not applied to colours",
                 band.scale.unwrap_or(1.0),

@@ -58,16 +58,25 @@ pub(crate) fn files(path: &Path) -> Vec<PathBuf> {
 
 /// What `.aux.xml` and `.prj` add to tags.
 pub(crate) fn read_tags(path: &Path, geo: &mut GeoTags) -> Result<(), TerrainFileError> {
-    let aux = [with_more(path, ".aux.xml"), path.with_extension("aux.xml")].into_iter().find(|aux| aux.is_file());
+    let aux =
+        [with_more(path, ".aux.xml"), path.with_extension("aux.xml")].into_iter().find(|aux| aux.is_file());
     if let Some(aux) = aux {
         let wrong = |problem: String| TerrainFileError::Meaning { path: aux.clone(), problem };
-        let text = std::fs::read_to_string(&aux).map_err(|error| wrong(format!("cannot be read: {error}")))?;
-        let metadata = Metadata::of_aux(&text).map_err(|reason| wrong(format!("is no GDAL metadata: {reason}")))?;
-        merge(geo, &aux, metadata).map_err(|what| wrong(format!("{what}, and the raster itself says another: remove one of them")))?;
+        let text =
+            std::fs::read_to_string(&aux).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let metadata =
+            Metadata::of_aux(&text).map_err(|reason| wrong(format!("is no GDAL metadata: {reason}")))?;
+        merge(geo, &aux, metadata).map_err(|what| {
+            wrong(format!("{what}, and the raster itself says another: remove one of them"))
+        })?;
     }
-    let prj = ["prj", "PRJ"].map(|extension| path.with_extension(extension)).into_iter().find(|prj| prj.is_file());
+    let prj =
+        ["prj", "PRJ"].map(|extension| path.with_extension(extension)).into_iter().find(|prj| prj.is_file());
     if let Some(prj) = prj {
-        let wrong = |error: std::io::Error| TerrainFileError::Meaning { path: prj.clone(), problem: format!("cannot be read: {error}") };
+        let wrong = |error: std::io::Error| TerrainFileError::Meaning {
+            path: prj.clone(),
+            problem: format!("cannot be read: {error}"),
+        };
         // What ARC/INFO wrote may be in any encoding.
         let bytes = std::fs::read(&prj).map_err(wrong)?;
         geo.texts.push((prj.clone(), String::from_utf8_lossy(&bytes).into_owned()));
@@ -83,7 +92,11 @@ pub(crate) fn read_mask(path: &Path, raster: &mut Raster) -> Result<(), crate::p
 
 /// An error is what they disagree in.
 fn merge(geo: &mut GeoTags, path: &Path, aux: Metadata) -> Result<(), String> {
-    fn one<T: PartialEq + std::fmt::Debug + Clone>(own: &mut Option<T>, other: Option<T>, what: &str) -> Result<(), String> {
+    fn one<T: PartialEq + std::fmt::Debug + Clone>(
+        own: &mut Option<T>,
+        other: Option<T>,
+        what: &str,
+    ) -> Result<(), String> {
         match (&own, other) {
             (Some(own), Some(other)) if *own != other => Err(format!("states {what} = {other:?}")),
             (None, other) => {

@@ -1,14 +1,16 @@
 //! Coordinate reference systems of terrain files, to and from WGS-84 latitude and longitude.
 //!
-//! Transformations are horizontal: they run at height 0 of the source datum, as in the usual 2D tools, and heights never take part.
+//! Transformations are horizontal: they run at height 0 of the source datum, as in the usual 2D tools, and
+//! heights never take part.
 
 use proj4rs::{proj::Proj, transform::transform};
 
 /// Radius of the sphere of EPSG:3857, metres.
 const WEB_MERCATOR_RADIUS_M: f64 = 6_378_137.0;
 
-/// What the EPSG registry says of each system that is known beside WGS-84's UTM zones and 3857: kind;code;name;definition;metres by which the shift of its
-/// datum may be off. Datums without a shift are taken for WGS-84, from which they differ by a metre or two (ETRS89, NAD83 and the like).
+/// What the EPSG registry says of each system that is known beside WGS-84's UTM zones and 3857:
+/// kind;code;name;definition;metres by which the shift of its datum may be off. Datums without a shift are
+/// taken for WGS-84, from which they differ by a metre or two (ETRS89, NAD83 and the like).
 pub(crate) const SYSTEMS: &str = include_str!("crs/systems.csv");
 
 /// A known coordinate reference system.
@@ -90,7 +92,12 @@ impl Crs {
             return wgs84(name.into(), Kind::Geographic);
         }
         let [name, definition, accuracy] = line_of("projected", epsg)?;
-        Some(Self { epsg, name: name.into(), accuracy_m: accuracy.parse().ok(), kind: projected(definition)? })
+        Some(Self {
+            epsg,
+            name: name.into(),
+            accuracy_m: accuracy.parse().ok(),
+            kind: projected(definition)?,
+        })
     }
 
     /// Metres in a unit of its coordinates; `None` for degrees.
@@ -130,7 +137,9 @@ impl Crs {
     pub fn model_from_geodetic(&self, [latitude, longitude]: [f64; 2]) -> Option<[f64; 2]> {
         let model = match &self.kind {
             Kind::Geographic => [longitude.to_degrees(), latitude.to_degrees()],
-            Kind::WebMercator => [longitude * WEB_MERCATOR_RADIUS_M, latitude.tan().asinh() * WEB_MERCATOR_RADIUS_M],
+            Kind::WebMercator => {
+                [longitude * WEB_MERCATOR_RADIUS_M, latitude.tan().asinh() * WEB_MERCATOR_RADIUS_M]
+            }
             Kind::Projected { projection, wgs84 } => {
                 let mut point = (longitude, latitude, 0.0);
                 transform(wgs84, projection, &mut point).ok()?;
@@ -171,7 +180,8 @@ mod tests {
         assert_near(degrees(21781, [783_249.0, 178_821.0]), [46.735383, 9.836560], 0.2);
         assert_near(degrees(2056, [2_783_249.0, 1_178_821.0]), [46.735383, 9.836560], 0.2);
         assert_near(degrees(32615, [576_702.0, 5_188_162.0]), [46.842580, -91.994050], 0.2);
-        // swisstopo's worked example of its approximate formulas; the three-parameter shift is good to 1 to 2 m.
+        // swisstopo's worked example of its approximate formulas; the three-parameter shift is good to 1 to 2
+        // m.
         assert_near(degrees(21781, [700_000.0, 100_000.0]), [46.044_130, 8.730_497], 2.0);
         assert_near(degrees(3857, [1_113_194.907_932_735, 5_621_521.486_192_066]), [45.0, 10.0], 1e-3);
         assert_near(degrees(25832, [500_000.0, 0.0]), [0.0, 9.0], 1e-3);
@@ -181,7 +191,9 @@ mod tests {
     /// By PROJ, two for each system: scripts/goldens/crs_table.py.
     #[test]
     fn every_system_is_where_proj_has_it() {
-        let points = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/crs_points.csv")).unwrap();
+        let points =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/crs_points.csv"))
+                .unwrap();
         let mut seen = std::collections::BTreeSet::new();
         let mut wrong = Vec::new();
         for line in points.lines().skip(2) {
@@ -197,7 +209,8 @@ mod tests {
             let unit_m = crs.metres_per_unit().unwrap();
             let off_m = [(found[0] - lat) * 111_000.0, (found[1] - lon) * 111_000.0 * lat.to_radians().cos()];
             let back_m = [(back[0] - x) * unit_m, (back[1] - y) * unit_m];
-            // Datum shifts drop their height, which costs some hundredths of a millimetre; series of projections are good to a millimetre.
+            // Datum shifts drop their height, which costs some hundredths of a millimetre; series of
+            // projections are good to a millimetre.
             if off_m.iter().chain(&back_m).any(|metres| metres.abs() > 2e-3) {
                 wrong.push(format!("{line}: off by {off_m:?} m, back by {back_m:?} m"));
             }
@@ -211,11 +224,16 @@ mod tests {
     #[test]
     fn heights_have_their_unit_and_pairs_their_parts() {
         let feet = VerticalCrs::new(6360).unwrap();
-        assert!(feet.name == "NAVD88 height (ftUS)" && (feet.metres_per_unit - 1200.0 / 3937.0).abs() < 1e-15);
+        assert!(
+            feet.name == "NAVD88 height (ftUS)" && (feet.metres_per_unit - 1200.0 / 3937.0).abs() < 1e-15
+        );
         assert_eq!(VerticalCrs::new(5773).map(|crs| crs.metres_per_unit), Some(1.0));
         assert_eq!(VerticalCrs::new(8228).map(|crs| crs.metres_per_unit), Some(0.3048));
         assert_eq!(VerticalCrs::new(32632), None);
-        assert_eq!((compound(7405), compound(7415), compound(4326)), (Some([27700, 5701]), Some([28992, 5709]), None));
+        assert_eq!(
+            (compound(7405), compound(7415), compound(4326)),
+            (Some([27700, 5701]), Some([28992, 5709]), None)
+        );
     }
 
     #[test]
@@ -245,7 +263,13 @@ mod tests {
             for epsg in [4326, 3857, 21781, 32632] {
                 let _ = Crs::new(epsg).unwrap().geodetic_from_model(model);
             }
-            assert_eq!(Crs::new(4326).unwrap().geodetic_from_model(model).filter(|p| p.iter().any(|x| !x.is_finite())), None);
+            assert_eq!(
+                Crs::new(4326)
+                    .unwrap()
+                    .geodetic_from_model(model)
+                    .filter(|p| p.iter().any(|x| !x.is_finite())),
+                None
+            );
         }
     }
 }

@@ -20,13 +20,15 @@ use super::{
     words,
 };
 
-/// Heights outside of this are garbage or undeclared "no data" marks, metres: from below the deepest sea to above the highest mountain.
+/// Heights outside of this are garbage or undeclared "no data" marks, metres: from below the deepest sea to
+/// above the highest mountain.
 const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
 
 /// Heights outside of this are rare enough to be spoken of, metres.
 const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
 
-/// Programs that compute with a mark miss it by as much, in parts of it. Marks that may be heights are met exactly.
+/// Programs that compute with a mark miss it by as much, in parts of it. Marks that may be heights are met
+/// exactly.
 const MARK_TOLERANCE: f64 = 1e-5;
 
 /// What lies outside of it but within this may be a height in another unit; marks lie farther away.
@@ -94,12 +96,20 @@ impl Dem {
             return Err(TerrainFileError::Meaning { path: path.into(), problem: problem.clone() });
         }
         notes.extend(stated.other.clone());
-        let own_vertical = stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
+        let own_vertical =
+            stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
         let verticals: Vec<&Vertical> = own_vertical.iter().chain(&stated.beside).collect();
         notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, converts)));
-        if verticals.is_empty() && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955) && spec.height == HeightReference::Msl {
-            let three =
-                Vertical { code: Some(crs.epsg), datum: Some(Datum::Ellipsoid), name: crs.name.clone(), metres_per_unit: Some(1.0) };
+        if verticals.is_empty()
+            && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955)
+            && spec.height == HeightReference::Msl
+        {
+            let three = Vertical {
+                code: Some(crs.epsg),
+                datum: Some(Datum::Ellipsoid),
+                name: crs.name.clone(),
+                metres_per_unit: Some(1.0),
+            };
             notes.extend(three.note(spec.height, converts));
         }
         notes.extend(crs.accuracy_m.filter(|metres| *metres >= 2.0).map(|metres| {
@@ -108,8 +118,9 @@ impl Dem {
                 crs.epsg, crs.name
             )
         }));
-        let has_alpha =
-            raster.bands() == 2 && raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2)) && may_be_alpha(geo.bands.get(1));
+        let has_alpha = raster.bands() == 2
+            && raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2))
+            && may_be_alpha(geo.bands.get(1));
         if raster.bands() == 2 && !has_alpha {
             notes.push("holds a second band, which is left out".to_owned());
         }
@@ -140,7 +151,8 @@ impl Dem {
         Ok(dem)
     }
 
-    /// Some files count rows from the south (or columns from the east); the diagonals of the cells are defined with the north on top.
+    /// Some files count rows from the south (or columns from the east); the diagonals of the cells are
+    /// defined with the north on top.
     fn turn_north_up(&mut self) {
         let [cols, rows] = self.size.map(f64::from);
         if self.model_from_pixel.row[1] > 0.0 {
@@ -171,12 +183,17 @@ impl Dem {
 
     /// Whether plausible or not; NaN where the file says that there is nothing.
     fn stored_m(&self, at: [u32; 2]) -> f64 {
-        let [column, row] = [0, 1].map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
+        let [column, row] = [0, 1]
+            .map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
         let pixel = row * self.size[0] as usize + column;
         let stored = self.raster.value(pixel);
         let is_nodata = self.nodata.iter().any(|mark| is_mark(stored, *mark));
         let is_clear = self.has_alpha && self.raster.image.value(pixel, 1) == 0.0;
-        if is_nodata || is_clear || !self.raster.is_valid(pixel) { f64::NAN } else { stored * self.metres[0] + self.metres[1] }
+        if is_nodata || is_clear || !self.raster.is_valid(pixel) {
+            f64::NAN
+        } else {
+            stored * self.metres[0] + self.metres[1]
+        }
     }
 
     pub fn heights(&self) -> Heights {
@@ -186,9 +203,17 @@ impl Dem {
             (0..self.size[0]).fold(none(), |all, column| match self.stored_m([column, row]) {
                 m if (lowest..=highest).contains(&m) => {
                     let is_usual = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&m);
-                    Heights { range_m: widened(all.range_m, m), unlikely: all.unlikely + u64::from(!is_usual), ..all }
+                    Heights {
+                        range_m: widened(all.range_m, m),
+                        unlikely: all.unlikely + u64::from(!is_usual),
+                        ..all
+                    }
                 }
-                m => Heights { voids: all.voids + 1, implausible: all.implausible + u64::from(m.abs() < NUMBERS_NOT_MARKS), ..all },
+                m => Heights {
+                    voids: all.voids + 1,
+                    implausible: all.implausible + u64::from(m.abs() < NUMBERS_NOT_MARKS),
+                    ..all
+                },
             })
         });
         rows.reduce(none, |a, b| Heights {
@@ -219,13 +244,16 @@ impl Dem {
 
     /// Samples of which something holds.
     pub fn count(&self, holds: impl Fn([u32; 2]) -> bool + Sync) -> u64 {
-        (0..self.points() as usize).into_par_iter().filter(|&index| holds(self.column_and_row(index))).count() as u64
+        (0..self.points() as usize).into_par_iter().filter(|&index| holds(self.column_and_row(index))).count()
+            as u64
     }
 
     /// The outermost samples.
     pub fn border(&self) -> impl Iterator<Item = [u32; 2]> {
         let [cols, rows] = self.size;
-        (0..cols).flat_map(move |i| [[i, 0], [i, rows - 1]]).chain((0..rows).flat_map(move |j| [[0, j], [cols - 1, j]]))
+        (0..cols)
+            .flat_map(move |i| [[i, 0], [i, rows - 1]])
+            .chain((0..rows).flat_map(move |j| [[0, j], [cols - 1, j]]))
     }
 }
 
@@ -233,10 +261,13 @@ impl Dem {
 fn is_mark(stored: f64, mark: f64) -> bool {
     let may_be_height = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&mark);
     // A float32 file may declare its mark with more digits than it holds.
-    stored == mark || stored as f32 == mark as f32 || !may_be_height && (stored - mark).abs() <= MARK_TOLERANCE * mark.abs()
+    stored == mark
+        || stored as f32 == mark as f32
+        || !may_be_height && (stored - mark).abs() <= MARK_TOLERANCE * mark.abs()
 }
 
-/// Metres in the unit of the heights. Where the file says two units or where it may be one of two, the key decides.
+/// Metres in the unit of the heights. Where the file says two units or where it may be one of two, the key
+/// decides.
 fn unit_m(
     spec: &TerrainSpec,
     geo: &GeoTags,
@@ -275,7 +306,9 @@ fn unit_m(
     }
     for vertical in verticals {
         let Some(unit) = &vertical.metres_per_unit else { continue };
-        let label = vertical.code.map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
+        let label = vertical
+            .code
+            .map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
         if *unit < 0.0 {
             return Err(meaning(format!(
                 "states depths ({}), which count downwards: turn them into heights with `gdal_calc.py -A IN --calc=-A --outfile OUT`",
@@ -287,26 +320,40 @@ fn unit_m(
     if let Some(code) = geo.keys.vertical_unit {
         match unit_of_code(code) {
             Some(unit) => stated.push((format!("VerticalUnits {code}"), unit)),
-            None if unit_of_key.is_none() => return Err(TerrainFileError::Unit { path: path.clone(), what: "vertical", code }),
+            None if unit_of_key.is_none() => {
+                return Err(TerrainFileError::Unit { path: path.clone(), what: "vertical", code });
+            }
             None => {}
         }
     }
     let of_tags = stated.len();
-    stated.extend(words::units(geo).filter_map(|(name, value)| Some((format!("item {name} `{value}`"), unit_of_name(value)?))));
-    if let (0, None, Some((text, unit))) = (of_tags, unit_of_key, stated.first().filter(|(_, unit)| *unit != 1.0)) {
+    stated.extend(
+        words::units(geo)
+            .filter_map(|(name, value)| Some((format!("item {name} `{value}`"), unit_of_name(value)?))),
+    );
+    if let (0, None, Some((text, unit))) =
+        (of_tags, unit_of_key, stated.first().filter(|(_, unit)| *unit != 1.0))
+    {
         notes.push(format!(
             "its heights are taken in units of {unit} m, by its {text}: if that is not of heights, set scene.terrain.height_unit after removing it"
         ));
     }
     let close = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
     let agree = stated.windows(2).all(|pair| close(pair[0].1, pair[1].1));
-    let all = || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
+    let all =
+        || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
     match (unit_of_key, stated.first()) {
         (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| close(*stated, unit)) => {
-            Err(meaning(format!("states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file", all())))
+            Err(meaning(format!(
+                "states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file",
+                all()
+            )))
         }
         (Some(unit), _) => Ok(unit),
-        (None, Some(_)) if !agree => Err(meaning(format!("states {}: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"", all()))),
+        (None, Some(_)) if !agree => Err(meaning(format!(
+            "states {}: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
+            all()
+        ))),
         (None, Some((_, unit))) => Ok(*unit),
         // Who maps in feet may have heights in feet, or not.
         (None, None) if crs.metres_per_unit().is_some_and(|unit| !close(unit, 1.0)) => Err(meaning(format!(
@@ -318,9 +365,18 @@ fn unit_m(
 }
 
 /// `scale x stored + offset` in the unit of the heights.
-fn scale_and_offset(path: &Path, geo: &GeoTags, has_vertical: bool, notes: &mut Vec<String>) -> Result<[f64; 2], TerrainFileError> {
+fn scale_and_offset(
+    path: &Path,
+    geo: &GeoTags,
+    has_vertical: bool,
+    notes: &mut Vec<String>,
+) -> Result<[f64; 2], TerrainFileError> {
     let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
-    let band = geo.bands.first().map(|band| (band.scale, band.offset)).filter(|(scale, offset)| scale.is_some() || offset.is_some());
+    let band = geo
+        .bands
+        .first()
+        .map(|band| (band.scale, band.offset))
+        .filter(|(scale, offset)| scale.is_some() || offset.is_some());
     let of_band = band.map(|(scale, offset)| [scale.unwrap_or(1.0), offset.unwrap_or(0.0)]);
     if of_band.is_some_and(|[scale, _]| scale == 0.0) {
         return Err(meaning("states a scale of 0 for its heights (GDAL_METADATA): correct the file".into()));
@@ -329,7 +385,8 @@ fn scale_and_offset(path: &Path, geo: &GeoTags, has_vertical: bool, notes: &mut 
         (Some(band), Some(place)) if has_vertical && band != place => Err(meaning(format!(
             "states two scales of its heights, {band:?} (GDAL_METADATA) and {place:?} (ModelPixelScale and ModelTiepoint): remove one with `gdal_translate`"
         ))),
-        // It scales heights where there is a vertical system, as for GDAL; elsewhere writers leave anything there.
+        // It scales heights where there is a vertical system, as for GDAL; elsewhere writers leave anything
+        // there.
         (None, Some(place)) if has_vertical => Ok(place),
         (of_band, Some([scale, offset])) if !has_vertical => {
             notes.push(format!(
@@ -342,17 +399,27 @@ fn scale_and_offset(path: &Path, geo: &GeoTags, has_vertical: bool, notes: &mut 
 }
 
 /// From the file's own tags, or from a world file beside it; with what there is to say.
-pub(super) fn georeference_of(path: &Path, from_tags: Option<Affine>) -> Result<(Option<Affine>, Vec<String>), TerrainFileError> {
+pub(super) fn georeference_of(
+    path: &Path,
+    from_tags: Option<Affine>,
+) -> Result<(Option<Affine>, Vec<String>), TerrainFileError> {
     let (found, notes) = match from_tags {
         Some(affine) => {
             // One that cannot be read has no say, since it is not needed.
             let other = world_file(path).ok().flatten().filter(|other| !is_same_place(&affine, other));
-            (Some(affine), other.map(|_| "a world file beside it says another place than its own tags, and is not used".to_owned()))
+            (
+                Some(affine),
+                other.map(|_| {
+                    "a world file beside it says another place than its own tags, and is not used".to_owned()
+                }),
+            )
         }
         None => (world_file(path)?, None),
     };
     match found {
-        Some(affine) if affine.inverse().is_none() => Err(TerrainFileError::DegenerateGeoreference { path: path.into() }),
+        Some(affine) if affine.inverse().is_none() => {
+            Err(TerrainFileError::DegenerateGeoreference { path: path.into() })
+        }
         found => Ok((found, notes.into_iter().collect())),
     }
 }
@@ -370,5 +437,9 @@ fn is_same_place(a: &Affine, b: &Affine) -> bool {
 fn no_georeference(path: &Path, geo: &GeoTags) -> TerrainFileError {
     let world = georeference::world_file_names(path).into_iter().next().unwrap_or_default();
     let world = world.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    TerrainFileError::NoGeoreference { path: path.into(), world, more: geo.notes.iter().map(|note| format!(" ({note})")).collect() }
+    TerrainFileError::NoGeoreference {
+        path: path.into(),
+        world,
+        more: geo.notes.iter().map(|note| format!(" ({note})")).collect(),
+    }
 }

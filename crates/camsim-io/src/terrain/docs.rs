@@ -25,8 +25,16 @@ const TAGS: &[(&str, &str, &str)] = &[
         "applied; complex numbers and others are refused. Bands that differ are refused",
     ),
     ("266 FillOrder", "bits from the lowest on", "refused below 8 bits"),
-    ("273, 279, 324, 325 blocks", "offset or length 0: the block is left out", "void (heights), without picture (colours)"),
-    ("274 Orientation, EXIF", "which way is up", "applied to pictures without a georeference; named for those with one and for heights"),
+    (
+        "273, 279, 324, 325 blocks",
+        "offset or length 0: the block is left out",
+        "void (heights), without picture (colours)",
+    ),
+    (
+        "274 Orientation, EXIF",
+        "which way is up",
+        "applied to pictures without a georeference; named for those with one and for heights",
+    ),
     ("284 PlanarConfiguration", "bands one after the other", "applied, strips and tiles"),
     ("317 Predictor", "1, 2, 3", "applied"),
     ("320 ColorMap", "palette", "applied"),
@@ -40,7 +48,11 @@ const TAGS: &[(&str, &str, &str)] = &[
         "pixel size and tie point, or a matrix",
         "applied, rotated and from the south too; control points alone are refused with the command that warps",
     ),
-    ("33550, 33922 third numbers", "scale and offset of heights", "applied with a vertical system (4096), else named"),
+    (
+        "33550, 33922 third numbers",
+        "scale and offset of heights",
+        "applied with a vertical system (4096), else named",
+    ),
     ("42112 GDAL_METADATA", "see below", "see below"),
     (
         "42113 GDAL_NODATA",
@@ -52,13 +64,19 @@ const TAGS: &[(&str, &str, &str)] = &[
 
 /// Keys and what they decide.
 const KEYS: &[(&str, &str)] = &[
-    ("height", "`\"ellipsoid\"` or `\"msl\"`: the datum of the heights. A vertical system of the file that contradicts it warns"),
+    (
+        "height",
+        "`\"ellipsoid\"` or `\"msl\"`: the datum of the heights. A vertical system of the file that contradicts it warns",
+    ),
     (
         "height_unit",
         "`\"m\"`, `\"ft\"`, `\"us-ft\"`: needed where the file says two units, one that is not known, or maps in feet without a word on heights",
     ),
     ("epsg", "the coordinate system of the DEM, where it states none"),
-    ("ortho_white", "the stored number that is white: for pictures of 16 bits that use fewer, which are named"),
+    (
+        "ortho_white",
+        "the stored number that is white: for pictures of 16 bits that use fewer, which are named",
+    ),
     (
         "beyond",
         "`\"grey\"` (sRGB 118), `\"edge\"` (the colours of the picture's border), `\"void\"` (no ground, to the last whole cell): what is seen where the ortho-image has nothing, \
@@ -79,19 +97,34 @@ pub fn documentation() -> String {
             let _ = writeln!(page, "| {} |", row.join(" | "));
         }
     };
-    let two = |rows: &[(&str, &str)]| rows.iter().map(|(a, b)| vec![(*a).to_owned(), (*b).to_owned()]).collect::<Vec<_>>();
+    let two = |rows: &[(&str, &str)]| {
+        rows.iter().map(|(a, b)| vec![(*a).to_owned(), (*b).to_owned()]).collect::<Vec<_>>()
+    };
     let three = |rows: &[(&str, &str, &str)]| {
-        rows.iter().map(|(a, b, c)| vec![(*a).to_owned(), (*b).to_owned(), (*c).to_owned()]).collect::<Vec<_>>()
+        rows.iter()
+            .map(|(a, b, c)| vec![(*a).to_owned(), (*b).to_owned(), (*c).to_owned()])
+            .collect::<Vec<_>>()
     };
     table("Heights", &["format", "told by"], two(FORMATS));
     table("Keys of `scene.terrain`", &["key", "what it decides"], two(KEYS));
     table("TIFF tags", &["tag", "what it is", "what becomes of it"], three(TAGS));
-    let compressions = COMPRESSIONS.iter().map(|(code, name)| vec![code.to_string(), (*name).to_owned(), "read".to_owned()]);
-    let refused = REFUSED
+    let compressions =
+        COMPRESSIONS.iter().map(|(code, name)| vec![code.to_string(), (*name).to_owned(), "read".to_owned()]);
+    let refused = REFUSED.iter().map(|(code, name)| {
+        vec![
+            code.to_string(),
+            (*name).to_owned(),
+            "refused, with the `gdal_translate` line for the file".to_owned(),
+        ]
+    });
+    table(
+        "Compression (tag 259)",
+        &["code", "name", "what becomes of it"],
+        compressions.chain(refused).collect(),
+    );
+    let photometrics = PHOTOMETRICS
         .iter()
-        .map(|(code, name)| vec![code.to_string(), (*name).to_owned(), "refused, with the `gdal_translate` line for the file".to_owned()]);
-    table("Compression (tag 259)", &["code", "name", "what becomes of it"], compressions.chain(refused).collect());
-    let photometrics = PHOTOMETRICS.iter().map(|(code, name, what)| vec![code.to_string(), (*name).to_owned(), (*what).to_owned()]);
+        .map(|(code, name, what)| vec![code.to_string(), (*name).to_owned(), (*what).to_owned()]);
     table("Colours (tag 262)", &["code", "name", "what becomes of it"], photometrics.collect());
     table("GeoKeys (tag 34735)", &["key", "what it is", "what becomes of it"], three(GEO_KEYS));
     table("GDAL_METADATA (tag 42112) and `.aux.xml`", &["item", "what becomes of it"], two(ITEMS));

@@ -65,10 +65,22 @@ pub(crate) const GEO_KEYS: &[(&str, &str, &str)] = &[
     ("2048 GeodeticCRS", "EPSG code of latitude and longitude", "applied, or refused by its code"),
     ("2054 GeogAngularUnits", "9102 (degrees)", "applied; others are refused"),
     ("3072 ProjectedCRS", "EPSG code of east and north", "applied, or refused by its code"),
-    ("3074 Projection", "UTM zone of a system without a code", "applied with geodetic codes 4326, 4258, 4269; others are refused"),
-    ("3075, 3078 to 3096", "a projection of the file's own", "refused, with the command that gives it a code"),
+    (
+        "3074 Projection",
+        "UTM zone of a system without a code",
+        "applied with geodetic codes 4326, 4258, 4269; others are refused",
+    ),
+    (
+        "3075, 3078 to 3096",
+        "a projection of the file's own",
+        "refused, with the command that gives it a code",
+    ),
     ("3076 ProjLinearUnits", "must be the unit of the code in 3072", "refused where it is another"),
-    ("4096 VerticalCRS", "EPSG code of the heights' datum and unit", "unit applied; a datum that contradicts scene.terrain.height warns"),
+    (
+        "4096 VerticalCRS",
+        "EPSG code of the heights' datum and unit",
+        "unit applied; a datum that contradicts scene.terrain.height warns",
+    ),
     ("4097 VerticalCitation", "what it is called", "named where 4096 has no code"),
     ("4099 VerticalUnits", "9001 metre, 9002 foot, 9003 US survey foot", "applied; others are refused"),
 ];
@@ -85,7 +97,8 @@ impl GeoTags {
         let raster_type = tags.read_keys(tiff, of)?;
         let affine = affine(scale.as_deref(), tie.as_deref(), matrix.as_deref());
         // 2: whole pixel coordinates are pixel centres ("pixel is point").
-        tags.model_from_pixel = if raster_type == Some(2) { affine.map(Affine::with_centres_at_half) } else { affine };
+        tags.model_from_pixel =
+            if raster_type == Some(2) { affine.map(Affine::with_centres_at_half) } else { affine };
         if affine.is_none()
             && let Some(points) = tie.as_ref().map(|tie| tie.len() / 6).filter(|points| *points > 1)
         {
@@ -96,15 +109,20 @@ impl GeoTags {
         tags.vertical_scale = match (&scale, &tie, &matrix) {
             (_, _, Some(matrix)) if matrix.len() >= 12 => Some([matrix[10], matrix[11]]),
             // Heights of the tie point: model = z + scale (raster - k).
-            (Some(scale), Some(tie), None) if scale.len() >= 3 && tie.len() >= 6 => Some([scale[2], tie[5] - tie[2] * scale[2]]),
+            (Some(scale), Some(tie), None) if scale.len() >= 3 && tie.len() >= 6 => {
+                Some([scale[2], tie[5] - tie[2] * scale[2]])
+            }
             _ => None,
         }
-        .filter(|[scale, offset]| scale.is_finite() && offset.is_finite() && (!matches!(*scale, 0.0 | 1.0) || *offset != 0.0))
+        .filter(|[scale, offset]| {
+            scale.is_finite() && offset.is_finite() && (!matches!(*scale, 0.0 | 1.0) || *offset != 0.0)
+        })
         .map(|[scale, offset]| [if scale == 0.0 { 1.0 } else { scale }, offset]);
         if let Some(text) = tiff.text(of, tag::GDAL_NODATA)? {
             let text = text.trim();
-            tags.nodata =
-                Some(number(text).ok_or_else(|| format!("its mark of missing values (tag 42113) is `{text}`, which is no number"))?);
+            tags.nodata = Some(number(text).ok_or_else(|| {
+                format!("its mark of missing values (tag 42113) is `{text}`, which is no number")
+            })?);
         }
         if let Some(text) = tiff.text(of, tag::GDAL_METADATA)? {
             match Metadata::of_tag(&text) {
@@ -114,12 +132,15 @@ impl GeoTags {
                     tags.descriptions = metadata.descriptions;
                 }
                 Err(reason) => {
-                    return Err(format!("its GDAL_METADATA (tag 42112) cannot be read, and a scale or a unit may be in it: {reason}"));
+                    return Err(format!(
+                        "its GDAL_METADATA (tag 42112) cannot be read, and a scale or a unit may be in it: {reason}"
+                    ));
                 }
             }
         }
         tags.descriptions.extend(tiff.text(of, tag::IMAGE_DESCRIPTION).ok().flatten());
-        tags.orientation = tiff.integer(of, tag::ORIENTATION)?.filter(|orientation| !matches!(orientation, 0 | 1));
+        tags.orientation =
+            tiff.integer(of, tag::ORIENTATION)?.filter(|orientation| !matches!(orientation, 0 | 1));
         if of.has(tag::RPC_COEFFICIENTS) {
             tags.notes.push("its rational camera model (RPC, tag 50844) is not used: a picture that is not orthorectified does not lie where its georeference says".into());
         }
@@ -128,16 +149,30 @@ impl GeoTags {
 
     /// The directory of keys. Gives the raster type.
     fn read_keys(&mut self, tiff: &mut TiffFile, of: &Directory) -> Result<Option<u16>, String> {
-        let keys: Vec<u16> = tiff.integers(of, tag::GEO_KEY_DIRECTORY)?.unwrap_or_default().iter().map(|&key| key as u16).collect();
+        let keys: Vec<u16> = tiff
+            .integers(of, tag::GEO_KEY_DIRECTORY)?
+            .unwrap_or_default()
+            .iter()
+            .map(|&key| key as u16)
+            .collect();
         let texts = tiff.text(of, tag::GEO_ASCII_PARAMS)?.unwrap_or_default();
         // Entries: key, place (0 = here), count, value.
-        let entry = |wanted: u16| keys.get(4..).and_then(|keys| keys.chunks_exact(4).find(|entry| entry[0] == wanted));
-        let key = |wanted: u16| entry(wanted).filter(|entry| entry[1] == 0).map(|entry| entry[3]).filter(|&code| code != 0);
+        let entry = |wanted: u16| {
+            keys.get(4..).and_then(|keys| keys.chunks_exact(4).find(|entry| entry[0] == wanted))
+        };
+        let key = |wanted: u16| {
+            entry(wanted).filter(|entry| entry[1] == 0).map(|entry| entry[3]).filter(|&code| code != 0)
+        };
         let text = |wanted: u16| {
             let found = entry(wanted).filter(|entry| entry[1] == tag::GEO_ASCII_PARAMS);
-            let found =
-                found.and_then(|entry| texts.get(usize::from(entry[3])..(usize::from(entry[3]) + usize::from(entry[2])).min(texts.len())));
-            found.map(|text| text.trim_end_matches(['|', '\0', ' ']).to_owned()).filter(|text| !text.is_empty())
+            let found = found.and_then(|entry| {
+                texts.get(
+                    usize::from(entry[3])..(usize::from(entry[3]) + usize::from(entry[2])).min(texts.len()),
+                )
+            });
+            found
+                .map(|text| text.trim_end_matches(['|', '\0', ' ']).to_owned())
+                .filter(|text| !text.is_empty())
         };
         self.keys = GeoKeys {
             model_type: key(1024),

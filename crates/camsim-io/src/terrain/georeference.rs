@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::TerrainFileError;
 
-/// `model = origin + x column + y row`, where (x, y) are pixel coordinates with (0, 0) at the outer corner of the top-left pixel: the
-/// centre of pixel (i, j) is (i + 0.5, j + 0.5). GeoTIFF calls this "pixel is area".
+/// `model = origin + x column + y row`, where (x, y) are pixel coordinates with (0, 0) at the outer corner of
+/// the top-left pixel: the centre of pixel (i, j) is (i + 0.5, j + 0.5). GeoTIFF calls this "pixel is area".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Affine {
     pub origin: [f64; 2],
@@ -77,7 +77,9 @@ pub(super) fn world_file(path: &Path) -> Result<Option<Affine>, TerrainFileError
     let values = text
         .split_whitespace()
         .enumerate()
-        .map(|(index, word)| word.parse::<f64>().map_err(|_| error(format!("number {} is `{word}`", index + 1))))
+        .map(|(index, word)| {
+            word.parse::<f64>().map_err(|_| error(format!("number {} is `{word}`", index + 1)))
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let [a, d, b, e, c, f] = values[..] else { return Err(error(format!("{} numbers found", values.len()))) };
     Ok(Some(Affine { origin: [c, f], column: [a, d], row: [b, e] }.with_centres_at_half()))
@@ -109,6 +111,8 @@ mod tests {
         std::fs::write(folder.path().join("a.pgw"), "2.0 x").unwrap();
         assert!(world_file(&picture).unwrap_err().to_string().contains("number 2 is `x`"));
         std::fs::write(folder.path().join("a.pgw"), "2.0 1.0").unwrap();
-        assert!(world_file(&picture).unwrap_err().to_string().contains("a.pgw: a world file has six numbers"));
+        assert!(
+            world_file(&picture).unwrap_err().to_string().contains("a.pgw: a world file has six numbers")
+        );
     }
 }

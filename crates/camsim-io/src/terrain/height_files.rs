@@ -18,7 +18,10 @@ pub(crate) const FORMATS: &[(&str, &str)] = &[
         "ESRI ASCII grid (`.asc`)",
         "by content: `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` (or `dx`, `dy`), `NODATA_value` (else -9999); EPSG code by a `.prj` beside it or scene.terrain.epsg",
     ),
-    ("SRTM tile (`N47E008.hgt`)", "by name, which is its place; 1201 x 1201 or 3601 x 3601 heights above EGM96, EPSG:4326, -32768 missing"),
+    (
+        "SRTM tile (`N47E008.hgt`)",
+        "by name, which is its place; 1201 x 1201 or 3601 x 3601 heights above EGM96, EPSG:4326, -32768 missing",
+    ),
 ];
 
 /// What SRTM tiles have for heights that are missing.
@@ -33,9 +36,17 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainFileError> {
         return read_srtm(path);
     }
     let mut start = Vec::new();
-    let file = std::fs::File::open(path).map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
-    file.take(64).read_to_end(&mut start).map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
-    if String::from_utf8_lossy(&start).trim_start_matches('\u{feff}').trim_start().to_lowercase().starts_with("ncols") {
+    let file = std::fs::File::open(path)
+        .map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
+    file.take(64)
+        .read_to_end(&mut start)
+        .map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
+    if String::from_utf8_lossy(&start)
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .to_lowercase()
+        .starts_with("ncols")
+    {
         return read_ascii(path);
     }
     let what = match start[..] {
@@ -50,9 +61,11 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainFileError> {
 fn read_srtm(path: &Path) -> Result<Raster, TerrainFileError> {
     let wrong = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
-    let [south, west] =
-        place_of_name(&name).ok_or_else(|| wrong("an SRTM tile is named by its south-western corner, for example N47E008.hgt".into()))?;
-    let bytes = std::fs::read(path).map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
+    let [south, west] = place_of_name(&name).ok_or_else(|| {
+        wrong("an SRTM tile is named by its south-western corner, for example N47E008.hgt".into())
+    })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
     let side = match bytes.len() {
         2_884_802 => 1201,
         25_934_402 => 3601,
@@ -62,12 +75,22 @@ fn read_srtm(path: &Path) -> Result<Raster, TerrainFileError> {
             )));
         }
     };
-    let data = bytes.chunks_exact(2).flat_map(|pair| i16::from_be_bytes([pair[0], pair[1]]).to_ne_bytes()).collect();
+    let data =
+        bytes.chunks_exact(2).flat_map(|pair| i16::from_be_bytes([pair[0], pair[1]]).to_ne_bytes()).collect();
     let step = 1.0 / f64::from(side - 1);
     // The outermost heights lie on whole degrees.
-    let model_from_pixel = Affine { origin: [west - 0.5 * step, south + 1.0 + 0.5 * step], column: [step, 0.0], row: [0.0, -step] };
+    let model_from_pixel = Affine {
+        origin: [west - 0.5 * step, south + 1.0 + 0.5 * step],
+        column: [step, 0.0],
+        row: [0.0, -step],
+    };
     let keys = GeoKeys { geographic: Some(4326), vertical: Some(5773), ..GeoKeys::default() };
-    let geo = GeoTags { model_from_pixel: Some(model_from_pixel), keys, nodata: Some(SRTM_VOID), ..GeoTags::default() };
+    let geo = GeoTags {
+        model_from_pixel: Some(model_from_pixel),
+        keys,
+        nodata: Some(SRTM_VOID),
+        ..GeoTags::default()
+    };
     Ok(Raster::of_numbers(Image::of_band([side, side], Sample::I16, data), geo))
 }
 
@@ -78,8 +101,9 @@ fn place_of_name(name: &str) -> Option<[f64; 2]> {
         letter if letter == minus => Some(-1.0),
         _ => None,
     };
-    let number =
-        |from: usize, to: usize| name.get(from..to).filter(|digits| digits.bytes().all(|b| b.is_ascii_digit()))?.parse::<f64>().ok();
+    let number = |from: usize, to: usize| {
+        name.get(from..to).filter(|digits| digits.bytes().all(|b| b.is_ascii_digit()))?.parse::<f64>().ok()
+    };
     let (lat, lon) = (sign(0, "N", "S")? * number(1, 3)?, sign(3, "E", "W")? * number(4, 7)?);
     (lat.abs() <= 90.0 && lon.abs() <= 180.0).then_some([lat, lon])
 }
@@ -96,19 +120,22 @@ struct Header {
 }
 
 fn read_ascii(path: &Path) -> Result<Raster, TerrainFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| TerrainFileError::of_dem(PictureError::open(path, source)))?;
     let wrong = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
     let mut header = Header::default();
     let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate().peekable();
     while let Some((index, line)) = lines.next_if(|(_, line)| {
-        line.trim_start().is_empty() || line.trim_start().starts_with(|c: char| c.is_ascii_alphabetic()) && !is_number(line)
+        line.trim_start().is_empty()
+            || line.trim_start().starts_with(|c: char| c.is_ascii_alphabetic()) && !is_number(line)
     }) {
         if !line.trim().is_empty() {
             header.take(line).map_err(|problem| wrong(format!("line {}: {problem}", index + 1)))?;
         }
     }
     let missing = |key: &str| wrong(format!("its header has no `{key}`"));
-    let size = [header.columns.ok_or_else(|| missing("ncols"))?, header.rows.ok_or_else(|| missing("nrows"))?];
+    let size =
+        [header.columns.ok_or_else(|| missing("ncols"))?, header.rows.ok_or_else(|| missing("nrows"))?];
     let count = u64::from(size[0]) * u64::from(size[1]);
     // A number and what parts it from the next take two bytes.
     if count > text.len() as u64 {
@@ -125,14 +152,23 @@ fn read_ascii(path: &Path) -> Result<Raster, TerrainFileError> {
         }
     }
     if data.len() as u64 != 8 * count {
-        return Err(wrong(format!("holds {} heights, and {} x {} are {count}", data.len() / 8, size[0], size[1])));
+        return Err(wrong(format!(
+            "holds {} heights, and {} x {} are {count}",
+            data.len() / 8,
+            size[0],
+            size[1]
+        )));
     }
     let [Some(dx), Some(dy)] = header.cell else { return Err(missing("cellsize")) };
-    let [Some((x, x_is_centre)), Some((y, y_is_centre))] = header.corner else { return Err(missing("xllcorner` and `yllcorner")) };
+    let [Some((x, x_is_centre)), Some((y, y_is_centre))] = header.corner else {
+        return Err(missing("xllcorner` and `yllcorner"));
+    };
     let west = if x_is_centre { x - 0.5 * dx } else { x };
     let south = if y_is_centre { y - 0.5 * dy } else { y };
-    let model_from_pixel = Affine { origin: [west, south + dy * f64::from(size[1])], column: [dx, 0.0], row: [0.0, -dy] };
-    let geo = GeoTags { model_from_pixel: Some(model_from_pixel), nodata: header.nodata, ..GeoTags::default() };
+    let model_from_pixel =
+        Affine { origin: [west, south + dy * f64::from(size[1])], column: [dx, 0.0], row: [0.0, -dy] };
+    let geo =
+        GeoTags { model_from_pixel: Some(model_from_pixel), nodata: header.nodata, ..GeoTags::default() };
     Ok(Raster::of_numbers(Image::of_band(size, Sample::F64, data), geo))
 }
 
@@ -147,12 +183,25 @@ impl Header {
         let (Some(key), Some(value), None) = (words.next(), words.next(), words.next()) else {
             return Err(format!("`{}` is no key with its value", line.trim()));
         };
-        let number =
-            || value.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| format!("{key} is `{value}`, which is no number"));
-        let count = || {
-            value.parse::<u32>().ok().filter(|count| *count > 0).ok_or_else(|| format!("{key} is `{value}`, which is no number of cells"))
+        let number = || {
+            value
+                .parse::<f64>()
+                .ok()
+                .filter(|value| value.is_finite())
+                .ok_or_else(|| format!("{key} is `{value}`, which is no number"))
         };
-        let step = || number().and_then(|step| if step > 0.0 { Ok(step) } else { Err(format!("{key} is {step}, which is no size")) });
+        let count = || {
+            value
+                .parse::<u32>()
+                .ok()
+                .filter(|count| *count > 0)
+                .ok_or_else(|| format!("{key} is `{value}`, which is no number of cells"))
+        };
+        let step = || {
+            number().and_then(|step| {
+                if step > 0.0 { Ok(step) } else { Err(format!("{key} is {step}, which is no size")) }
+            })
+        };
         match key.to_lowercase().as_str() {
             "ncols" => self.columns = Some(count()?),
             "nrows" => self.rows = Some(count()?),
@@ -163,7 +212,10 @@ impl Header {
             "cellsize" => self.cell = [Some(step()?); 2],
             "dx" => self.cell[0] = Some(step()?),
             "dy" => self.cell[1] = Some(step()?),
-            "nodata_value" => self.nodata = Some(value.parse().map_err(|_| format!("{key} is `{value}`, which is no number"))?),
+            "nodata_value" => {
+                self.nodata =
+                    Some(value.parse().map_err(|_| format!("{key} is `{value}`, which is no number"))?)
+            }
             _ => return Err(format!("`{key}` is no key of an ESRI ASCII grid")),
         }
         Ok(())

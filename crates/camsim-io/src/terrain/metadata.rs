@@ -31,8 +31,14 @@ pub(crate) struct Metadata {
 
 /// Items and elements and what becomes of them.
 pub(crate) const ITEMS: &[(&str, &str)] = &[
-    ("`SCALE`, `OFFSET` of a band (`<Scale>`, `<Offset>`)", "applied to heights: `scale x stored + offset`; named for pictures"),
-    ("`UNITTYPE` of a band (`<UnitType>`)", "applied to heights: metre, foot, US survey foot, and cm, mm, km; others are refused"),
+    (
+        "`SCALE`, `OFFSET` of a band (`<Scale>`, `<Offset>`)",
+        "applied to heights: `scale x stored + offset`; named for pictures",
+    ),
+    (
+        "`UNITTYPE` of a band (`<UnitType>`)",
+        "applied to heights: metre, foot, US survey foot, and cm, mm, km; others are refused",
+    ),
     ("`COLORINTERP` of a band (`<ColorInterp>`)", "applied: which bands are red, green, blue, grey, alpha"),
     ("`<NoDataValue>`", "applied, before the scale"),
     ("`<GeoTransform>`, `<SRS>`", "applied where the raster itself has none"),
@@ -55,7 +61,8 @@ impl Metadata {
     /// The text of tag 42112.
     pub fn of_tag(text: &str) -> Result<Self, String> {
         let mut found = Self::default();
-        let document = Document::parse(text.trim_end_matches('\0').trim()).map_err(|error| error.to_string())?;
+        let document =
+            Document::parse(text.trim_end_matches('\0').trim()).map_err(|error| error.to_string())?;
         for item in document.descendants().filter(|node| node.has_tag_name("Item")) {
             // An item of a band in a domain of its own is none of these.
             if item.attribute("domain").is_some_and(|domain| !domain.is_empty()) {
@@ -71,10 +78,14 @@ impl Metadata {
             match role {
                 "scale" => found.band(sample)?.scale = Some(finite("scale", text)?),
                 "offset" => found.band(sample)?.offset = Some(finite("offset", text)?),
-                "unittype" => found.band(sample)?.unit = Some(text.to_owned()).filter(|text| !text.is_empty()),
+                "unittype" => {
+                    found.band(sample)?.unit = Some(text.to_owned()).filter(|text| !text.is_empty())
+                }
                 "colorinterp" => found.band(sample)?.color = Some(text.to_owned()),
                 "description" if sample == 0 => found.descriptions.push(text.to_owned()),
-                "" if sample == 0 => found.items.push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned())),
+                "" if sample == 0 => {
+                    found.items.push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned()))
+                }
                 _ => {}
             }
         }
@@ -84,9 +95,12 @@ impl Metadata {
     /// The text of an `.aux.xml` file.
     pub fn of_aux(text: &str) -> Result<Self, String> {
         let mut found = Self::default();
-        let document = Document::parse(text.trim_start_matches('\u{feff}')).map_err(|error| error.to_string())?;
+        let document =
+            Document::parse(text.trim_start_matches('\u{feff}')).map_err(|error| error.to_string())?;
         let inside = |node: Node<'_, '_>, name: &str| {
-            node.children().find(|child| child.has_tag_name(name)).and_then(|child| child.text().map(|t| t.trim().to_owned()))
+            node.children()
+                .find(|child| child.has_tag_name(name))
+                .and_then(|child| child.text().map(|t| t.trim().to_owned()))
         };
         let root = document.root_element();
         found.wkt = inside(root, "SRS").filter(|text| !text.is_empty());
@@ -108,10 +122,13 @@ impl Metadata {
                 found.items.extend(items_of_aux(band));
                 found.descriptions.extend(inside(band, "Description"));
             }
-            let real = |name: &str| inside(band, name).filter(|text| !text.is_empty()).map(|text| finite(name, &text)).transpose();
+            let real = |name: &str| {
+                inside(band, name).filter(|text| !text.is_empty()).map(|text| finite(name, &text)).transpose()
+            };
             let (scale, offset) = (real("Scale")?, real("Offset")?);
-            let nodata =
-                inside(band, "NoDataValue").map(|text| number(&text).ok_or_else(|| format!("NoDataValue is `{text}`"))).transpose()?;
+            let nodata = inside(band, "NoDataValue")
+                .map(|text| number(&text).ok_or_else(|| format!("NoDataValue is `{text}`")))
+                .transpose()?;
             *found.band(index - 1)? = BandMeaning {
                 scale,
                 offset,
@@ -136,11 +153,22 @@ impl Metadata {
 
 /// Those of the domain without a name.
 fn items_of_aux(parent: Node<'_, '_>) -> Vec<(String, String)> {
-    let of_no_domain = |node: &Node<'_, '_>| node.has_tag_name("Metadata") && node.attribute("domain").is_none_or(str::is_empty);
-    let items = parent.children().filter(of_no_domain).flat_map(|metadata| metadata.children().filter(|node| node.has_tag_name("MDI")));
-    items.filter_map(|item| Some((item.attribute("key")?.to_owned(), item.text().unwrap_or_default().trim().to_owned()))).collect()
+    let of_no_domain = |node: &Node<'_, '_>| {
+        node.has_tag_name("Metadata") && node.attribute("domain").is_none_or(str::is_empty)
+    };
+    let items = parent
+        .children()
+        .filter(of_no_domain)
+        .flat_map(|metadata| metadata.children().filter(|node| node.has_tag_name("MDI")));
+    items
+        .filter_map(|item| {
+            Some((item.attribute("key")?.to_owned(), item.text().unwrap_or_default().trim().to_owned()))
+        })
+        .collect()
 }
 
 fn finite(what: &str, text: &str) -> Result<f64, String> {
-    number(text).filter(|value| value.is_finite()).ok_or_else(|| format!("{what} is `{text}`, which is no number"))
+    number(text)
+        .filter(|value| value.is_finite())
+        .ok_or_else(|| format!("{what} is `{text}`, which is no number"))
 }

@@ -32,8 +32,8 @@ pub(super) struct Ortho {
     pub notes: Vec<String>,
 }
 
-/// Pixels of grey around a picture that ends before the ground does: as many as a screen's pixel may cover before the colours at the picture's very border are
-/// drawn less exactly than to a texel.
+/// Pixels of grey around a picture that ends before the ground does: as many as a screen's pixel may cover
+/// before the colours at the picture's very border are drawn less exactly than to a texel.
 const MARGIN_PX: u32 = 64;
 
 /// Where a picture lies.
@@ -52,10 +52,15 @@ pub(super) struct OrthoPlace {
 impl OrthoPlace {
     /// Pixel coordinates of a height on the picture as it is stored.
     fn pixel(&self, dem: &Dem, at: [u32; 2]) -> [f64; 2] {
-        let model =
-            if self.is_of_dem { Some(dem.model(at)) } else { dem.geodetic_rad(at).and_then(|place| self.crs.model_from_geodetic(place)) };
+        let model = if self.is_of_dem {
+            Some(dem.model(at))
+        } else {
+            dem.geodetic_rad(at).and_then(|place| self.crs.model_from_geodetic(place))
+        };
         // 190 degrees east are 170 degrees west.
-        let model = model.map(|[x, y]| [x - self.crs.period().map_or(0.0, |period| period * ((x - self.middle_x) / period).round()), y]);
+        let model = model.map(|[x, y]| {
+            [x - self.crs.period().map_or(0.0, |period| period * ((x - self.middle_x) / period).round()), y]
+        });
         // A point that the picture's projection does not reach is outside of the picture.
         model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model))
     }
@@ -83,7 +88,13 @@ impl Ortho {
             notes.extend(geo.notes);
             let content = content_of(&texture);
             finish(&mut texture, None, spec.beyond);
-            return Ok(Self { texture, place: None, content, holds_ground: true, notes: with_name(path, notes) });
+            return Ok(Self {
+                texture,
+                place: None,
+                content,
+                holds_ground: true,
+                notes: with_name(path, notes),
+            });
         };
         notes.extend(geo.notes.iter().cloned());
         if let Some(orientation) = geo.orientation {
@@ -93,13 +104,22 @@ impl Ortho {
         // A world file states no coordinate system: then it is the DEM's.
         let assumed = (stated.horizontal.is_none() && stated.own.is_none()).then_some(dem.crs.epsg);
         let crs = stated.crs(path, &geo, assumed)?;
-        let pixel_from_model = model_from_pixel.inverse().ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
+        let pixel_from_model = model_from_pixel
+            .inverse()
+            .ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
         let size = texture.size_px.map(f64::from);
         let content = content_of(&texture);
         let over_voids = over_voids(&texture, dem, &model_from_pixel);
         finish(&mut texture, over_voids.as_deref(), spec.beyond);
         let middle_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
-        let mut place = OrthoPlace { pixel_from_model, is_of_dem: crs.epsg == dem.crs.epsg, crs, size, middle_x, margin_px: 0.0 };
+        let mut place = OrthoPlace {
+            pixel_from_model,
+            is_of_dem: crs.epsg == dem.crs.epsg,
+            crs,
+            size,
+            middle_x,
+            margin_px: 0.0,
+        };
         // What holds the border of the ground holds the ground.
         let holds_ground = dem.border().all(|at| place.is_inside(place.pixel(dem, at)));
         if spec.beyond == Beyond::Grey && !holds_ground {
@@ -128,7 +148,9 @@ impl Ortho {
         }
         let pixel = match &self.place {
             Some(place) => place.pixel(dem, at),
-            None => [0, 1].map(|k: usize| (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])),
+            None => [0, 1].map(|k: usize| {
+                (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])
+            }),
         };
         if self.place.as_ref().is_some_and(|place| !place.is_inside(pixel)) {
             return false;
@@ -160,9 +182,13 @@ fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<Str
         return Ok((texture, raster.geo, notes));
     }
     if spec.ortho_white.is_some() {
-        return Err(failed(PictureError::decode(path, "scene.terrain.ortho_white is for TIFF files: leave it out")));
+        return Err(failed(PictureError::decode(
+            path,
+            "scene.terrain.ortho_white is for TIFF files: leave it out",
+        )));
     }
-    let Stored { texture, orientation, largest_of_16_bits } = read_stored(path, Encoding::Srgb).map_err(failed)?;
+    let Stored { texture, orientation, largest_of_16_bits } =
+        read_stored(path, Encoding::Srgb).map_err(failed)?;
     let mut geo = GeoTags { orientation, ..GeoTags::default() };
     beside::read_tags(path, &mut geo)?;
     let dark = largest_of_16_bits.filter(|largest| (1..1 << 14).contains(largest)).map(|largest| {
@@ -178,8 +204,8 @@ fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<Str
 /// Neutral, and as bright as a card of 18 % looks: sRGB.
 pub(super) const GREY: u8 = 118;
 
-/// Colours of pixels without content. Over ground they are what lies beyond the picture is; where there is no ground they are those of their
-/// neighbours, which they would darken.
+/// Colours of pixels without content. Over ground they are what lies beyond the picture is; where there is no
+/// ground they are those of their neighbours, which they would darken.
 fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
     let light = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
     if beyond == Beyond::Grey {
@@ -187,7 +213,8 @@ fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
             if pixel[3] < 255 && over_voids.is_none_or(|voids| !voids[index]) {
                 let [share, grey] = [f32::from(pixel[3]) / 255.0, light(GREY)];
                 for byte in &mut pixel[..3] {
-                    *byte = (255.0 * srgb_from_linear(light(*byte) * share + grey * (1.0 - share))).round() as u8;
+                    *byte =
+                        (255.0 * srgb_from_linear(light(*byte) * share + grey * (1.0 - share))).round() as u8;
                 }
                 pixel[3] = 255;
             }
@@ -203,7 +230,8 @@ fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
     texture.bleed_into_transparent();
 }
 
-/// Which pixels lie over voids of a DEM on the same grid: black there is no content, and would darken the rim of what is.
+/// Which pixels lie over voids of a DEM on the same grid: black there is no content, and would darken the rim
+/// of what is.
 fn over_voids(texture: &Texture, dem: &Dem, ortho_from_pixel: &Affine) -> Option<Vec<bool>> {
     if texture.size_px != dem.size || *ortho_from_pixel != dem.model_from_pixel {
         return None;

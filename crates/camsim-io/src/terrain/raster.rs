@@ -107,7 +107,8 @@ impl Raster {
         self.image.bands
     }
 
-    /// Of a depth picture: whether it holds 16-bit whole numbers, or floats; `None` if neither, or of several bands.
+    /// Of a depth picture: whether it holds 16-bit whole numbers, or floats; `None` if neither, or of several
+    /// bands.
     pub fn depth_is_whole(&self) -> Option<bool> {
         match (self.image.sample, self.image.bands, self.image.bits) {
             (Sample::U16, 1, 16) => Some(true),
@@ -126,9 +127,15 @@ impl Raster {
         self.to_picture(path, encoding, None).map(|(texture, _)| texture)
     }
 
-    /// As a colour picture, with what there is to say about it. `white` is the stored number that is full light. Pixels without content are transparent:
-    /// those of the "no data" mark, of masks, and of blocks that are left out.
-    pub fn to_picture(&self, path: &Path, encoding: Encoding, white: Option<f64>) -> Result<(Texture, Vec<String>), PictureError> {
+    /// As a colour picture, with what there is to say about it. `white` is the stored number that is full
+    /// light. Pixels without content are transparent: those of the "no data" mark, of masks, and of blocks
+    /// that are left out.
+    pub fn to_picture(
+        &self,
+        path: &Path,
+        encoding: Encoding,
+        white: Option<f64>,
+    ) -> Result<(Texture, Vec<String>), PictureError> {
         let wrong = |reason: String| PictureError::decode(path, reason);
         let image = &self.image;
         if !matches!(image.sample, Sample::U8 | Sample::U16) {
@@ -137,14 +144,24 @@ impl Raster {
                 gdal_translate("-ot Byte -scale", path)
             )));
         }
-        let bands = ColorBands::of(image, &self.geo.bands, self.palette.is_some())
-            .map_err(|reason| wrong(format!("{reason}: convert it with `{}`", gdal_translate("-expand rgb -co PHOTOMETRIC=RGB", path))))?;
+        let bands = ColorBands::of(image, &self.geo.bands, self.palette.is_some()).map_err(|reason| {
+            wrong(format!(
+                "{reason}: convert it with `{}`",
+                gdal_translate("-expand rgb -co PHOTOMETRIC=RGB", path)
+            ))
+        })?;
         let mut notes = bands.notes.clone();
         let most = f64::from((1_u32 << image.bits) - 1);
         notes.extend(self.say_scale(&bands, white, most));
         let white = white.unwrap_or(most);
-        let byte = |pixel: usize, band: usize| (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8;
-        let mark = self.geo.nodata.filter(|mark| mark.fract() == 0.0 && (0.0..=most).contains(mark)).map(|mark| mark as u32);
+        let byte = |pixel: usize, band: usize| {
+            (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8
+        };
+        let mark = self
+            .geo
+            .nodata
+            .filter(|mark| mark.fract() == 0.0 && (0.0..=most).contains(mark))
+            .map(|mark| mark as u32);
         let color = |pixel: usize| -> [u8; 4] {
             let mut rgb = match (&self.palette, bands.is_palette) {
                 (Some(palette), true) => palette_color(palette, image.unsigned(pixel, bands.rgb[0])),
@@ -153,13 +170,18 @@ impl Raster {
             if bands.is_inverted {
                 rgb = rgb.map(|byte| 255 - byte);
             }
-            let is_void =
-                mark.is_some_and(|mark| bands.rgb.iter().all(|&band| image.unsigned(pixel, band) == mark)) || !self.is_valid(pixel);
+            let is_void = mark
+                .is_some_and(|mark| bands.rgb.iter().all(|&band| image.unsigned(pixel, band) == mark))
+                || !self.is_valid(pixel);
             let alpha = match bands.alpha {
                 _ if is_void => 0,
                 None => 255,
-                Some(band) if bands.alpha_is_full_scale => (f64::from(image.unsigned(pixel, band)) * 255.0 / most).round() as u8,
-                Some(band) => (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8,
+                Some(band) if bands.alpha_is_full_scale => {
+                    (f64::from(image.unsigned(pixel, band)) * 255.0 / most).round() as u8
+                }
+                Some(band) => {
+                    (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8
+                }
             };
             if bands.is_premultiplied && alpha > 0 {
                 rgb = rgb.map(|byte| (u32::from(byte) * 255 / u32::from(alpha)).min(255) as u8);
@@ -180,7 +202,9 @@ impl Raster {
     fn say_scale(&self, bands: &ColorBands, white: Option<f64>, most: f64) -> Option<String> {
         let image = &self.image;
         if bands.is_palette && white.is_some() {
-            return Some("its colours are those of a palette: scene.terrain.ortho_white is not used".to_owned());
+            return Some(
+                "its colours are those of a palette: scene.terrain.ortho_white is not used".to_owned(),
+            );
         }
         if bands.is_palette || (image.bits <= 8 && white.is_none()) {
             return None;
@@ -194,7 +218,10 @@ impl Raster {
         let largest = (0..image.pixels()).into_par_iter().map(largest_of).max().unwrap_or(0);
         match white {
             Some(white) => {
-                let cut = (0..image.pixels()).into_par_iter().filter(|&pixel| f64::from(largest_of(pixel)) > white).count();
+                let cut = (0..image.pixels())
+                    .into_par_iter()
+                    .filter(|&pixel| f64::from(largest_of(pixel)) > white)
+                    .count();
                 (cut > 0).then(|| {
                     let share = 100.0 * cut as f64 / image.pixels() as f64;
                     format!("{share:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white}, and are cut there; the largest value is {largest}")
@@ -213,20 +240,28 @@ impl Raster {
         }
     }
 
-    /// As a grey picture of values 0..=1: integers by their full range, floats as they are (cut to the range).
+    /// As a grey picture of values 0..=1: integers by their full range, floats as they are (cut to the
+    /// range).
     pub fn to_gray(&self, path: &Path) -> Result<GrayImage, PictureError> {
         let image = &self.image;
         let is_float = matches!(image.sample, Sample::F16 | Sample::F32 | Sample::F64);
-        if image.bands == 1 && image.photometric == 1 && (is_float || matches!(image.sample, Sample::U8 | Sample::U16)) {
+        if image.bands == 1
+            && image.photometric == 1
+            && (is_float || matches!(image.sample, Sample::U8 | Sample::U16))
+        {
             let scale = if is_float { 1.0 } else { f64::from((1_u32 << image.bits) - 1) };
-            let values: Vec<f32> = (0..image.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
+            let values: Vec<f32> =
+                (0..image.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
             if values.iter().any(|v| v.is_nan()) {
                 return Err(PictureError::decode(path, "holds NaN"));
             }
             return Ok(GrayImage { size_px: self.size, values });
         }
         if !matches!(image.sample, Sample::U8 | Sample::U16) {
-            return Err(PictureError::decode(path, "grey values must be of at most 16 bits, unsigned, or floats"));
+            return Err(PictureError::decode(
+                path,
+                "grey values must be of at most 16 bits, unsigned, or floats",
+            ));
         }
         Ok(crate::pictures::gray_from_texture(&self.to_texture(path, Encoding::Linear)?))
     }
@@ -238,10 +273,13 @@ fn mask_of(tiff: &mut TiffFile, of: &Directory, size: [u32; 2]) -> Result<Vec<bo
     if mask.size != size {
         return Err(format!("its mask has {:?} pixels, and the picture {size:?}", mask.size));
     }
-    let mut valid: Vec<bool> = (0..mask.pixels()).map(|pixel| (0..mask.bands).any(|band| mask.value(pixel, band) != 0.0)).collect();
+    let mut valid: Vec<bool> =
+        (0..mask.pixels()).map(|pixel| (0..mask.bands).any(|band| mask.value(pixel, band) != 0.0)).collect();
     // What a mask leaves out, it does not show.
     for [x, y, columns, rows] in &mask.absent {
-        (*y..y + rows).for_each(|row| valid[(row * size[0] + x) as usize..(row * size[0] + x + columns) as usize].fill(false));
+        (*y..y + rows).for_each(|row| {
+            valid[(row * size[0] + x) as usize..(row * size[0] + x + columns) as usize].fill(false)
+        });
     }
     Ok(valid)
 }
@@ -250,5 +288,9 @@ fn palette_color(palette: &[u64], index: u32) -> [u8; 3] {
     let entries = palette.len() / 3;
     // Some writers fill bytes where words are meant.
     let is_of_bytes = palette.iter().all(|value| *value < 256);
-    [0, 1, 2].map(|k| palette.get(k * entries + index as usize).map_or(0, |v| if is_of_bytes { *v as u8 } else { (v >> 8) as u8 }))
+    [0, 1, 2].map(|k| {
+        palette
+            .get(k * entries + index as usize)
+            .map_or(0, |v| if is_of_bytes { *v as u8 } else { (v >> 8) as u8 })
+    })
 }

@@ -1,12 +1,18 @@
-//! Colour for terrain without a picture: tinted by height, shaded from the north-west if the scene has no light of its own.
+//! Colour for terrain without a picture: tinted by height, shaded from the north-west if the scene has no
+//! light of its own.
 
 use camsim_core::scene::{Encoding, Texture};
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Height tints from the lowest to the highest point, sRGB.
-const TINTS: [[f64; 3]; 5] =
-    [[88.0, 125.0, 78.0], [140.0, 155.0, 95.0], [170.0, 150.0, 115.0], [150.0, 138.0, 128.0], [235.0, 235.0, 238.0]];
+const TINTS: [[f64; 3]; 5] = [
+    [88.0, 125.0, 78.0],
+    [140.0, 155.0, 95.0],
+    [170.0, 150.0, 115.0],
+    [150.0, 138.0, 128.0],
+    [235.0, 235.0, 238.0],
+];
 
 /// Light that reaches faces turned away from the sun.
 const AMBIENT: f64 = 0.35;
@@ -14,7 +20,8 @@ const AMBIENT: f64 = 0.35;
 /// Rows of a band, whose points are found together.
 const BAND_ROWS: usize = 32;
 
-/// One pixel a height, `shaded` or not; voids are transparent. `height_m` and `point_ned_m` by column and row.
+/// One pixel a height, `shaded` or not; voids are transparent. `height_m` and `point_ned_m` by column and
+/// row.
 pub(super) fn relief(
     size: [u32; 2],
     [low, high]: [f64; 2],
@@ -30,7 +37,8 @@ pub(super) fn relief(
         // With a row more on each side.
         let first = (band * BAND_ROWS).saturating_sub(1);
         let past = (band * BAND_ROWS + BAND_ROWS + 1).min(rows);
-        let points: Vec<DVec3> = (first..past).flat_map(|j| (0..cols).map(move |i| point_ned_m([i as u32, j as u32]))).collect();
+        let points: Vec<DVec3> =
+            (first..past).flat_map(|j| (0..cols).map(move |i| point_ned_m([i as u32, j as u32]))).collect();
         let point = |i: usize, j: usize| points[(j - first) * cols + i];
         for (index, pixel) in pixels.chunks_exact_mut(4).enumerate() {
             let (i, j) = (index % cols, band * BAND_ROWS + index / cols);
@@ -43,7 +51,8 @@ pub(super) fn relief(
             // Beside a void there is no slope: then as level ground.
             let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
             let upwards = if normal.z > 0.0 { -normal } else { normal };
-            let relief = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
+            let relief =
+                AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
             let light = if shaded { relief } else { 1.0 };
             let share = if high > low { (height - low) / (high - low) } else { 0.0 };
             for (byte, tint) in pixel.iter_mut().zip(tint(share)) {

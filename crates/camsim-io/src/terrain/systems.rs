@@ -52,12 +52,15 @@ impl Stated {
         let keys = &geo.keys;
         let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
         if keys.model_type == Some(3) {
-            return Err(meaning("is in geocentric coordinates: convert it with `gdalwarp -t_srs EPSG:CODE IN OUT`".into()));
+            return Err(meaning(
+                "is in geocentric coordinates: convert it with `gdalwarp -t_srs EPSG:CODE IN OUT`".into(),
+            ));
         }
         let code = |key: Option<u16>| key.filter(|code| *code != USER_DEFINED);
         // A projection of the file's own has a geographic system too, as its base.
         let is_own_projection = keys.projected == Some(USER_DEFINED)
-            || (keys.projected.is_none() && (keys.model_type == Some(1) || keys.projection.is_some() || keys.method.is_some()));
+            || (keys.projected.is_none()
+                && (keys.model_type == Some(1) || keys.projection.is_some() || keys.method.is_some()));
         let mut stated = Self { vertical: keys.vertical, ..Self::default() };
         if is_own_projection {
             stated.horizontal = utm_by_zone(keys.projection, keys.geographic, keys.linear_unit);
@@ -128,12 +131,18 @@ impl Stated {
                 None => matches!(name.to_lowercase().as_str(), "dd" | "degrees" | "decimal degrees"),
             };
             if !is_same {
-                return Some(format!("{file} states `Units {name}`, which are not those of {}: correct one of them", of_crs()));
+                return Some(format!(
+                    "{file} states `Units {name}`, which are not those of {}: correct one of them",
+                    of_crs()
+                ));
             }
         }
         let is_utm = matches!(crs.epsg, 25801..=25860 | 26901..=26960 | 32601..=32660 | 32701..=32760);
         if let Some(zone) = arc.utm_zone.filter(|zone| is_utm && crs.epsg % 100 != *zone) {
-            return Some(format!("{file} states UTM zone {zone}, which is not that of {}: correct one of them", of_crs()));
+            return Some(format!(
+                "{file} states UTM zone {zone}, which is not that of {}: correct one of them",
+                of_crs()
+            ));
         }
         (arc.shifts != [0.0; 2]).then(|| {
             format!(
@@ -154,14 +163,16 @@ impl Stated {
             (Some(stated), None) => stated,
             (None, None) => {
                 return Err(match &self.own {
-                    Some(name) => {
-                        TerrainFileError::OwnCrs { path: path.into(), name: if name.is_empty() { "no name".into() } else { name.clone() } }
-                    }
+                    Some(name) => TerrainFileError::OwnCrs {
+                        path: path.into(),
+                        name: if name.is_empty() { "no name".into() } else { name.clone() },
+                    },
                     None => TerrainFileError::NoCrs { path: path.into() },
                 });
             }
         };
-        let crs = Crs::new(epsg).ok_or_else(|| TerrainFileError::UnsupportedCrs { path: path.into(), epsg })?;
+        let crs =
+            Crs::new(epsg).ok_or_else(|| TerrainFileError::UnsupportedCrs { path: path.into(), epsg })?;
         if let Some(problem) = self.contradiction(&crs) {
             return Err(TerrainFileError::Meaning { path: path.into(), problem });
         }
@@ -173,7 +184,10 @@ impl Stated {
                 _ => {}
             },
             Some(metres) => {
-                if let Some(code) = geo.keys.linear_unit.filter(|code| unit_of_code(*code).is_none_or(|unit| (unit - metres).abs() > 1e-9))
+                if let Some(code) = geo
+                    .keys
+                    .linear_unit
+                    .filter(|code| unit_of_code(*code).is_none_or(|unit| (unit - metres).abs() > 1e-9))
                 {
                     return Err(unit("horizontal", code));
                 }
@@ -220,9 +234,10 @@ pub(crate) fn unit_of_name(name: &str) -> Option<f64> {
     let name = name.trim().to_lowercase().replace(['_', '-'], " ").replace(['.', '[', ']', '(', ')'], "");
     Some(match name.as_str() {
         "m" | "metre" | "metres" | "meter" | "meters" => 1.0,
-        "ft" | "foot" | "feet" | "international foot" | "international feet" | "foot international" | "ft intl" => 0.3048,
-        "us survey foot" | "us survey feet" | "survey foot" | "survey feet" | "us foot" | "us feet" | "us ft" | "usft" | "ftus"
-        | "ft us" | "foot us" | "sft" => 1200.0 / 3937.0,
+        "ft" | "foot" | "feet" | "international foot" | "international feet" | "foot international"
+        | "ft intl" => 0.3048,
+        "us survey foot" | "us survey feet" | "survey foot" | "survey feet" | "us foot" | "us feet"
+        | "us ft" | "usft" | "ftus" | "ft us" | "foot us" | "sft" => 1200.0 / 3937.0,
         "cm" | "centimetre" | "centimetres" | "centimeter" | "centimeters" => 0.01,
         "dm" | "decimetre" | "decimetres" | "decimeter" | "decimeters" => 0.1,
         "mm" | "millimetre" | "millimetres" | "millimeter" | "millimeters" => 0.001,
@@ -273,7 +288,9 @@ impl Vertical {
             };
         }
         match old_datum(code) {
-            Some((datum, name)) => Self { code: Some(code), datum: Some(datum), name: name.into(), metres_per_unit: None },
+            Some((datum, name)) => {
+                Self { code: Some(code), datum: Some(datum), name: name.into(), metres_per_unit: None }
+            }
             None => Self {
                 code: Some(code),
                 datum: None,
@@ -285,9 +302,18 @@ impl Vertical {
 
     /// Of a text in a file: by its code and by its own words, where these are two things.
     fn of_text(text: &wkt::VerticalText, file: &str) -> Vec<Self> {
-        let datum = text.is_ellipsoid.map(|is_ellipsoid| if is_ellipsoid { Datum::Ellipsoid } else { Datum::SeaLevel });
-        let by_words = Self { code: text.code, datum, name: format!("{} in {file}", text.name), metres_per_unit: text.metres_per_unit };
-        let Some(known) = text.code.filter(|code| VerticalCrs::new(*code).is_some()) else { return vec![by_words] };
+        let datum = text
+            .is_ellipsoid
+            .map(|is_ellipsoid| if is_ellipsoid { Datum::Ellipsoid } else { Datum::SeaLevel });
+        let by_words = Self {
+            code: text.code,
+            datum,
+            name: format!("{} in {file}", text.name),
+            metres_per_unit: text.metres_per_unit,
+        };
+        let Some(known) = text.code.filter(|code| VerticalCrs::new(*code).is_some()) else {
+            return vec![by_words];
+        };
         let mut by_code = Self::of(known, "");
         by_code.name = format!("{} in {file}", by_code.name);
         let is_same = match (by_code.metres_per_unit, text.metres_per_unit) {
@@ -310,15 +336,17 @@ impl Vertical {
                 "states heights above sea level ({label}), but scene.terrain.height is \"ellipsoid\": set scene.terrain.height = \"msl\" \
                  (the geoid is up to 100 m away from the ellipsoid), and flight.height as the log has it"
             )),
-            (Some(Datum::Ellipsoid), HeightReference::Msl) => {
-                Some(format!("states heights above the ellipsoid ({label}), but scene.terrain.height is \"msl\": set it to \"ellipsoid\""))
-            }
+            (Some(Datum::Ellipsoid), HeightReference::Msl) => Some(format!(
+                "states heights above the ellipsoid ({label}), but scene.terrain.height is \"msl\": set it to \"ellipsoid\""
+            )),
             (Some(Datum::SeaLevel), HeightReference::Msl) if converts && self.code != Some(5773) => {
-                Some(format!("its heights are of {label}; EGM96, which they are converted with, may be a metre or so from it"))
+                Some(format!(
+                    "its heights are of {label}; EGM96, which they are converted with, may be a metre or so from it"
+                ))
             }
-            (None, _) => {
-                Some(format!("states a vertical system that is not known ({label}); its heights are taken as scene.terrain.height says"))
-            }
+            (None, _) => Some(format!(
+                "states a vertical system that is not known ({label}); its heights are taken as scene.terrain.height says"
+            )),
             _ => None,
         }
     }

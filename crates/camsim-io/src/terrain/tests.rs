@@ -21,7 +21,11 @@ fn frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> DVec3
         let (a, f) = (6_378_137.0, 1.0 / 298.257_223_563);
         let e2: f64 = f * (2.0 - f);
         let n = a / (1.0 - e2 * lat.sin().powi(2)).sqrt();
-        DVec3::new((n + h) * lat.cos() * lon.cos(), (n + h) * lat.cos() * lon.sin(), (n * (1.0 - e2) + h) * lat.sin())
+        DVec3::new(
+            (n + h) * lat.cos() * lon.cos(),
+            (n + h) * lat.cos() * lon.sin(),
+            (n * (1.0 - e2) + h) * lat.sin(),
+        )
     }
     let [lat0, lon0] = origin_deg.map(f64::to_radians);
     let origin = ecef(lat0, lon0, height_m);
@@ -48,8 +52,13 @@ struct Tags {
 }
 
 /// UTM 32N around 9 E, 45.1 N, 10 m.
-const UTM: Tags =
-    Tags { scale: [10.0, 10.0, 0.0], tie: [0.0, 0.0, 0.0, 500_000.0, 5_000_000.0, 0.0], epsg: Some(32632), raster_type: 1, nodata: None };
+const UTM: Tags = Tags {
+    scale: [10.0, 10.0, 0.0],
+    tie: [0.0, 0.0, 0.0, 500_000.0, 5_000_000.0, 0.0],
+    epsg: Some(32632),
+    raster_type: 1,
+    nodata: None,
+};
 
 fn write_dem(path: &Path, [width, height]: [u32; 2], heights: &[f32], tags: Option<&Tags>) {
     let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
@@ -74,7 +83,8 @@ fn write_dem(path: &Path, [width, height]: [u32; 2], heights: &[f32], tags: Opti
 /// Model coordinates of the first vertex, by way of the frame at the model point (500000, 5000000).
 fn first_vertex(path: &Path) -> DVec3 {
     let [lat, lon] = Crs::new(32632).unwrap().geodetic_from_model([500_000.0, 5_000_000.0]).unwrap();
-    let loaded = read_terrain(&spec(path, None), &frame([lat.to_degrees(), lon.to_degrees()], 0.0), None).unwrap();
+    let loaded =
+        read_terrain(&spec(path, None), &frame([lat.to_degrees(), lon.to_degrees()], 0.0), None).unwrap();
     loaded.terrain.position_ned_m(0, 0, 0)
 }
 
@@ -85,7 +95,11 @@ fn pixel_centres_are_where_the_raster_type_says() {
     let heights = [7.0; 12];
     write_dem(&path, [4, 3], &heights, Some(&UTM));
     // Area: the tie point is the outer corner. UTM scale on the central meridian is 0.9996.
-    assert!((first_vertex(&path) - DVec3::new(-5.002, 5.002, -7.0)).length() < 2e-3, "{}", first_vertex(&path));
+    assert!(
+        (first_vertex(&path) - DVec3::new(-5.002, 5.002, -7.0)).length() < 2e-3,
+        "{}",
+        first_vertex(&path)
+    );
     write_dem(&path, [4, 3], &heights, Some(&Tags { raster_type: 2, ..UTM }));
     assert!((first_vertex(&path) - DVec3::new(0.0, 0.0, -7.0)).length() < 2e-3, "{}", first_vertex(&path));
     // A world file means centres too.
@@ -97,7 +111,8 @@ fn pixel_centres_are_where_the_raster_type_says() {
     let loaded = read_terrain(&with_epsg, &frame([45.0, 9.0], 0.0), Some(&|_, _| 50.0)).unwrap();
     assert_eq!((loaded.summary.epsg, loaded.summary.height_range_m), (32632, [7.0, 7.0]));
     let shifted = loaded.terrain.position_ned_m(0, 0, 0);
-    let plain = read_terrain(&with_epsg, &frame([45.0, 9.0], 0.0), None).unwrap().terrain.position_ned_m(0, 0, 0);
+    let plain =
+        read_terrain(&with_epsg, &frame([45.0, 9.0], 0.0), None).unwrap().terrain.position_ned_m(0, 0, 0);
     // 17 km away from the frame's origin "up" leans by a few milliradians.
     assert!((plain.z - shifted.z - 50.0).abs() < 1e-3 && (plain - shifted).truncate().length() < 0.5);
 }
@@ -120,7 +135,10 @@ fn a_raster_from_the_south_is_turned() {
     for n in 0..12 {
         assert!((a.position_ned_m(0, n % 4, n / 4) - b.position_ned_m(0, n % 4, n / 4)).length() < 1e-6);
     }
-    assert!(a.position_ned_m(0, 0, 0).x > a.position_ned_m(0, 0, 2).x && a.position_ned_m(0, 0, 0).y < a.position_ned_m(0, 3, 0).y);
+    assert!(
+        a.position_ned_m(0, 0, 0).x > a.position_ned_m(0, 0, 2).x
+            && a.position_ned_m(0, 0, 0).y < a.position_ned_m(0, 3, 0).y
+    );
 }
 
 #[test]
@@ -150,7 +168,9 @@ fn files_that_are_no_terrain_are_named() {
     let path = folder.path().join("dem.tif");
     let ned = frame([45.15, 9.0], 0.0);
     let fails = |wanted: Option<u16>, text: &str| {
-        let error = read_terrain(&TerrainSpec { epsg: wanted, ..spec(&path, None) }, &ned, None).unwrap_err().to_string();
+        let error = read_terrain(&TerrainSpec { epsg: wanted, ..spec(&path, None) }, &ned, None)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("dem.tif") && error.contains(text), "{error}");
     };
     fails(None, "cannot be read");
@@ -203,7 +223,10 @@ fn an_ortho_may_have_another_coordinate_system() {
     let mut encoder = TiffEncoder::new(fs::File::create(&ortho).unwrap()).unwrap();
     let mut image = encoder.new_image::<colortype::RGB8>(10, 10).unwrap();
     image.encoder().write_tag(Tag::ModelPixelScaleTag, &[100.0, 100.0, 0.0][..]).unwrap();
-    image.encoder().write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, x - 250.0, y + 750.0, 0.0][..]).unwrap();
+    image
+        .encoder()
+        .write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, x - 250.0, y + 750.0, 0.0][..])
+        .unwrap();
     image.encoder().write_tag(Tag::GeoKeyDirectoryTag, &[1u16, 1, 0, 1, 3072, 0, 1, 3857][..]).unwrap();
     image.write_data(&[50; 300]).unwrap();
     let loaded = read_terrain(&spec(&dem, Some(&ortho)), &frame([45.15, 9.0], 0.0), None).unwrap();
@@ -252,18 +275,33 @@ fn sertig_lies_where_it_should() {
     let origin = [46.735383, 9.836560];
     let ned = frame(origin, 0.0);
     let begin = std::time::Instant::now();
-    let loaded = read_terrain(&spec(&folder.join("sertig_valley.tif"), Some(&folder.join("sertig_valley_color.tif"))), &ned, None).unwrap();
+    let loaded = read_terrain(
+        &spec(&folder.join("sertig_valley.tif"), Some(&folder.join("sertig_valley_color.tif"))),
+        &ned,
+        None,
+    )
+    .unwrap();
     eprintln!("sertig loads in {:.3} s", begin.elapsed().as_secs_f64());
     let (terrain, summary) = (&loaded.terrain, &loaded.summary);
-    assert_eq!((terrain.cells, summary.void_heights, summary.outside_ortho, summary.epsg), ([640, 916], 0, 0, 21781));
-    assert!((summary.height_range_m[0] - 1491.7).abs() < 0.1 && (summary.height_range_m[1] - 3002.4).abs() < 0.1);
+    assert_eq!(
+        (terrain.cells, summary.void_heights, summary.outside_ortho, summary.epsg),
+        ([640, 916], 0, 0, 21781)
+    );
+    assert!(
+        (summary.height_range_m[0] - 1491.7).abs() < 0.1 && (summary.height_range_m[1] - 3002.4).abs() < 0.1
+    );
     // The frame's origin is E 783249 N 178821: column 320, row 458 of the grid (pixel centres).
     let (chunk, i, j) = (7 * terrain.chunk_grid[0] + 5, 0, 458 - 448);
     let centre = terrain.position_ned_m(chunk, i, j);
     assert!(centre.truncate().length() < 2.0, "{centre}");
-    // The grid turns against north by the convergence of the Swiss grid there, atan(2.4 deg * sin 46.7 deg) = 1.74 deg.
+    // The grid turns against north by the convergence of the Swiss grid there, atan(2.4 deg * sin 46.7 deg) =
+    // 1.74 deg.
     let north = terrain.position_ned_m(2 * terrain.chunk_grid[0] + 5, 0, 0) - centre;
-    assert!(((-north.y).atan2(north.x).to_degrees() + 1.745).abs() < 0.03, "{}", (-north.y).atan2(north.x).to_degrees());
+    assert!(
+        ((-north.y).atan2(north.x).to_degrees() + 1.745).abs() < 0.03,
+        "{}",
+        (-north.y).atan2(north.x).to_degrees()
+    );
     let down = terrain.down_at(0.0, 0.0).unwrap();
     assert!((-down - -centre.z).abs() < 30.0, "{down} {centre}");
 
@@ -275,7 +313,8 @@ fn sertig_lies_where_it_should() {
         let mut before = u64::MAX;
         for max_error_px in [0.25, 0.5, 1.0, 2.0, 4.0] {
             let begin = std::time::Instant::now();
-            let mesh = TerrainDetail::new(terrain, &camera, [-1.0, 1.0, -0.75, 0.75], 307.6, max_error_px).mesh();
+            let mesh =
+                TerrainDetail::new(terrain, &camera, [-1.0, 1.0, -0.75, 0.75], 307.6, max_error_px).mesh();
             let (lod, microseconds) = (mesh.lod, begin.elapsed().as_secs_f64() * 1e6);
             eprintln!(
                 "{name} {max_error_px} px: {} chunks, {} triangles, {:.3} px, {microseconds:.0} us",
@@ -296,7 +335,12 @@ fn all_real_terrains_load() {
         ("hinwil/hinwil.tif", Some("hinwil/hinwil_color.tif"), [47.31, 8.83], 0.0),
         ("hinwil/hinwil_large_dem.tif", Some("hinwil/hinwil_color.tif"), [47.31, 8.83], 0.0),
         ("bern/swissALTI3D_bern_2m.tif", None, [46.93, 7.45], 0.0),
-        ("brighton_beach/brighton_beach_dsm_10cm.tif", Some("brighton_beach/brighton_beach_rgb_10cm.tif"), [46.84258, -91.99405], 0.57),
+        (
+            "brighton_beach/brighton_beach_dsm_10cm.tif",
+            Some("brighton_beach/brighton_beach_rgb_10cm.tif"),
+            [46.84258, -91.99405],
+            0.57,
+        ),
         ("jacksboro/jacksboro_fault_dem.tif", None, [36.59, -84.25], 0.0),
     ] {
         let ortho = ortho.map(|name| folder.join(name));
@@ -318,7 +362,10 @@ fn all_real_terrains_load() {
         assert!(summary.centre_ned_m.truncate().length() < 10_000.0, "{dem} {}", summary.centre_ned_m);
         let share = summary.void_heights as f64 / (f64::from(summary.size[0]) * f64::from(summary.size[1]));
         assert!((share - void_share).abs() < 0.01, "{dem} {share}");
-        assert!(summary.south_west_rad[0] < summary.centre_rad[0] && summary.centre_rad[1] < summary.north_east_rad[1]);
+        assert!(
+            summary.south_west_rad[0] < summary.centre_rad[0]
+                && summary.centre_rad[1] < summary.north_east_rad[1]
+        );
         // The bounding box's middle has ground (unless void), at the height of the file.
         let middle = terrain.bounds.centre();
         match terrain.down_at(middle.x, middle.y) {
@@ -328,7 +375,8 @@ fn all_real_terrains_load() {
     }
 }
 
-/// Without a picture the colours of heights have a shading of their own; in the scene's light they have that instead, not on top.
+/// Without a picture the colours of heights have a shading of their own; in the scene's light they have that
+/// instead, not on top.
 #[test]
 fn the_scenes_light_takes_the_place_of_the_shading_of_heights() {
     let folder = tempfile::tempdir().unwrap();
@@ -353,7 +401,10 @@ fn the_scenes_light_takes_the_place_of_the_shading_of_heights() {
         for (a, b) in a[..3].iter().zip(b) {
             // Both are rounded to a byte of sRGB.
             let [low, high] = [a.saturating_sub(1), a.saturating_add(1)].map(|a| linear(a) * ratio);
-            assert!(linear(b.saturating_sub(1)) <= high && linear(b.saturating_add(1)) >= low, "{a} {b} {ratio}");
+            assert!(
+                linear(b.saturating_sub(1)) <= high && linear(b.saturating_add(1)) >= low,
+                "{a} {b} {ratio}"
+            );
         }
     }
 }

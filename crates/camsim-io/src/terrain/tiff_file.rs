@@ -1,7 +1,7 @@
 //! TIFF and BigTIFF files: what their directories say, and their pixels as they are stored.
 //!
-//! Blocks (strips or tiles) are decoded here one by one, because what decides about truth is in them: blocks that are not there, bands beyond the
-//! third, masks in a directory of their own, values of 12 bits.
+//! Blocks (strips or tiles) are decoded here one by one, because what decides about truth is in them: blocks
+//! that are not there, bands beyond the third, masks in a directory of their own, values of 12 bits.
 
 mod blocks;
 mod compression;
@@ -51,7 +51,15 @@ pub(crate) fn gdal_translate(options: &str, path: &std::path::Path) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let quoted = |path: &std::path::Path| {
         let text = path.display().to_string();
-        if text.chars().any(|c| c.is_whitespace() || "'\"()&;$".contains(c)) { format!("'{}'", text.replace('\'', "'\\''")) } else { text }
+        if text.chars().any(|c| c.is_whitespace() || "'\"()&;$".contains(c)) {
+            format!("'{}'", text.replace('\'', "'\\''"))
+        } else {
+            text
+        }
     };
-    format!("gdal_translate {options} {} {}", quoted(path), quoted(&path.with_file_name(format!("{stem}_converted.tif"))))
+    format!(
+        "gdal_translate {options} {} {}",
+        quoted(path),
+        quoted(&path.with_file_name(format!("{stem}_converted.tif")))
+    )
 }

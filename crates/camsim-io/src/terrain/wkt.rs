@@ -1,7 +1,7 @@
 //! Coordinate systems as well-known text: which EPSG code they are.
 //!
-//! By the code that the text itself states, or by the names that ESRI gives, which state none. A definition without either is not compared number
-//! by number: two that look alike may be two datums.
+//! By the code that the text itself states, or by the names that ESRI gives, which state none. A definition
+//! without either is not compared number by number: two that look alike may be two datums.
 
 use super::crs::SYSTEMS;
 
@@ -46,9 +46,14 @@ pub(super) fn codes(text: &str) -> Codes {
     let parts = children(text);
     let is_compound = ["COMPD_CS", "COMPOUNDCRS"].iter().any(|word| text.starts_with(word));
     if is_compound {
-        let vertical = parts.iter().find(|part| ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word)));
+        let vertical = parts.iter().find(|part| {
+            ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word))
+        });
         let horizontal = parts.iter().find(|part| part.starts_with("PROJ") || part.starts_with("GEO"));
-        return Codes { horizontal: horizontal.and_then(|part| code(part)), vertical: vertical.and_then(|part| stated(part)) };
+        return Codes {
+            horizontal: horizontal.and_then(|part| code(part)),
+            vertical: vertical.and_then(|part| stated(part)),
+        };
     }
     Codes { horizontal: code(text), vertical: None }
 }
@@ -57,24 +62,36 @@ pub(super) fn codes(text: &str) -> Codes {
 pub(super) fn vertical(text: &str) -> Option<VerticalText> {
     let all = format!("ALL[{}]", text.trim().trim_start_matches('\u{feff}'));
     let definitions = children(&all).into_iter().flat_map(|part| {
-        let inside = if ["COMPD_CS", "COMPOUNDCRS"].iter().any(|word| part.starts_with(word)) { children(part) } else { Vec::new() };
+        let inside = if ["COMPD_CS", "COMPOUNDCRS"].iter().any(|word| part.starts_with(word)) {
+            children(part)
+        } else {
+            Vec::new()
+        };
         std::iter::once(part).chain(inside)
     });
-    let found =
-        definitions.into_iter().find(|part| ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word)))?;
+    let found = definitions.into_iter().find(|part| {
+        ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word))
+    })?;
     let parts = children(found);
-    let starting = |words: &[&str]| parts.iter().copied().find(|part| words.iter().any(|word| part.starts_with(word)));
+    let starting =
+        |words: &[&str]| parts.iter().copied().find(|part| words.iter().any(|word| part.starts_with(word)));
     let parameter = |name: &str| {
-        parts.iter().find(|part| part.starts_with("PARAMETER") && self::name(part).eq_ignore_ascii_case(name)).and_then(|part| second(part))
+        parts
+            .iter()
+            .find(|part| part.starts_with("PARAMETER") && self::name(part).eq_ignore_ascii_case(name))
+            .and_then(|part| second(part))
     };
     let axis = starting(&["AXIS"]);
     let is_down = parameter("Direction").is_some_and(|direction| direction < 0.0)
-        || axis.is_some_and(|axis| children(axis).iter().skip(1).any(|word| word.eq_ignore_ascii_case("down")));
+        || axis
+            .is_some_and(|axis| children(axis).iter().skip(1).any(|word| word.eq_ignore_ascii_case("down")));
     let size = length_unit(found).or_else(|| axis.and_then(length_unit)).filter(|size| *size > 0.0);
     let datum = starting(&["VDATUM", "VERT_DATUM", "VERTDATUM", "VERTICALDATUM", "VRF", "ENSEMBLE", "DATUM"]);
     let is_ellipsoid = datum
         .filter(|datum| !matches!(name(datum).to_lowercase().as_str(), "unknown" | "unnamed" | "local"))
-        .map(|datum| datum.starts_with("DATUM") || datum.starts_with("VERT_DATUM") && second(datum) == Some(2002.0));
+        .map(|datum| {
+            datum.starts_with("DATUM") || datum.starts_with("VERT_DATUM") && second(datum) == Some(2002.0)
+        });
     Some(VerticalText {
         code: stated(found),
         name: name(found).to_owned(),
@@ -88,13 +105,19 @@ pub(super) fn vertical(text: &str) -> Option<VerticalText> {
 pub(super) fn horizontal_unit(text: &str) -> Option<f64> {
     let text = text.trim().trim_start_matches('\u{feff}');
     let parts = children(text);
-    let projected =
-        if text.starts_with("PROJ") { Some(text) } else { parts.into_iter().find(|part| part.starts_with("PROJ") && part.contains('[')) };
+    let projected = if text.starts_with("PROJ") {
+        Some(text)
+    } else {
+        parts.into_iter().find(|part| part.starts_with("PROJ") && part.contains('['))
+    };
     projected.and_then(length_unit)
 }
 
 fn length_unit(text: &str) -> Option<f64> {
-    children(text).into_iter().find(|part| part.starts_with("UNIT[") || part.starts_with("LENGTHUNIT[")).and_then(second)
+    children(text)
+        .into_iter()
+        .find(|part| part.starts_with("UNIT[") || part.starts_with("LENGTHUNIT["))
+        .and_then(second)
 }
 
 /// The number behind a name.
@@ -113,7 +136,8 @@ fn code(text: &str) -> Option<u16> {
 
 /// `AUTHORITY["EPSG","N"]` or `ID["EPSG",N]` of the text itself, not of its parts.
 fn stated(text: &str) -> Option<u16> {
-    let own = children(text).into_iter().find(|part| part.starts_with("AUTHORITY") || part.starts_with("ID["))?;
+    let own =
+        children(text).into_iter().find(|part| part.starts_with("AUTHORITY") || part.starts_with("ID["))?;
     if !own.contains("\"EPSG\"") {
         return None;
     }
@@ -122,12 +146,15 @@ fn stated(text: &str) -> Option<u16> {
 
 fn by_name(name: &str) -> Option<u16> {
     let name = name.replace('_', " ");
-    for (start, north, south) in
-        [("WGS 1984 UTM Zone ", 32600, Some(32700)), ("ETRS 1989 UTM Zone ", 25800, None), ("NAD 1983 UTM Zone ", 26900, None)]
-    {
+    for (start, north, south) in [
+        ("WGS 1984 UTM Zone ", 32600, Some(32700)),
+        ("ETRS 1989 UTM Zone ", 25800, None),
+        ("NAD 1983 UTM Zone ", 26900, None),
+    ] {
         let Some(zone) = name.strip_prefix(start) else { continue };
         let base = if zone.ends_with('S') { south? } else { north };
-        let zone: u16 = zone.trim_end_matches(['N', 'S']).parse().ok().filter(|zone| (1..=60).contains(zone))?;
+        let zone: u16 =
+            zone.trim_end_matches(['N', 'S']).parse().ok().filter(|zone| (1..=60).contains(zone))?;
         return Some(base + zone);
     }
     if let Some(zone) = name.strip_prefix("GDA 1994 MGA Zone ") {
@@ -141,13 +168,15 @@ fn by_name(name: &str) -> Option<u16> {
         zone.parse::<u16>().ok().filter(|zone| (1..=60).contains(zone)).map(|zone| base + zone)
     };
     // As the registry itself calls them.
-    by_rule("WGS 84 / UTM zone ", 32600, 'N').or_else(|| by_rule("WGS 84 / UTM zone ", 32700, 'S')).or_else(|| {
-        SYSTEMS.lines().find_map(|line| {
-            let mut words = line.split(';');
-            let (kind, code, known) = (words.next()?, words.next()?, words.next()?);
-            (matches!(kind, "projected" | "geographic") && known == name).then(|| code.parse().ok())?
-        })
-    })
+    by_rule("WGS 84 / UTM zone ", 32600, 'N').or_else(|| by_rule("WGS 84 / UTM zone ", 32700, 'S')).or_else(
+        || {
+            SYSTEMS.lines().find_map(|line| {
+                let mut words = line.split(';');
+                let (kind, code, known) = (words.next()?, words.next()?, words.next()?);
+                (matches!(kind, "projected" | "geographic") && known == name).then(|| code.parse().ok())?
+            })
+        },
+    )
 }
 
 /// The parts between a text's outermost brackets.
@@ -190,14 +219,24 @@ mod tests {
         // Without its own code it is not its base's; its name is known.
         assert_eq!(found(&UTM.replace(r#","32632"]"#, r#"x"]"#)), Some(32632));
         assert_eq!(found(&UTM.replace(r#","32632"]"#, r#"x"]"#).replace("zone 32N", "of mine")), None);
-        assert_eq!(found(r#"PROJCS["WGS_1984_UTM_Zone_33S",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]]"#), Some(32733));
-        assert_eq!(found(r#"PROJCS["ETRS_1989_UTM_Zone_32N",GEOGCS["GCS_ETRS_1989",DATUM["D"]]]"#), Some(25832));
+        assert_eq!(
+            found(r#"PROJCS["WGS_1984_UTM_Zone_33S",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]]"#),
+            Some(32733)
+        );
+        assert_eq!(
+            found(r#"PROJCS["ETRS_1989_UTM_Zone_32N",GEOGCS["GCS_ETRS_1989",DATUM["D"]]]"#),
+            Some(25832)
+        );
         assert_eq!(found(r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]"#), Some(4326));
-        assert_eq!(found(r#"PROJCRS["RGF93 v1 / Lambert-93",BASEGEOGCRS["RGF93 v1"],ID["EPSG",2154]]"#), Some(2154));
+        assert_eq!(
+            found(r#"PROJCRS["RGF93 v1 / Lambert-93",BASEGEOGCRS["RGF93 v1"],ID["EPSG",2154]]"#),
+            Some(2154)
+        );
         assert_eq!(found("Projection UTM\nZone 32"), None);
         assert_eq!(found("PROJCS[\"a\"[[["), None);
-        let both =
-            format!(r#"COMPD_CS["both",{UTM},VERT_CS["EGM96 height",UNIT["metre",1],AUTHORITY["EPSG","5773"]],AUTHORITY["EPSG","9999"]]"#);
+        let both = format!(
+            r#"COMPD_CS["both",{UTM},VERT_CS["EGM96 height",UNIT["metre",1],AUTHORITY["EPSG","5773"]],AUTHORITY["EPSG","9999"]]"#
+        );
         assert_eq!(codes(&both), Codes { horizontal: Some(32632), vertical: Some(5773) });
     }
 

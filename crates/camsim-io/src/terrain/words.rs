@@ -3,11 +3,21 @@
 use super::{geo_tags::GeoTags, systems::unit_of_name};
 
 /// Names of items that have the unit of heights.
-const UNITS: [&str; 9] =
-    ["units", "unit", "zunits", "zunit", "verticalunits", "verticalunit", "heightunits", "heightunit", "elevationunits"];
+const UNITS: [&str; 9] = [
+    "units",
+    "unit",
+    "zunits",
+    "zunit",
+    "verticalunits",
+    "verticalunit",
+    "heightunits",
+    "heightunit",
+    "elevationunits",
+];
 
 /// Variables of netCDF that are no heights.
-const COORDINATES: [&str; 10] = ["x", "y", "lat", "lon", "latitude", "longitude", "time", "t", "easting", "northing"];
+const COORDINATES: [&str; 10] =
+    ["x", "y", "lat", "lon", "latitude", "longitude", "time", "t", "easting", "northing"];
 
 /// `Band1#units` is of a variable; those of coordinates are none of these.
 fn key(name: &str) -> Option<String> {
@@ -19,10 +29,14 @@ fn key(name: &str) -> Option<String> {
 /// Items that have a unit: name and value.
 pub(super) fn units(geo: &GeoTags) -> impl Iterator<Item = (&str, &str)> {
     let is_unit = |name: &str| key(name).is_some_and(|key| UNITS.contains(&key.as_str()));
-    geo.items.iter().filter(move |(name, value)| is_unit(name) && !value.is_empty()).map(|(name, value)| (name.as_str(), value.as_str()))
+    geo.items
+        .iter()
+        .filter(move |(name, value)| is_unit(name) && !value.is_empty())
+        .map(|(name, value)| (name.as_str(), value.as_str()))
 }
 
-/// Notes on what is not applied. `metres` are those of the unit that is, `scale` is the band's own; `is_asked`: whether a key gave the unit.
+/// Notes on what is not applied. `metres` are those of the unit that is, `scale` is the band's own;
+/// `is_asked`: whether a key gave the unit.
 pub(super) fn notes(geo: &GeoTags, metres: f64, scale: [f64; 2], is_asked: bool) -> Vec<String> {
     let mut notes = Vec::new();
     let number = |wanted: &str| {
@@ -38,12 +52,13 @@ pub(super) fn notes(geo: &GeoTags, metres: f64, scale: [f64; 2], is_asked: bool)
         ));
     }
     for (name, value) in units(geo).filter(|(_, value)| unit_of_name(value).is_none()) {
-        notes.push(format!("the item {name} is `{value}`, which is no unit of heights that is known, and is not used"));
+        notes.push(format!(
+            "the item {name} is `{value}`, which is no unit of heights that is known, and is not used"
+        ));
     }
-    let of_items = geo
-        .items
-        .iter()
-        .filter(|(name, _)| key(name).is_some_and(|key| matches!(key.as_str(), "longname" | "standardname" | "description")));
+    let of_items = geo.items.iter().filter(|(name, _)| {
+        key(name).is_some_and(|key| matches!(key.as_str(), "longname" | "standardname" | "description"))
+    });
     let vertical = Some(&geo.keys.vertical_citation).filter(|text| !text.is_empty());
     for text in geo.descriptions.iter().chain(of_items.map(|(_, value)| value)).chain(vertical) {
         let shown: String = text.trim_end_matches('\0').trim().chars().take(80).collect();
@@ -56,7 +71,9 @@ pub(super) fn notes(geo: &GeoTags, metres: f64, scale: [f64; 2], is_asked: bool)
             notes.push(depths(&format!("is described as `{shown}`")));
         }
     }
-    if geo.items.iter().any(|(name, value)| key(name).is_some_and(|key| key == "positive") && value.eq_ignore_ascii_case("down")) {
+    if geo.items.iter().any(|(name, value)| {
+        key(name).is_some_and(|key| key == "positive") && value.eq_ignore_ascii_case("down")
+    }) {
         notes.push(depths("has an item positive = down"));
     }
     notes

@@ -10,13 +10,16 @@ use std::{
 
 use super::WriteError;
 
-/// Writes `bytes` under a temporary name in the same folder (made if need be) and renames; nothing is left behind on failure.
+/// Writes `bytes` under a temporary name in the same folder (made if need be) and renames; nothing is left
+/// behind on failure.
 ///
 /// # Errors
 /// With the path, the system's reason and what to do.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
-    let name = path.file_name().ok_or_else(|| fail(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file")))?;
+    let name = path
+        .file_name()
+        .ok_or_else(|| fail(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     if !folder.as_os_str().is_empty() {
         fs::create_dir_all(folder).map_err(fail)?;
@@ -31,7 +34,8 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     })
 }
 
-/// Removes what killed runs left of these files: temporary names that nobody will rename. Whoever else writes below the folder writes other files.
+/// Removes what killed runs left of these files: temporary names that nobody will rename. Whoever else writes
+/// below the folder writes other files.
 pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
     let mut by_folder: HashMap<PathBuf, HashSet<OsString>> = HashMap::new();
     for path in paths {
@@ -42,7 +46,8 @@ pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
     for (folder, names) in by_folder {
         // A folder that is not there has nothing to sweep; litter that cannot be removed stays litter.
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            if entry.file_name().to_str().and_then(meant).is_some_and(|name| names.contains(OsStr::new(name))) {
+            if entry.file_name().to_str().and_then(meant).is_some_and(|name| names.contains(OsStr::new(name)))
+            {
                 let _ = fs::remove_file(entry.path());
             }
         }
@@ -67,7 +72,15 @@ mod tests {
     fn only_leftovers_of_these_files_go() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        let stay = ["a.exr", ".b.exr.12-0.tmp", ".a.exr.tmp", ".a.exr.12-.tmp", ".a.exr.x-1.tmp", "a.exr.12-0.tmp", ".a.exr.12-0"];
+        let stay = [
+            "a.exr",
+            ".b.exr.12-0.tmp",
+            ".a.exr.tmp",
+            ".a.exr.12-.tmp",
+            ".a.exr.x-1.tmp",
+            "a.exr.12-0.tmp",
+            ".a.exr.12-0",
+        ];
         let go = [".a.exr.12-0.tmp", ".a.exr.4711-38.tmp"];
         stay.iter().chain(&go).for_each(|name| fs::write(at(name), "x").unwrap());
         sweep([at("a.exr"), at("none/c.exr")].into_iter());

@@ -35,8 +35,12 @@ struct SrgbTable {
 }
 
 static SRGB: LazyLock<SrgbTable> = LazyLock::new(|| {
-    let steps = std::array::from_fn(|code| if code < 255 { linear_from_srgb((code as f64 + 0.5) / 255.0) as f32 } else { f32::INFINITY });
-    let first = std::array::from_fn(|cell| (srgb_from_linear(cell as f64 / CELLS as f64) * 255.0 - 0.5).floor().max(0.0) as u8);
+    let steps = std::array::from_fn(|code| {
+        if code < 255 { linear_from_srgb((code as f64 + 0.5) / 255.0) as f32 } else { f32::INFINITY }
+    });
+    let first = std::array::from_fn(|cell| {
+        (srgb_from_linear(cell as f64 / CELLS as f64) * 255.0 - 0.5).floor().max(0.0) as u8
+    });
     SrgbTable { steps, first }
 });
 

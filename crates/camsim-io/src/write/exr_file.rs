@@ -3,7 +3,10 @@
 use std::{io::Cursor, path::Path};
 
 use camsim_core::scenario::{ExrCompression, ExrPixel};
-use exr::prelude::{AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LineOrder, SmallVec, Vec2, WritableImage};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LineOrder, SmallVec, Vec2,
+    WritableImage,
+};
 use half::f16;
 
 use super::WriteError;
@@ -21,8 +24,11 @@ pub(super) fn encode(
     for (channel, name) in names.iter().enumerate() {
         let plane = samples.iter().skip(channel).step_by(names.len());
         let plane = match pixel {
-            // Beyond the range of half a value would become an infinity, which no reader expects of a picture.
-            ExrPixel::Half => FlatSamples::F16(plane.map(|&v| f16::from_f32(v.clamp(-65504.0, 65504.0))).collect()),
+            // Beyond the range of half a value would become an infinity, which no reader expects of a
+            // picture.
+            ExrPixel::Half => {
+                FlatSamples::F16(plane.map(|&v| f16::from_f32(v.clamp(-65504.0, 65504.0))).collect())
+            }
             ExrPixel::Float => FlatSamples::F32(plane.copied().collect()),
         };
         list.push(AnyChannel::new(*name, plane));

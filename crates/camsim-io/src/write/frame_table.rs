@@ -14,9 +14,9 @@ use super::{
     write_atomic,
 };
 
-/// What each row begins with, before a column of paths for each file of a frame. The first pose is the camera's at the stamp; columns that begin with `ideal_`
-/// say what the source coordinates x, y of `coords` are in: a pinhole camera's frame, and where that camera is at which instant. Both q are
-/// ned_from_camera.
+/// What each row begins with, before a column of paths for each file of a frame. The first pose is the
+/// camera's at the stamp; columns that begin with `ideal_` say what the source coordinates x, y of `coords`
+/// are in: a pinhole camera's frame, and where that camera is at which instant. Both q are ned_from_camera.
 pub const FRAMES_COLUMNS: &str = "frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
                                   ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
@@ -134,7 +134,9 @@ impl FrameTable {
         });
         let is_used = |column: usize| self.rows.values().any(|(_, files)| !files[column].is_empty());
         let used: Vec<bool> = (0..columns).map(is_used).collect();
-        let kept = |list: &[String]| list.iter().zip(&used).filter(|(_, used)| **used).map(|(item, _)| item.clone()).collect();
+        let kept = |list: &[String]| {
+            list.iter().zip(&used).filter(|(_, used)| **used).map(|(item, _)| item.clone()).collect()
+        };
         self.columns = kept(&self.columns);
         self.rows.values_mut().for_each(|(_, files)| *files = kept(files));
     }
@@ -149,7 +151,9 @@ impl FrameTable {
     #[must_use]
     pub fn has_files(&self, index: u64, files: &[(String, String)]) -> bool {
         let Some((_, there)) = self.rows.get(&index) else { return false };
-        let has = |column: &String, file: &String| self.columns.iter().zip(there).any(|(known, at)| known == column && at == file);
+        let has = |column: &String, file: &String| {
+            self.columns.iter().zip(there).any(|(known, at)| known == column && at == file)
+        };
         files.iter().all(|(column, file)| has(column, file))
     }
 
@@ -196,9 +200,17 @@ mod tests {
     use super::*;
 
     fn record(frame: u64, columns: &[&str]) -> FrameRecord {
-        let pose = CameraPose { position_ned_m: DVec3::new(1.0, -2.5, 3.0), ned_from_camera: DQuat::IDENTITY };
-        let source = SourceFrame { size_px: [700, 500], focal_px: [420.0, 421.5], principal_px: [349.5, 249.25], t_ns: -7, pose };
-        let files = columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
+        let pose =
+            CameraPose { position_ned_m: DVec3::new(1.0, -2.5, 3.0), ned_from_camera: DQuat::IDENTITY };
+        let source = SourceFrame {
+            size_px: [700, 500],
+            focal_px: [420.0, 421.5],
+            principal_px: [349.5, 249.25],
+            t_ns: -7,
+            pose,
+        };
+        let files =
+            columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
         FrameRecord { frame, stamp_ns: 9, pose, source, files }
     }
 
@@ -209,12 +221,17 @@ mod tests {
         let text = table.to_csv();
         assert_eq!(
             text,
-            format!("{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,0,0,color_exr/4\n")
+            format!(
+                "{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,0,0,color_exr/4\n"
+            )
         );
         assert_eq!(FrameTable::parse(&text).unwrap(), table);
         assert_eq!(FrameTable::default().to_csv(), format!("{FRAMES_COLUMNS}\n"));
         // Of another version.
-        assert_eq!(FrameTable::parse("frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,a\n"), None);
+        assert_eq!(
+            FrameTable::parse("frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,a\n"),
+            None
+        );
     }
 
     #[test]
@@ -241,7 +258,12 @@ mod tests {
         table.keep_what_is_in(folder.path(), &|frame| frame == 1);
         let lines: Vec<String> = table.to_csv().lines().map(str::to_owned).collect();
         assert!(lines.len() == 3 && lines[0].ends_with("ideal_qz,depth"), "{lines:?}");
-        assert!(lines[1].starts_with("1,9,") && lines[1].ends_with("0,") && lines[2].starts_with("3,9,") && lines[2].ends_with(",depth/3"));
+        assert!(
+            lines[1].starts_with("1,9,")
+                && lines[1].ends_with("0,")
+                && lines[2].starts_with("3,9,")
+                && lines[2].ends_with(",depth/3")
+        );
         assert!(table.contains(3) && !table.contains(0));
     }
 }

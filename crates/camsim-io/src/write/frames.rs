@@ -46,7 +46,8 @@ impl FrameFiles {
         self.pieces().into_iter().map(|piece| (column(piece).to_owned(), name(piece, index))).collect()
     }
 
-    /// Whether every file of frame `index` is there, which `--resume` takes for done: files are never there in part.
+    /// Whether every file of frame `index` is there, which `--resume` takes for done: files are never there
+    /// in part.
     pub fn exist(&self, index: u64) -> bool {
         let names = self.names(index);
         !names.is_empty() && names.iter().all(|(_, name)| self.folder.join(name).is_file())
@@ -60,24 +61,33 @@ impl FrameFiles {
         for (_, name) in frames.iter().flat_map(|&index| self.names(index)) {
             let path = self.folder.join(name);
             match std::fs::remove_file(&path) {
-                Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(WriteError::Io { path, source }),
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(WriteError::Io { path, source });
+                }
                 _ => {}
             }
         }
         Ok(())
     }
 
-    /// Files of frames in the folder, of any channel, that are not among those of `frames`: paths below the folder, in order.
+    /// Files of frames in the folder, of any channel, that are not among those of `frames`: paths below the
+    /// folder, in order.
     pub fn others(&self, frames: &[u64]) -> Vec<String> {
-        let own: std::collections::HashSet<String> = frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
+        let own: std::collections::HashSet<String> =
+            frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
         let mut others = Vec::new();
         // A folder that cannot be read has nothing that could be mixed up.
         for channel in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
             let of_channel = channel.file_name().to_string_lossy().into_owned();
             for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
                 let name = file.file_name().to_string_lossy().into_owned();
-                let number = name.strip_prefix("frame_").and_then(|rest| rest.split_once('.')).map(|(number, _)| number);
-                let is_frame = number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()));
+                let number = name
+                    .strip_prefix("frame_")
+                    .and_then(|rest| rest.split_once('.'))
+                    .map(|(number, _)| number);
+                let is_frame = number.is_some_and(|number| {
+                    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+                });
                 let path = format!("{of_channel}/{name}");
                 if is_frame && !own.contains(&path) {
                     others.push(path);
@@ -127,7 +137,9 @@ impl FrameFiles {
                 exr_file::encode(&path, frame.size_px, names, samples, pixel, self.output.exr_compression)
             };
             let bytes = match piece {
-                Piece::Color(ImageFormat::Exr) => exr(&["R", "G", "B", "A"], &frame.color_rgba, self.output.exr_pixel)?,
+                Piece::Color(ImageFormat::Exr) => {
+                    exr(&["R", "G", "B", "A"], &frame.color_rgba, self.output.exr_pixel)?
+                }
                 Piece::Color(ImageFormat::Png) => png_file::encode_color(&path, frame, self.encoding)?,
                 Piece::Depth => exr(&["Z"], frame.depth_m.as_deref().unwrap_or_default(), ExrPixel::Float)?,
                 Piece::Valid => png_file::encode_valid(&path, frame)?,
@@ -173,12 +185,17 @@ fn check(frame: &RenderedFrame, pieces: &[Piece]) -> Result<(), WriteError> {
     let needs = |piece: Piece| match piece {
         Piece::Color(_) | Piece::Valid => ("color", frame.color_rgba.len(), pixels * 4),
         Piece::Depth => ("depth", frame.depth_m.as_ref().map_or(0, Vec::len), pixels),
-        Piece::Coords => ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS),
+        Piece::Coords => {
+            ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS)
+        }
         Piece::Rows => ("rows", frame.rows.len().min(1), 1),
     };
     for (what, found, needed) in pieces.iter().map(|&piece| needs(piece)) {
         if found != needed || pixels == 0 {
-            let message = format!("{what} has {found} values where {needed} are needed ({}x{})", frame.size_px[0], frame.size_px[1]);
+            let message = format!(
+                "{what} has {found} values where {needed} are needed ({}x{})",
+                frame.size_px[0], frame.size_px[1]
+            );
             return Err(WriteError::Frame { frame: frame.index, message });
         }
     }
@@ -194,7 +211,8 @@ pub struct WriteSummary {
     pub bytes: u64,
 }
 
-/// Encodes and writes frames on worker threads behind a bounded queue, so memory does not grow with the sequence.
+/// Encodes and writes frames on worker threads behind a bounded queue, so memory does not grow with the
+/// sequence.
 #[derive(Debug)]
 pub struct FrameWriter {
     queue: Option<SyncSender<RenderedFrame>>,
@@ -253,16 +271,18 @@ impl FrameWriter {
         let whole = self.join();
         match self.shared.take_failure() {
             Some(failure) => Err(failure),
-            None if whole => {
-                Ok(WriteSummary { frames: self.shared.frames.load(Ordering::Relaxed), bytes: self.shared.bytes.load(Ordering::Relaxed) })
-            }
+            None if whole => Ok(WriteSummary {
+                frames: self.shared.frames.load(Ordering::Relaxed),
+                bytes: self.shared.bytes.load(Ordering::Relaxed),
+            }),
             None => Err(WriteError::Ended),
         }
     }
 
     fn join(&mut self) -> bool {
         self.queue = None;
-        // Counted rather than `all`, which would stop at the first failure and leave the other threads running.
+        // Counted rather than `all`, which would stop at the first failure and leave the other threads
+        // running.
         self.workers.drain(..).filter_map(|worker| worker.join().err()).count() == 0
     }
 }
@@ -284,7 +304,8 @@ fn work(files: &FrameFiles, frames: &Mutex<Receiver<RenderedFrame>>, shared: &Sh
                 shared.bytes.fetch_add(bytes, Ordering::Relaxed);
             }
             Err(error) => {
-                // Later frames would most likely fail alike (a full disk): the first failure is the one to tell.
+                // Later frames would most likely fail alike (a full disk): the first failure is the one to
+                // tell.
                 shared.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
             }
         }

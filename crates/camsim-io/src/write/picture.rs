@@ -9,8 +9,8 @@ use camsim_core::{
 
 use super::{WriteError, exr_file, png_file, write_atomic};
 
-/// Writes one frame's picture; the ending of `path` says how: `.exr` is linear R G B A in 32-bit floats, with the depth `Z` where the frame
-/// has one; `.png` is encoded as `output` says.
+/// Writes one frame's picture; the ending of `path` says how: `.exr` is linear R G B A in 32-bit floats, with
+/// the depth `Z` where the frame has one; `.png` is encoded as `output` says.
 ///
 /// # Errors
 /// Another ending; planes that do not fill the frame; a file that cannot be written.
@@ -18,16 +18,25 @@ pub fn write_picture(path: &Path, frame: &RenderedFrame, output: OutputEncoding)
     let pixels = frame.size_px[0] as usize * frame.size_px[1] as usize;
     let depth = frame.depth_m.as_deref().filter(|depth| depth.len() == pixels);
     if frame.color_rgba.len() != 4 * pixels || (frame.depth_m.is_some() && depth.is_none()) {
-        return Err(WriteError::Frame { frame: frame.index, message: "its planes do not fill its size".into() });
+        return Err(WriteError::Frame {
+            frame: frame.index,
+            message: "its planes do not fill its size".into(),
+        });
     }
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let exr =
-        |names: &[&str], samples: &[f32]| exr_file::encode(path, frame.size_px, names, samples, ExrPixel::Float, ExrCompression::Zip16);
+    let exr = |names: &[&str], samples: &[f32]| {
+        exr_file::encode(path, frame.size_px, names, samples, ExrPixel::Float, ExrCompression::Zip16)
+    };
     let bytes = match (ending.as_str(), depth) {
         ("png", _) => png_file::encode_color(path, frame, output)?,
         ("exr", None) => exr(&["R", "G", "B", "A"], &frame.color_rgba)?,
         ("exr", Some(depth)) => {
-            let samples: Vec<f32> = frame.color_rgba.chunks_exact(4).zip(depth).flat_map(|(p, z)| [p[0], p[1], p[2], p[3], *z]).collect();
+            let samples: Vec<f32> = frame
+                .color_rgba
+                .chunks_exact(4)
+                .zip(depth)
+                .flat_map(|(p, z)| [p[0], p[1], p[2], p[3], *z])
+                .collect();
             exr(&["R", "G", "B", "A", "Z"], &samples)?
         }
         _ => {

@@ -13,21 +13,32 @@ use super::{
     encode::{code8, code16, luminance, srgb8},
 };
 
-/// Colour: RGBA of 8 or 16 bits, luminance without alpha for the `luma` encodings, as a grey camera writes it.
-pub(super) fn encode_color(path: &Path, frame: &RenderedFrame, output: OutputEncoding) -> Result<Vec<u8>, WriteError> {
+/// Colour: RGBA of 8 or 16 bits, luminance without alpha for the `luma` encodings, as a grey camera writes
+/// it.
+pub(super) fn encode_color(
+    path: &Path,
+    frame: &RenderedFrame,
+    output: OutputEncoding,
+) -> Result<Vec<u8>, WriteError> {
     let pixels = frame.color_rgba.chunks_exact(4);
     let grey = |p: &[f32]| luminance([p[0], p[1], p[2]]);
     let (bytes, kind): (Vec<u8>, _) = match output {
-        OutputEncoding::Srgb8 => {
-            (pixels.flat_map(|p| [srgb8(p[0]), srgb8(p[1]), srgb8(p[2]), code8(p[3])]).collect(), ExtendedColorType::Rgba8)
+        OutputEncoding::Srgb8 => (
+            pixels.flat_map(|p| [srgb8(p[0]), srgb8(p[1]), srgb8(p[2]), code8(p[3])]).collect(),
+            ExtendedColorType::Rgba8,
+        ),
+        OutputEncoding::Linear8 => {
+            (frame.color_rgba.iter().map(|&v| code8(v)).collect(), ExtendedColorType::Rgba8)
         }
-        OutputEncoding::Linear8 => (frame.color_rgba.iter().map(|&v| code8(v)).collect(), ExtendedColorType::Rgba8),
         // The encoder takes samples in the machine's order.
-        OutputEncoding::LinearF32 | OutputEncoding::LinearF16 => {
-            (frame.color_rgba.iter().flat_map(|&v| code16(v).to_ne_bytes()).collect(), ExtendedColorType::Rgba16)
-        }
+        OutputEncoding::LinearF32 | OutputEncoding::LinearF16 => (
+            frame.color_rgba.iter().flat_map(|&v| code16(v).to_ne_bytes()).collect(),
+            ExtendedColorType::Rgba16,
+        ),
         OutputEncoding::Luma8 => (pixels.map(|p| code8(grey(p))).collect(), ExtendedColorType::L8),
-        OutputEncoding::Luma16 => (pixels.flat_map(|p| code16(grey(p)).to_ne_bytes()).collect(), ExtendedColorType::L16),
+        OutputEncoding::Luma16 => {
+            (pixels.flat_map(|p| code16(grey(p)).to_ne_bytes()).collect(), ExtendedColorType::L16)
+        }
     };
     encode(path, frame.size_px, &bytes, kind)
 }
@@ -38,7 +49,12 @@ pub(super) fn encode_valid(path: &Path, frame: &RenderedFrame) -> Result<Vec<u8>
     encode(path, frame.size_px, &bytes, ExtendedColorType::L8)
 }
 
-fn encode(path: &Path, [width, height]: [u32; 2], bytes: &[u8], kind: ExtendedColorType) -> Result<Vec<u8>, WriteError> {
+fn encode(
+    path: &Path,
+    [width, height]: [u32; 2],
+    bytes: &[u8],
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>, WriteError> {
     let mut out = Cursor::new(Vec::new());
     PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
         .write_image(bytes, width, height, kind)
@@ -46,11 +62,17 @@ fn encode(path: &Path, [width, height]: [u32; 2], bytes: &[u8], kind: ExtendedCo
     Ok(out.into_inner())
 }
 
-/// Frames side by side, `columns` a row, each shrunk by `shrink` (mean of linear values), as an sRGB PNG. All frames have the size of the first.
+/// Frames side by side, `columns` a row, each shrunk by `shrink` (mean of linear values), as an sRGB PNG. All
+/// frames have the size of the first.
 ///
 /// # Errors
 /// There is no frame, one has another size, or the file cannot be written.
-pub fn contact_sheet(path: &Path, frames: &[RenderedFrame], columns: u32, shrink: u32) -> Result<(), WriteError> {
+pub fn contact_sheet(
+    path: &Path,
+    frames: &[RenderedFrame],
+    columns: u32,
+    shrink: u32,
+) -> Result<(), WriteError> {
     let fail = |frame: u64, message: &str| WriteError::Frame { frame, message: message.into() };
     let first = frames.first().ok_or_else(|| fail(0, "a contact sheet needs at least one frame"))?;
     let (columns, shrink) = (columns.clamp(1, frames.len() as u32), shrink.max(1));
@@ -59,7 +81,9 @@ pub fn contact_sheet(path: &Path, frames: &[RenderedFrame], columns: u32, shrink
     let mut bytes = vec![0_u8; sheet[0] as usize * sheet[1] as usize * 3];
     for (index, frame) in frames.iter().enumerate() {
         let [source_width, source_height] = frame.size_px;
-        if frame.size_px != first.size_px || frame.color_rgba.len() != source_width as usize * source_height as usize * 4 {
+        if frame.size_px != first.size_px
+            || frame.color_rgba.len() != source_width as usize * source_height as usize * 4
+        {
             return Err(fail(frame.index, "its size is not that of the first frame of the contact sheet"));
         }
         let corner = [index as u32 % columns * width, index as u32 / columns * height];

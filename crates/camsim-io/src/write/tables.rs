@@ -10,10 +10,12 @@ use glam::{DQuat, DVec3};
 
 /// Header of `rows/*.csv`; q = ned_from_camera.
 pub const ROWS_COLUMNS: &str = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
-/// Header of `trajectory.csv` and of `camsim track`; q = ned_from_body, body rates in rad/s, t_s on the log's clock.
-pub const TRAJECTORY_COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
-/// Header of `camera_trajectory.csv` and of `camsim track --of camera`: the optical frame with lever arm, mount and vibration; q = ned_from_camera, rates in
-/// optical axes, rad/s.
+/// Header of `trajectory.csv` and of `camsim track`; q = ned_from_body, body rates in rad/s, t_s on the log's
+/// clock.
+pub const TRAJECTORY_COLUMNS: &str =
+    "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
+/// Header of `camera_trajectory.csv` and of `camsim track --of camera`: the optical frame with lever arm,
+/// mount and vibration; q = ned_from_camera, rates in optical axes, rad/s.
 pub const CAMERA_TRAJECTORY_COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,qw,qx,qy,qz,wx,wy,wz";
 
 /// One line of `trajectory.csv`.

@@ -20,7 +20,9 @@ fn frame(index: u64) -> RenderedFrame {
         index,
         stamp_ns: 1_400_000_000_000_000_123,
         size_px: SIZE,
-        color_rgba: (0..pixels * 4).map(|i| if i % 4 == 3 { f32::from(u8::from(i % 8 == 3)) } else { (i % 97) as f32 / 96.0 }).collect(),
+        color_rgba: (0..pixels * 4)
+            .map(|i| if i % 4 == 3 { f32::from(u8::from(i % 8 == 3)) } else { (i % 97) as f32 / 96.0 })
+            .collect(),
         depth_m: Some((0..pixels).map(|i| i as f32 * 1.25).collect()),
         coords: Some((0..pixels).map(|i| std::array::from_fn(|c| (i * 8 + c) as f32 * 0.1)).collect()),
         rows: vec![RowRecord {
@@ -35,7 +37,14 @@ fn frame(index: u64) -> RenderedFrame {
 
 fn everything(pixel: ExrPixel, compression: ExrCompression) -> OutputSpec {
     OutputSpec {
-        channels: vec![Channel::Color, Channel::Depth, Channel::Valid, Channel::Rows, Channel::Coords, Channel::Color],
+        channels: vec![
+            Channel::Color,
+            Channel::Depth,
+            Channel::Valid,
+            Channel::Rows,
+            Channel::Coords,
+            Channel::Color,
+        ],
         format: vec![ImageFormat::Exr, ImageFormat::Png],
         exr_pixel: pixel,
         exr_compression: compression,
@@ -46,7 +55,13 @@ fn everything(pixel: ExrPixel, compression: ExrCompression) -> OutputSpec {
 fn read_exr(path: &Path) -> Vec<(String, Vec<f32>)> {
     let image = read_first_flat_layer_from_file(path).unwrap();
     assert_eq!([image.layer_data.size.0 as u32, image.layer_data.size.1 as u32], SIZE);
-    image.layer_data.channel_data.list.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect())).collect()
+    image
+        .layer_data
+        .channel_data
+        .list
+        .iter()
+        .map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect()))
+        .collect()
 }
 
 fn files_below(folder: &Path) -> Vec<String> {
@@ -54,7 +69,11 @@ fn files_below(folder: &Path) -> Vec<String> {
         .unwrap()
         .flat_map(|entry| {
             let path = entry.unwrap().path();
-            if path.is_dir() { files_below(&path) } else { vec![path.file_name().unwrap().to_string_lossy().into_owned()] }
+            if path.is_dir() {
+                files_below(&path)
+            } else {
+                vec![path.file_name().unwrap().to_string_lossy().into_owned()]
+            }
         })
         .collect();
     all.sort();
@@ -95,7 +114,12 @@ fn every_channel_reads_back_in_every_compression() {
         assert_eq!((depth[0].0.as_str(), &depth[0].1), ("Z", frame.depth_m.as_ref().unwrap()));
         for (name, values) in read_exr(&dir.path().join("coords/frame_000007.exr")) {
             let channel = ["u", "v", "x", "y", "dt", "n", "e", "d"].iter().position(|n| *n == name).unwrap();
-            assert!(values.iter().zip(frame.coords.as_ref().unwrap()).all(|(read, pixel)| *read == pixel[channel]));
+            assert!(
+                values
+                    .iter()
+                    .zip(frame.coords.as_ref().unwrap())
+                    .all(|(read, pixel)| *read == pixel[channel])
+            );
         }
         let rows = fs::read_to_string(dir.path().join("rows/frame_000007.csv")).unwrap();
         assert_eq!(rows, "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd\n0,-5,0.1,2,-3,1,0,0,0,1,0,0\n");
@@ -126,12 +150,16 @@ fn png_follows_the_encoding() {
             }
             image::DynamicImage::ImageLuma16(read) => {
                 let p = &expected[160..163];
-                assert!((f32::from(read.as_raw()[40]) - 65535.0 * luminance([p[0], p[1], p[2]])).abs() <= 0.6);
+                assert!(
+                    (f32::from(read.as_raw()[40]) - 65535.0 * luminance([p[0], p[1], p[2]])).abs() <= 0.6
+                );
             }
             _ => {}
         }
     }
-    let valid = image::load_from_memory(&png_file::encode_valid(Path::new("x.png"), &frame(0)).unwrap()).unwrap().into_luma8();
+    let valid = image::load_from_memory(&png_file::encode_valid(Path::new("x.png"), &frame(0)).unwrap())
+        .unwrap()
+        .into_luma8();
     assert_eq!(&valid.as_raw()[..4], [255, 0, 255, 0]);
 }
 
@@ -152,7 +180,11 @@ fn failures_are_told_with_the_path_and_leave_nothing_behind() {
     fs::write(dir.path().join("color"), "in the way").unwrap();
     let files = FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8);
     let writer = FrameWriter::new(files, 2);
-    let error = (0..50).find_map(|index| writer.write(frame(index)).err()).or_else(|| writer.finish().err()).unwrap().to_string();
+    let error = (0..50)
+        .find_map(|index| writer.write(frame(index)).err())
+        .or_else(|| writer.finish().err())
+        .unwrap()
+        .to_string();
     assert!(error.contains("color") && error.contains("choose another folder"), "{error}");
     assert_eq!(files_below(dir.path()), ["color"]);
 
@@ -162,7 +194,8 @@ fn failures_are_told_with_the_path_and_leave_nothing_behind() {
     assert!(write_atomic(Path::new("/"), b"x").unwrap_err().to_string().contains("names no file"));
 
     let short = RenderedFrame { color_rgba: vec![0.0; 5], ..frame(3) };
-    let writer = FrameWriter::new(FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8), 1);
+    let writer =
+        FrameWriter::new(FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8), 1);
     let told = writer.write(short);
     let error = told.err().or_else(|| writer.finish().err()).unwrap().to_string();
     assert!(error.contains("frame 3") && error.contains("33x21"), "{error}");
@@ -171,9 +204,21 @@ fn failures_are_told_with_the_path_and_leave_nothing_behind() {
 #[test]
 fn values_that_are_not_numbers_are_written_without_panic() {
     let mut odd = frame(0);
-    odd.color_rgba[..8].copy_from_slice(&[f32::NAN, f32::INFINITY, -1e30, 1.0, 1e30, 0.0, f32::NEG_INFINITY, f32::NAN]);
+    odd.color_rgba[..8].copy_from_slice(&[
+        f32::NAN,
+        f32::INFINITY,
+        -1e30,
+        1.0,
+        1e30,
+        0.0,
+        f32::NEG_INFINITY,
+        f32::NAN,
+    ]);
     let dir = tempfile::tempdir().unwrap();
-    let writer = FrameWriter::new(FrameFiles::new(dir.path(), &everything(ExrPixel::Half, ExrCompression::Zip1), OutputEncoding::Srgb8), 1);
+    let writer = FrameWriter::new(
+        FrameFiles::new(dir.path(), &everything(ExrPixel::Half, ExrCompression::Zip1), OutputEncoding::Srgb8),
+        1,
+    );
     writer.write(odd).unwrap();
     writer.finish().unwrap();
 }
@@ -188,13 +233,16 @@ fn tables_have_their_columns() {
         rate_body_rad_s: DVec3::ZERO,
         angular_acceleration_body_rad_s2: DVec3::Z,
     };
-    let text = trajectory_csv([1_403_636_579_763_555_584, -1_500_000_000].map(|t_ns| TrajectoryRecord { t_ns, state }));
+    let text = trajectory_csv(
+        [1_403_636_579_763_555_584, -1_500_000_000].map(|t_ns| TrajectoryRecord { t_ns, state }),
+    );
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[1].starts_with("1403636579.763555584,1,2,3,0,") && lines[2].starts_with("-1.500000000,"));
     assert!(lines.iter().all(|line| line.split(',').count() == 20));
 
     let pose = CameraPose { position_ned_m: DVec3::ONE, ned_from_camera: DQuat::IDENTITY };
-    let record = CameraRecord { t_ns: 500_000_000, pose, velocity_ned_m_s: DVec3::X, rate_camera_rad_s: DVec3::Z };
+    let record =
+        CameraRecord { t_ns: 500_000_000, pose, velocity_ned_m_s: DVec3::X, rate_camera_rad_s: DVec3::Z };
     let text = camera_trajectory_csv([record]);
     assert_eq!(text, format!("{CAMERA_TRAJECTORY_COLUMNS}\n0.500000000,1,1,1,1,0,0,1,0,0,0,0,0,1\n"));
 }

@@ -37,14 +37,23 @@ fn kalibrs_files_gone_wrong() {
         ("[400, 401, 320, 240]", "[400 401 320 240]", ["cam0.intrinsics", "not a list"]),
         ("[400, 401,", "[\"400,5\", 401,", ["cam0.intrinsics", "finite"]),
         ("[640, 480]\n", "[640, 480]\n  resolution: [752, 480]\n", ["c.yaml", "duplicate"]),
-        ("[640, 480]\n", "[640, 480]\n  distortion_coefficients: [0, 0, 0, 0]\n", ["cam0.distortion_coefficients", "another thing"]),
+        (
+            "[640, 480]\n",
+            "[640, 480]\n  distortion_coefficients: [0, 0, 0, 0]\n",
+            ["cam0.distortion_coefficients", "another thing"],
+        ),
         ("[640, 480]\n", "[640, 480]\n  skew: 1.5\n", ["cam0.skew", "1.5"]),
         ("[640, 480]\n", "[640, 480]\n  xi: 0.9\n", ["cam0.xi", "MEI"]),
     ] {
         refused(to, "c.yaml", &CHAIN.replace(from, to), &words);
     }
-    let noted =
-        import("c.yaml", &CHAIN.replace("[640, 480]\n", "[640, 480]\n  focal_mm: 8.8\n  pixel_pitch_um: 3.4\n"), None, None).unwrap();
+    let noted = import(
+        "c.yaml",
+        &CHAIN.replace("[640, 480]\n", "[640, 480]\n  focal_mm: 8.8\n  pixel_pitch_um: 3.4\n"),
+        None,
+        None,
+    )
+    .unwrap();
     check("unknown", &noted, &[Note("cam0.focal_mm = 8.8, cam0.pixel_pitch_um = 3.4")]);
 }
 
@@ -72,19 +81,54 @@ fn ros_ini_gone_wrong() {
 
 #[test]
 fn what_is_no_calibration_is_told_what_it_is() {
-    refused("a CAMERA.toml", "CAMERA.toml", "size_px = [640, 480]\nfocal_px = [500.0, 500.0]\n", &["as it is"]);
-    refused("a bad CAMERA.toml", "CAMERA.toml", "size_px = [640, 480]\nfocal = [500.0, 500.0]\n", &["CAMERA.toml:2", "focal_px"]);
-    refused("lensfun", "db.xml", "<lensdatabase><lens><model>x</model></lens></lensdatabase>", &["data base of lenses"]);
-    refused("a distortion alone", "d.yaml", "distortion_model: plumb_bob\nD: [0, 0, 0, 0, 0]\n", &["no camera matrix"]);
+    refused(
+        "a CAMERA.toml",
+        "CAMERA.toml",
+        "size_px = [640, 480]\nfocal_px = [500.0, 500.0]\n",
+        &["as it is"],
+    );
+    refused(
+        "a bad CAMERA.toml",
+        "CAMERA.toml",
+        "size_px = [640, 480]\nfocal = [500.0, 500.0]\n",
+        &["CAMERA.toml:2", "focal_px"],
+    );
+    refused(
+        "lensfun",
+        "db.xml",
+        "<lensdatabase><lens><model>x</model></lens></lensdatabase>",
+        &["data base of lenses"],
+    );
+    refused(
+        "a distortion alone",
+        "d.yaml",
+        "distortion_model: plumb_bob\nD: [0, 0, 0, 0, 0]\n",
+        &["no camera matrix"],
+    );
     refused(
         "nerfstudio",
         "transforms.json",
         r#"{"fl_x": 500, "fl_y": 501, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": []}"#,
         &["half a pixel"],
     );
-    refused("RealSense", "i.json", r#"{"width": 640, "height": 480, "ppx": 321, "ppy": 241, "fx": 600, "fy": 601}"#, &["[fx, 0, ppx"]);
-    refused("KITTI", "calib.txt", "P0: 7e2 0 6e2 0 0 7e2 2e2 0 0 0 1 0\nP1: 7e2 0 6e2 -3 0 7e2 2e2 0 0 0 1 0\n", &["rectified pictures"]);
-    refused("MATLAB", "m.yaml", "ImageSize: [480, 640]\nIntrinsicMatrix: [[400, 0, 0], [0, 401, 0], [320, 240, 1]]\n", &["transposed"]);
+    refused(
+        "RealSense",
+        "i.json",
+        r#"{"width": 640, "height": 480, "ppx": 321, "ppy": 241, "fx": 600, "fy": 601}"#,
+        &["[fx, 0, ppx"],
+    );
+    refused(
+        "KITTI",
+        "calib.txt",
+        "P0: 7e2 0 6e2 0 0 7e2 2e2 0 0 0 1 0\nP1: 7e2 0 6e2 -3 0 7e2 2e2 0 0 0 1 0\n",
+        &["rectified pictures"],
+    );
+    refused(
+        "MATLAB",
+        "m.yaml",
+        "ImageSize: [480, 640]\nIntrinsicMatrix: [[400, 0, 0], [0, 401, 0], [320, 240, 1]]\n",
+        &["transposed"],
+    );
     refused("a list", "l.json", "[1, 2, 3]", &["no camera file", "COLMAP"]);
     refused("a number", "n.yaml", "12\n", &["no camera file"]);
     refused("nothing", "e.json", "", &["empty"]);

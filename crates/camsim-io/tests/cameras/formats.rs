@@ -1,4 +1,5 @@
-//! Formats that the data folder has no file of, or none that can be read: small files after their public definitions.
+//! Formats that the data folder has no file of, or none that can be read: small files after their public
+//! definitions.
 
 use camsim_core::scenario::LensModel::{BrownConrady, KannalaBrandt, Pinhole};
 use camsim_core::scenario::Readout;
@@ -14,7 +15,11 @@ fn colmap() {
         ("SIMPLE_PINHOLE 640 480 500 320 240", [500.0, 500.0, 319.5, 239.5], Lens(Pinhole, &[])),
         ("PINHOLE 640 480 500 510 320 240", [500.0, 510.0, 319.5, 239.5], Lens(Pinhole, &[])),
         ("SIMPLE_RADIAL 640 480 500 320 240 -0.1", [500.0, 500.0, 319.5, 239.5], Lens(BrownConrady, &[-0.1])),
-        ("RADIAL 640 480 500 320 240 -0.1 0.02", [500.0, 500.0, 319.5, 239.5], Lens(BrownConrady, &[-0.1, 0.02])),
+        (
+            "RADIAL 640 480 500 320 240 -0.1 0.02",
+            [500.0, 500.0, 319.5, 239.5],
+            Lens(BrownConrady, &[-0.1, 0.02]),
+        ),
         (
             "OPENCV 640 480 500 510 321 241 -0.1 0.02 1e-3 -2e-3",
             [500.0, 510.0, 320.5, 240.5],
@@ -30,25 +35,43 @@ fn colmap() {
             [300.0, 310.0, 320.5, 240.5],
             Lens(KannalaBrandt, &[0.1, 0.02, 0.003, 0.004]),
         ),
-        ("SIMPLE_RADIAL_FISHEYE 640 480 300 321 241 0.1", [300.0, 300.0, 320.5, 240.5], Lens(KannalaBrandt, &[0.1])),
-        ("RADIAL_FISHEYE 640 480 300 321 241 0.1 0.2", [300.0, 300.0, 320.5, 240.5], Lens(KannalaBrandt, &[0.1, 0.2])),
+        (
+            "SIMPLE_RADIAL_FISHEYE 640 480 300 321 241 0.1",
+            [300.0, 300.0, 320.5, 240.5],
+            Lens(KannalaBrandt, &[0.1]),
+        ),
+        (
+            "RADIAL_FISHEYE 640 480 300 321 241 0.1 0.2",
+            [300.0, 300.0, 320.5, 240.5],
+            Lens(KannalaBrandt, &[0.1, 0.2]),
+        ),
     ] {
-        let imported =
-            read("cameras.txt", &format!("# Camera list with one line of data per camera:\n# Number of cameras: 1\n1 {params}\n"));
+        let imported = read(
+            "cameras.txt",
+            &format!("# Camera list with one line of data per camera:\n# Number of cameras: 1\n1 {params}\n"),
+        );
         assert_eq!(imported.format, CameraFormat::Colmap);
         check(params, &imported, &[Size([640, 480]), Intrinsics(wanted), lens, Note("half a pixel")]);
     }
     for (params, words) in [
         ("FOV 640 480 500 500 320 240 0.9", ["MODEL", "FOV"]),
         ("THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0", ["MODEL", "THIN_PRISM_FISHEYE"]),
-        ("RAD_TAN_THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0 0 0 0 0", ["MODEL", "OPENCV_FISHEYE"]),
+        (
+            "RAD_TAN_THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0 0 0 0 0",
+            ["MODEL", "OPENCV_FISHEYE"],
+        ),
         ("OPENCV 640 480 500 500 320 240 -0.1 0.02 1e-3", ["PARAMS", "has 7 parameters where OPENCV has 8"]),
         ("PINHOLE 640.5 480 500 500 320 240", ["WIDTH", "whole numbers"]),
     ] {
         refused(params, "cameras.txt", &format!("1 {params}\n"), &words);
     }
     refused("binary", "cameras.bin", "\u{1}\u{0}", &["colmap model_converter --output_type TXT"]);
-    refused("a broken line", "cameras.txt", "1 PINHOLE 640 480 500 500 320 240\n2 PINHOLE 640\n", &["cameras.txt:2", "no camera"]);
+    refused(
+        "a broken line",
+        "cameras.txt",
+        "1 PINHOLE 640 480 500 500 320 240\n2 PINHOLE 640\n",
+        &["cameras.txt:2", "no camera"],
+    );
 }
 
 const ORB3: &str = "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 190.978477\nCamera1.fy: 190.973307\nCamera1.cx: 254.931706\n\
@@ -74,13 +97,32 @@ fn orb_slam() {
     check(
         "ORB-SLAM2",
         &read("tum1.yaml", two),
-        &[Lens(BrownConrady, &[0.1, 0.2, 0.001, 0.002, 0.3]), Note("Camera.bf = 40"), Without("DepthMapFactor")],
+        &[
+            Lens(BrownConrady, &[0.1, 0.2, 0.001, 0.002, 0.3]),
+            Note("Camera.bf = 40"),
+            Without("DepthMapFactor"),
+        ],
     );
     refused("another model", "orb.yaml", &ORB3.replace("KannalaBrandt8", "Omni"), &["Camera.type", "`Omni`"]);
     refused("no size", "orb.yaml", &ORB3.replace("Camera.width: 512\n", ""), &["add `Camera.width`"]);
-    refused("a fisheye's k4 in a pinhole", "orb.yaml", &ORB3.replace("KannalaBrandt8", "PinHole"), &["Camera1.k4"]);
-    refused("missing k3", "orb.yaml", &ORB3.replace("Camera1.k3: -0.0020532\n", ""), &["Camera1.k3: is missing"]);
-    refused("tangential fisheye", "orb.yaml", &ORB3.replace("Camera.RGB: 1", "Camera1.p1: 0.1"), &["Camera1.p1"]);
+    refused(
+        "a fisheye's k4 in a pinhole",
+        "orb.yaml",
+        &ORB3.replace("KannalaBrandt8", "PinHole"),
+        &["Camera1.k4"],
+    );
+    refused(
+        "missing k3",
+        "orb.yaml",
+        &ORB3.replace("Camera1.k3: -0.0020532\n", ""),
+        &["Camera1.k3: is missing"],
+    );
+    refused(
+        "tangential fisheye",
+        "orb.yaml",
+        &ORB3.replace("Camera.RGB: 1", "Camera1.p1: 0.1"),
+        &["Camera1.p1"],
+    );
 }
 
 fn basalt(kind: &str, numbers: &str) -> String {
@@ -93,10 +135,25 @@ fn basalt(kind: &str, numbers: &str) -> String {
 
 #[test]
 fn basalt_models() {
-    let notes = || [Note("value0.vignette"), Note("cam_time_offset_ns"), Note("value0.T_imu_cam"), Without("imu_update_rate")];
+    let notes = || {
+        [
+            Note("value0.vignette"),
+            Note("cam_time_offset_ns"),
+            Note("value0.T_imu_cam"),
+            Without("imu_update_rate"),
+        ]
+    };
     let kb4 = read("calibration.json", &basalt("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4"#));
     assert_eq!(kb4.format, CameraFormat::Basalt);
-    check("kb4", &kb4, &[Size([512, 514]), Intrinsics([300.0, 301.0, 255.0, 256.0]), Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])]);
+    check(
+        "kb4",
+        &kb4,
+        &[
+            Size([512, 514]),
+            Intrinsics([300.0, 301.0, 255.0, 256.0]),
+            Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4]),
+        ],
+    );
     check("kb4", &kb4, &notes());
     let radtan = r#""k1": 0.1, "k2": 0.2, "p1": 0.01, "p2": 0.02, "k3": 0.3, "k4": 0.4, "k5": 0.5, "k6": 0.6, "rpmax": 2.7"#;
     let wants = [Lens(BrownConrady, &[0.1, 0.2, 0.01, 0.02, 0.3, 0.4, 0.5, 0.6]), Note("rpmax = 2.7")];
@@ -131,8 +188,16 @@ fn okvis_models() {
         Note("no shutter times"),
         Without("no frame rate"),
     ];
-    check("radialtangential", &read("config.yaml", &text("radialtangential", "0.1, 0.2, 0.003, 0.004")), &wants);
-    check("equidistant", &read("config.yaml", &text("equidistant", "0.1, 0.2, 0.3, 0.4")), &[Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])]);
+    check(
+        "radialtangential",
+        &read("config.yaml", &text("radialtangential", "0.1, 0.2, 0.003, 0.004")),
+        &wants,
+    );
+    check(
+        "equidistant",
+        &read("config.yaml", &text("equidistant", "0.1, 0.2, 0.3, 0.4")),
+        &[Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])],
+    );
     check(
         "8",
         &read("config.yaml", &text("radialtangential8", "1, 2, 3, 4, 5, 6, 7, 8")),
@@ -157,14 +222,24 @@ fn rigs_of_maplab() {
              T_B_C: {{cols: 2, rows: 2, data: [1, 0, 0, 1]}}\n"
         )
     };
-    let wants = [Ms(24.0), Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4]), Note("x 480 rows is a readout of 24"), Without("T_B_C")];
+    let wants = [
+        Ms(24.0),
+        Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4]),
+        Note("x 480 rows is a readout of 24"),
+        Without("T_B_C"),
+    ];
     check("rolling", &read("rig.yaml", &text("50000", "pinhole", "equidistant")), &wants);
     check(
         "by label",
         &import("rig.yaml", &text("0", "pinhole", "radial-tangential"), None, Some("left")).unwrap(),
         &[Ms(0.0), Without("no shutter times")],
     );
-    refused("fov", "rig.yaml", &text("0", "pinhole", "fisheye"), &["camera.distortion.type", "field-of-view"]);
+    refused(
+        "fov",
+        "rig.yaml",
+        &text("0", "pinhole", "fisheye"),
+        &["camera.distortion.type", "field-of-view"],
+    );
     refused("omni", "rig.yaml", &text("0", "omni", "none"), &["camera.type", "OCamCalib"]);
 }
 
@@ -174,9 +249,19 @@ fn flat_files_of_vikit() {
     check(
         "pinhole",
         &read("cam.yaml", text),
-        &[Size([640, 480]), Intrinsics([400.0, 401.0, 320.0, 240.0]), Lens(BrownConrady, &[0.1, 0.2, 0.001, 0.002]), Note("scale = 0.5")],
+        &[
+            Size([640, 480]),
+            Intrinsics([400.0, 401.0, 320.0, 240.0]),
+            Lens(BrownConrady, &[0.1, 0.2, 0.001, 0.002]),
+            Note("scale = 0.5"),
+        ],
     );
-    refused("fisheye's numbers", "cam.yaml", &text.replace("Pinhole", "EquidistantCamera"), &["cam_d0", "does not read it"]);
+    refused(
+        "fisheye's numbers",
+        "cam.yaml",
+        &text.replace("Pinhole", "EquidistantCamera"),
+        &["cam_d0", "does not read it"],
+    );
     refused("atan", "cam.yaml", &text.replace("Pinhole", "ATAN"), &["cam_model", "`ATAN`"]);
 }
 
@@ -191,11 +276,17 @@ fn open_sfm() {
         Lens(BrownConrady, &[-0.1, 0.02, 0.001, 0.002, 0.003]),
     ];
     check("brown", &read("camera_models.json", text), &wants);
-    let reconstruction = format!(r#"[{{"cameras": {text}, "shots": {{"a.jpg": {{"gps_dop": 15.0}}}}, "points": {{}}}}]"#);
+    let reconstruction =
+        format!(r#"[{{"cameras": {text}, "shots": {{"a.jpg": {{"gps_dop": 15.0}}}}, "points": {{}}}}]"#);
     check("reconstruction", &read("reconstruction.json", &reconstruction), &wants);
-    let fisheye =
-        text.replace("\"brown\"", "\"fisheye_opencv\"").replace(r#""p1": 0.001, "p2": 0.002, "k3": 0.003"#, r#""k3": 0.003, "k4": 0.004"#);
-    check("fisheye", &read("camera_models.json", &fisheye), &[Lens(KannalaBrandt, &[-0.1, 0.02, 0.003, 0.004])]);
+    let fisheye = text
+        .replace("\"brown\"", "\"fisheye_opencv\"")
+        .replace(r#""p1": 0.001, "p2": 0.002, "k3": 0.003"#, r#""k3": 0.003, "k4": 0.004"#);
+    check(
+        "fisheye",
+        &read("camera_models.json", &fisheye),
+        &[Lens(KannalaBrandt, &[-0.1, 0.02, 0.003, 0.004])],
+    );
     for (from, to, words) in [
         ("\"brown\"", "\"spherical\"", ["projection_type", "panorama"]),
         ("\"brown\"", "\"fisheye624\"", ["projection_type", "fisheye624"]),
@@ -213,7 +304,11 @@ const GYROFLOW: &str = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "orig_dime
 #[test]
 fn gyroflow() {
     let imported = read("p.json", GYROFLOW);
-    check("asymmetrical", &imported, &[Intrinsics([1340.0, 1345.0, 1353.5, 1022.9]), Ms(11.5), Note("negative"), Without("no shutter")]);
+    check(
+        "asymmetrical",
+        &imported,
+        &[Intrinsics([1340.0, 1345.0, 1353.5, 1022.9]), Ms(11.5), Note("negative"), Without("no shutter")],
+    );
     assert_eq!(imported.spec.shutter.readout, Readout::BottomToTop);
     let other = |from: &str, to: &str| GYROFLOW.replace(from, to);
     check(
@@ -226,7 +321,11 @@ fn gyroflow() {
         &read("p.json", &other("\"fps\"", r#""crop": 2.0, "fps""#)),
         &[Intrinsics([670.0, 672.5, 1353.5, 1022.9]), Note("crop = 2")],
     );
-    check("global", &read("p.json", &other("\"fps\"", r#""global_shutter": true, "fps""#)), &[Ms(0.0), Note("11.5 ms")]);
+    check(
+        "global",
+        &read("p.json", &other("\"fps\"", r#""global_shutter": true, "fps""#)),
+        &[Ms(0.0), Note("11.5 ms")],
+    );
     check(
         "original",
         &read("p.json", &other(r#""orig_dimension": {"w": 2704"#, r#""orig_dimension": {"w": 5408"#)),
@@ -239,7 +338,11 @@ fn gyroflow() {
         ("\"fps\"", r#""input_horizontal_stretch": 1.33, "fps""#, ["input_horizontal_stretch", "1.33"]),
         ("\"fps\"", r#""distortion_model": "poly5", "fps""#, ["distortion_model", "poly5"]),
         ("\"fps\"", r#""distortion_model_id": 2, "fps""#, ["distortion_model_id", "OpenCV's fisheye"]),
-        ("\"fps\"", r#""frame_readout_direction": "Diagonal", "fps""#, ["frame_readout_direction", "no direction"]),
+        (
+            "\"fps\"",
+            r#""frame_readout_direction": "Diagonal", "fps""#,
+            ["frame_readout_direction", "no direction"],
+        ),
         ("\"fps\"", r#""use_opencv_fisheye": false, "fps""#, ["use_opencv_fisheye", "no model"]),
         (", 0.002]", "]", ["distortion_coeffs", "has 3 numbers"]),
         ("-11.5", "11500", ["frame_readout_time", "check its unit"]),
@@ -253,7 +356,11 @@ fn gyroflow() {
 #[test]
 fn metashape() {
     let text = "<calibration><projection>frame</projection><width>2000</width><height>1000</height><f>1500</f><cx>10</cx><cy>-20</cy><b1>3</b1><k1>0.1</k1><p1>0.001</p1><p2>0.002</p2></calibration>";
-    check("b1", &read("m.xml", text), &[Intrinsics([1503.0, 1500.0, 1009.5, 479.5]), Lens(BrownConrady, &[0.1, 0.0, 0.002, 0.001])]);
+    check(
+        "b1",
+        &read("m.xml", text),
+        &[Intrinsics([1503.0, 1500.0, 1009.5, 479.5]), Lens(BrownConrady, &[0.1, 0.0, 0.002, 0.001])],
+    );
     let other = |to: &str| text.replace("<k1>", &format!("{to}<k1>"));
     for (to, words) in [
         ("<b2>0.5</b2>", ["b2", "skew"]),
@@ -266,10 +373,14 @@ fn metashape() {
     }
     refused("spherical", "m.xml", &text.replace(">frame<", ">spherical<"), &["projection", "`spherical`"]);
     let project = |sensor: &str| {
-        format!("<document version=\"1.5.0\"><chunk><sensors>{sensor}</sensors><cameras><camera id=\"0\"/></cameras></chunk></document>")
+        format!(
+            "<document version=\"1.5.0\"><chunk><sensors>{sensor}</sensors><cameras><camera id=\"0\"/></cameras></chunk></document>"
+        )
     };
     let sensor = |label: &str, body: &str| {
-        format!("<sensor id=\"3\" label=\"{label}\" type=\"fisheye\"><resolution width=\"2000\" height=\"1000\"/>{body}</sensor>")
+        format!(
+            "<sensor id=\"3\" label=\"{label}\" type=\"fisheye\"><resolution width=\"2000\" height=\"1000\"/>{body}</sensor>"
+        )
     };
     let both = "<calibration type=\"fisheye\" class=\"adjusted\"><f>600</f><k1>0.1</k1></calibration><calibration type=\"fisheye\" class=\"initial\"><f>500</f></calibration>\
                 <rolling_shutter>1</rolling_shutter>";
@@ -293,9 +404,23 @@ fn metashape() {
 fn camodocal_in_full() {
     let text = "model_type: PINHOLE_FULL\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   k1: 0.1\n   k2: 0.2\n   k3: 0.3\n   k4: 0.4\n   k5: 0.5\n   k6: 0.6\n   p1: 0.01\n   \
                 p2: 0.02\nprojection_parameters:\n   fx: 400\n   fy: 400\n   cx: 320\n   cy: 240\n";
-    check("full", &read("cam.yaml", text), &[Lens(BrownConrady, &[0.1, 0.2, 0.01, 0.02, 0.3, 0.4, 0.5, 0.6])]);
-    refused("k3 of a PINHOLE", "cam.yaml", &text.replace("_FULL", ""), &["distortion_parameters.k3", "PINHOLE_FULL"]);
-    refused("scaramuzza", "cam.yaml", &text.replace("PINHOLE_FULL", "SCARAMUZZA"), &["model_type", "OCamCalib"]);
+    check(
+        "full",
+        &read("cam.yaml", text),
+        &[Lens(BrownConrady, &[0.1, 0.2, 0.01, 0.02, 0.3, 0.4, 0.5, 0.6])],
+    );
+    refused(
+        "k3 of a PINHOLE",
+        "cam.yaml",
+        &text.replace("_FULL", ""),
+        &["distortion_parameters.k3", "PINHOLE_FULL"],
+    );
+    refused(
+        "scaramuzza",
+        "cam.yaml",
+        &text.replace("PINHOLE_FULL", "SCARAMUZZA"),
+        &["model_type", "OCamCalib"],
+    );
     let main = "%YAML:1.0\nimu: 1\nnum_of_cam: 2\ncam0_calib: \"cam0_mei.yaml\"\ncam1_calib: \"cam1_mei.yaml\"\nimage_width: 752\n";
     refused("the main file", "euroc.yaml", main, &["import one of those (cam0_mei.yaml, cam1_mei.yaml)"]);
 }

@@ -27,7 +27,11 @@ fn words_that_name_the_model() {
         ("model: plumb_bob", BrownConrady),
     ] {
         let imported = read("out.yml", &file(four, more));
-        assert_eq!((imported.spec.lens.model, imported.spec.lens.coefficients.as_slice()), (model, list), "{more}");
+        assert_eq!(
+            (imported.spec.lens.model, imported.spec.lens.coefficients.as_slice()),
+            (model, list),
+            "{more}"
+        );
     }
 }
 
@@ -47,9 +51,21 @@ fn two_readings_are_refused() {
         (five, "model_type: omnidir", ["model_type", "omnidirectional"]),
         (five, "camera_model: double_sphere", ["camera_model", "double sphere"]),
         (five, "xi: [1.2]", ["xi", "MEI"]),
-        (five, "fisheye_model: 0\ncamera_model: fisheye", ["camera_model", "another model than fisheye_model"]),
-        (five, "distortion_coefficients: [0.5, 0, 0, 0, 0]", ["dist_coeffs", "another thing than distortion_coefficients"]),
-        (five, "K: [500, 0, 320, 0, 501, 240, 0, 0, 1]\nD: [0, 0, 0, 0, 0]", ["cameras", "there are 2 (`camera_matrix`, `K`)"]),
+        (
+            five,
+            "fisheye_model: 0\ncamera_model: fisheye",
+            ["camera_model", "another model than fisheye_model"],
+        ),
+        (
+            five,
+            "distortion_coefficients: [0.5, 0, 0, 0, 0]",
+            ["dist_coeffs", "another thing than distortion_coefficients"],
+        ),
+        (
+            five,
+            "K: [500, 0, 320, 0, 501, 240, 0, 0, 1]\nD: [0, 0, 0, 0, 0]",
+            ["cameras", "there are 2 (`camera_matrix`, `K`)"],
+        ),
         (five, "image_size: [752, 480]", ["image_size", "752"]),
         (five, "img_shape: [480, 640]", ["img_shape", "rows first"]),
         (five, "skew: 0.3", ["skew", "recalibrate"]),
@@ -74,7 +90,12 @@ fn a_matrix_that_is_none() {
         ("8.8, 0, 320, 0, 8.8, 240, 0, 0, 1", ["focal length", "millimetres"]),
         ("400, 0, 320, 0, .inf, 240, 0, 0, 1", ["out.yml:5", "non-finite"]),
     ] {
-        refused(matrix, "out.yml", &file(five, "").replace("400, 0, 320, 0, 401, 240, 0, 0, 1", matrix), &words);
+        refused(
+            matrix,
+            "out.yml",
+            &file(five, "").replace("400, 0, 320, 0, 401, 240, 0, 0, 1", matrix),
+            &words,
+        );
     }
 }
 
@@ -82,13 +103,21 @@ fn a_matrix_that_is_none() {
 fn what_is_odd_is_spoken_of() {
     let five = "0.1, 0.2, 0.003, 0.004, 0.5";
     for (from, to, note) in [
-        ("image_width: 640\nimage_height: 480", "image_width: 300\nimage_height: 480", "outside of the picture"),
+        (
+            "image_width: 640\nimage_height: 480",
+            "image_width: 300\nimage_height: 480",
+            "outside of the picture",
+        ),
         ("image_width: 640\nimage_height: 480", "image_width: 1280\nimage_height: 960", "about 641 x 481"),
         ("image_width: 640\nimage_height: 480", "image_width: 480\nimage_height: 640", "is it turned?"),
         ("401, 240", "900, 240", "factor of two"),
         ("[400, 0, 320, 0, 401", "[50, 0, 320, 0, 50", "162 degrees"),
         ("image_width", "Readout_time_ms: 12\nimage_width", "no frame rate is in the file"),
-        ("image_width", "new_camera_matrix: [380, 0, 320, 0, 381, 240, 0, 0, 1]\nimage_width", "new_camera_matrix"),
+        (
+            "image_width",
+            "new_camera_matrix: [380, 0, 320, 0, 381, 240, 0, 0, 1]\nimage_width",
+            "new_camera_matrix",
+        ),
         ("image_width", "R1: [0.9, 0.1, 0, 0, 1, 0, 0, 0, 1]\nimage_width", "stereo or rectification"),
         ("image_width", "image_scale: 0.5\nimage_width", "image_scale = 0.5"),
         ("image_width", "flip_vertical: true\nimage_width", "flip_vertical = true"),
@@ -111,7 +140,9 @@ fn names_of_other_programs() {
         format!("{{\"K\": {matrix}, \"D\": {list}, \"image_size\": [640, 480]}}"),
         format!("{{\"cameraMatrix\": {matrix}, \"distCoeffs\": {list}, \"imageSize\": [640, 480]}}"),
         format!("{{\"camera_matrix\": {matrix}, \"dist_coeff\": {list}, \"img_size\": [640, 480]}}"),
-        format!("CameraMat: {{rows: 3, cols: 3, dt: d, data: {matrix}}}\nDistCoeff: {list}\nImageSize: [640, 480]\n"),
+        format!(
+            "CameraMat: {{rows: 3, cols: 3, dt: d, data: {matrix}}}\nDistCoeff: {list}\nImageSize: [640, 480]\n"
+        ),
     ] {
         let wants = [
             Size([640, 480]),

@@ -15,8 +15,16 @@ fn with(more: &str) -> String {
 #[test]
 fn regions_and_binning() {
     for (more, size, wanted) in [
-        ("roi: {x_offset: 0, y_offset: 0, width: 0, height: 0, do_rectify: false}", [1280, 800], [400.0, 404.0, 630.0, 376.0]),
-        ("roi: {x_offset: 320, y_offset: 200, width: 640, height: 400}", [640, 400], [400.0, 404.0, 310.0, 176.0]),
+        (
+            "roi: {x_offset: 0, y_offset: 0, width: 0, height: 0, do_rectify: false}",
+            [1280, 800],
+            [400.0, 404.0, 630.0, 376.0],
+        ),
+        (
+            "roi: {x_offset: 320, y_offset: 200, width: 640, height: 400}",
+            [640, 400],
+            [400.0, 404.0, 310.0, 176.0],
+        ),
         ("binning_x: 2\nbinning_y: 2", [640, 400], [200.0, 202.0, 315.0, 188.0]),
         (
             "binning_x: 4\nbinning_y: 4\nroi: {x_offset: 320, y_offset: 200, width: 640, height: 400}",
@@ -34,11 +42,17 @@ fn regions_and_binning() {
         ("roi: {x_offset: 320, y_offset: 200, width: 0, height: 0}", ["roi", "no size"]),
         ("roi: {x_offset: 0, y_offset: 0, width: 640, height: 0}", ["roi", "not within"]),
         ("roi: {x_offset: 0.5, y_offset: 0, width: 640, height: 400}", ["roi", "not within"]),
-        ("roi: {x_offset: left, y_offset: 0, width: 640, height: 400}", ["roi.x_offset", "not a finite number"]),
+        (
+            "roi: {x_offset: left, y_offset: 0, width: 640, height: 400}",
+            ["roi.x_offset", "not a finite number"],
+        ),
         ("binning_x: 3\nbinning_y: 1", ["binning_x", "does not divide"]),
         ("binning_x: 1\nbinning_y: -2", ["binning_y", "does not divide"]),
         ("binning_x: 0.5\nbinning_y: 1", ["binning_x", "does not divide"]),
-        ("roi: {x_offset: 0, y_offset: 0, width: 642, height: 400}\nbinning_x: 4\nbinning_y: 4", ["binning_x", "does not divide 642"]),
+        (
+            "roi: {x_offset: 0, y_offset: 0, width: 642, height: 400}\nbinning_x: 4\nbinning_y: 4",
+            ["binning_x", "does not divide 642"],
+        ),
     ] {
         refused(more, "info.yaml", &with(more), &words);
     }
@@ -48,20 +62,40 @@ fn regions_and_binning() {
 fn rectification_is_spoken_of_where_there_is_one() {
     let identity = "rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}";
     let same = "projection_matrix: {rows: 3, cols: 4, data: [400, 0, 630, 0, 0, 404, 376, 0, 0, 0, 1, 0]}";
-    check("none", &read("info.yaml", &with(&format!("{identity}\n{same}"))), &[Without("rectif"), Without("projection_matrix")]);
-    check("turned", &read("info.yaml", &with(&identity.replace("[1, 0", "[0.999, 0.04"))), &[Note("rectification_matrix")]);
+    check(
+        "none",
+        &read("info.yaml", &with(&format!("{identity}\n{same}"))),
+        &[Without("rectif"), Without("projection_matrix")],
+    );
+    check(
+        "turned",
+        &read("info.yaml", &with(&identity.replace("[1, 0", "[0.999, 0.04"))),
+        &[Note("rectification_matrix")],
+    );
     check(
         "another matrix",
         &read("info.yaml", &with(&same.replace("[400", "[390"))),
         &[Note("projection_matrix"), Intrinsics([400.0, 404.0, 630.0, 376.0])],
     );
-    check("a baseline", &read("info.yaml", &with(&same.replace("630, 0", "630, -48"))), &[Note("projection_matrix")]);
+    check(
+        "a baseline",
+        &read("info.yaml", &with(&same.replace("630, 0", "630, -48"))),
+        &[Note("projection_matrix")],
+    );
     check(
         "do_rectify",
-        &read("info.yaml", &with("roi: {x_offset: 0, y_offset: 0, width: 1280, height: 800, do_rectify: true}")),
+        &read(
+            "info.yaml",
+            &with("roi: {x_offset: 0, y_offset: 0, width: 1280, height: 800, do_rectify: true}"),
+        ),
         &[Note("roi.do_rectify = true")],
     );
-    refused("cut off", "info.yaml", &with("projection_matrix: [400, 0, 630]"), &["projection_matrix", "3 x 4"]);
+    refused(
+        "cut off",
+        "info.yaml",
+        &with("projection_matrix: [400, 0, 630]"),
+        &["projection_matrix", "3 x 4"],
+    );
 }
 
 #[test]
@@ -74,7 +108,11 @@ fn models_of_ros() {
         &read("i.yaml", &other(list, four).replace("plumb_bob", "equidistant")),
         &[Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])],
     );
-    check("fisheye", &read("i.yaml", &other(list, four).replace("plumb_bob", "fisheye")), &[Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])]);
+    check(
+        "fisheye",
+        &read("i.yaml", &other(list, four).replace("plumb_bob", "fisheye")),
+        &[Lens(KannalaBrandt, &[0.1, 0.2, 0.3, 0.4])],
+    );
     check("no distortion", &read("i.yaml", &other(list, "[]")), &[Lens(Pinhole, &[])]);
     let eight = other(list, "[1, 2, 0.1, 0.2, 3, 4, 5, 6]");
     check(
@@ -88,12 +126,21 @@ fn models_of_ros() {
         (other("plumb_bob", "thin_prism"), ["distortion_model", "`thin_prism`"]),
         (other(list, "[0.1, 0.2, 0.3]"), ["distortion_coefficients", "has 3 numbers"]),
         (other("plumb_bob", "equidistant"), ["distortion_coefficients", "fisheye has four"]),
-        (other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[0, 0, 0, 0, 0, 0, 0, 0, 0]"), ["camera_matrix", "never calibrated"]),
-        (other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[400, 0, 0, 0, 404, 0, 630, 376, 1]"), ["camera_matrix", "transposed"]),
+        (
+            other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[0, 0, 0, 0, 0, 0, 0, 0, 0]"),
+            ["camera_matrix", "never calibrated"],
+        ),
+        (
+            other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[400, 0, 0, 0, 404, 0, 630, 376, 1]"),
+            ["camera_matrix", "transposed"],
+        ),
         (with("K: [500, 0, 630, 0, 404, 376, 0, 0, 1]"), ["K", "another thing than camera_matrix"]),
         (with("width: 640"), ["width", "another thing than image_width"]),
         (with("image_width: 640"), ["i.yaml", "duplicate"]),
-        (other("distortion_coefficients", "distortion_coefficents"), ["distortion_coefficients", "is missing"]),
+        (
+            other("distortion_coefficients", "distortion_coefficents"),
+            ["distortion_coefficients", "is missing"],
+        ),
         (with("k4: 0.1"), ["k4", "coefficient"]),
         (other("image_height: 800\n", ""), ["height", "missing"]),
     ] {
@@ -106,8 +153,12 @@ fn messages_as_they_are_printed() {
     let one = "header: \n  seq: 1\n  stamp: {secs: 1, nsecs: 5}\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: \"plumb_bob\"\nD: [0.1, 0.2, 0.003, 0.004, 0.0]\n\
                K: [400.0, 0.0, 320.0, 0.0, 401.0, 240.0, 0.0, 0.0, 1.0]\nR: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\nP: [400.0, 0.0, 320.0, 0.0, 0.0, 401.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0]\n\
                binning_x: 0\nbinning_y: 0\nroi: \n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: False\n---\n";
-    let wants =
-        [Size([640, 480]), Intrinsics([400.0, 401.0, 320.0, 240.0]), Lens(BrownConrady, &[0.1, 0.2, 0.003, 0.004]), Without("left out")];
+    let wants = [
+        Size([640, 480]),
+        Intrinsics([400.0, 401.0, 320.0, 240.0]),
+        Lens(BrownConrady, &[0.1, 0.2, 0.003, 0.004]),
+        Without("left out"),
+    ];
     check("one", &read("echo.yaml", one), &wants);
     check("two alike", &read("echo.yaml", &format!("{one}{}", one.replace("seq: 1", "seq: 2"))), &wants);
     refused(

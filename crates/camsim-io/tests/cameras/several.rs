@@ -18,27 +18,46 @@ fn the_one_that_is_named() {
         )
     };
     let rig = format!("cameras:\n{}{}", rig("left", "500"), rig("right", "600"));
-    let basalt = |f: &str| format!(r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5, "cy": 239.5}}}}"#);
-    let basalt =
-        format!(r#"{{"value0": {{"intrinsics": [{}, {}], "resolution": [[640, 480], [640, 480]]}}}}"#, basalt("500"), basalt("600"));
+    let basalt = |f: &str| {
+        format!(
+            r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5, "cy": 239.5}}}}"#
+        )
+    };
+    let basalt = format!(
+        r#"{{"value0": {{"intrinsics": [{}, {}], "resolution": [[640, 480], [640, 480]]}}}}"#,
+        basalt("500"),
+        basalt("600")
+    );
     let sensor = |id: &str, f: &str| {
         format!(
             "<sensor id=\"{id}\" label=\"camera {id}\" type=\"frame\"><calibration><resolution width=\"640\" height=\"480\"/><f>{f}</f></calibration></sensor>"
         )
     };
-    let metashape = format!("<document><chunk><sensors>{}{}</sensors></chunk></document>", sensor("0", "500"), sensor("1", "600"));
+    let metashape = format!(
+        "<document><chunk><sensors>{}{}</sensors></chunk></document>",
+        sensor("0", "500"),
+        sensor("1", "600")
+    );
     let matrix = |f: &str| format!("[{f}, 0, 319.5, 0, {f}, 239.5, 0, 0, 1]");
     let stereo = format!(
         "image_width: 640\nimage_height: 480\nM1: {}\nD1: [0, 0, 0, 0, 0]\nM2: {}\nD2: [0, 0, 0, 0, 0]\n",
         matrix("500"),
         matrix("600")
     );
-    let orb = |name: &str, f: &str| format!("{name}.fx: {f}\n{name}.fy: {f}\n{name}.cx: 319.5\n{name}.cy: 239.5\n");
-    let orb = format!("Camera.width: 640\nCamera.height: 480\n{}{}", orb("Camera1", "500"), orb("Camera2", "600"));
-    let ini = |name: &str, f: &str| format!("[{name}]\n\ncamera matrix\n{f} 0 319.5\n0 {f} 239.5\n0 0 1\n\ndistortion\n0 0 0 0 0\n\n");
-    let ini = format!("[image]\n\nwidth\n640\n\nheight\n480\n\n{}{}", ini("left", "500"), ini("right", "600"));
+    let orb =
+        |name: &str, f: &str| format!("{name}.fx: {f}\n{name}.fy: {f}\n{name}.cx: 319.5\n{name}.cy: 239.5\n");
+    let orb =
+        format!("Camera.width: 640\nCamera.height: 480\n{}{}", orb("Camera1", "500"), orb("Camera2", "600"));
+    let ini = |name: &str, f: &str| {
+        format!("[{name}]\n\ncamera matrix\n{f} 0 319.5\n0 {f} 239.5\n0 0 1\n\ndistortion\n0 0 0 0 0\n\n")
+    };
+    let ini =
+        format!("[image]\n\nwidth\n640\n\nheight\n480\n\n{}{}", ini("left", "500"), ini("right", "600"));
     let sfm = |name: &str, f: f64| {
-        format!(r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {}, "k1": 0, "k2": 0}}"#, f / 640.0)
+        format!(
+            r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {}, "k1": 0, "k2": 0}}"#,
+            f / 640.0
+        )
     };
     let sfm = format!("{{{}, {}}}", sfm("v2 a 0.8", 500.0), sfm("v2 b 0.9", 600.0));
     for (file, text, first, second) in [
@@ -58,7 +77,11 @@ fn the_one_that_is_named() {
         assert!(error.contains("there are 2") && error.contains("--camera"), "{file}: {error}");
         for (name, f) in [(first, 500.0), (second, 600.0)] {
             let imported = import(file, text, None, Some(name)).unwrap_or_else(|error| panic!("{error}"));
-            check(&format!("{file} {name}"), &imported, &[Intrinsics([f, f, 319.5, 239.5]), Without("left out")]);
+            check(
+                &format!("{file} {name}"),
+                &imported,
+                &[Intrinsics([f, f, 319.5, 239.5]), Without("left out")],
+            );
         }
         let error = import(file, text, None, Some("nobody")).unwrap_err();
         assert!(error.contains("none is called `nobody`"), "{file}: {error}");

@@ -33,7 +33,11 @@ fn readouts_of_24_ms_under_every_name() {
         "shutter: {type: rolling, line_delay_ns: 50000}",
         "line_delay: 5.0e-5\nreadout_ms: 24",
     ] {
-        check(more, &read("chain.yaml", &chain(more)), &[Ms(24.0), Without("no shutter times"), Without("left out")]);
+        check(
+            more,
+            &read("chain.yaml", &chain(more)),
+            &[Ms(24.0), Without("no shutter times"), Without("left out")],
+        );
     }
 }
 
@@ -76,7 +80,10 @@ fn what_is_no_shutter_is_refused() {
 #[test]
 fn what_is_said_of_the_shutter_is_true() {
     for (more, wants) in [
-        ("shutter_type: rolling", &[Ms(0.0), Note("set shutter.readout_ms"), Without("no shutter times")][..]),
+        (
+            "shutter_type: rolling",
+            &[Ms(0.0), Note("set shutter.readout_ms"), Without("no shutter times")][..],
+        ),
         ("shutter_type: global", &[Ms(0.0), Without("no shutter times"), Without("left out")]),
         ("shutter_type: global\nline_delay: 5.0e-5", &[Ms(0.0), Note("left out: cam0.line_delay (24 ms)")]),
         ("line_delay: 0", &[Ms(0.0), Without("no shutter times"), Without("rows is")]),
@@ -85,8 +92,19 @@ fn what_is_said_of_the_shutter_is_true() {
         ("shutter: 0.002", &[Note("cam0.shutter = 0.002"), Without("no shutter times")]),
         ("readout_noise: 7", &[Note("cam0.readout_noise = 7"), Without("no shutter times")]),
         ("fps: 60", &[Fps(60.0), Note("no shutter times"), Without("no frame rate")]),
-        ("rate_hz: 20\nreadout_ms: 60", &[Fps(20.0), Ms(60.0), Note("longer than the frame period of 50.000 ms")]),
-        ("fps: 0", &[Fps(30.0), Note("no frame rate; fps is 30"), Without("no frame rate is in"), Without("no frame rate and")]),
+        (
+            "rate_hz: 20\nreadout_ms: 60",
+            &[Fps(20.0), Ms(60.0), Note("longer than the frame period of 50.000 ms")],
+        ),
+        (
+            "fps: 0",
+            &[
+                Fps(30.0),
+                Note("no frame rate; fps is 30"),
+                Without("no frame rate is in"),
+                Without("no frame rate and"),
+            ],
+        ),
         ("timeshift_cam_imu: 0.002", &[Ms(0.0), Note("timeshift_cam_imu = 0.002")]),
         ("timeshift_cam_imu: 0.0", &[Without("timeshift")]),
         ("imu_rate_hz: 200", &[Fps(30.0), Note("imu_rate_hz = 200")]),
@@ -123,7 +141,16 @@ fn vins() {
         &read("v.yaml", &text("rolling_shutter: 0\nrolling_shutter_tr: 0.033\n")),
         &[Ms(0.0), Note("left out: rolling_shutter_tr (33 ms)")],
     );
-    check("no time", &read("v.yaml", &text("rolling_shutter: 1\nrolling_shutter_tr: 0\n")), &[Ms(0.0), Note("set shutter.readout_ms")]);
+    check(
+        "no time",
+        &read("v.yaml", &text("rolling_shutter: 1\nrolling_shutter_tr: 0\n")),
+        &[Ms(0.0), Note("set shutter.readout_ms")],
+    );
     check("no flag", &read("v.yaml", &text("rolling_shutter_tr: 0.033\n")), &[Ms(33.0)]);
-    refused("in ms", "v.yaml", &text("rolling_shutter: 1\nrolling_shutter_tr: 33\n"), &["rolling_shutter_tr", "check its unit"]);
+    refused(
+        "in ms",
+        "v.yaml",
+        &text("rolling_shutter: 1\nrolling_shutter_tr: 33\n"),
+        &["rolling_shutter_tr", "check its unit"],
+    );
 }

@@ -20,26 +20,37 @@ fn grid(folder: &Path, text: &str) -> TerrainSpec {
 fn ascii_grids_have_their_heights_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let corner = read(&grid(folder.path(), &format!("{HEADER}{VALUES}"))).unwrap();
-    assert_eq!([[0, 0], [1, 1], [0, 2], [3, 2]].map(|at| height_m(&corner, at)), [Some(1.0), Some(6.5), Some(9.0), None]);
+    assert_eq!(
+        [[0, 0], [1, 1], [0, 2], [3, 2]].map(|at| height_m(&corner, at)),
+        [Some(1.0), Some(6.5), Some(9.0), None]
+    );
     // Rows go south: (20, 15) m from the corner in the middle.
     let expected = [46.953_664_2, 9.000_262_8];
     let middle = |loaded: &camsim_io::terrain::LoadedTerrain| loaded.summary.centre_rad.map(f64::to_degrees);
     let found = middle(&corner);
     assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 2e-6), "{found:?}");
-    // The same by the middle of the first pixel, in capitals, with windows' line ends, values over several lines, and a mark of its own.
-    let centre = HEADER.to_uppercase().replace("XLLCORNER 500000", "XLLCENTER 500005").replace("YLLCORNER 5200000", "YLLCENTER 5200005");
+    // The same by the middle of the first pixel, in capitals, with windows' line ends, values over several
+    // lines, and a mark of its own.
+    let centre = HEADER
+        .to_uppercase()
+        .replace("XLLCORNER 500000", "XLLCENTER 500005")
+        .replace("YLLCORNER 5200000", "YLLCENTER 5200005");
     let text = format!("\u{feff}{centre}{}", VALUES.replace("4\n", "4 ")).replace('\n', "\r\n");
     let loaded = read(&grid(folder.path(), &text)).unwrap();
     assert!((0..2).all(|k| (middle(&loaded)[k] - found[k]).abs() < 1e-9));
     assert_eq!(height_m(&loaded, [0, 1]), Some(5.0));
     // By the file beside it.
     fs::write(folder.path().join("dem.prj"), UTM_PRJ).unwrap();
-    let loaded = read(&TerrainSpec { epsg: None, ..grid(folder.path(), &format!("{HEADER}{VALUES}")) }).unwrap();
+    let loaded =
+        read(&TerrainSpec { epsg: None, ..grid(folder.path(), &format!("{HEADER}{VALUES}")) }).unwrap();
     assert_eq!((loaded.summary.epsg, middle(&loaded)), (32632, found));
     // Cells that are not square; a height of nothing.
     let text = HEADER.replace("cellsize 10", "dx 10\ndy 20") + "1 2 3 4\n5 6.5 7 8\n9 10 11 nan\n";
     let loaded = read(&grid(folder.path(), &text)).unwrap();
-    assert!((loaded.terrain.bounds.max.x - loaded.terrain.bounds.min.x) / 1e5 > 5e-6 && height_m(&loaded, [3, 2]).is_none());
+    assert!(
+        (loaded.terrain.bounds.max.x - loaded.terrain.bounds.min.x) / 1e5 > 5e-6
+            && height_m(&loaded, [3, 2]).is_none()
+    );
 }
 
 /// A vertical system in the text beside a raster counts as one within it does.
@@ -58,9 +69,15 @@ fn units_of_heights_beside_a_raster_are_applied() {
         let loaded = read(&grid(folder.path(), &format!("{HEADER}{VALUES}"))).unwrap();
         let found = height_m(&loaded, [1, 1]).unwrap();
         assert!((found - 6.5 * unit_m).abs() < 1e-5, "{text}: {found}");
-        assert_eq!(loaded.notes.iter().any(|note| note.contains("scene.terrain.height = \"msl\"")), warns, "{text}: {:?}", loaded.notes);
+        assert_eq!(
+            loaded.notes.iter().any(|note| note.contains("scene.terrain.height = \"msl\"")),
+            warns,
+            "{text}: {:?}",
+            loaded.notes
+        );
     }
-    fs::write(folder.path().join("dem.prj"), arc.replace("Units         METERS", "Units         FEET")).unwrap();
+    fs::write(folder.path().join("dem.prj"), arc.replace("Units         METERS", "Units         FEET"))
+        .unwrap();
     let error = fails(&grid(folder.path(), &format!("{HEADER}{VALUES}")));
     assert!(error.contains("dem.prj"), "{error}");
     fs::remove_file(folder.path().join("dem.prj")).unwrap();
@@ -81,7 +98,8 @@ fn another_horizontal_system_beside_a_raster_is_named() {
         fs::write(folder.path().join("dem.prj"), UTM_PRJ.replace("32N", zone)).unwrap();
         let loaded = read(&spec(&path)).unwrap();
         assert_eq!(loaded.summary.epsg, 32632);
-        let says = |note: &String| note.contains("dem.prj states EPSG:32633 and the raster itself EPSG:32632");
+        let says =
+            |note: &String| note.contains("dem.prj states EPSG:32633 and the raster itself EPSG:32632");
         assert_eq!(loaded.notes.iter().any(says), warns, "{:?}", loaded.notes);
     }
 }
@@ -92,10 +110,16 @@ fn ascii_grids_that_are_none_are_refused() {
     for (text, says) in [
         (HEADER.to_owned(), "holds 0 heights, and 4 x 3 are 12"),
         (format!("{HEADER}{VALUES}1"), "holds 13 heights"),
-        (format!("{HEADER}1 2 3 4\n5 6,5 7 8\n9 10 11 12"), "line 8: `6,5` is no number (decimals need a point)"),
+        (
+            format!("{HEADER}1 2 3 4\n5 6,5 7 8\n9 10 11 12"),
+            "line 8: `6,5` is no number (decimals need a point)",
+        ),
         (format!("{}{VALUES}", HEADER.replace("cellsize 10\n", "")), "no `cellsize`"),
         (format!("{}{VALUES}", HEADER.replace("cellsize 10", "cellsize -10")), "line 5: cellsize is -10"),
-        (format!("{}{VALUES}", HEADER.replace("cellsize 10", "cellsize 10 m")), "line 5: `cellsize 10 m` is no key with its value"),
+        (
+            format!("{}{VALUES}", HEADER.replace("cellsize 10", "cellsize 10 m")),
+            "line 5: `cellsize 10 m` is no key with its value",
+        ),
         (format!("{}{VALUES}", HEADER.replace("xllcorner 500000\n", "")), "no `xllcorner` and `yllcorner`"),
         (format!("{}{VALUES}", HEADER.replace("nrows 3", "nrows 0")), "line 2: nrows is `0`"),
         (format!("{}{VALUES}", HEADER.replace("nrows 3", "nrows 4000000000")), "do not fit into"),
@@ -116,8 +140,11 @@ fn srtm_tiles_lie_where_their_name_says() {
     let folder = tempfile::tempdir().unwrap();
     let heights = |name: &str| {
         let path = folder.path().join(name);
-        let height = |row: i16, column: i16| if (row, column) == (3, 4) { i16::MIN } else { (row - column) % 400 };
-        let bytes: Vec<u8> = (0..1201).flat_map(|row| (0..1201).flat_map(move |column| height(row, column).to_be_bytes())).collect();
+        let height =
+            |row: i16, column: i16| if (row, column) == (3, 4) { i16::MIN } else { (row - column) % 400 };
+        let bytes: Vec<u8> = (0..1201)
+            .flat_map(|row| (0..1201).flat_map(move |column| height(row, column).to_be_bytes()))
+            .collect();
         fs::write(&path, bytes).unwrap();
         TerrainSpec { height: HeightReference::Msl, ..spec(&path) }
     };
@@ -126,11 +153,22 @@ fn srtm_tiles_lie_where_their_name_says() {
     let degrees = |loaded: &camsim_io::terrain::LoadedTerrain| {
         [loaded.summary.south_west_rad, loaded.summary.north_east_rad].map(|place| place.map(f64::to_degrees))
     };
-    let near = |found: [[f64; 2]; 2], expected: [[f64; 2]; 2]| (0..4).all(|k| (found[k / 2][k % 2] - expected[k / 2][k % 2]).abs() < 1e-9);
-    assert!(near(degrees(&loaded), [[47.0, 8.0], [48.0, 9.0]]) && loaded.notes.is_empty(), "{:?} {:?}", degrees(&loaded), loaded.notes);
+    let near = |found: [[f64; 2]; 2], expected: [[f64; 2]; 2]| {
+        (0..4).all(|k| (found[k / 2][k % 2] - expected[k / 2][k % 2]).abs() < 1e-9)
+    };
+    assert!(
+        near(degrees(&loaded), [[47.0, 8.0], [48.0, 9.0]]) && loaded.notes.is_empty(),
+        "{:?} {:?}",
+        degrees(&loaded),
+        loaded.notes
+    );
     let south = read(&TerrainSpec { height: HeightReference::Ellipsoid, ..heights("s01w072.HGT") }).unwrap();
     assert!(near(degrees(&south), [[-1.0, -72.0], [0.0, -71.0]]));
-    assert!(south.notes[0].contains("EGM96") && south.notes[0].contains("scene.terrain.height = \"msl\""), "{:?}", south.notes);
+    assert!(
+        south.notes[0].contains("EGM96") && south.notes[0].contains("scene.terrain.height = \"msl\""),
+        "{:?}",
+        south.notes
+    );
     for name in ["tile.hgt", "N47X008.hgt", "N97E008.hgt", "N4é7E08.hgt"] {
         let error = fails(&heights(name));
         assert!(error.contains("south-western corner"), "{error}");
@@ -147,15 +185,24 @@ fn what_lies_beside_adds_to_a_raster_or_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
     let aux = folder.path().join("dem.tif.aux.xml");
-    let band = |inside: &str| format!("<PAMDataset><PAMRasterBand band=\"1\">{inside}</PAMRasterBand></PAMDataset>");
+    let band =
+        |inside: &str| format!("<PAMDataset><PAMRasterBand band=\"1\">{inside}</PAMRasterBand></PAMDataset>");
     Tiff::heights([4, 3], |column, _| 100.0 + column as f32).write(&path);
-    fs::write(&aux, band("<Scale>2</Scale><Offset>10</Offset><UnitType>ft</UnitType><NoDataValue>102</NoDataValue>")).unwrap();
+    fs::write(
+        &aux,
+        band("<Scale>2</Scale><Offset>10</Offset><UnitType>ft</UnitType><NoDataValue>102</NoDataValue>"),
+    )
+    .unwrap();
     let loaded = read(&spec(&path)).unwrap();
-    assert!((height_m(&loaded, [1, 0]).unwrap() - 212.0 * 0.3048).abs() < 1e-3 && height_m(&loaded, [2, 0]).is_none());
+    assert!(
+        (height_m(&loaded, [1, 0]).unwrap() - 212.0 * 0.3048).abs() < 1e-3
+            && height_m(&loaded, [2, 0]).is_none()
+    );
     // Of another band; nothing but statistics.
-    for text in
-        [band("<Scale>2</Scale>").replace("band=\"1\"", "band=\"2\""), band("<Metadata><MDI key=\"STATISTICS_MEAN\">5</MDI></Metadata>")]
-    {
+    for text in [
+        band("<Scale>2</Scale>").replace("band=\"1\"", "band=\"2\""),
+        band("<Metadata><MDI key=\"STATISTICS_MEAN\">5</MDI></Metadata>"),
+    ] {
         fs::write(&aux, text).unwrap();
         assert_eq!(height_m(&read(&spec(&path)).unwrap(), [1, 0]), Some(101.0));
     }
@@ -163,8 +210,14 @@ fn what_lies_beside_adds_to_a_raster_or_is_refused() {
         (band("<Scale>two</Scale>"), "Scale is `two`"),
         (band("<NoDataValue>none</NoDataValue>"), "NoDataValue is `none`"),
         ("<PAMDataset>".to_owned(), "no GDAL metadata"),
-        ("<PAMDataset><GeoTransform>1, 2, 3</GeoTransform></PAMDataset>".to_owned(), "no list of six numbers"),
-        ("<PAMDataset><GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform></PAMDataset>".to_owned(), "the raster itself says another"),
+        (
+            "<PAMDataset><GeoTransform>1, 2, 3</GeoTransform></PAMDataset>".to_owned(),
+            "no list of six numbers",
+        ),
+        (
+            "<PAMDataset><GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform></PAMDataset>".to_owned(),
+            "the raster itself says another",
+        ),
     ] {
         fs::write(&aux, text).unwrap();
         let error = fails(&spec(&path));

@@ -13,7 +13,9 @@ fn assert_true(name: &str, is_void: impl Fn([u32; 2]) -> bool) {
         let expected = 400.0 + 0.7 * f64::from(at[0]) + 0.3 * f64::from(at[1]);
         match height_m(&loaded, at) {
             None => assert!(is_void(at), "{name} {at:?}"),
-            Some(found) => assert!(!is_void(at) && (found - expected).abs() < 1e-3, "{name} {at:?}: {found} {expected}"),
+            Some(found) => {
+                assert!(!is_void(at) && (found - expected).abs() < 1e-3, "{name} {at:?}: {found} {expected}")
+            }
         }
     }
 }
@@ -51,10 +53,15 @@ fn what_is_not_read_says_how_to_convert_it() {
 }
 
 /// 4 x 3 heights of 100 and one of 140, in a file of its own with changes.
-fn made(name: &str, change: impl FnOnce(Tiff) -> Tiff, wish: impl FnOnce(&mut TerrainSpec)) -> Result<(Option<f64>, Vec<String>), String> {
+fn made(
+    name: &str,
+    change: impl FnOnce(Tiff) -> Tiff,
+    wish: impl FnOnce(&mut TerrainSpec),
+) -> Result<(Option<f64>, Vec<String>), String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("{name}.tif"));
-    change(Tiff::heights([4, 3], |column, row| if (column, row) == (1, 1) { 140.0 } else { 100.0 })).write(&path);
+    change(Tiff::heights([4, 3], |column, row| if (column, row) == (1, 1) { 140.0 } else { 100.0 }))
+        .write(&path);
     let mut spec = spec(&path);
     wish(&mut spec);
     read(&spec).map(|loaded| (height_m(&loaded, [1, 1]), loaded.notes)).map_err(|error| error.to_string())
@@ -78,9 +85,18 @@ const SURVEY: f64 = 1200.0 / 3937.0;
 fn units_by_any_name_or_key() {
     assert_eq!(near(plain(|tiff| tiff), 140.0), [""; 0]);
     for (items, unit) in [
-        (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">metre</Item></GDALMetadata>"#, 1.0),
-        (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">foot</Item></GDALMetadata>"#, FOOT),
-        (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">Foot_US</Item></GDALMetadata>"#, SURVEY),
+        (
+            r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">metre</Item></GDALMetadata>"#,
+            1.0,
+        ),
+        (
+            r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">foot</Item></GDALMetadata>"#,
+            FOOT,
+        ),
+        (
+            r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">Foot_US</Item></GDALMetadata>"#,
+            SURVEY,
+        ),
         (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">cm</Item></GDALMetadata>"#, 0.01),
         (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype"></Item></GDALMetadata>"#, 1.0),
         // Of another band.
@@ -88,7 +104,8 @@ fn units_by_any_name_or_key() {
     ] {
         near(plain(|tiff| tiff.with_metadata(items)), 140.0 * unit);
     }
-    let keyed = |keys: &[u16]| plain(|tiff| tiff.with_keys(&[&[1024, 1, 1025, 1, 3072, 32632], keys].concat()));
+    let keyed =
+        |keys: &[u16]| plain(|tiff| tiff.with_keys(&[&[1024, 1, 1025, 1, 3072, 32632], keys].concat()));
     near(keyed(&[4099, 9002]), 140.0 * FOOT);
     near(keyed(&[4099, 9003]), 140.0 * SURVEY);
     near(keyed(&[4096, 8228]), 140.0 * FOOT);
@@ -103,33 +120,72 @@ fn units_by_any_name_or_key() {
     assert!(error.contains("Black Sea depth") && error.contains("downwards"), "{error}");
     let notes = near(keyed(&[4096, 5999]), 140.0);
     assert!(notes[0].contains("vertical system that is not known (EPSG:5999"), "{notes:?}");
-    let error =
-        plain(|tiff| tiff.with_metadata(r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">furlong</Item></GDALMetadata>"#))
-            .unwrap_err();
+    let error = plain(|tiff| {
+        tiff.with_metadata(
+            r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">furlong</Item></GDALMetadata>"#,
+        )
+    })
+    .unwrap_err();
     assert!(error.contains("`furlong`") && error.contains("scene.terrain.height_unit"), "{error}");
 }
 
 #[test]
 fn scales_are_applied_or_refused() {
-    near(plain(|tiff| tiff.with_metadata(r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>"#)), 280.0);
-    near(plain(|tiff| tiff.with_metadata(r#"<GDALMetadata><Item name="OFFSET" sample="0" role="offset">-50</Item></GDALMetadata>"#)), 90.0);
+    near(
+        plain(|tiff| {
+            tiff.with_metadata(
+                r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>"#,
+            )
+        }),
+        280.0,
+    );
+    near(
+        plain(|tiff| {
+            tiff.with_metadata(
+                r#"<GDALMetadata><Item name="OFFSET" sample="0" role="offset">-50</Item></GDALMetadata>"#,
+            )
+        }),
+        90.0,
+    );
     // Scale before unit, and no role is no scale.
     let all = r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.5</Item><Item name="OFFSET" sample="0" role="offset">30</Item><Item name="UNITTYPE" sample="0" role="unittype">ft</Item></GDALMetadata>"#;
     near(plain(|tiff| tiff.with_metadata(all)), 100.0 * FOOT);
-    near(plain(|tiff| tiff.with_metadata(r#"<GDALMetadata><Item name="SCALE" sample="0">2</Item></GDALMetadata>"#)), 140.0);
+    near(
+        plain(|tiff| {
+            tiff.with_metadata(r#"<GDALMetadata><Item name="SCALE" sample="0">2</Item></GDALMetadata>"#)
+        }),
+        140.0,
+    );
     for (items, says) in [
-        (r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0,1</Item></GDALMetadata>"#, "scale is `0,1`"),
-        (r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0</Item></GDALMetadata>"#, "a scale of 0"),
+        (
+            r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0,1</Item></GDALMetadata>"#,
+            "scale is `0,1`",
+        ),
+        (
+            r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0</Item></GDALMetadata>"#,
+            "a scale of 0",
+        ),
         (r#"<GDALMetadata><Item name="SCALE" sample="x" role="scale">1</Item></GDALMetadata>"#, "sample `x`"),
-        (r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1"#, "GDAL_METADATA (tag 42112) cannot be read"),
-        (r#"<GDALMetadata><Item name="SCALE" sample="9999999999" role="scale">1</Item></GDALMetadata>"#, "sample `9999999999`"),
+        (
+            r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1"#,
+            "GDAL_METADATA (tag 42112) cannot be read",
+        ),
+        (
+            r#"<GDALMetadata><Item name="SCALE" sample="9999999999" role="scale">1</Item></GDALMetadata>"#,
+            "sample `9999999999`",
+        ),
     ] {
-        let error = plain(|tiff| tiff.with_metadata(items)).map(|(height, notes)| format!("{height:?} {notes:?}"));
-        assert!(error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)), "{error:?} {says}");
+        let error =
+            plain(|tiff| tiff.with_metadata(items)).map(|(height, notes)| format!("{height:?} {notes:?}"));
+        assert!(
+            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)),
+            "{error:?} {says}"
+        );
     }
     // In the georeference, as GDAL takes it: with a vertical system only.
     let third = |tiff: Tiff| {
-        tiff.with(33550, Value::Double(vec![10.0, 10.0, 0.5])).with(33922, Value::Double(vec![0.0, 0.0, 0.0, 500_000.0, 5_200_000.0, 7.0]))
+        tiff.with(33550, Value::Double(vec![10.0, 10.0, 0.5]))
+            .with(33922, Value::Double(vec![0.0, 0.0, 0.0, 500_000.0, 5_200_000.0, 7.0]))
     };
     near(plain(|tiff| third(tiff).with_keys(&[1024, 1, 1025, 1, 3072, 32632, 4096, 5703])), 77.0);
     let notes = near(plain(third), 140.0);
@@ -148,7 +204,11 @@ fn marks_are_of_stored_numbers() {
     // Numbers that are no heights in metres are counted.
     let (height, notes) = made(
         "dem",
-        |tiff| tiff.with_metadata(r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">90</Item></GDALMetadata>"#),
+        |tiff| {
+            tiff.with_metadata(
+                r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">90</Item></GDALMetadata>"#,
+            )
+        },
         |_| {},
     )
     .unwrap();
@@ -157,7 +217,8 @@ fn marks_are_of_stored_numbers() {
 
 #[test]
 fn systems_of_place_are_known_or_refused() {
-    let keyed = |keys: &[u16], wish: Option<u16>| made("dem", |tiff| tiff.with_keys(keys), |spec| spec.epsg = wish);
+    let keyed =
+        |keys: &[u16], wish: Option<u16>| made("dem", |tiff| tiff.with_keys(keys), |spec| spec.epsg = wish);
     for (keys, says) in [
         (&[1024, 1, 1025, 1, 3072, 32767][..], "defines a coordinate system of its own"),
         // A projection of its own over a known geographic system: metres are no degrees.
@@ -188,17 +249,25 @@ fn systems_of_place_are_known_or_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
     let place = Value::Double(vec![0.0, 0.0, 0.0, 6_300_000.0, 1_900_000.0, 0.0]);
-    Tiff::heights([4, 3], |_, _| 100.0).with(33922, place).with_keys(&[1024, 1, 1025, 1, 3072, 2230, 3076, 9003]).write(&path);
+    Tiff::heights([4, 3], |_, _| 100.0)
+        .with(33922, place)
+        .with_keys(&[1024, 1, 1025, 1, 3072, 2230, 3076, 9003])
+        .write(&path);
     let loaded = read(&TerrainSpec { height_unit: Some(HeightUnit::UsFt), ..spec(&path) }).unwrap();
     assert!((height_m(&loaded, [1, 1]).unwrap() - 100.0 * SURVEY).abs() < 1e-3);
     // By PROJ: cs2cs EPSG:2230 EPSG:4269 of the grid's middle.
     let middle = loaded.summary.centre_rad.map(f64::to_degrees);
-    assert!((middle[0] - 32.877_115_5).abs() < 2e-6 && (middle[1] - -117.102_211_1).abs() < 2e-6, "{middle:?}");
+    assert!(
+        (middle[0] - 32.877_115_5).abs() < 2e-6 && (middle[1] - -117.102_211_1).abs() < 2e-6,
+        "{middle:?}"
+    );
 }
 
 #[test]
 fn datums_that_contradict_the_key_are_named() {
-    let keyed = |keys: &[u16], height: HeightReference| made("dem", |tiff| tiff.with_keys(keys), |spec| spec.height = height).unwrap().1;
+    let keyed = |keys: &[u16], height: HeightReference| {
+        made("dem", |tiff| tiff.with_keys(keys), |spec| spec.height = height).unwrap().1
+    };
     let sea = [1024, 1, 1025, 1, 3072, 32632, 4096, 3855];
     assert!(keyed(&sea, HeightReference::Ellipsoid)[0].contains("EPSG:3855, EGM2008 height"));
     assert!(keyed(&sea, HeightReference::Msl).is_empty());
@@ -224,13 +293,24 @@ fn broken_layouts_are_refused() {
         (256, Value::Long(vec![2_000_000_000]), "impossible for a file of this length"),
         (273, Value::Double(vec![8.0]), "tag 273 is no list of whole numbers"),
     ] {
-        let error = plain(|tiff| tiff.with(tag, value)).map(|(height, notes)| format!("{height:?} {notes:?}"));
-        assert!(error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)), "{tag}: {error:?} {says}");
+        let error =
+            plain(|tiff| tiff.with(tag, value)).map(|(height, notes)| format!("{height:?} {notes:?}"));
+        assert!(
+            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)),
+            "{tag}: {error:?} {says}"
+        );
     }
     // Control points alone.
     let points: Vec<f64> = (0..4)
         .flat_map(|k| {
-            [f64::from(k % 2), f64::from(k / 2), 0.0, 500_000.0 + 10.0 * f64::from(k % 2), 5_200_000.0 - 10.0 * f64::from(k / 2), 0.0]
+            [
+                f64::from(k % 2),
+                f64::from(k / 2),
+                0.0,
+                500_000.0 + 10.0 * f64::from(k % 2),
+                5_200_000.0 - 10.0 * f64::from(k / 2),
+                0.0,
+            ]
         })
         .collect();
     let error = plain(|mut tiff| {

@@ -1,4 +1,5 @@
-//! Terrain files in every way that they are written, and in ways that they should not be: heights and colours at known places, or the refusal.
+//! Terrain files in every way that they are written, and in ways that they should not be: heights and colours
+//! at known places, or the refusal.
 
 #![allow(clippy::unwrap_used)]
 

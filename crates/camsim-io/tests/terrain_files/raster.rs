@@ -22,24 +22,41 @@ pub struct Tiff {
 impl Tiff {
     /// Floats of one band in UTM zone 32N, 10 m wide, the corner at 500 000, 5 200 000.
     pub fn heights([width, height]: [u32; 2], value: impl Fn(u32, u32) -> f32) -> Self {
-        let data: Vec<u8> =
-            (0..height).flat_map(|row| (0..width).map(move |column| (column, row))).flat_map(|(c, r)| value(c, r).to_le_bytes()).collect();
+        let data: Vec<u8> = (0..height)
+            .flat_map(|row| (0..width).map(move |column| (column, row)))
+            .flat_map(|(c, r)| value(c, r).to_le_bytes())
+            .collect();
         let mut tiff = Self::pixels([width, height], 1, 32, 3, 1, data);
         tiff.keys = vec![1024, 1, 1025, 1, 3072, 32632];
         tiff
     }
 
     /// Bytes of red, green and blue at the same place.
-    pub fn colors([width, height]: [u32; 2], bands: u16, photometric: u16, value: impl Fn(u32, u32, u16) -> u8) -> Self {
+    pub fn colors(
+        [width, height]: [u32; 2],
+        bands: u16,
+        photometric: u16,
+        value: impl Fn(u32, u32, u16) -> u8,
+    ) -> Self {
         let value = &value;
-        let data =
-            (0..height).flat_map(|row| (0..width).flat_map(move |column| (0..bands).map(move |band| value(column, row, band)))).collect();
+        let data = (0..height)
+            .flat_map(|row| {
+                (0..width).flat_map(move |column| (0..bands).map(move |band| value(column, row, band)))
+            })
+            .collect();
         let mut tiff = Self::pixels([width, height], bands, 8, 1, photometric, data);
         tiff.keys = vec![1024, 1, 1025, 1, 3072, 32632];
         tiff
     }
 
-    pub fn pixels([width, height]: [u32; 2], bands: u16, bits: u16, format: u16, photometric: u16, data: Vec<u8>) -> Self {
+    pub fn pixels(
+        [width, height]: [u32; 2],
+        bands: u16,
+        bits: u16,
+        format: u16,
+        photometric: u16,
+        data: Vec<u8>,
+    ) -> Self {
         let tags = vec![
             (256, Value::Long(vec![width])),
             (257, Value::Long(vec![height])),

@@ -1,6 +1,8 @@
-//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left; as plans make it, and with the sampling of the whole camera
-//! held. An effect can hide what is wrong with a picture: without blur, vignette or lens it takes a finer one to keep `quality.max_error_dn`, so that plans may spend more
-//! time where less is to be done. What the effect itself takes is the difference that is left when pictures are sampled alike.
+//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left;
+//! as plans make it, and with the sampling of the whole camera held. An effect can hide what is wrong with a
+//! picture: without blur, vignette or lens it takes a finer one to keep `quality.max_error_dn`, so that plans
+//! may spend more time where less is to be done. What the effect itself takes is the difference that is left
+//! when pictures are sampled alike.
 
 use std::sync::Arc;
 
@@ -41,8 +43,15 @@ pub enum Effect {
 }
 
 /// All of them, in the order in which they are left out one after the other.
-pub const EFFECTS: [Effect; 7] =
-    [Effect::Noise, Effect::Vignette, Effect::Blur, Effect::Vibration, Effect::Lens, Effect::RollingShutter, Effect::Silhouettes];
+pub const EFFECTS: [Effect; 7] = [
+    Effect::Noise,
+    Effect::Vignette,
+    Effect::Blur,
+    Effect::Vibration,
+    Effect::Lens,
+    Effect::RollingShutter,
+    Effect::Silhouettes,
+];
 
 impl Effect {
     /// For tables.
@@ -75,7 +84,8 @@ impl Effect {
             }
             Self::Lens => camera.lens = LensSpec::default(),
             Self::RollingShutter => {
-                camera.shutter = ShutterSpec { exposure_ms: camera.shutter.exposure_ms, ..ShutterSpec::default() };
+                camera.shutter =
+                    ShutterSpec { exposure_ms: camera.shutter.exposure_ms, ..ShutterSpec::default() };
             }
             Self::Silhouettes => sequence.scenario.quality.silhouettes = Silhouettes::Plain,
         }
@@ -95,7 +105,8 @@ pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>,
     Ok(Arc::new(sequence))
 }
 
-/// The sampling of a plan, or with grids where it reads areas, whatever it leaves of a picture; each frame from an ideal frame of its own.
+/// The sampling of a plan, or with grids where it reads areas, whatever it leaves of a picture; each frame
+/// from an ideal frame of its own.
 fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
     let taps = match plan.taps {
         TapStage::Bilinear | TapStage::Spline => 1,
@@ -131,7 +142,8 @@ pub struct AblationRow {
     pub ms_per_frame_p50: f64,
     /// Processor milliseconds a frame, median; null where it is not known.
     pub cpu_ms_per_frame: Option<f64>,
-    /// Difference to the whole camera in the same round, quartiles, ms; null for the copy, which is measured apart.
+    /// Difference to the whole camera in the same round, quartiles, ms; null for the copy, which is measured
+    /// apart.
     pub to_full_ms: Option<[f64; 3]>,
     /// The same three of frames that are sampled as the plan samples the whole camera's.
     pub alike_ms_per_frame_p50: Option<f64>,
@@ -141,11 +153,16 @@ pub struct AblationRow {
     pub alike_to_full_ms: Option<[f64; 3]>,
 }
 
-/// Times of a camera without each effect, without more and more of them, without any over a picture that is kept, and of a bare copy.
+/// Times of a camera without each effect, without more and more of them, without any over a picture that is
+/// kept, and of a bare copy.
 ///
 /// # Errors
 /// Whatever the renderer meets.
-pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<Vec<AblationRow>, BenchError> {
+pub fn measure(
+    engine: &Engine,
+    full: &Arc<Sequence>,
+    effort: Effort,
+) -> Result<Vec<AblationRow>, BenchError> {
     let mut names = vec!["nothing: the whole camera".to_owned()];
     let mut variants = vec![(full.clone(), false)];
     for effect in EFFECTS {
@@ -167,7 +184,8 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
     names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());
     variants.push((without(full, &EFFECTS)?, true));
     let planned = times(engine, &variants, effort)?;
-    let plan = Planner::new(full.clone(), &[Channel::Color], MAX_SIDE_PX).and_then(|planner| planner.plan(FRAME));
+    let plan =
+        Planner::new(full.clone(), &[Channel::Color], MAX_SIDE_PX).and_then(|planner| planner.plan(FRAME));
     let alike = match &plan {
         Ok(plan) => times(engine, &alike(&variants, plan), effort)?.into_iter().map(Some).collect(),
         // The renderer has made it: this cannot be.
@@ -175,14 +193,31 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
     };
     let full_alike = alike.first().cloned().flatten();
     let rows = names.into_iter().zip(planned.iter().zip(&alike));
-    let mut rows: Vec<_> =
-        rows.map(|(name, (own, alike))| row(name, own, Some(&planned[0]), alike.as_ref().zip(full_alike.as_ref()))).collect();
-    let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, planned[0].wall_ms.len().max(3), effort.burst)?;
-    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None, None));
+    let mut rows: Vec<_> = rows
+        .map(|(name, (own, alike))| {
+            row(name, own, Some(&planned[0]), alike.as_ref().zip(full_alike.as_ref()))
+        })
+        .collect();
+    let copy = blit::measure(
+        engine.gpu(),
+        full.scenario.camera.size_px,
+        planned[0].wall_ms.len().max(3),
+        effort.burst,
+    )?;
+    rows.push(row(
+        "all: a finished picture copied on the device and to the host".to_owned(),
+        &copy,
+        None,
+        None,
+    ));
     Ok(rows)
 }
 
-fn times(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effort) -> Result<Vec<Times>, BenchError> {
+fn times(
+    engine: &Engine,
+    variants: &[(Arc<Sequence>, bool)],
+    effort: Effort,
+) -> Result<Vec<Times>, BenchError> {
     Ok(rounds::measure(engine, variants, effort)?.into_iter().map(|measured| measured.times).collect())
 }
 
@@ -197,8 +232,9 @@ fn alike(variants: &[(Arc<Sequence>, bool)], plan: &FramePlan) -> Vec<(Arc<Seque
 }
 
 fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times, &Times)>) -> AblationRow {
-    let difference =
-        |own: &Times, full: &Times| quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>());
+    let difference = |own: &Times, full: &Times| {
+        quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>())
+    };
     AblationRow {
         without,
         ms_per_frame_p50: own.p50_p99_ms()[0],
@@ -221,8 +257,16 @@ mod tests {
         let full = &cases.iter().find(|case| case.name == "all-effects").expect("the case").sequence;
         let bare = without(full, &EFFECTS).expect("a mount");
         let camera = &bare.scenario.camera;
-        assert!(camera.lens == LensSpec::default() && camera.shutter == ShutterSpec::default() && camera.mount.vibration.is_empty());
-        assert!(camera.photometric.noise_sigma == 0.0 && camera.photometric.vignette.is_none() && bare.vignette.is_none());
+        assert!(
+            camera.lens == LensSpec::default()
+                && camera.shutter == ShutterSpec::default()
+                && camera.mount.vibration.is_empty()
+        );
+        assert!(
+            camera.photometric.noise_sigma == 0.0
+                && camera.photometric.vignette.is_none()
+                && bare.vignette.is_none()
+        );
         // The path is the platform's own again.
         assert_eq!(bare.path.highest_vibration_hz(), 0.0);
         // Each effect is there to be left out.

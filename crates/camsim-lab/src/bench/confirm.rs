@@ -1,5 +1,6 @@
-//! Whether a row that another one dominates does so for good. A case has hundreds of pairs of rows and a few rounds of each: by chance alone some pairs look as
-//! if one were slower. What is suspected is measured once more, two by two, and only what both measurements say is told.
+//! Whether a row that another one dominates does so for good. A case has hundreds of pairs of rows and a few
+//! rounds of each: by chance alone some pairs look as if one were slower. What is suspected is measured once
+//! more, two by two, and only what both measurements say is told.
 
 use camsim_gpu::Engine;
 
@@ -18,12 +19,22 @@ const ROUNDS: [usize; 2] = [9, 21];
 ///
 /// # Errors
 /// Whatever the renderer meets.
-pub fn confirmed(engine: &Engine, variants: &[Variant], suspected: Vec<Violation>, effort: Effort) -> Result<Vec<Violation>, BenchError> {
+pub fn confirmed(
+    engine: &Engine,
+    variants: &[Variant],
+    suspected: Vec<Violation>,
+    effort: Effort,
+) -> Result<Vec<Violation>, BenchError> {
     let [min_rounds, max_rounds] = ROUNDS;
     let effort = Effort { min_rounds, max_rounds, ..effort };
     let mut found = Vec::new();
     for violation in suspected {
-        let of = |knob: &str| variants.iter().find(|variant| variant.knob == knob).map(|variant| (variant.sequence.clone(), false));
+        let of = |knob: &str| {
+            variants
+                .iter()
+                .find(|variant| variant.knob == knob)
+                .map(|variant| (variant.sequence.clone(), false))
+        };
         let Some(pair) = of(&violation.row).zip(of(&violation.better)) else { continue };
         let alone = rounds::measure(engine, &[pair.0, pair.1], effort)?;
         let [row, better] = alone.as_slice() else { continue };

@@ -69,7 +69,8 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     if !matches!(case.group, Group::Lens | Group::Exposure) {
         row("linear", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Linear));
         row("rk2", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Rk2));
-        // Over smooth ground each look-up shows; with houses the error is at silhouettes. The whole camera's frames take seconds.
+        // Over smooth ground each look-up shows; with houses the error is at silhouettes. The whole camera's
+        // frames take seconds.
         let look_ups: &[u32] = match (quick, case.name, case.has_houses()) {
             (true, ..) => &[2],
             (_, WHOLE, _) => &[],
@@ -77,7 +78,9 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
             (.., false) => &[1, 2, 3],
         };
         for look_ups in look_ups {
-            row(&format!("reproject x{look_ups}"), Family::Solver, &|scenario| scenario.quality.iterations = Auto::Value(*look_ups));
+            row(&format!("reproject x{look_ups}"), Family::Solver, &|scenario| {
+                scenario.quality.iterations = Auto::Value(*look_ups)
+            });
         }
     }
     if quick {
@@ -89,11 +92,14 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     if case.has_houses() {
         if matches!(case.group, Group::Buildings | Group::LongWindow | Group::AllEffects) {
             for keys in [1, 2, 3] {
-                row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| scenario.quality.key_frames = Auto::Value(keys));
+                row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| {
+                    scenario.quality.key_frames = Auto::Value(keys)
+                });
             }
         }
         if matches!(case.group, Group::Buildings | Group::AllEffects) {
-            let with = |silhouettes| move |scenario: &mut Scenario| scenario.quality.silhouettes = silhouettes;
+            let with =
+                |silhouettes| move |scenario: &mut Scenario| scenario.quality.silhouettes = silhouettes;
             row("silhouettes: plain", Family::Silhouettes, &with(Silhouettes::Plain));
             row("silhouettes: rays", Family::Silhouettes, &with(Silhouettes::Rays));
             row("silhouettes: rays, 0.5/255", Family::Silhouettes, &|scenario| {
@@ -114,7 +120,9 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     // Without a lens nothing is minified.
     if case.sequence.scenario.camera.lens.model != LensModel::Pinhole {
         for taps in if case.name == WHOLE { &[1, 2][..] } else { &[1, 2, 4] } {
-            row(&format!("taps: {taps} x {taps}"), Family::Taps, &|scenario| scenario.quality.footprint_taps = Auto::Value(*taps));
+            row(&format!("taps: {taps} x {taps}"), Family::Taps, &|scenario| {
+                scenario.quality.footprint_taps = Auto::Value(*taps)
+            });
         }
     }
     if case.name == SIZED {
@@ -143,7 +151,8 @@ pub fn resize(scenario: &mut Scenario, size_px: [u32; 2]) {
     let scale = f64::from(size_px[1]) / f64::from(camera.size_px[1]);
     let middle = camera.size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
     if let Some(principal) = &mut camera.principal_point_px {
-        *principal = [0, 1].map(|k: usize| 0.5 * (f64::from(size_px[k]) - 1.0) + scale * (principal[k] - middle[k]));
+        *principal =
+            [0, 1].map(|k: usize| 0.5 * (f64::from(size_px[k]) - 1.0) + scale * (principal[k] - middle[k]));
     }
     camera.focal_px = camera.focal_px.map(|focal| scale * focal);
     camera.size_px = size_px;

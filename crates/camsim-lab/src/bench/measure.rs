@@ -26,7 +26,8 @@ struct Work {
 
 impl Work {
     fn new(engine: &Engine, sequence: &Arc<Sequence>) -> Result<Self, BenchError> {
-        let planner = Planner::new(sequence.clone(), &[Channel::Color], engine.gpu().max_side_px()).map_err(RenderError::from)?;
+        let planner = Planner::new(sequence.clone(), &[Channel::Color], engine.gpu().max_side_px())
+            .map_err(RenderError::from)?;
         let plan = planner.plan(FRAME).map_err(RenderError::from)?;
         Ok(Self { planner, texts: HashMap::from([(FRAME, text(plan.clone()))]), plan })
     }
@@ -49,12 +50,23 @@ impl Work {
     }
 }
 
-/// What the renderer does for a plan: every field, so that one added later counts, but those that are only told to the user.
+/// What the renderer does for a plan: every field, so that one added later counts, but those that are only
+/// told to the user.
 fn text(plan: FramePlan) -> String {
-    format!("{:?}", FramePlan { predicted: Predicted::default(), skipped: Vec::new(), price_ms: 0.0, ideal_price_ms: 0.0, ..plan })
+    format!(
+        "{:?}",
+        FramePlan {
+            predicted: Predicted::default(),
+            skipped: Vec::new(),
+            price_ms: 0.0,
+            ideal_price_ms: 0.0,
+            ..plan
+        }
+    )
 }
 
-/// For each variant the first one with the same plans: itself, or one above it. The renderer knows of `quality` only what is in the plans.
+/// For each variant the first one with the same plans: itself, or one above it. The renderer knows of
+/// `quality` only what is in the plans.
 fn first_alike(works: &mut [Work], frames: u64) -> Result<Vec<usize>, BenchError> {
     let mut first: Vec<usize> = Vec::new();
     for i in 0..works.len() {
@@ -79,17 +91,26 @@ fn moves_sources(family: Family) -> bool {
     }
 }
 
-/// Measures the rows of a case. Rows with the same plans are rendered once. Rows of another size than the case's are timed only.
+/// Measures the rows of a case. Rows with the same plans are rendered once. Rows of another size than the
+/// case's are timed only.
 ///
 /// # Errors
 /// Whatever the renderer or the oracle meets.
-pub fn case(engine: &Engine, case: &Case, variants: &[Variant], effort: Effort) -> Result<Vec<Row>, BenchError> {
-    let mut works = variants.iter().map(|variant| Work::new(engine, &variant.sequence)).collect::<Result<Vec<_>, _>>()?;
+pub fn case(
+    engine: &Engine,
+    case: &Case,
+    variants: &[Variant],
+    effort: Effort,
+) -> Result<Vec<Row>, BenchError> {
+    let mut works =
+        variants.iter().map(|variant| Work::new(engine, &variant.sequence)).collect::<Result<Vec<_>, _>>()?;
     let first = first_alike(&mut works, case.sequence.frames)?;
     let rendered: Vec<usize> = (0..variants.len()).filter(|&i| first[i] == i).collect();
     let timed: Vec<_> = rendered.iter().map(|&i| (variants[i].sequence.clone(), false)).collect();
-    let measured: HashMap<usize, _> = rendered.iter().copied().zip(rounds::measure(engine, &timed, effort)?).collect();
-    let default = variants.iter().position(|variant| variant.knob == DEFAULT).map(|i| &measured[&first[i]].times);
+    let measured: HashMap<usize, _> =
+        rendered.iter().copied().zip(rounds::measure(engine, &timed, effort)?).collect();
+    let default =
+        variants.iter().position(|variant| variant.knob == DEFAULT).map(|i| &measured[&first[i]].times);
     let truth = Truth::new(&of_truth(&case.sequence))?;
     let mut rows: Vec<Row> = Vec::new();
     for (i, variant) in variants.iter().enumerate() {

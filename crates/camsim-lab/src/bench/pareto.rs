@@ -38,18 +38,23 @@ pub struct Violation {
     pub psnr_db: [Option<f64>; 2],
 }
 
-/// Marks the rows that no other row of their case and size beats in both time and error: `coord_front` by the RMS of the source
-/// coordinates, `image_front` by PSNR. Times are compared within the rounds that two rows have in common.
+/// Marks the rows that no other row of their case and size beats in both time and error: `coord_front` by the
+/// RMS of the source coordinates, `image_front` by PSNR. Times are compared within the rounds that two rows
+/// have in common.
 pub fn mark_fronts(rows: &mut [Row]) {
     let fronts: Vec<[bool; 2]> = rows
         .iter()
         .map(|row| {
             let free = |error: fn(&Row) -> Option<f64>| {
                 error(row).is_some_and(|own| {
-                    !rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob).any(|other| {
-                        let [_, time, _] = other.times.ratio_to(&row.times);
-                        time <= 1.0 && error(other).is_some_and(|error| error < own || (error <= own && time < 1.0))
-                    })
+                    !rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob).any(
+                        |other| {
+                            let [_, time, _] = other.times.ratio_to(&row.times);
+                            time <= 1.0
+                                && error(other)
+                                    .is_some_and(|error| error < own || (error <= own && time < 1.0))
+                        },
+                    )
                 })
             };
             [free(|row| row.coord_rms_px), free(|row| row.psnr_db.map(|db| -db))]
@@ -96,8 +101,9 @@ pub(super) fn is_slower(ratios: &[f64]) -> bool {
     quantile(ratios, 1.0 - ROUNDS) > SLOWER
 }
 
-/// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger error: of all coordinates (RMS), of
-/// those away from silhouettes (99th percentile) or of the picture, and no smaller one of the others. A row that has the plans of one above it is that row.
+/// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger
+/// error: of all coordinates (RMS), of those away from silhouettes (99th percentile) or of the picture, and
+/// no smaller one of the others. A row that has the plans of one above it is that row.
 #[must_use]
 pub fn violations(rows: &[Row]) -> Vec<Violation> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.same_as.is_none()).collect();
@@ -108,9 +114,13 @@ pub fn violations(rows: &[Row]) -> Vec<Violation> {
             // Samples and taps do not move sources: what was not compared is as in the case's default row.
             let default = rows.iter().find(|default| comparable(row, default) && default.knob == DEFAULT);
             let coords = |figure: fn(&Row) -> Option<f64>| {
-                coords_than(figure(other).or_else(|| default.and_then(|default| figure(default))), figure(row))
+                coords_than(
+                    figure(other).or_else(|| default.and_then(|default| figure(default))),
+                    figure(row),
+                )
             };
-            let than = [coords(|row| row.coord_rms_px), coords(|row| row.smooth_p99_px), picture_than(other, row)];
+            let than =
+                [coords(|row| row.coord_rms_px), coords(|row| row.smooth_p99_px), picture_than(other, row)];
             if is_slower(&ratios) && than.contains(&Than::Better) && !than.contains(&Than::Worse) {
                 found.push(Violation {
                     case: row.case.clone(),
@@ -150,27 +160,41 @@ mod tests {
         let names = |rows: &[Row]| violations(rows).into_iter().map(|v| v.better).collect::<Vec<_>>();
         let better = row("better", Family::Solver, [10.0, 11.0, 10.0], 0.01, 45.0);
         assert_eq!(names(&[auto.clone(), better.clone()]), ["better"]);
-        // One row's time is noise, another's error is larger, a third's picture is worse; a forced row may be as bad as it likes.
+        // One row's time is noise, another's error is larger, a third's picture is worse; a forced row may be
+        // as bad as it likes.
         let noisy = row("noisy", Family::Solver, [19.0, 23.0, 21.5], 0.01, 45.0);
         let coarse = row("coarse", Family::Solver, [10.0, 11.0, 10.0], 0.06, 45.0);
         let ugly = row("ugly", Family::Solver, [10.0, 11.0, 10.0], 0.01, 40.0);
         assert!(names(&[auto.clone(), noisy, coarse, ugly]).is_empty());
-        assert!(names(&[row("forced", Family::Solver, [20.0, 22.0, 21.0], 0.05, 45.0), better.clone()]).is_empty());
+        assert!(
+            names(&[row("forced", Family::Solver, [20.0, 22.0, 21.0], 0.05, 45.0), better.clone()])
+                .is_empty()
+        );
         let mut larger = better.clone();
         larger.width = 1280;
         assert!(names(&[auto.clone(), larger]).is_empty());
-        // Fewer samples for a better picture, coordinates not looked at; and the same plan under another name.
-        let sharper = Row { coord_rms_px: None, ..row("sharper", Family::Blur, [10.0, 11.0, 10.0], 0.0, 45.5) };
+        // Fewer samples for a better picture, coordinates not looked at; and the same plan under another
+        // name.
+        let sharper =
+            Row { coord_rms_px: None, ..row("sharper", Family::Blur, [10.0, 11.0, 10.0], 0.0, 45.5) };
         assert_eq!(names(&[auto.clone(), sharper.clone()]), ["sharper"]);
-        // Its coordinates are then those of the default row: worse than those of a row that was asked to be exact.
-        let default = Row { coord_rms_px: Some(0.05), ..row(DEFAULT, Family::Tolerance, [9.0; 3], 0.05, 45.0) };
+        // Its coordinates are then those of the default row: worse than those of a row that was asked to be
+        // exact.
+        let default =
+            Row { coord_rms_px: Some(0.05), ..row(DEFAULT, Family::Tolerance, [9.0; 3], 0.05, 45.0) };
         let exact = row("exact", Family::Tolerance, [20.0, 22.0, 21.0], 1e-4, 45.0);
         assert!(names(&[default, exact, sharper.clone()]).is_empty());
-        let smoother = Row { smooth_p99_px: Some(1e-4), ..row("smoother", Family::Solver, [10.0, 11.0, 10.0], 0.05, 45.0) };
+        let smoother = Row {
+            smooth_p99_px: Some(1e-4),
+            ..row("smoother", Family::Solver, [10.0, 11.0, 10.0], 0.05, 45.0)
+        };
         assert_eq!(names(&[Row { smooth_p99_px: Some(2e-3), ..auto.clone() }, smoother]), ["smoother"]);
         // From 55 dB on pictures are alike.
         let pictures = |own_db: f64, better_db: f64| {
-            names(&[Row { coord_rms_px: None, psnr_db: Some(own_db), ..auto.clone() }, Row { psnr_db: Some(better_db), ..sharper.clone() }])
+            names(&[
+                Row { coord_rms_px: None, psnr_db: Some(own_db), ..auto.clone() },
+                Row { psnr_db: Some(better_db), ..sharper.clone() },
+            ])
         };
         assert_eq!(pictures(53.0, 62.0), ["sharper"]);
         assert!(pictures(59.0, 62.0).is_empty());

@@ -1,11 +1,13 @@
 //! Times of several variants, measured in turn.
 //!
-//! A machine is never quite idle, so what is compared is measured in the same rounds: each round renders a burst of frames with every
-//! variant. A time a frame is that of a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it,
-//! files are not. What the frames of a burst share, such as one ideal frame, is planned and drawn anew in each.
+//! A machine is never quite idle, so what is compared is measured in the same rounds: each round renders a
+//! burst of frames with every variant. A time a frame is that of a burst, two frames in flight, divided by
+//! its frames: plan, poses, passes and read-back are in it, files are not. What the frames of a burst share,
+//! such as one ideal frame, is planned and drawn anew in each.
 //!
-//! The time for all of it is shared out evenly: a variant leaves when it has used its share, so that slow ones have few rounds and quick ones
-//! many. Rounds that two variants have in common are the first ones of both.
+//! The time for all of it is shared out evenly: a variant leaves when it has used its share, so that slow
+//! ones have few rounds and quick ones many. Rounds that two variants have in common are the first ones of
+//! both.
 
 use std::{
     convert::Infallible,
@@ -28,8 +30,8 @@ pub const SLOW: Duration = Duration::from_secs(1);
 /// How long to measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Frames of a burst: enough for two in flight to pay. A frame that takes longer than [`SLOW`] is a burst of its own: what overlaps is
-    /// little beside it.
+    /// Frames of a burst: enough for two in flight to pay. A frame that takes longer than [`SLOW`] is a burst
+    /// of its own: what overlaps is little beside it.
     pub burst: u64,
     /// Rounds of each variant at least, whatever they take.
     pub min_rounds: usize,
@@ -40,7 +42,8 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// Whether one of `variants` that has spent `spent_ms` in its rounds goes on to round `round`, counted from 0.
+    /// Whether one of `variants` that has spent `spent_ms` in its rounds goes on to round `round`, counted
+    /// from 0.
     fn goes_on(&self, round: usize, spent_ms: f64, variants: usize) -> bool {
         round < self.min_rounds || (round < self.max_rounds && spent_ms * (variants as f64) < ms(self.budget))
     }
@@ -96,7 +99,10 @@ impl Times {
 }
 
 /// Renders frames and gives the last.
-fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> Result<Option<Finished>, BenchError> {
+fn render(
+    session: &mut Session<'_>,
+    frames: impl IntoIterator<Item = u64>,
+) -> Result<Option<Finished>, BenchError> {
     let mut last = None;
     session.render::<Infallible>(frames, &mut |finished| {
         last = std::hint::black_box(Some(finished));
@@ -105,12 +111,16 @@ fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> R
     Ok(last)
 }
 
-/// Times and a frame of `variants`, in their order. Each renders the frames of its sequence over and over; those of which `still` says so
-/// render one frame, so that its ideal frame is drawn once and kept.
+/// Times and a frame of `variants`, in their order. Each renders the frames of its sequence over and over;
+/// those of which `still` says so render one frame, so that its ideal frame is drawn once and kept.
 ///
 /// # Errors
 /// Whatever the renderer meets.
-pub fn measure(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effort) -> Result<Vec<Measured>, BenchError> {
+pub fn measure(
+    engine: &Engine,
+    variants: &[(Arc<Sequence>, bool)],
+    effort: Effort,
+) -> Result<Vec<Measured>, BenchError> {
     let mut running = Vec::new();
     for (sequence, still) in variants {
         let begin = Instant::now();
@@ -128,7 +138,8 @@ pub fn measure(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effo
         let mut any = false;
         // Each variant takes each place in the round once in a while.
         for place in 0..count {
-            let (session, frames, still, burst, Measured { times, .. }) = &mut running[(place + round) % count];
+            let (session, frames, still, burst, Measured { times, .. }) =
+                &mut running[(place + round) % count];
             let a_frame = |sum_ms: f64| sum_ms / *burst as f64;
             if !effort.goes_on(round, *burst as f64 * times.wall_ms.iter().sum::<f64>(), count) {
                 continue;
@@ -142,7 +153,9 @@ pub fn measure(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effo
             let begin = Instant::now();
             render(session, frames)?;
             times.wall_ms.push(a_frame(ms(begin.elapsed())));
-            times.processor_ms.extend(busy.zip(processor_ms()).map(|(before, after)| a_frame(after - before)));
+            times
+                .processor_ms
+                .extend(busy.zip(processor_ms()).map(|(before, after)| a_frame(after - before)));
         }
         if !any {
             break;
@@ -158,7 +171,9 @@ mod tests {
     #[test]
     fn slow_variants_leave_early_and_quick_ones_stay() {
         let effort = Effort { burst: 2, min_rounds: 3, max_rounds: 9, budget: Duration::from_secs(10) };
-        let rounds = |ms_a_round: f64| (0..).take_while(|&round| effort.goes_on(round, ms_a_round * round as f64, 10)).count();
+        let rounds = |ms_a_round: f64| {
+            (0..).take_while(|&round| effort.goes_on(round, ms_a_round * round as f64, 10)).count()
+        };
         // A second each: 3 rounds of 2 s all the same, 4 rounds of 300 ms, no more than 9 of 10 ms.
         assert_eq!([2000.0, 300.0, 10.0].map(rounds), [3, 4, 9]);
     }

@@ -35,7 +35,8 @@ pub struct Row {
     pub predicted_px: Option<f64>,
     /// What is forced, or `auto` and the tolerance.
     pub knob: String,
-    /// The row of this case whose plans are the same in every frame, so that its times and errors are this row's too; null if none is above it.
+    /// The row of this case whose plans are the same in every frame, so that its times and errors are this
+    /// row's too; null if none is above it.
     pub same_as: Option<String>,
     /// What the row varies.
     #[serde(skip)]

@@ -12,7 +12,8 @@ use crate::{
     timing::quantile,
 };
 
-/// Blender Cycles on two cores, the plane of 640x480 with 33 ms readout and 8 ms exposure: seconds a frame, dB. Measured once, outside of camsim.
+/// Blender Cycles on two cores, the plane of 640x480 with 33 ms readout and 8 ms exposure: seconds a frame,
+/// dB. Measured once, outside of camsim.
 const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
 /// The case that they stand beside.
 const CYCLES_CASE: &str = "blender-plane";
@@ -65,16 +66,23 @@ impl Report {
         writeln!(text, "\n### {}: {about}\n", first.case)?;
         let [coords, picture] = first.compared;
         let rendered = rows.iter().filter(|row| row.same_as.is_none());
-        let rounds = rendered.clone().map(|row| row.rounds).min().zip(rendered.clone().map(|row| row.rounds).max());
+        let rounds =
+            rendered.clone().map(|row| row.rounds).min().zip(rendered.clone().map(|row| row.rounds).max());
         write!(
             text,
             "{}x{}, {} rounds; errors over {coords} coordinates and {picture} pixels of the picture",
             first.width,
             first.height,
-            rounds.map_or(String::new(), |(least, most)| if least == most { most.to_string() } else { format!("{least} to {most}") }),
+            rounds.map_or(String::new(), |(least, most)| if least == most {
+                most.to_string()
+            } else {
+                format!("{least} to {most}")
+            }),
         )?;
         match first.edge_share.filter(|share| *share > 0.0) {
-            Some(share) => writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?,
+            Some(share) => {
+                writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?
+            }
             None => writeln!(text, ".\n")?,
         }
         writeln!(
@@ -83,7 +91,10 @@ impl Report {
         )?;
         writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|---|---|")?;
         for row in rendered {
-            let alike = rows.iter().filter(|other| other.same_as.as_ref() == Some(&row.knob)).map(|other| other.knob.as_str());
+            let alike = rows
+                .iter()
+                .filter(|other| other.same_as.as_ref() == Some(&row.knob))
+                .map(|other| other.knob.as_str());
             let names = [row.knob.as_str()].into_iter().chain(alike).collect::<Vec<_>>().join("; ");
             let front = match (row.coord_front, row.image_front) {
                 (true, true) => "both",
@@ -108,14 +119,26 @@ impl Report {
             )?;
         }
         for (seconds, db) in CYCLES.iter().filter(|_| first.case == CYCLES_CASE && !self.quick) {
-            writeln!(text, "| Blender Cycles, two cores | {:.0} | | | | | | | | | {db:.0} | | |", 1e3 * seconds)?;
+            writeln!(
+                text,
+                "| Blender Cycles, two cores | {:.0} | | | | | | | | | {db:.0} | | |",
+                1e3 * seconds
+            )?;
         }
         let worst = |of: fn(&Row) -> u64| rows.iter().filter(|row| of(row) > 0).max_by_key(|row| of(row));
         if let Some(row) = worst(|row| row.falsely_valid) {
-            writeln!(text, "\nMost pixels with a source that the oracle has none for: {} ({}).", row.falsely_valid, row.knob)?;
+            writeln!(
+                text,
+                "\nMost pixels with a source that the oracle has none for: {} ({}).",
+                row.falsely_valid, row.knob
+            )?;
         }
         if let Some(row) = worst(|row| row.missing) {
-            writeln!(text, "\nMost pixels without a source that the oracle has one for: {} ({}).", row.missing, row.knob)?;
+            writeln!(
+                text,
+                "\nMost pixels without a source that the oracle has one for: {} ({}).",
+                row.missing, row.knob
+            )?;
         }
         Ok(())
     }
@@ -126,7 +149,8 @@ impl Report {
         writeln!(text, "| without | {columns} | sampled alike, {columns} |")?;
         writeln!(text, "|---|---|---|---|---|---|---|")?;
         let difference = |quartiles: Option<[f64; 3]>| {
-            quartiles.map_or("-".into(), |[low, median, high]| format!("{median:+.1} ({low:+.1} .. {high:+.1})"))
+            quartiles
+                .map_or("-".into(), |[low, median, high]| format!("{median:+.1} ({low:+.1} .. {high:+.1})"))
         };
         for row in &self.ablation {
             writeln!(
@@ -155,7 +179,8 @@ impl Report {
         for violation in &self.violations {
             // What one of the two was not measured for is not compared.
             let against = |what: &str, [own, better]: [Option<f64>; 2], text: fn(Option<f64>) -> String| {
-                (own.is_some() && better.is_some()).then(|| format!("{} against {} {what}", text(own), text(better)))
+                (own.is_some() && better.is_some())
+                    .then(|| format!("{} against {} {what}", text(own), text(better)))
             };
             let compared = [
                 against("px RMS", violation.coord_rms_px, pixels),
@@ -174,7 +199,13 @@ impl Report {
         }
         writeln!(text, "\n### What was promised\n\n| promise | measured | kept |\n|---|---|---|")?;
         for promise in self.promises() {
-            writeln!(text, "| {} | {} | {} |", promise.what, promise.measured, if promise.kept { "yes" } else { "no" })?;
+            writeln!(
+                text,
+                "| {} | {} | {} |",
+                promise.what,
+                promise.measured,
+                if promise.kept { "yes" } else { "no" }
+            )?;
         }
         Ok(())
     }
@@ -192,10 +223,16 @@ impl Report {
     fn promises(&self) -> Vec<Promise> {
         let mut promises = Vec::new();
         let mut worst = |what: &str, limit: f64, below: bool, unit: &str, values: Vec<(&Row, f64)>| {
-            let order = |a: &&(&Row, f64), b: &&(&Row, f64)| if below { a.1.total_cmp(&b.1) } else { b.1.total_cmp(&a.1) };
+            let order = |a: &&(&Row, f64), b: &&(&Row, f64)| {
+                if below { a.1.total_cmp(&b.1) } else { b.1.total_cmp(&a.1) }
+            };
             if let Some((row, value)) = values.iter().max_by(order) {
                 let kept = if below { *value <= limit } else { *value >= limit };
-                promises.push(Promise { what: what.into(), measured: format!("{}{unit} ({})", short(*value), row.case), kept });
+                promises.push(Promise {
+                    what: what.into(),
+                    measured: format!("{}{unit} ({})", short(*value), row.case),
+                    kept,
+                });
             }
         };
         let tight = "auto 0.001 px";
@@ -214,7 +251,13 @@ impl Report {
             let rk2 = self.row(&row.case, "rk2")?;
             Some(row.times.ratio_to(&rk2.times)[1])
         };
-        worst("the same at no more than 1.5 times the time of rk2", 1.5, true, " times", of(&[Smooth], tight, &to_rk2));
+        worst(
+            "the same at no more than 1.5 times the time of rk2",
+            1.5,
+            true,
+            " times",
+            of(&[Smooth], tight, &to_rk2),
+        );
         worst(
             "tolerance 0.001 px with buildings: at most 0.05 px RMS",
             0.05,
@@ -223,7 +266,13 @@ impl Report {
             of(&[Buildings], tight, &|row| row.coord_rms_px),
         );
         let every = [Smooth, Vibration, Buildings, LongWindow, Exposure, Lens, AllEffects];
-        worst("default: p99 away from silhouettes at most 0.05 px", 0.05, true, " px", of(&every, DEFAULT, &|row| row.smooth_p99_px));
+        worst(
+            "default: p99 away from silhouettes at most 0.05 px",
+            0.05,
+            true,
+            " px",
+            of(&every, DEFAULT, &|row| row.smooth_p99_px),
+        );
         let over = |row: &Row| Some(row.smooth_p99_px? / row.predicted_px?);
         let all: Vec<_> = self.rows.iter().filter_map(|row| Some((row, over(row)?))).collect();
         worst("measured p99 over the predicted bound: at most 1", 1.0, true, "", all);
@@ -232,8 +281,16 @@ impl Report {
             rows.filter_map(|row| Some((row, value(row)?))).collect::<Vec<_>>()
         };
         worst("all effects: at least 45 dB", 45.0, false, " dB", of_whole(DEFAULT, &|row| row.psnr_db));
-        worst("all effects, a tolerance of 0.7/255: at least 50 dB", 50.0, false, " dB", of_whole(FINE, &|row| row.psnr_db));
-        for (what, knob) in [("", DEFAULT), (", rays and a tolerance of 0.5/255", "silhouettes: rays, 0.5/255")] {
+        worst(
+            "all effects, a tolerance of 0.7/255: at least 50 dB",
+            50.0,
+            false,
+            " dB",
+            of_whole(FINE, &|row| row.psnr_db),
+        );
+        for (what, knob) in
+            [("", DEFAULT), (", rays and a tolerance of 0.5/255", "silhouettes: rays, 0.5/255")]
+        {
             worst(
                 &format!("all effects: at least 40 dB within 3 px of silhouettes{what}"),
                 40.0,
@@ -251,9 +308,13 @@ impl Report {
         let single = &rest[..rest.len().min(super::ablation::EFFECTS.len())];
         // The lower quartile, so that noise about zero does not count as time lost.
         let full_ms = full.alike_ms_per_frame_p50.unwrap_or_default();
-        let dearer: Vec<_> = single.iter().filter(|row| row.alike_to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full_ms)).collect();
+        let dearer: Vec<_> = single
+            .iter()
+            .filter(|row| row.alike_to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full_ms))
+            .collect();
         let names = dearer.iter().map(|row| row.without.as_str()).collect::<Vec<_>>().join(", ");
-        let measured = if dearer.is_empty() { "each does".to_owned() } else { format!("more without {names}") };
+        let measured =
+            if dearer.is_empty() { "each does".to_owned() } else { format!("more without {names}") };
         promises.push(Promise {
             what: "sampled alike, a frame takes no more time without an effect".into(),
             measured,
@@ -301,9 +362,10 @@ impl Report {
         text
     }
 
-    /// RMS of the source coordinates against time, both logarithmic. A point is a method's geometric mean over the cases of one kind; for each kind
-    /// of case a curve joins the methods of which each is more exact than all that take less time; the others and the paper's preset stand alone. (Whether a
-    /// row is beaten, by more than rounds differ, the table tells.)
+    /// RMS of the source coordinates against time, both logarithmic. A point is a method's geometric mean
+    /// over the cases of one kind; for each kind of case a curve joins the methods of which each is more
+    /// exact than all that take less time; the others and the paper's preset stand alone. (Whether a row is
+    /// beaten, by more than rounds differ, the table tells.)
     ///
     /// # Errors
     /// Nothing was measured.
@@ -323,12 +385,16 @@ impl Report {
             }
             let mut points = Vec::new();
             for knob in knobs {
-                let of_knob: Vec<(f64, f64)> =
-                    rows.iter().filter(|row| row.knob == knob).filter_map(|row| Some((row.ms_per_frame_p50, row.coord_rms_px?))).collect();
+                let of_knob: Vec<(f64, f64)> = rows
+                    .iter()
+                    .filter(|row| row.knob == knob)
+                    .filter_map(|row| Some((row.ms_per_frame_p50, row.coord_rms_px?)))
+                    .collect();
                 // Means over different sets of cases would not be comparable.
                 if of_knob.len() == cases {
-                    let mean =
-                        |value: fn(&(f64, f64)) -> f64| (of_knob.iter().map(|p| value(p).max(1e-9).ln()).sum::<f64>() / cases as f64).exp();
+                    let mean = |value: fn(&(f64, f64)) -> f64| {
+                        (of_knob.iter().map(|p| value(p).max(1e-9).ln()).sum::<f64>() / cases as f64).exp()
+                    };
                     let point = (mean(|p| p.0), mean(|p| p.1));
                     if knob == "paper" { paper.push(point) } else { points.push(point) }
                 }
@@ -348,7 +414,11 @@ impl Report {
         series.push(Series { name: "not on a curve".to_owned(), points: beaten, joined: false });
         series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
         let plot = Plot {
-            title: format!("Error against time, camsim {}, {}", self.version, self.adapter.split(" (").next().unwrap_or_default()),
+            title: format!(
+                "Error against time, camsim {}, {}",
+                self.version,
+                self.adapter.split(" (").next().unwrap_or_default()
+            ),
             x_label: "ms a frame (median)".into(),
             y_label: "RMS of the source coordinates, px (geometric means over the cases of a kind)".into(),
             log: [true, true],

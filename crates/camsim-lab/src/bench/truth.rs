@@ -1,8 +1,9 @@
 //! The error of a row against the oracle, on one frame of the case.
 //!
-//! Coordinates are compared at every second pixel of every second row. Pictures are compared at a part of the pixels, each of them converged: the oracle takes tens to
-//! hundreds of rays a pixel. The part is random over the picture, and random over the neighbourhood of silhouettes, where it is denser; the overall
-//! figure weighs both as they are in the whole picture.
+//! Coordinates are compared at every second pixel of every second row. Pictures are compared at a part of the
+//! pixels, each of them converged: the oracle takes tens to hundreds of rays a pixel. The part is random over
+//! the picture, and random over the neighbourhood of silhouettes, where it is denser; the overall figure
+//! weighs both as they are in the whole picture.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -17,7 +18,8 @@ use camsim_gpu::{Engine, engine::Finished};
 use super::{BenchError, rounds::FRAME};
 use crate::cases::world::hash;
 
-/// Coordinates of every so many pixels are compared, in both directions: 76 800 of 640x480, as many as a 99th percentile needs by far.
+/// Coordinates of every so many pixels are compared, in both directions: 76 800 of 640x480, as many as a 99th
+/// percentile needs by far.
 const STEP_PX: u32 = 2;
 /// Pixels of the picture that are compared, about: away from silhouettes, and within 3 px of them.
 const PICTURED: [u64; 2] = [4000, 2000];
@@ -60,9 +62,16 @@ impl Truth {
         let coords = CoordTruth::new(oracle.clone(), FRAME, 0.0);
         let near = coords.near_silhouettes();
         let valid: Vec<bool> = coords.valid().collect();
-        let whole = [false, true].map(|kind| near.iter().zip(&valid).filter(|(near, valid)| **valid && **near == kind).count() as u64);
+        let whole = [false, true].map(|kind| {
+            near.iter().zip(&valid).filter(|(near, valid)| **valid && **near == kind).count() as u64
+        });
         let only = chosen(near, whole);
-        let options = RenderOptions { max_samples: MAX_SAMPLES, tolerance_dn: TOLERANCE_DN, only: Some(only), ..RenderOptions::default() };
+        let options = RenderOptions {
+            max_samples: MAX_SAMPLES,
+            tolerance_dn: TOLERANCE_DN,
+            only: Some(only),
+            ..RenderOptions::default()
+        };
         let picture = oracle.render(FRAME, &options);
         Ok(Self { coords, picture, whole })
     }
@@ -71,14 +80,19 @@ impl Truth {
     ///
     /// # Errors
     /// Whatever the renderer meets.
-    pub fn coord_errors(&self, engine: &Engine, sequence: &Arc<Sequence>) -> Result<Option<CoordErrors>, BenchError> {
+    pub fn coord_errors(
+        &self,
+        engine: &Engine,
+        sequence: &Arc<Sequence>,
+    ) -> Result<Option<CoordErrors>, BenchError> {
         let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords])?;
         let mut finished = None;
         session.render::<Infallible>([FRAME], &mut |done| {
             finished = Some(done);
             Ok(())
         })?;
-        Ok(finished.and_then(|Finished { frame, plan, .. }| self.coords.errors(&plan.ideal_view(), &frame, STEP_PX)))
+        Ok(finished
+            .and_then(|Finished { frame, plan, .. }| self.coords.errors(&plan.ideal_view(), &frame, STEP_PX)))
     }
 
     /// Compares a picture of the frame.
@@ -96,15 +110,19 @@ impl Truth {
         }
     }
 
-    /// Sum of squared differences of linear values, and pixels, away from silhouettes and near them. A pixel that one of the two has not
-    /// counts in `falsely_valid` or `missing` instead.
+    /// Sum of squared differences of linear values, and pixels, away from silhouettes and near them. A pixel
+    /// that one of the two has not counts in `falsely_valid` or `missing` instead.
     fn squares(&self, frame: &RenderedFrame) -> [(f64, u64); 2] {
         let mut sums = [(0.0, 0); 2];
         let pairs = self.picture.color_rgba.chunks_exact(4).zip(frame.color_rgba.chunks_exact(4));
         for ((truth, own), near) in pairs.zip(self.coords.near_silhouettes()) {
             if truth[3] > 0.0 && own[3] > 0.0 {
                 let (sum, count) = &mut sums[usize::from(*near)];
-                *sum += truth[..3].iter().zip(own).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();
+                *sum += truth[..3]
+                    .iter()
+                    .zip(own)
+                    .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2))
+                    .sum::<f64>();
                 *count += 1;
             }
         }

@@ -32,7 +32,8 @@ impl World {
     /// Everything from one seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        // Equal variance an octave is an amplitude spectrum of 1/f, as natural pictures have. Relief falls faster: hills, no needles.
+        // Equal variance an octave is an amplitude spectrum of 1/f, as natural pictures have. Relief falls
+        // faster: hills, no needles.
         let relief = fractal(CELLS, 2, CELLS / 4, 0.5, seed ^ 3);
         let points = CELLS + 1;
         let at = |i: u32| f64::from(relief[((i / points % CELLS) * CELLS + i % points % CELLS) as usize]);
@@ -61,7 +62,13 @@ impl World {
     /// A relief or width that makes no terrain.
     pub fn hills(&self, width_m: f64, relief_m: f64) -> Result<Scene, TerrainError> {
         let heights: Vec<f64> = self.relief.iter().map(|height| relief_m * height).collect();
-        let terrain = Terrain::from_heights(CELLS + 1, CELLS + 1, width_m / f64::from(CELLS), &heights, Some(self.ground.clone()))?;
+        let terrain = Terrain::from_heights(
+            CELLS + 1,
+            CELLS + 1,
+            width_m / f64::from(CELLS),
+            &heights,
+            Some(self.ground.clone()),
+        )?;
         Ok(Scene { terrain: Some(terrain), sky_linear: [0.35, 0.55, 0.9], ..Scene::default() })
     }
 
@@ -80,7 +87,8 @@ impl World {
     pub fn town_on_hills(&self, half_m: f64, relief_m: f64) -> Result<Scene, TerrainError> {
         let mut scene = self.hills(GROUND_M, relief_m)?;
         let cell_m = GROUND_M / f64::from(CELLS);
-        let index = |m: f64| ((m / cell_m + 0.5 * f64::from(CELLS)).round().clamp(0.0, f64::from(CELLS))) as u32;
+        let index =
+            |m: f64| ((m / cell_m + 0.5 * f64::from(CELLS)).round().clamp(0.0, f64::from(CELLS))) as u32;
         // Five metres into the ground, so that no slope shows a house's underside. Row 0 is the north.
         let houses = self.houses(half_m, 5.0, &|north_m, east_m| {
             relief_m * self.relief[((CELLS - index(north_m)) * (CELLS + 1) + index(east_m)) as usize]
@@ -89,15 +97,16 @@ impl World {
         Ok(scene)
     }
 
-    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, turned and moved at random. `ground_m` is the height
-    /// of the ground at (north, east).
+    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, turned and moved at
+    /// random. `ground_m` is the height of the ground at (north, east).
     fn houses(&self, half_m: f64, sunk_m: f64, ground_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
         const PLOT_M: f64 = 40.0;
         let mut shape = Shape::default();
         let plots = (half_m / PLOT_M).floor() as i32;
         for (i, j) in (-plots..=plots).flat_map(|i| (-plots..=plots).map(move |j| (i, j))) {
             let random = |k: u64| unit(hash((i + 1000) as u64 * 4096 + (j + 1000) as u64, k));
-            let centre = [f64::from(i) + 0.4 * (random(0) - 0.5), f64::from(j) + 0.4 * (random(1) - 0.5)].map(|plots| plots * PLOT_M);
+            let centre = [f64::from(i) + 0.4 * (random(0) - 0.5), f64::from(j) + 0.4 * (random(1) - 0.5)]
+                .map(|plots| plots * PLOT_M);
             let half = [4.0 + 4.0 * random(2), 4.0 + 4.0 * random(3)];
             let ground_m = ground_m(centre[0], centre[1]);
             let heights_m = [ground_m - sunk_m, ground_m + 6.0 + 14.0 * random(4)];
@@ -120,7 +129,8 @@ fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f
         let first = shape.vertices.len() as u32;
         for (point, [a, b]) in points.into_iter().zip([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) {
             // Each house has its own part of the picture.
-            let uv = [a * size_m[0] + centre_m[0], b * size_m[1] + centre_m[1]].map(|m| (m / FACADE_M) as f32);
+            let uv =
+                [a * size_m[0] + centre_m[0], b * size_m[1] + centre_m[1]].map(|m| (m / FACADE_M) as f32);
             shape.vertices.push(MeshVertex::new(point.map(|m| m as f32), uv));
         }
         shape.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
@@ -129,7 +139,10 @@ fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f
     face(corners.map(|c| at(c, top_m)), [2.0 * half_m[1], 2.0 * half_m[0]]);
     for k in 0..4 {
         let (a, b) = (corners[k], corners[(k + 1) % 4]);
-        face([at(a, top_m), at(b, top_m), at(b, bottom_m), at(a, bottom_m)], [2.0 * half_m[(k + 1) % 2], top_m - bottom_m]);
+        face(
+            [at(a, top_m), at(b, top_m), at(b, bottom_m), at(a, bottom_m)],
+            [2.0 * half_m[(k + 1) % 2], top_m - bottom_m],
+        );
     }
 }
 
@@ -150,18 +163,22 @@ fn picture(side: u32, seed: u64) -> Texture {
     let brightness = fractal(side, 3, side / 2, 1.0, seed);
     let hue = fractal(side, 3, side / 8, 1.0, !seed);
     let byte = |value: f32| (118.0 + 42.0 * value).clamp(2.0, 253.0) as u8;
-    let pixels = brightness.par_iter().zip(&hue).flat_map_iter(|(&b, &h)| [byte(b + 0.3 * h), byte(b), byte(b - 0.3 * h), 255]);
+    let pixels = brightness
+        .par_iter()
+        .zip(&hue)
+        .flat_map_iter(|(&b, &h)| [byte(b + 0.3 * h), byte(b), byte(b - 0.3 * h), 255]);
     Texture { size_px: [side, side], rgba8: pixels.collect(), encoding: Encoding::Srgb }
 }
 
-/// Periodic noise of mean 0 and standard deviation 1: octaves of smoothly interpolated lattices from `coarsest` to `finest` periods a side,
-/// each `persistence` times as strong as the one before.
+/// Periodic noise of mean 0 and standard deviation 1: octaves of smoothly interpolated lattices from
+/// `coarsest` to `finest` periods a side, each `persistence` times as strong as the one before.
 fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -> Vec<f32> {
     let mut sum = vec![0.0_f32; (side * side) as usize];
     let (mut periods, mut amplitude) = (coarsest.max(1), 1.0_f64);
     while periods <= finest {
-        let lattice: Vec<f32> =
-            (0..periods * periods).map(|i| (2.0 * unit(hash(seed, u64::from(periods) << 32 | u64::from(i))) - 1.0) as f32).collect();
+        let lattice: Vec<f32> = (0..periods * periods)
+            .map(|i| (2.0 * unit(hash(seed, u64::from(periods) << 32 | u64::from(i))) - 1.0) as f32)
+            .collect();
         let place = |k: u32| {
             let at = f64::from(k) * f64::from(periods) / f64::from(side);
             let t = at.fract();
@@ -191,7 +208,8 @@ fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -
 
 /// Finaliser of SplitMix64 (Steele, Lea & Flood 2014) over both words.
 pub(crate) fn hash(seed: u64, counter: u64) -> u64 {
-    let mut z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(counter.wrapping_mul(0xd1b5_4a32_d192_ed03));
+    let mut z =
+        seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(counter.wrapping_mul(0xd1b5_4a32_d192_ed03));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -212,14 +230,21 @@ mod tests {
         let noise = fractal(side, 2, 32, 1.0, 7);
         assert_eq!(noise, fractal(side, 2, 32, 1.0, 7));
         let at = |x: u32, y: u32| f64::from(noise[(y % side * side + x % side) as usize]);
-        // Mean square difference at a lag grows with the lag for every octave that it does not yet span, and is about 2 beyond.
+        // Mean square difference at a lag grows with the lag for every octave that it does not yet span, and
+        // is about 2 beyond.
         let structure = |lag: u32| {
-            (0..side * side).map(|i| (at(i % side + lag, i / side) - at(i % side, i / side)).powi(2)).sum::<f64>() / f64::from(side * side)
+            (0..side * side)
+                .map(|i| (at(i % side + lag, i / side) - at(i % side, i / side)).powi(2))
+                .sum::<f64>()
+                / f64::from(side * side)
         };
         let seam = (0..side).map(|y| (at(0, y) - at(side - 1, y)).powi(2)).sum::<f64>() / f64::from(side);
         assert!(seam < 2.0 * structure(1), "{seam} {}", structure(1));
         let [one, four, sixteen] = [1, 4, 16].map(structure);
-        assert!(one < 0.5 * four && four < sixteen && (1.0..3.0).contains(&structure(60)), "{one} {four} {sixteen}");
+        assert!(
+            one < 0.5 * four && four < sixteen && (1.0..3.0).contains(&structure(60)),
+            "{one} {four} {sixteen}"
+        );
     }
 
     #[test]
@@ -233,9 +258,13 @@ mod tests {
             // The roof comes first.
             let roof = DVec3::from_array(corners[0].position_m.map(f64::from));
             let from = DVec3::new(roof.x, roof.y, -500.0);
-            let ground = terrain.intersect(from, DVec3::Z, f64::INFINITY).expect("ground under every house").t - 500.0;
+            let ground =
+                terrain.intersect(from, DVec3::Z, f64::INFINITY).expect("ground under every house").t - 500.0;
             above += u32::from(roof.z < ground);
-            assert!(corners.iter().any(|c| f64::from(c.position_m[2]) > ground), "the walls reach the ground");
+            assert!(
+                corners.iter().any(|c| f64::from(c.position_m[2]) > ground),
+                "the walls reach the ground"
+            );
         }
         assert_eq!(above as usize, houses.shape.vertices.len() / 20, "every roof is above ground");
     }

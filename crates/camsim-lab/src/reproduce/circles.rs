@@ -7,7 +7,8 @@ use super::pattern::Seen;
 
 /// Linear light that separates black circles from the white target.
 const THRESHOLD: f32 = 0.5;
-/// Pixels around what lies below the threshold that still belong to the circle: they carry its antialiased rim.
+/// Pixels around what lies below the threshold that still belong to the circle: they carry its antialiased
+/// rim.
 const RIM_PX: i32 = 2;
 /// Smallest area of a circle that counts, pixels.
 pub const LEAST_PX: usize = 12;
@@ -21,8 +22,8 @@ pub struct Spot {
     pub area_px2: f64,
 }
 
-/// All dark spots that touch neither the border of the picture nor a pixel without a ray. A pixel that is half dark counts half, so that
-/// the centroid is that of the area, not of a staircase.
+/// All dark spots that touch neither the border of the picture nor a pixel without a ray. A pixel that is
+/// half dark counts half, so that the centroid is that of the area, not of a staircase.
 #[must_use]
 pub fn spots(frame: &RenderedFrame) -> Vec<Spot> {
     let [width, height] = frame.size_px.map(|side| side as i32);
@@ -44,7 +45,10 @@ pub fn spots(frame: &RenderedFrame) -> Vec<Spot> {
         while let Some(&(x, y)) = core.get(next) {
             next += 1;
             for (x, y) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
-                if inside(x, y) && !taken[(y * width + x) as usize] && light(x, y).is_some_and(|value| value < THRESHOLD) {
+                if inside(x, y)
+                    && !taken[(y * width + x) as usize]
+                    && light(x, y).is_some_and(|value| value < THRESHOLD)
+                {
                     taken[(y * width + x) as usize] = true;
                     core.push((x, y));
                 }
@@ -55,8 +59,13 @@ pub fn spots(frame: &RenderedFrame) -> Vec<Spot> {
     found
 }
 
-/// Centroid over a core of dark pixels and its rim; `None` where picture or rays end too close by, or hardly anything is there.
-fn spot(core: &[(i32, i32)], light: &impl Fn(i32, i32) -> Option<f32>, inside: &impl Fn(i32, i32) -> bool) -> Option<Spot> {
+/// Centroid over a core of dark pixels and its rim; `None` where picture or rays end too close by, or hardly
+/// anything is there.
+fn spot(
+    core: &[(i32, i32)],
+    light: &impl Fn(i32, i32) -> Option<f32>,
+    inside: &impl Fn(i32, i32) -> bool,
+) -> Option<Spot> {
     if core.len() < LEAST_PX {
         return None;
     }
@@ -101,8 +110,10 @@ pub fn matches(seen: &[Seen], spots: &[Spot]) -> Matches {
     let mut matches = Matches::default();
     for circle in seen {
         let reach_px = 0.5 * (circle.area_px2 / std::f64::consts::PI).sqrt();
-        let fits =
-            |spot: &&Spot| spot.centroid_px.distance(circle.centroid_px) < reach_px && (spot.area_px2 / circle.area_px2 - 1.0).abs() < 0.34;
+        let fits = |spot: &&Spot| {
+            spot.centroid_px.distance(circle.centroid_px) < reach_px
+                && (spot.area_px2 / circle.area_px2 - 1.0).abs() < 0.34
+        };
         let distance = |spot: &&Spot| spot.centroid_px.distance(circle.centroid_px);
         match spots.iter().filter(fits).min_by(|a, b| distance(a).total_cmp(&distance(b))) {
             Some(spot) => matches.pairs.push((*circle, *spot)),
@@ -113,7 +124,8 @@ pub fn matches(seen: &[Seen], spots: &[Spot]) -> Matches {
 }
 
 impl Matches {
-    /// Statistics of [`Matches::errors_px`]; not a number where nothing was found, which is not an error of 0.
+    /// Statistics of [`Matches::errors_px`]; not a number where nothing was found, which is not an error of
+    /// 0.
     #[must_use]
     pub fn stats(&self) -> ErrorStats {
         match self.pairs.is_empty() {
@@ -156,8 +168,9 @@ mod tests {
         let found = spots(&frame);
         assert_eq!(found.len(), 2, "the one at the border does not count: {found:?}");
         for (spot, (centre, radius)) in found.iter().zip(discs) {
-            // What the picture itself, of 64 x 64 places a pixel, does not know of the disc is below 1e-3.
-            // A rim pixel's share counts at the pixel's centre, not at that of the part covered: 0.0017 and 0.0035 px for these two discs.
+            // What the picture itself, of 64 x 64 places a pixel, does not know of the disc is below 1e-3. A
+            // rim pixel's share counts at the pixel's centre, not at that of the part covered: 0.0017 and
+            // 0.0035 px for these two discs.
             let area_px2 = std::f64::consts::PI * radius * radius;
             let (shift, growth) = (spot.centroid_px.distance(centre), spot.area_px2 / area_px2 - 1.0);
             assert!(shift < 5e-3 && growth.abs() < 5e-3, "{spot:?}: {shift} {growth}");
@@ -169,9 +182,17 @@ mod tests {
 
     #[test]
     fn only_what_is_in_place_matches() {
-        let seen = |x: f64| Seen { centroid_px: DVec2::new(x, 9.0), area_px2: 100.0, centre_px: DVec2::ZERO, bounds_px: [DVec2::ZERO; 2] };
+        let seen = |x: f64| Seen {
+            centroid_px: DVec2::new(x, 9.0),
+            area_px2: 100.0,
+            centre_px: DVec2::ZERO,
+            bounds_px: [DVec2::ZERO; 2],
+        };
         let spot = |x: f64, area_px2: f64| Spot { centroid_px: DVec2::new(x, 9.0), area_px2 };
-        let matches = matches(&[seen(10.0), seen(40.0), seen(80.0)], &[spot(10.5, 95.0), spot(44.0, 100.0), spot(80.1, 30.0)]);
+        let matches = matches(
+            &[seen(10.0), seen(40.0), seen(80.0)],
+            &[spot(10.5, 95.0), spot(44.0, 100.0), spot(80.1, 30.0)],
+        );
         assert_eq!((matches.pairs.len(), matches.missed), (1, 2));
         assert_eq!(matches.errors_px(), [0.5]);
         assert_eq!(matches.stats().rms_px, 0.5);

@@ -1,8 +1,10 @@
-//! The paper's pipeline on one ideal frame (its fig. 2): every output pixel is taken back to the frame's stamp at constant twist and depth.
+//! The paper's pipeline on one ideal frame (its fig. 2): every output pixel is taken back to the frame's
+//! stamp at constant twist and depth.
 //!
-//! camsim itself draws the ideal frame in the middle of what the output frame sees and takes the true pose of every row; this is what the
-//! paper does instead, in f64, so that what its approximations cost can be seen. Choices that the paper leaves open are the reference
-//! program's: depth is that of the ideal frame's nearest pixel at the ray's own place.
+//! camsim itself draws the ideal frame in the middle of what the output frame sees and takes the true pose of
+//! every row; this is what the paper does instead, in f64, so that what its approximations cost can be seen.
+//! Choices that the paper leaves open are the reference program's: depth is that of the ideal frame's nearest
+//! pixel at the ray's own place.
 
 use std::sync::Arc;
 
@@ -100,24 +102,33 @@ impl Ideal {
         spec.photometric = Default::default();
         let geometry = IdealGeometry { size_px: spec.size_px, focal_px: camera.focal_px, principal_px };
         let path = sequence.path.clone();
-        let frame = rig::render(engine, &Arc::new(wide), &[Channel::Color, Channel::Depth], [0])?.pop().map(|finished| finished.frame);
-        let (Some(pose), Some(RenderedFrame { color_rgba, depth_m: Some(depth_m), .. })) = (Some(path.pose(stamp_s)), frame) else {
+        let frame = rig::render(engine, &Arc::new(wide), &[Channel::Color, Channel::Depth], [0])?
+            .pop()
+            .map(|finished| finished.frame);
+        let (Some(pose), Some(RenderedFrame { color_rgba, depth_m: Some(depth_m), .. })) =
+            (Some(path.pose(stamp_s)), frame)
+        else {
             return Err(ReproduceError::made("the ideal frame", "it has no depth"));
         };
         let camera_from_ned = pose.ned_from_camera.inverse();
-        let twist = Twist { velocity_m_s: camera_from_ned * path.velocity_ned(stamp_s), rate_rad_s: path.rate_camera(stamp_s) };
-        let inverse_depth = depth_m.iter().map(|&depth_m| if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 }).collect();
+        let twist = Twist {
+            velocity_m_s: camera_from_ned * path.velocity_ned(stamp_s),
+            rate_rad_s: path.rate_camera(stamp_s),
+        };
+        let inverse_depth =
+            depth_m.iter().map(|&depth_m| if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 }).collect();
         Ok(Self { geometry, pose, twist, rgba: color_rgba, inverse_depth })
     }
 
     /// Where an ideal ray of the output, `dt_s` after the stamp, looks in this frame.
     #[must_use]
     pub fn source_px(&self, uv: DVec2, dt_s: f64, model: Model) -> DVec2 {
-        self.geometry.px_from_point(model.displace(uv, self.nearest_inverse_depth(uv), &self.twist, dt_s).extend(1.0))
+        self.geometry
+            .px_from_point(model.displace(uv, self.nearest_inverse_depth(uv), &self.twist, dt_s).extend(1.0))
     }
 
-    /// The camera's frame by the paper's method, `samples` of the exposure from one end to the other (1 without exposure). A pixel
-    /// whose samples all lie outside of this frame is not valid.
+    /// The camera's frame by the paper's method, `samples` of the exposure from one end to the other (1
+    /// without exposure). A pixel whose samples all lie outside of this frame is not valid.
     ///
     /// # Errors
     /// A camera that cannot be used.
@@ -129,9 +140,10 @@ impl Ideal {
         path: Path,
         light: Light,
     ) -> Result<RenderedFrame, ReproduceError> {
-        let lens = CameraModel::from_spec(camera).map_err(|error| ReproduceError::made("the camera", error))?;
-        let shutter =
-            Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).map_err(|error| ReproduceError::made("the shutter", error))?;
+        let lens =
+            CameraModel::from_spec(camera).map_err(|error| ReproduceError::made("the camera", error))?;
+        let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)
+            .map_err(|error| ReproduceError::made("the shutter", error))?;
         let [width, height] = camera.size_px;
         let pixel = |i: u32| {
             let [x, y] = [i % width, i / width];
@@ -139,9 +151,12 @@ impl Ideal {
                 let dt_s = shutter.dt_pixel_s(x, y);
                 let place = |phase: f64| self.source_px(uv, dt_s + phase * shutter.exposure_s(), model);
                 let ends = [-0.5, 0.5].map(place);
-                let phases = (0..samples.max(1)).map(|i| if samples < 2 { 0.0 } else { f64::from(i) / f64::from(samples - 1) - 0.5 });
+                let phases = (0..samples.max(1))
+                    .map(|i| if samples < 2 { 0.0 } else { f64::from(i) / f64::from(samples - 1) - 0.5 });
                 match path {
-                    Path::Straight => self.mean(phases.map(|phase| ends[0].lerp(ends[1], phase + 0.5)), light),
+                    Path::Straight => {
+                        self.mean(phases.map(|phase| ends[0].lerp(ends[1], phase + 0.5)), light)
+                    }
                     Path::Curved => self.mean(phases.map(place), light),
                 }
             });

@@ -18,7 +18,9 @@ const LAG_S: f64 = 1.0;
 pub(super) fn woven(even: &RenderedFrame, odd: &RenderedFrame) -> RenderedFrame {
     let mut frame = odd.clone();
     let row = 4 * frame.size_px[0] as usize;
-    for (mine, other) in frame.color_rgba.chunks_exact_mut(row).zip(even.color_rgba.chunks_exact(row)).step_by(2) {
+    for (mine, other) in
+        frame.color_rgba.chunks_exact_mut(row).zip(even.color_rgba.chunks_exact(row)).step_by(2)
+    {
         mine.copy_from_slice(other);
     }
     frame
@@ -31,21 +33,43 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     ));
     let scene = rig::target(setup, TARGET_M)?;
     let bench = rig::sequence(rig::pinhole(setup.width_px), Motion::turning(), &scene)?;
-    let interlaced = rig::at(&bench, LAG_S, ShutterSpec { interlace_ms: FieldOr::Ms(1e3 * LAG_S), ..ShutterSpec::default() });
+    let interlaced = rig::at(
+        &bench,
+        LAG_S,
+        ShutterSpec { interlace_ms: FieldOr::Ms(1e3 * LAG_S), ..ShutterSpec::default() },
+    );
     let [first, second] = [0.0, LAG_S].map(|stamp_s| rig::snapshot(setup.engine, &bench, stamp_s));
     let (first, second) = (first?, second?);
     let truth = woven(&first, &second);
     let own = rig::picture(setup.engine, &interlaced)?;
     let ideal = Ideal::at(setup.engine, &bench, LAG_S)?;
-    let mut table = Table::new("Fig. 20 against rows of two perfect pictures, linear light", &["method", "PSNR, dB", "largest difference"]);
+    let mut table = Table::new(
+        "Fig. 20 against rows of two perfect pictures, linear light",
+        &["method", "PSNR, dB", "largest difference"],
+    );
     let step_rad = 2.5_f64.to_radians();
     let mut frames = vec![first, second];
     for (method, frame) in [
         (
             "paper: linear, one step",
-            ideal.frame(&interlaced.scenario.camera, Model::Linear(f64::INFINITY), 1, Path::Straight, Light::Linear)?,
+            ideal.frame(
+                &interlaced.scenario.camera,
+                Model::Linear(f64::INFINITY),
+                1,
+                Path::Straight,
+                Light::Linear,
+            )?,
         ),
-        ("paper: RK2", ideal.frame(&interlaced.scenario.camera, Model::Rk2(step_rad), 1, Path::Straight, Light::Linear)?),
+        (
+            "paper: RK2",
+            ideal.frame(
+                &interlaced.scenario.camera,
+                Model::Rk2(step_rad),
+                1,
+                Path::Straight,
+                Light::Linear,
+            )?,
+        ),
         ("camsim", own),
     ] {
         let difference = rig::difference(&frame, &truth)?;

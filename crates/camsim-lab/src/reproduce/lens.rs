@@ -48,11 +48,18 @@ fn calibrations(width_px: u32) -> [Calibration; 2] {
     let opencv = CameraSpec {
         focal_px: [307.960_654 * scale; 2],
         principal_point_px: Some([298.985_405 * scale - 0.5, 227.025_456 * scale - 0.5]),
-        lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.428_129, 0.158_059, 0.000_245, -0.002_286, -0.029_194] },
+        lens: LensSpec {
+            model: LensModel::BrownConrady,
+            coefficients: vec![-0.428_129, 0.158_059, 0.000_245, -0.002_286, -0.029_194],
+        },
         ..rig::pinhole(width_px)
     };
     [
-        Calibration { name: "OpenCV", poses: "camsim/path-chessboard-S3fisheye-lowoffset-opencv+posetracker.csv", camera: opencv },
+        Calibration {
+            name: "OpenCV",
+            poses: "camsim/path-chessboard-S3fisheye-lowoffset-opencv+posetracker.csv",
+            camera: opencv,
+        },
         Calibration {
             name: "Agisoft Lens",
             poses: "camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv",
@@ -64,7 +71,11 @@ fn calibrations(width_px: u32) -> [Calibration; 2] {
 /// One pose a second. Without the paper's files: poses around the target, tilted up to 25 deg towards it.
 fn poses(setup: &Setup<'_>, file: &str) -> Result<Vec<LogRow>, ReproduceError> {
     if let Some(path) = setup.data_file(file) {
-        let spec = FlightSpec { log: path.clone(), format: LogFormat::CsvNed, ..rig::scenario(rig::pinhole(96)).flight };
+        let spec = FlightSpec {
+            log: path.clone(),
+            format: LogFormat::CsvNed,
+            ..rig::scenario(rig::pinhole(96)).flight
+        };
         return Ok(read_flight_log(&path, &spec, HeightConversion::None)?.rows);
     }
     let pose = |i: u32| {
@@ -73,17 +84,28 @@ fn poses(setup: &Setup<'_>, file: &str) -> Result<Vec<LogRow>, ReproduceError> {
         let tilt = 25f64.to_radians() * out;
         let sideways = DVec3::new(around.cos(), around.sin(), 0.0);
         let height_m = 3000.0 + 300.0 * (1.7 * i).sin();
-        // Leaning about the horizontal axis across the way out turns the view from straight down back to the target.
-        let attitude = DQuat::from_axis_angle(sideways.cross(DVec3::Z), -tilt) * DQuat::from_rotation_z(0.7 * i);
-        LogRow { t_s: i, position_ned_m: height_m * tilt.tan() * sideways - height_m * DVec3::Z, ned_from_body: attitude }
+        // Leaning about the horizontal axis across the way out turns the view from straight down back to the
+        // target.
+        let attitude =
+            DQuat::from_axis_angle(sideways.cross(DVec3::Z), -tilt) * DQuat::from_rotation_z(0.7 * i);
+        LogRow {
+            t_s: i,
+            position_ned_m: height_m * tilt.tan() * sideways - height_m * DVec3::Z,
+            ned_from_body: attitude,
+        }
     };
     Ok((0..60).map(pose).collect())
 }
 
-fn sequence(camera: CameraSpec, rows: &[LogRow], scene: &Arc<Scene>) -> Result<Arc<Sequence>, ReproduceError> {
+fn sequence(
+    camera: CameraSpec,
+    rows: &[LogRow],
+    scene: &Arc<Scene>,
+) -> Result<Arc<Sequence>, ReproduceError> {
     let spec = TrackerSpec { kind: TrackerKind::Linear, ..TrackerSpec::default() };
     let tracked = track(rows, &spec).map_err(|error| ReproduceError::made("the list of poses", error))?;
-    let path = CameraPath::new(tracked.trajectory, &camera.mount).map_err(|error| ReproduceError::made("the mount", error))?;
+    let path = CameraPath::new(tracked.trajectory, &camera.mount)
+        .map_err(|error| ReproduceError::made("the mount", error))?;
     Ok(Arc::new(Sequence {
         scenario: rig::scenario(camera),
         path: Arc::new(path),
@@ -120,7 +142,9 @@ pub(super) fn find(setup: &Setup<'_>, which: usize, count: u64) -> Result<Found,
         let listed: Vec<Option<Seen>> = super::pattern::circles(TARGET_M)
             .iter()
             .map(|circle| {
-                circle.seen(|point| rig::project(&sequence, &camera, &shutter, stamp_s, point)).filter(|seen| inside(seen, camera.size_px))
+                circle
+                    .seen(|point| rig::project(&sequence, &camera, &shutter, stamp_s, point))
+                    .filter(|seen| inside(seen, camera.size_px))
             })
             .collect();
         let here = matches(&listed.iter().flatten().copied().collect::<Vec<_>>(), &spots(&finished.frame));
@@ -170,8 +194,14 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
          only camsim's own error and that of finding circles."
     ));
     let found = [find(setup, 0, u64::MAX)?, find(setup, 1, u64::MAX)?];
-    if let Some((calibration, _)) = calibrations(setup.width_px).iter().zip(&found).find(|(_, found)| found.pairs.is_empty()) {
-        return Err(ReproduceError::NoCircle { calibration: calibration.name, width_px: setup.width_px, least_px: LEAST_PX });
+    if let Some((calibration, _)) =
+        calibrations(setup.width_px).iter().zip(&found).find(|(_, found)| found.pairs.is_empty())
+    {
+        return Err(ReproduceError::NoCircle {
+            calibration: calibration.name,
+            width_px: setup.width_px,
+            least_px: LEAST_PX,
+        });
     }
     let mut table = Table::new(
         "Centres of the area of the circles, px",
@@ -189,10 +219,12 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     );
     let mut series = Vec::new();
     for (calibration, found) in calibrations(setup.width_px).iter().zip(&found) {
-        let camera =
-            camsim_core::camera::CameraModel::from_spec(&calibration.camera).map_err(|error| ReproduceError::made("the camera", error))?;
+        let camera = camsim_core::camera::CameraModel::from_spec(&calibration.camera)
+            .map_err(|error| ReproduceError::made("the camera", error))?;
         let stats = ErrorStats::of(found.errors_px());
-        let naive = ErrorStats::of(found.pairs.iter().map(|(seen, spot)| seen.centre_px.distance(spot.centroid_px)).collect());
+        let naive = ErrorStats::of(
+            found.pairs.iter().map(|(seen, spot)| seen.centre_px.distance(spot.centroid_px)).collect(),
+        );
         table.row([
             calibration.name.into(),
             found.frames.len().to_string(),
@@ -204,7 +236,11 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             short(naive.rms_px),
             format!("{:.2} %", 100.0 * (1.0 - camera.check().valid_fraction)),
         ]);
-        series.push(Series { name: calibration.name.into(), points: found.rings(camera.principal_point_px, setup.width_px), joined: true });
+        series.push(Series {
+            name: calibration.name.into(),
+            points: found.rings(camera.principal_point_px, setup.width_px),
+            joined: true,
+        });
     }
     report.tables.push(("circles", table));
     if setup.data.is_some() {
@@ -285,7 +321,9 @@ pub(super) fn paper_roots(camera: &CameraModel) -> Vec<(bool, Root)> {
         let found = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
         let kind = match (found, camera.unproject(pixel)) {
             (None, Some(_)) => Root::Missed,
-            (Some(found), truth) if truth.is_none_or(|truth| focal_px * found.distance(truth) >= 1.0) => Root::False,
+            (Some(found), truth) if truth.is_none_or(|truth| focal_px * found.distance(truth) >= 1.0) => {
+                Root::False
+            }
             _ => Root::Right,
         };
         (found.is_some(), kind)
@@ -306,7 +344,8 @@ fn with_paper_roots(frame: &RenderedFrame, camera: &CameraModel) -> RenderedFram
     frame
 }
 
-/// Rays lost and invented by the paper's inverse; camsim's is the truth here, and the error of its way back stands beside.
+/// Rays lost and invented by the paper's inverse; camsim's is the truth here, and the error of its way back
+/// stands beside.
 fn inverse(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
     let mut table = Table::new(
         "Inverse of the lens at every pixel (50 steps, 0.1 px as in the paper)",
@@ -334,7 +373,8 @@ fn inverse(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
     Ok(table)
 }
 
-/// How far the same circle of the same photograph is apart by the two calibrations: both were fitted to these photographs.
+/// How far the same circle of the same photograph is apart by the two calibrations: both were fitted to these
+/// photographs.
 fn between([opencv, agisoft]: &[Found; 2]) -> Table {
     let shifts: Vec<DVec2> = opencv
         .seen
@@ -344,7 +384,8 @@ fn between([opencv, agisoft]: &[Found; 2]) -> Table {
         .filter_map(|(a, b)| Some((*a)?.centroid_px - (*b)?.centroid_px))
         .collect();
     let mean = shifts.iter().sum::<DVec2>() / shifts.len().max(1) as f64;
-    let [stats, rest] = [DVec2::ZERO, mean].map(|middle| ErrorStats::of(shifts.iter().map(|shift| shift.distance(middle)).collect()));
+    let [stats, rest] = [DVec2::ZERO, mean]
+        .map(|middle| ErrorStats::of(shifts.iter().map(|shift| shift.distance(middle)).collect()));
     let mut table = Table::new(
         "Between the two calibrations of the same photographs, px",
         &["", "circles", "RMS", "99 %", "largest", "mean shift x, y", "RMS without it"],
@@ -367,7 +408,8 @@ mod tests {
 
     #[test]
     fn rings_are_plotted_where_one_is_full() {
-        let series = |points: &[(f64, f64)]| Series { name: String::new(), points: points.to_vec(), joined: true };
+        let series =
+            |points: &[(f64, f64)]| Series { name: String::new(), points: points.to_vec(), joined: true };
         assert_eq!(by_radius(vec![series(&[]), series(&[])]), None);
         assert!(by_radius(vec![series(&[]), series(&[(10.0, 0.1)])]).is_some_and(|plot| plot.svg().is_ok()));
     }
@@ -378,12 +420,19 @@ mod tests {
             eprintln!("CAMSIM_DATA is not set: the calibration files are not read");
             return;
         };
-        for (calibration, file) in calibrations(640).iter().zip(["S3FishEye5ParamCam-OpenCV.xml", "S3FishEye5ParamCam-AgisoftLens.xml"]) {
-            let there = camsim_io::camera_file::import_camera(&data.join("camsim").join(file)).expect("a camera");
+        for (calibration, file) in calibrations(640)
+            .iter()
+            .zip(["S3FishEye5ParamCam-OpenCV.xml", "S3FishEye5ParamCam-AgisoftLens.xml"])
+        {
+            let there =
+                camsim_io::camera_file::import_camera(&data.join("camsim").join(file)).expect("a camera");
             let here = &calibration.camera;
             let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
             assert!(near(&here.focal_px, &there.focal_px), "{file}");
-            assert!(near(&here.principal_point_px.expect("given"), &there.principal_point_px.expect("given")), "{file}");
+            assert!(
+                near(&here.principal_point_px.expect("given"), &there.principal_point_px.expect("given")),
+                "{file}"
+            );
             assert!(near(&here.lens.coefficients, &there.lens.coefficients), "{file}");
         }
     }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use camsim_core::{
     reference::{ErrorStats, IdealView, coord_errors},
-    scenario::{CameraSpec, Channel, FieldOr, FlightSpec, Scenario, SceneSpec, ShutterSpec, TerrainSpec, TrackerSpec},
+    scenario::{
+        CameraSpec, Channel, FieldOr, FlightSpec, Scenario, SceneSpec, ShutterSpec, TerrainSpec, TrackerSpec,
+    },
     sequence::Sequence,
 };
 use camsim_io::{builtin, load::load_sequence, scenario_file::read_scenario};
@@ -36,12 +38,18 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             };
             let own = rig::scenario(camera);
             let scenario = Scenario {
-                flight: FlightSpec { log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"), ..own.flight.clone() },
+                flight: FlightSpec {
+                    log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"),
+                    ..own.flight.clone()
+                },
                 tracker: TrackerSpec::default(),
                 scene: SceneSpec { terrain: Some(terrain), sky: SKY, ..own.scene.clone() },
                 ..own
             };
-            (scenario, "the paper's lawnmower log, moved and scaled over an alpine valley (the paper's own ground is not at hand)")
+            (
+                scenario,
+                "the paper's lawnmower log, moved and scaled over an alpine valley (the paper's own ground is not at hand)",
+            )
         }
         None => {
             let built_in = read_scenario(&builtin::unpack(&setup.scratch.join("built-in"))?, &[], None)?;
@@ -52,32 +60,44 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
     Ok((load_sequence(&scenario)?.sequence, name))
 }
 
-/// An instant in a left turn at least half as sharp as the sharpest one, path time, seconds: of those, one a second, the one with most land
-/// in the picture; and how much that is. The paper's view along the nose always has the horizon in it, and the land has an edge.
+/// An instant in a left turn at least half as sharp as the sharpest one, path time, seconds: of those, one a
+/// second, the one with most land in the picture; and how much that is. The paper's view along the nose
+/// always has the horizon in it, and the land has an edge.
 fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError> {
     let (start_s, end_s) = sequence.path.span_s();
     let trajectory = &sequence.path.trajectory;
-    let left_rate = |t_s: f64| -(-2..=2).map(|k| trajectory.state(t_s + 0.5 * f64::from(k)).rate_body_rad_s.z).sum::<f64>();
+    let left_rate = |t_s: f64| {
+        -(-2..=2).map(|k| trajectory.state(t_s + 0.5 * f64::from(k)).rate_body_rad_s.z).sum::<f64>()
+    };
     // One frame a second, far enough from both ends for every effect.
     let each_second = rig::at(sequence, start_s + 3.0, ShutterSpec::default());
     let oracle = rig::oracle(&each_second)?;
-    let instants: Vec<(u64, f64)> = (0..(end_s - start_s - 6.0).max(1.0) as u64).map(|i| (i, start_s + 3.0 + i as f64)).collect();
+    let instants: Vec<(u64, f64)> =
+        (0..(end_s - start_s - 6.0).max(1.0) as u64).map(|i| (i, start_s + 3.0 + i as f64)).collect();
     let sharpest = instants.iter().map(|(_, t_s)| left_rate(*t_s)).fold(f64::MIN, f64::max);
     let [width, height] = sequence.scenario.camera.size_px;
     let land = |frame: u64| {
         let view = oracle.view(frame);
         let step = (width / 32).max(1) as usize;
         let looks = (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| [x, y]));
-        let looks: Vec<bool> = looks.filter_map(|at| view.look(at, DVec2::ZERO, 0.0)).map(|look| look.hit.is_some()).collect();
+        let looks: Vec<bool> =
+            looks.filter_map(|at| view.look(at, DVec2::ZERO, 0.0)).map(|look| look.hit.is_some()).collect();
         looks.iter().filter(|hit| **hit).count() as f64 / looks.len().max(1) as f64
     };
-    let turns = instants.into_iter().filter(|(_, t_s)| left_rate(*t_s) >= 0.5 * sharpest).map(|(frame, t_s)| (t_s, land(frame)));
+    let turns = instants
+        .into_iter()
+        .filter(|(_, t_s)| left_rate(*t_s) >= 0.5 * sharpest)
+        .map(|(frame, t_s)| (t_s, land(frame)));
     Ok(turns.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((start_s, 0.0)))
 }
 
-/// The paper's RK2 from the frame of the stamp against the oracle at one phase of the exposure, in pixels of the ideal frame, and how many
-/// of the pixels looked at have their source outside of it.
-fn paper_errors(setup: &Setup<'_>, sequence: &Arc<Sequence>, phase: f64) -> Result<(ErrorStats, usize), ReproduceError> {
+/// The paper's RK2 from the frame of the stamp against the oracle at one phase of the exposure, in pixels of
+/// the ideal frame, and how many of the pixels looked at have their source outside of it.
+fn paper_errors(
+    setup: &Setup<'_>,
+    sequence: &Arc<Sequence>,
+    phase: f64,
+) -> Result<(ErrorStats, usize), ReproduceError> {
     let ideal = Ideal::at(setup.engine, sequence, sequence.start_s)?;
     let key = IdealView { pose: ideal.pose, ideal: ideal.geometry };
     let oracle = rig::oracle(sequence)?;
@@ -87,7 +107,8 @@ fn paper_errors(setup: &Setup<'_>, sequence: &Arc<Sequence>, phase: f64) -> Resu
     for y in (0..height).step_by(STEP_PX as usize) {
         for x in (0..width).step_by(STEP_PX as usize) {
             let Some(look) = view.look([x, y], DVec2::ZERO, phase) else { continue };
-            let found = ideal.source_px(look.uv, look.t_s - sequence.start_s, Model::Rk2(2.5_f64.to_radians()));
+            let found =
+                ideal.source_px(look.uv, look.t_s - sequence.start_s, Model::Rk2(2.5_f64.to_radians()));
             let truth = key.source_px(&look);
             if !ideal.geometry.contains(found) || !ideal.geometry.contains(truth) {
                 outside += 1;
@@ -142,10 +163,18 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     for (name, stamp_s, shutter, phase) in effects {
         let sequence = rig::at(&flight, stamp_s, shutter);
         let (paper, outside) = paper_errors(setup, &sequence, phase)?;
-        let finished = rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
+        let finished =
+            rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
         let finished = finished.ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))?;
-        let own = coord_errors(&rig::oracle(&sequence)?, finished.plan.frame, &finished.plan.ideal_view(), &finished.frame, phase, STEP_PX)
-            .unwrap_or_default();
+        let own = coord_errors(
+            &rig::oracle(&sequence)?,
+            finished.plan.frame,
+            &finished.plan.ideal_view(),
+            &finished.frame,
+            phase,
+            STEP_PX,
+        )
+        .unwrap_or_default();
         frames.push(finished.frame);
         table.row([
             name.into(),

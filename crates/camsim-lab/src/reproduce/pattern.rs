@@ -1,4 +1,5 @@
-//! The paper's calibration target, OpenCV's asymmetric grid of 11 x 4 circles, and where a camera must see its circles.
+//! The paper's calibration target, OpenCV's asymmetric grid of 11 x 4 circles, and where a camera must see
+//! its circles.
 
 use std::sync::Arc;
 
@@ -9,7 +10,8 @@ use glam::{DVec2, DVec3};
 const SIZE_PX: [u32; 2] = [1830, 1330];
 /// Columns, and circles in each.
 const GRID: [u32; 2] = [11, 4];
-/// Distance between columns; between circles of a column it is twice that, and every second column is shifted by one.
+/// Distance between columns; between circles of a column it is twice that, and every second column is shifted
+/// by one.
 const SPACING_PX: f64 = 112.0;
 /// Centre of the first circle of the first column (integer coordinates are pixel centres), and the radius.
 const FIRST_PX: [f64; 2] = [354.0, 384.0];
@@ -47,7 +49,10 @@ fn centres_px() -> impl Iterator<Item = DVec2> {
     (0..GRID[0]).flat_map(|column| {
         (0..GRID[1]).map(move |row| {
             let shift = if column % 2 == 0 { 0.0 } else { -SPACING_PX };
-            DVec2::new(FIRST_PX[0] + SPACING_PX * f64::from(column), FIRST_PX[1] + shift + 2.0 * SPACING_PX * f64::from(row))
+            DVec2::new(
+                FIRST_PX[0] + SPACING_PX * f64::from(column),
+                FIRST_PX[1] + shift + 2.0 * SPACING_PX * f64::from(row),
+            )
         })
     })
 }
@@ -83,7 +88,11 @@ fn covered(dx: f64, dy: f64) -> f64 {
 /// The target lying level, centred on the origin, top to the north, under a sky-coloured void.
 #[must_use]
 pub fn scene(texture: Texture, width_m: f64) -> Scene {
-    Scene { meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)], sky_linear: SKY_LINEAR, ..Scene::default() }
+    Scene {
+        meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)],
+        sky_linear: SKY_LINEAR,
+        ..Scene::default()
+    }
 }
 
 /// The circles of a target that is `width_m` wide.
@@ -120,7 +129,12 @@ impl Circle {
         let low = rim.iter().copied().fold(centre_px, DVec2::min);
         let high = rim.iter().copied().fold(centre_px, DVec2::max);
         let centroid_px = centre_px + moment / (3.0 * twice_area);
-        centroid_px.is_finite().then_some(Seen { centroid_px, area_px2: 0.5 * twice_area.abs(), centre_px, bounds_px: [low, high] })
+        centroid_px.is_finite().then_some(Seen {
+            centroid_px,
+            area_px2: 0.5 * twice_area.abs(),
+            centre_px,
+            bounds_px: [low, high],
+        })
     }
 }
 
@@ -134,8 +148,10 @@ mod tests {
         let flat = circle.seen(|p| Some(p.truncate() * 100.0)).expect("in view");
         assert!(flat.centroid_px.distance(DVec2::new(100.0, 200.0)) < 1e-9);
         assert!((flat.area_px2 / (std::f64::consts::PI * 2500.0) - 1.0).abs() < 1e-4);
-        // Perspective along x only: the image of the circle is a conic whose centre follows from its axis: the mean of both ends.
-        let tilted = circle.seen(|p| Some(DVec2::new(p.x, p.y - 2.0) / (3.0 - p.x) * 100.0)).expect("in view");
+        // Perspective along x only: the image of the circle is a conic whose centre follows from its axis:
+        // the mean of both ends.
+        let tilted =
+            circle.seen(|p| Some(DVec2::new(p.x, p.y - 2.0) / (3.0 - p.x) * 100.0)).expect("in view");
         let ends = [0.5, 1.5].map(|x| 100.0 * x / (3.0 - x));
         assert!((tilted.centroid_px.x - 0.5 * (ends[0] + ends[1])).abs() < 1e-3, "{tilted:?}");
         assert!((tilted.centre_px.x - 50.0).abs() < 1e-12 && tilted.centroid_px.x > 55.0);

@@ -37,8 +37,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// Writes every table as CSV, every plot as SVG, every picture as PNG (pixels without a ray are red, as in the paper), and all of it
-    /// as `report.md` under `title`. Gives the files.
+    /// Writes every table as CSV, every plot as SVG, every picture as PNG (pixels without a ray are red, as
+    /// in the paper), and all of it as `report.md` under `title`. Gives the files.
     ///
     /// # Errors
     /// A file cannot be written, or there is nothing to plot.
@@ -55,7 +55,12 @@ impl Report {
         for picture in &self.pictures {
             let frames: Vec<RenderedFrame> = picture.frames.iter().map(with_red_void).collect();
             files.push(folder.join(format!("{}.png", picture.name)));
-            contact_sheet(&folder.join(format!("{}.png", picture.name)), &frames, picture.columns, picture.shrink)?;
+            contact_sheet(
+                &folder.join(format!("{}.png", picture.name)),
+                &frames,
+                picture.columns,
+                picture.shrink,
+            )?;
         }
         files.push(folder.join("report.md"));
         write_atomic(&folder.join("report.md"), self.markdown(title).as_bytes())?;

@@ -1,4 +1,5 @@
-//! The paper's test bench: a camera that looks straight down at the circle grid from 3 km, turning or flying at constant speed.
+//! The paper's test bench: a camera that looks straight down at the circle grid from 3 km, turning or flying
+//! at constant speed.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -9,7 +10,9 @@ use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
     reference::Oracle,
-    scenario::{CameraSpec, Channel, FlightSpec, LensModel, LensSpec, MountSpec, QualitySpec, Scenario, ShutterSpec},
+    scenario::{
+        CameraSpec, Channel, FlightSpec, LensModel, LensSpec, MountSpec, QualitySpec, Scenario, ShutterSpec,
+    },
     scene::Scene,
     sequence::Sequence,
     shutter::Shutter,
@@ -35,8 +38,8 @@ pub const FLIGHT_M_S: f64 = 300.0;
 /// How long the motion goes on before and after t = 0.
 const SPAN_S: f64 = 20.0;
 
-/// Coefficients k1 k2 p1 p2 k3 of the paper's lens, a clip-on fisheye of a phone, by Agisoft Lens (its table 2 as the reference program
-/// has it).
+/// Coefficients k1 k2 p1 p2 k3 of the paper's lens, a clip-on fisheye of a phone, by Agisoft Lens (its table
+/// 2 as the reference program has it).
 pub const FISHEYE: [f64; 5] = [-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63];
 
 /// The paper's camera by Agisoft Lens at `width_px` (640 there), looking straight down, every effect off.
@@ -70,7 +73,8 @@ pub fn pinhole(width_px: u32) -> CameraSpec {
 pub struct Motion {
     /// Velocity, north, east, down, m/s.
     pub velocity_ned_m_s: DVec3,
-    /// Body rate about forward, right, down, deg/s. The camera looks down: the third turns it about its optical axis, clockwise.
+    /// Body rate about forward, right, down, deg/s. The camera looks down: the third turns it about its
+    /// optical axis, clockwise.
     pub rate_body_deg_s: DVec3,
 }
 
@@ -132,9 +136,15 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
 ///
 /// # Errors
 /// A mount that cannot be used.
-pub fn sequence(camera: CameraSpec, motion: Motion, scene: &Arc<Scene>) -> Result<Arc<Sequence>, ReproduceError> {
-    let trajectory = motion.trajectory().ok_or_else(|| ReproduceError::made("the motion", "it is not finite"))?;
-    let path = CameraPath::new(trajectory, &camera.mount).map_err(|error| ReproduceError::made("the mount", error))?;
+pub fn sequence(
+    camera: CameraSpec,
+    motion: Motion,
+    scene: &Arc<Scene>,
+) -> Result<Arc<Sequence>, ReproduceError> {
+    let trajectory =
+        motion.trajectory().ok_or_else(|| ReproduceError::made("the motion", "it is not finite"))?;
+    let path = CameraPath::new(trajectory, &camera.mount)
+        .map_err(|error| ReproduceError::made("the mount", error))?;
     Ok(Arc::new(Sequence {
         scenario: scenario(camera),
         path: Arc::new(path),
@@ -147,7 +157,8 @@ pub fn sequence(camera: CameraSpec, motion: Motion, scene: &Arc<Scene>) -> Resul
     }))
 }
 
-/// The circle grid as the paper has it: its own picture when there is a data folder, else the same one drawn here.
+/// The circle grid as the paper has it: its own picture when there is a data folder, else the same one drawn
+/// here.
 ///
 /// # Errors
 /// The file of the data folder.
@@ -208,7 +219,10 @@ pub fn render_at_phase(
 /// As [`render`].
 pub fn picture(engine: &Engine, sequence: &Arc<Sequence>) -> Result<RenderedFrame, ReproduceError> {
     let mut frames = render(engine, sequence, &[Channel::Color], [0])?;
-    frames.pop().map(|finished| finished.frame).ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))
+    frames
+        .pop()
+        .map(|finished| finished.frame)
+        .ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))
 }
 
 /// What a perfect camera sees at `stamp_s`.
@@ -256,28 +270,39 @@ pub fn oracle(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
     Oracle::new(sequence.clone()).map_err(|error| ReproduceError::made("the camera", error))
 }
 
-/// Pixels of frame 0 that show the target where the oracle's ray through their centre meets nothing, or the sky where it meets the target.
+/// Pixels of frame 0 that show the target where the oracle's ray through their centre meets nothing, or the
+/// sky where it meets the target.
 ///
 /// # Errors
 /// A camera that cannot be used.
 pub fn wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<usize, ReproduceError> {
     let oracle = oracle(sequence)?;
     let [width, _] = frame.size_px;
-    // The sky is blue, the target has no hue. A pixel on the border that shows as much of both is right either way.
+    // The sky is blue, the target has no hue. A pixel on the border that shows as much of both is right
+    // either way.
     let sky = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
     let view = oracle.view(0);
     let wrong = frame.color_rgba.par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
         let at = [*i as u32 % width, *i as u32 / width];
         let look = view.look(at, DVec2::ZERO, 0.0);
-        look.is_some_and(|look| pixel[3] > 0.0 && if look.hit.is_some() { sky(pixel) > 0.75 } else { sky(pixel) < 0.25 })
+        look.is_some_and(|look| {
+            pixel[3] > 0.0 && if look.hit.is_some() { sky(pixel) > 0.75 } else { sky(pixel) < 0.25 }
+        })
     });
     Ok(wrong.count())
 }
 
-/// Where a point of the world appears in a frame whose pixels have the times of the camera's shutter (rows, no fields): the time depends on
-/// the row, and the row on the time. `None` behind the camera or beyond the fold of the lens.
+/// Where a point of the world appears in a frame whose pixels have the times of the camera's shutter (rows,
+/// no fields): the time depends on the row, and the row on the time. `None` behind the camera or beyond the
+/// fold of the lens.
 #[must_use]
-pub fn project(sequence: &Sequence, camera: &CameraModel, shutter: &Shutter, stamp_s: f64, point_ned_m: DVec3) -> Option<DVec2> {
+pub fn project(
+    sequence: &Sequence,
+    camera: &CameraModel,
+    shutter: &Shutter,
+    stamp_s: f64,
+    point_ned_m: DVec3,
+) -> Option<DVec2> {
     let rows = f64::from(camera.size_px[1]);
     let mut t_s = stamp_s - shutter.delay_s();
     let mut at = DVec2::ZERO;
@@ -304,15 +329,21 @@ pub fn project(sequence: &Sequence, camera: &CameraModel, shutter: &Shutter, sta
 pub fn checked(sequence: &Sequence) -> Result<(CameraModel, Shutter), ReproduceError> {
     let spec = &sequence.scenario.camera;
     let camera = CameraModel::from_spec(spec).map_err(|error| ReproduceError::made("the camera", error))?;
-    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| ReproduceError::made("the shutter", error))?;
+    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
+        .map_err(|error| ReproduceError::made("the shutter", error))?;
     Ok((camera, shutter))
 }
 
-/// How each circle of the target wholly in the picture (and a little inside) is seen by a frame of the sequence with its stamp at `stamp_s`.
+/// How each circle of the target wholly in the picture (and a little inside) is seen by a frame of the
+/// sequence with its stamp at `stamp_s`.
 ///
 /// # Errors
 /// What cannot be used.
-pub fn seen_circles(sequence: &Sequence, stamp_s: f64, target_m: f64) -> Result<Vec<pattern::Seen>, ReproduceError> {
+pub fn seen_circles(
+    sequence: &Sequence,
+    stamp_s: f64,
+    target_m: f64,
+) -> Result<Vec<pattern::Seen>, ReproduceError> {
     let (camera, shutter) = checked(sequence)?;
     let last = DVec2::new(f64::from(camera.size_px[0]) - 1.0, f64::from(camera.size_px[1]) - 1.0);
     let inside = |seen: &pattern::Seen| {

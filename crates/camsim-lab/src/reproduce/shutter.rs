@@ -26,7 +26,8 @@ pub(super) struct Seen {
     pub wrong: usize,
 }
 
-/// Affine change of the circle grid against the picture of a still camera: `[[xx, xy], [yx, yy]]`, least squares about the image centre.
+/// Affine change of the circle grid against the picture of a still camera: `[[xx, xy], [yx, yy]]`, least
+/// squares about the image centre.
 pub(super) fn affine(still: &[DVec2], moved: &[DVec2]) -> [[f64; 2]; 2] {
     let middle = |points: &[DVec2]| points.iter().sum::<DVec2>() / points.len().max(1) as f64;
     let (still_middle, moved_middle) = (middle(still), middle(moved));
@@ -68,10 +69,17 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         (Motion::flying(0.0, -1.0), "upwards"),
         (Motion::flying(0.0, 1.0), "downwards"),
     ] {
-        let bench = rig::at(&*rig::sequence(rig::pinhole(setup.width_px), motion, &scene)?, 0.0, rolling.clone());
+        let bench =
+            rig::at(&*rig::sequence(rig::pinhole(setup.width_px), motion, &scene)?, 0.0, rolling.clone());
         let still = rig::snapshot(setup.engine, &bench, 0.0)?;
         let ideal = Ideal::at(setup.engine, &bench, 0.0)?;
-        let paper = ideal.frame(&bench.scenario.camera, Model::Rk2(2.5_f64.to_radians()), 1, Path::Straight, Light::Linear)?;
+        let paper = ideal.frame(
+            &bench.scenario.camera,
+            Model::Rk2(2.5_f64.to_radians()),
+            1,
+            Path::Straight,
+            Light::Linear,
+        )?;
         let own = rig::picture(setup.engine, &bench)?;
         for (method, frame) in [("paper: RK2 from the frame of the stamp", &paper), ("camsim", &own)] {
             let found = look(&bench, name, frame)?;
@@ -114,13 +122,17 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
 }
 
 /// Finds the circles of a frame of the bench.
-pub(super) fn look(bench: &Arc<Sequence>, motion: &'static str, frame: &camsim_core::frame::RenderedFrame) -> Result<Seen, ReproduceError> {
+pub(super) fn look(
+    bench: &Arc<Sequence>,
+    motion: &'static str,
+    frame: &camsim_core::frame::RenderedFrame,
+) -> Result<Seen, ReproduceError> {
     let circles = matches(&rig::seen_circles(bench, 0.0, TARGET_M)?, &spots(frame));
     Ok(Seen { motion, circles, wrong: rig::wrong_surface(bench, frame)? })
 }
 
-/// Shear or stretch of the grid against its closed form: with the image moving at `rate` px/s, `rows` rows and readout `t_r`, a point of
-/// still row y appears where `y' = y + rate t_r (y'/rows)`.
+/// Shear or stretch of the grid against its closed form: with the image moving at `rate` px/s, `rows` rows
+/// and readout `t_r`, a point of still row y appears where `y' = y + rate t_r (y'/rows)`.
 fn shape(bench: &Sequence, found: &Seen, table: &mut Table) -> Result<(), ReproduceError> {
     let (camera, _) = rig::checked(bench)?;
     let rate_px_s = camera.focal_px.y * FLIGHT_M_S / HEIGHT_M;
@@ -141,14 +153,26 @@ fn shape(bench: &Sequence, found: &Seen, table: &mut Table) -> Result<(), Reprod
         .filter_map(|circle| {
             let (moving, shutter) = rig::checked(bench).ok()?;
             let here = circle.seen(|p| rig::project(bench, &moving, &shutter, 0.0, p))?;
-            let spot = found.circles.pairs.iter().find(|(seen, _)| seen.centroid_px.distance(here.centroid_px) < 1e-6)?.1;
+            let spot = found
+                .circles
+                .pairs
+                .iter()
+                .find(|(seen, _)| seen.centroid_px.distance(here.centroid_px) < 1e-6)?
+                .1;
             let still = circle.seen(|p| rig::project(&global, &still_camera, &still_shutter, 0.0, p))?;
             Some((still.centroid_px, spot.centroid_px, here.centroid_px))
         })
         .collect();
     let still: Vec<DVec2> = pairs.iter().map(|p| p.0).collect();
-    let [found_shape, true_shape] = [pairs.iter().map(|p| p.1).collect::<Vec<_>>(), pairs.iter().map(|p| p.2).collect()]
-        .map(|moved| affine(&still, &moved)[k[0]][k[1]]);
-    table.row([found.motion.into(), what.into(), format!("{closed:.5}"), format!("{found_shape:.5}"), format!("{true_shape:.5}")]);
+    let [found_shape, true_shape] =
+        [pairs.iter().map(|p| p.1).collect::<Vec<_>>(), pairs.iter().map(|p| p.2).collect()]
+            .map(|moved| affine(&still, &moved)[k[0]][k[1]]);
+    table.row([
+        found.motion.into(),
+        what.into(),
+        format!("{closed:.5}"),
+        format!("{found_shape:.5}"),
+        format!("{true_shape:.5}"),
+    ]);
     Ok(())
 }

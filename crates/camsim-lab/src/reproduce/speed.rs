@@ -20,7 +20,8 @@ const ROUNDS: usize = 9;
 const BURST: u64 = 3;
 /// No round begins after this.
 const BUDGET: Duration = Duration::from_secs(120);
-/// The reference program under a software adapter on two cores, 640 x 480, its best time in ms a frame; the last row's exposure is 100 ms.
+/// The reference program under a software adapter on two cores, 640 x 480, its best time in ms a frame; the
+/// last row's exposure is 100 ms.
 const CASES: [(&str, bool, f64, f64, u32, f64); 5] = [
     ("ideal camera, nothing on", false, 0.0, 0.0, 1, 23.6),
     ("fisheye", true, 0.0, 0.0, 1, 32.0),
@@ -40,9 +41,15 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     // The path of the reference program's measurements: the turn of its rotation file.
     let mut variants = Vec::new();
     for (_, lens, readout_ms, exposure_ms, samples, _) in CASES {
-        for (preset, silhouettes) in [(Preset::Paper, false), (Preset::Default, true), (Preset::Default, false)] {
+        for (preset, silhouettes) in
+            [(Preset::Paper, false), (Preset::Default, true), (Preset::Default, false)]
+        {
             let camera = if lens { rig::fisheye(setup.width_px) } else { rig::pinhole(setup.width_px) };
-            let camera = CameraSpec { fps: 30.0, shutter: ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() }, ..camera };
+            let camera = CameraSpec {
+                fps: 30.0,
+                shutter: ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() },
+                ..camera
+            };
             let mut sequence = (*rig::sequence(camera, Motion::turning(), &scene)?).clone();
             sequence.scenario.quality.preset = preset;
             if !silhouettes {
@@ -82,7 +89,16 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     ));
     let mut table = Table::new(
         "Time a frame, ms",
-        &["case", "reference program", "paper preset", "frames/s", "camsim", "frames/s", "camsim without silhouette samples", "frames/s"],
+        &[
+            "case",
+            "reference program",
+            "paper preset",
+            "frames/s",
+            "camsim",
+            "frames/s",
+            "camsim without silhouette samples",
+            "frames/s",
+        ],
     );
     for (k, (name, .., reference_ms)) in CASES.into_iter().enumerate() {
         let [paper, own, plain] = [ms[3 * k], ms[3 * k + 1], ms[3 * k + 2]];
@@ -116,7 +132,11 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
                 series("paper preset", 0),
                 series("camsim", 1),
                 series("camsim without silhouette samples", 2),
-                Series { name: "reference program (software adapter, two cores)".into(), points: reference, joined: false },
+                Series {
+                    name: "reference program (software adapter, two cores)".into(),
+                    points: reference,
+                    joined: false,
+                },
             ],
         },
     ));

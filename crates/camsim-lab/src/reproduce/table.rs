@@ -15,7 +15,11 @@ impl Table {
     /// An empty table.
     #[must_use]
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
-        Self { title: title.into(), columns: columns.iter().map(|name| (*name).to_owned()).collect(), rows: Vec::new() }
+        Self {
+            title: title.into(),
+            columns: columns.iter().map(|name| (*name).to_owned()).collect(),
+            rows: Vec::new(),
+        }
     }
 
     /// Adds a row; missing cells stay empty.
@@ -29,15 +33,20 @@ impl Table {
     #[must_use]
     pub fn text(&self) -> String {
         let lines: Vec<&Vec<String>> = std::iter::once(&self.columns).chain(&self.rows).collect();
-        let widths: Vec<usize> =
-            (0..self.columns.len()).map(|k| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0)).collect();
+        let widths: Vec<usize> = (0..self.columns.len())
+            .map(|k| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0))
+            .collect();
         let mut text = format!("{}\n", self.title);
         for line in lines {
             let cells: Vec<String> = line
                 .iter()
                 .zip(&widths)
                 .enumerate()
-                .map(|(k, (cell, &width))| if k == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") })
+                .map(
+                    |(k, (cell, &width))| {
+                        if k == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+                    },
+                )
                 .collect();
             text += cells.join("  ").trim_end();
             text.push('\n');
@@ -48,9 +57,14 @@ impl Table {
     /// A Markdown table under its title in bold.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let line =
-            |cells: &[String]| format!("| {} |\n", cells.iter().map(|cell| cell.replace('|', "\\|")).collect::<Vec<_>>().join(" | "));
-        let mut text = format!("**{}**\n\n{}|{}\n", self.title, line(&self.columns), "---|".repeat(self.columns.len()));
+        let line = |cells: &[String]| {
+            format!(
+                "| {} |\n",
+                cells.iter().map(|cell| cell.replace('|', "\\|")).collect::<Vec<_>>().join(" | ")
+            )
+        };
+        let mut text =
+            format!("**{}**\n\n{}|{}\n", self.title, line(&self.columns), "---|".repeat(self.columns.len()));
         for row in &self.rows {
             text += &line(row);
         }
@@ -60,8 +74,13 @@ impl Table {
     /// Comma-separated values with a header; cells with commas or quotes are quoted.
     #[must_use]
     pub fn csv(&self) -> String {
-        let cell =
-            |cell: &String| if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.clone() };
+        let cell = |cell: &String| {
+            if cell.contains([',', '"', '\n']) {
+                format!("\"{}\"", cell.replace('"', "\"\""))
+            } else {
+                cell.clone()
+            }
+        };
         let line = |cells: &Vec<String>| cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
         std::iter::once(&self.columns).chain(&self.rows).map(line).collect()
     }
@@ -92,7 +111,10 @@ mod tests {
         table.row(["rk2".into(), "0.02".into()]);
         table.row(["a|b".into()]);
         assert_eq!(table.text(), "steps\nsolver  error, px\nrk2          0.02\na|b\n");
-        assert_eq!(table.markdown(), "**steps**\n\n| solver | error, px |\n|---|---|\n| rk2 | 0.02 |\n| a\\|b |  |\n");
+        assert_eq!(
+            table.markdown(),
+            "**steps**\n\n| solver | error, px |\n|---|---|\n| rk2 | 0.02 |\n| a\\|b |  |\n"
+        );
         assert_eq!(table.csv(), "solver,\"error, px\"\nrk2,0.02\na|b,\n");
     }
 

@@ -7,12 +7,14 @@ use super::{displace::Model, *};
 /// Width of the pictures: circles are 5 px across.
 const WIDTH_PX: u32 = 240;
 
-/// How far circles may be from where they are found, px RMS: twice what 5 px of a fisheye's circle leave (0.02 px; straight down 0.003 to 0.01).
+/// How far circles may be from where they are found, px RMS: twice what 5 px of a fisheye's circle leave
+/// (0.02 px; straight down 0.003 to 0.01).
 const CIRCLES_PX: f64 = 0.04;
 
 /// Runs `check` with the software adapter.
 fn with_setup(check: impl FnOnce(&Setup<'_>)) {
-    let engine = Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+    let engine = Engine::new(AdapterChoice::Software)
+        .expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
     let scratch = tempfile::tempdir().expect("a folder");
     check(&Setup { engine: &engine, data: None, scratch: scratch.path(), width_px: WIDTH_PX });
 }
@@ -21,8 +23,15 @@ fn with_setup(check: impl FnOnce(&Setup<'_>)) {
 fn cell(report: &Report, table: &str, row: &[&str], column: &str) -> f64 {
     let (_, table) = report.tables.iter().find(|(name, _)| *name == table).expect("the table");
     let column = table.columns.iter().position(|name| name == column).expect("the column");
-    let row = table.rows.iter().find(|cells| cells.iter().zip(row).all(|(cell, name)| cell == name)).expect("the row");
-    row[column].trim_end_matches([' ', '%']).parse().unwrap_or_else(|_| panic!("no number: {:?}", row[column]))
+    let row = table
+        .rows
+        .iter()
+        .find(|cells| cells.iter().zip(row).all(|(cell, name)| cell == name))
+        .expect("the row");
+    row[column]
+        .trim_end_matches([' ', '%'])
+        .parse()
+        .unwrap_or_else(|_| panic!("no number: {:?}", row[column]))
 }
 
 /// Every file that a report names is there and not empty.
@@ -37,7 +46,8 @@ fn writes_itself(report: &Report, title: &str) {
 
 #[test]
 fn straight_steps_halve_the_error_with_the_step_and_heuns_quarter_it() {
-    let places: Vec<glam::DVec2> = (0..50).map(|i| glam::DVec2::from_angle(f64::from(i)) * 0.01 * f64::from(i)).collect();
+    let places: Vec<glam::DVec2> =
+        (0..50).map(|i| glam::DVec2::from_angle(f64::from(i)) * 0.01 * f64::from(i)).collect();
     let errors = time::errors(&places, 300.0, glam::DVec3::Z);
     for pair in errors.windows(2).skip(2) {
         let ratio = pair[0].step_deg / pair[1].step_deg;
@@ -53,7 +63,10 @@ fn straight_steps_halve_the_error_with_the_step_and_heuns_quarter_it() {
 
 #[test]
 fn a_whole_turn_divided_evenly_takes_so_many_steps() {
-    let twist = camsim_core::temporal::displacement::Twist { rate_rad_s: glam::DVec3::Z * 36f64.to_radians(), ..Default::default() };
+    let twist = camsim_core::temporal::displacement::Twist {
+        rate_rad_s: glam::DVec3::Z * 36f64.to_radians(),
+        ..Default::default()
+    };
     let uv = glam::DVec2::new(0.3, 0.1);
     let by_hand = uv - camsim_core::temporal::displacement::image_rate(uv, 0.0, &twist) * -1.0;
     assert_eq!(Model::Linear(f64::INFINITY).displace(uv, 0.0, &twist, -1.0), by_hand);
@@ -83,10 +96,15 @@ fn circles_are_where_the_lens_puts_them() {
     with_setup(|setup| {
         for calibration in [0, 1] {
             let found = lens::find(setup, calibration, 3).expect("done");
-            let errors = found.pairs.iter().map(|(seen, spot)| seen.centroid_px.distance(spot.centroid_px)).collect();
+            let errors =
+                found.pairs.iter().map(|(seen, spot)| seen.centroid_px.distance(spot.centroid_px)).collect();
             let stats = camsim_core::reference::ErrorStats::of(errors);
             eprintln!("calibration {calibration}: {stats:?}, missed {}", found.missed);
-            assert!(stats.count > 100 && found.missed == 0 && stats.rms_px < CIRCLES_PX, "{stats:?}, missed {}", found.missed);
+            assert!(
+                stats.count > 100 && found.missed == 0 && stats.rms_px < CIRCLES_PX,
+                "{stats:?}, missed {}",
+                found.missed
+            );
         }
     });
 }
@@ -117,7 +135,8 @@ fn rows_of_a_rolling_shutter_are_where_the_world_was() {
             assert!(cell(&report, "circles", &[motion, "camsim"], "missed") == 0.0, "{motion}");
         }
         for motion in ["to the right", "upwards", "downwards"] {
-            let [closed, found] = ["closed form", "found"].map(|column| cell(&report, "shapes", &[motion], column));
+            let [closed, found] =
+                ["closed form", "found"].map(|column| cell(&report, "shapes", &[motion], column));
             assert!((closed - found).abs() < 2e-3, "{motion}: {closed} {found}");
         }
     });
@@ -130,15 +149,19 @@ fn fields_and_exposures_are_those_of_perfect_pictures() {
         let fields = Experiment::Interlace.run(setup).expect("done");
         // The turn between the fields must not push a corner of either out of the ideal frame.
         let own = &fields.pictures[0].frames[4];
-        assert!(own.color_rgba.chunks_exact(4).all(|pixel| pixel[3] > 0.0), "a pixel of a pinhole camera has no source");
+        assert!(
+            own.color_rgba.chunks_exact(4).all(|pixel| pixel[3] > 0.0),
+            "a pixel of a pinhole camera has no source"
+        );
         eprintln!("{}", fields.tables[0].1.text());
-        let [paper, own] = ["paper: linear, one step", "camsim"].map(|method| cell(&fields, "fig20", &[method], "PSNR, dB"));
+        let [paper, own] =
+            ["paper: linear, one step", "camsim"].map(|method| cell(&fields, "fig20", &[method], "PSNR, dB"));
         assert!(own > 30.0 && own > paper + 10.0, "{own} {paper}");
         let blur = Experiment::Blur.run(setup).expect("done");
         eprintln!("{}{}", blur.tables[0].1.text(), blur.tables[1].1.text());
         let exact = "against the exact exposure, dB";
-        let [straight, own] =
-            [["paper: RK2, straight line", "100"], ["camsim", "by its own rule"]].map(|row| cell(&blur, "fig16", &row, exact));
+        let [straight, own] = [["paper: RK2, straight line", "100"], ["camsim", "by its own rule"]]
+            .map(|row| cell(&blur, "fig16", &row, exact));
         assert!(own > 35.0 && own > straight + 10.0, "{own} {straight}");
     });
 }
@@ -151,7 +174,8 @@ fn one_second_over_terrain() {
         eprintln!("{}", report.tables[0].1.text());
         assert!(cell(&report, "fig21", &["delay, 1 s later"], "camsim: RMS") < 0.01);
         assert!(
-            cell(&report, "fig21", &["rolling shutter"], "smooth: RMS") < 0.1 * cell(&report, "fig21", &["rolling shutter"], "paper: RMS")
+            cell(&report, "fig21", &["rolling shutter"], "smooth: RMS")
+                < 0.1 * cell(&report, "fig21", &["rolling shutter"], "paper: RMS")
         );
         writes_itself(&report, "map");
     });
@@ -163,7 +187,11 @@ fn every_case_has_a_time() {
     with_setup(|setup| {
         let report = Experiment::Speed.run(setup).expect("done");
         for row in &report.tables[0].1.rows {
-            assert!(row[2].parse::<f64>().is_ok_and(|ms| ms > 0.0) && row[4].parse::<f64>().is_ok_and(|ms| ms > 0.0), "{row:?}");
+            assert!(
+                row[2].parse::<f64>().is_ok_and(|ms| ms > 0.0)
+                    && row[4].parse::<f64>().is_ok_and(|ms| ms > 0.0),
+                "{row:?}"
+            );
         }
     });
 }

@@ -1,6 +1,8 @@
 //! 8.4: the displacement models over one second, in rotation (figs. 13 and 14) and in translation (fig. 15).
 
-use camsim_core::{frame::RenderedFrame, reference::ErrorStats, scenario::ShutterSpec, temporal::displacement::Twist};
+use camsim_core::{
+    frame::RenderedFrame, reference::ErrorStats, scenario::ShutterSpec, temporal::displacement::Twist,
+};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::{
@@ -30,8 +32,8 @@ pub(super) struct StepError {
     pub rk2_px: f64,
 }
 
-/// RMS error in pixels at the given places after a turn of 36 deg about `axis` (camera axes) within one second of time shift, against the
-/// exact rotation; places that leave the front of the camera do not count.
+/// RMS error in pixels at the given places after a turn of 36 deg about `axis` (camera axes) within one
+/// second of time shift, against the exact rotation; places that leave the front of the camera do not count.
 pub(super) fn errors(places: &[DVec2], focal_px: f64, axis: DVec3) -> Vec<StepError> {
     let angle_rad = TURN_DEG_S.to_radians();
     let twist = Twist { rate_rad_s: axis * angle_rad, ..Twist::default() };
@@ -40,7 +42,9 @@ pub(super) fn errors(places: &[DVec2], focal_px: f64, axis: DVec3) -> Vec<StepEr
     let error = |model: Model| {
         let errors = places.iter().filter_map(|&uv| {
             let turned = exact * uv.extend(1.0);
-            (turned.z > 0.2).then(|| focal_px * model.displace(uv, 0.0, &twist, -1.0).distance(turned.truncate() / turned.z))
+            (turned.z > 0.2).then(|| {
+                focal_px * model.displace(uv, 0.0, &twist, -1.0).distance(turned.truncate() / turned.z)
+            })
         });
         ErrorStats::of(errors.collect()).rms_px
     };
@@ -85,8 +89,8 @@ fn rotation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceError
         .filter_map(|at| camera.unproject(at))
         .collect();
     let focal_px = camera.focal_px.x;
-    let [on_circles, on_frame, pitched] =
-        [(&centres, DVec3::Z), (&grid, DVec3::Z), (&grid, DVec3::X)].map(|(at, axis)| errors(at, focal_px, axis));
+    let [on_circles, on_frame, pitched] = [(&centres, DVec3::Z), (&grid, DVec3::Z), (&grid, DVec3::X)]
+        .map(|(at, axis)| errors(at, focal_px, axis));
 
     // The same as somebody measures it who has only the pictures: circles found in them.
     let ideal = Ideal::at(setup.engine, &bench, 1.0)?;
@@ -96,8 +100,21 @@ fn rotation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceError
     let own = rig::picture(setup.engine, &delayed)?;
     let (own_px, own_missed) = measured(&own, &seen);
 
-    let columns = ["step, deg", "linear", "RK2", "RK2 by pictures", "missed", "frame: linear", "frame: RK2", "pitch: linear", "pitch: RK2"];
-    let mut table = Table::new("Fig. 14: error in px RMS after a turn of 36 deg, at the circles and over the frame", &columns);
+    let columns = [
+        "step, deg",
+        "linear",
+        "RK2",
+        "RK2 by pictures",
+        "missed",
+        "frame: linear",
+        "frame: RK2",
+        "pitch: linear",
+        "pitch: RK2",
+    ];
+    let mut table = Table::new(
+        "Fig. 14: error in px RMS after a turn of 36 deg, at the circles and over the frame",
+        &columns,
+    );
     let mut by_pictures = Vec::new();
     for (k, error) in on_circles.iter().enumerate() {
         let (px, missed) = measured(&paper(Model::Rk2(error.step_deg.to_radians() * ABOVE))?, &seen);
@@ -135,8 +152,16 @@ fn rotation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceError
                 curve("RK2, whole frame", &on_frame, |e| e.rk2_px),
                 curve("RK2, pitch instead of roll", &pitched, |e| e.rk2_px),
                 Series { name: "RK2, circles found in pictures".into(), points: by_pictures, joined: true },
-                Series { name: "camsim, circles found in its picture".into(), points: vec![(0.5, own_px), (36.0, own_px)], joined: true },
-                Series { name: "the paper's words: 0.02 px at 2.5 deg".into(), points: vec![(2.5, 0.02)], joined: false },
+                Series {
+                    name: "camsim, circles found in its picture".into(),
+                    points: vec![(0.5, own_px), (36.0, own_px)],
+                    joined: true,
+                },
+                Series {
+                    name: "the paper's words: 0.02 px at 2.5 deg".into(),
+                    points: vec![(2.5, 0.02)],
+                    joined: false,
+                },
             ],
         },
     ));
@@ -173,7 +198,8 @@ fn translation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceEr
         let truth = rig::snapshot(setup.engine, &bench, 0.0)?;
         let ideal = Ideal::at(setup.engine, &bench, 1.0)?;
         let delayed = rig::at(&bench, 1.0, ShutterSpec { delay_ms: 1000.0, ..ShutterSpec::default() });
-        let paper = |model: Model| ideal.frame(&delayed.scenario.camera, model, 1, Path::Straight, Light::Linear);
+        let paper =
+            |model: Model| ideal.frame(&delayed.scenario.camera, model, 1, Path::Straight, Light::Linear);
         let linear = paper(Model::Linear(f64::INFINITY))?;
         let own = rig::picture(setup.engine, &delayed)?;
         for (model, frame) in [
@@ -182,7 +208,13 @@ fn translation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceEr
             ("camsim", &own),
         ] {
             let (px, missed) = measured(frame, &seen);
-            table.row([name.into(), model.into(), short(px), missed.to_string(), rig::wrong_surface(&delayed, frame)?.to_string()]);
+            table.row([
+                name.into(),
+                model.into(),
+                short(px),
+                missed.to_string(),
+                rig::wrong_surface(&delayed, frame)?.to_string(),
+            ]);
         }
         frames.extend([truth, linear, own]);
     }

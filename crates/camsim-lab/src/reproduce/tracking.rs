@@ -13,7 +13,8 @@ use crate::plot::{Plot, Series};
 /// The paper's limits: 2 g and 60 deg/s^2.
 const MAX_ACCELERATION_M_S2: f64 = 19.6;
 const MAX_ANGULAR_ACCELERATION_DEG_S2: f64 = 60.0;
-/// RMS of the reference program on the same log (glitch rows left out), measured: north, east, down in m, roll, pitch, yaw in deg.
+/// RMS of the reference program on the same log (glitch rows left out), measured: north, east, down in m,
+/// roll, pitch, yaw in deg.
 const REFERENCE_PROGRAM: [f64; 6] = [0.379, 0.314, 0.075, 0.201, 0.038, 0.052];
 /// Part of the flight that is plotted, seconds from its first row, and the step.
 const PLOTTED_S: [f64; 2] = [100.0, 130.0];
@@ -33,7 +34,11 @@ pub(super) struct Followed {
 pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), ReproduceError> {
     let log = match setup.data_file("camsim/path_lawnmower.csv") {
         Some(path) => {
-            let spec = FlightSpec { log: path.clone(), format: LogFormat::CsvLla, ..rig::scenario(rig::pinhole(96)).flight };
+            let spec = FlightSpec {
+                log: path.clone(),
+                format: LogFormat::CsvLla,
+                ..rig::scenario(rig::pinhole(96)).flight
+            };
             read_flight_log(&path, &spec, HeightConversion::None)?
         }
         None => {
@@ -52,7 +57,9 @@ pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), Re
             ..TrackerSpec::default()
         };
         let tracked = track(&log.rows, &spec).map_err(|error| ReproduceError::made("the tracker", error))?;
-        let report = tracked.report(&log.rows).ok_or_else(|| ReproduceError::made("the flight log", "it has no row"))?;
+        let report = tracked
+            .report(&log.rows)
+            .ok_or_else(|| ReproduceError::made("the flight log", "it has no row"))?;
         followed.push(Followed { name, tracked, report });
     }
     Ok((log, followed))
@@ -80,10 +87,22 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         "RMS distance from the interpolated log",
         &["channel", "sqrt", "spline", "reference program", "sqrt, max", "spline, max"],
     );
-    let [sqrt, spline] = [0, 1].map(|k: usize| (listed(&followed[k].report.rms), listed(&followed[k].report.max_error)));
-    for (i, name) in ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg", "attitude, deg"].into_iter().enumerate() {
+    let [sqrt, spline] =
+        [0, 1].map(|k: usize| (listed(&followed[k].report.rms), listed(&followed[k].report.max_error)));
+    for (i, name) in
+        ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg", "attitude, deg"]
+            .into_iter()
+            .enumerate()
+    {
         let program = program.get(i).cloned().unwrap_or_else(|| "-".to_owned());
-        table.row([name.to_owned(), short(sqrt.0[i]), short(spline.0[i]), program, short(sqrt.1[i]), short(spline.1[i])]);
+        table.row([
+            name.to_owned(),
+            short(sqrt.0[i]),
+            short(spline.0[i]),
+            program,
+            short(sqrt.1[i]),
+            short(spline.1[i]),
+        ]);
     }
     report.tables.push(("rms", table));
     report.tables.push(("motion", motion(&followed)));
@@ -133,6 +152,9 @@ fn error_plot(log: &FlightLog, followed: &[Followed]) -> Plot {
         x_label: "time from the first row, s".into(),
         y_label: "distance, m".into(),
         log: [false, false],
-        series: followed.iter().map(|f| Series { name: f.name.into(), points: points(&f.tracked), joined: true }).collect(),
+        series: followed
+            .iter()
+            .map(|f| Series { name: f.name.into(), points: points(&f.tracked), joined: true })
+            .collect(),
     }
 }

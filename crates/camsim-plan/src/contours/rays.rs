@@ -3,19 +3,23 @@
 use super::{Contours, Outlook, SAFETY};
 use crate::{BlurStage, levels::Sampling};
 
-/// Part of what stairs cost, squared, that rays leave of it; and how sure what is known of rays is, which was found with a look once a pixel.
+/// Part of what stairs cost, squared, that rays leave of it; and how sure what is known of rays is, which was
+/// found with a look once a pixel.
 pub(super) const RAYS_LEAVE: f64 = 0.42;
 pub(super) const SAFETY_WITH_RAYS: f64 = 1.2;
 /// Rays for each fine pixel along a side with which that was found.
 const STILL_RAYS: u32 = 16;
-/// How many rays there may be, as powers of two: only then are their places even. Over an exposure twice as many at least.
+/// How many rays there may be, as powers of two: only then are their places even. Over an exposure twice as
+/// many at least.
 const LEAST_RAYS: u32 = 4;
 const MOST_RAYS: u32 = 8;
 
 impl Outlook {
-    /// Rays a pixel: the fewest that add no more than a part of the error, squared, that the samples leave which they go through.
+    /// Rays a pixel: the fewest that add no more than a part of the error, squared, that the samples leave
+    /// which they go through.
     pub fn rays(&self, scale: f64, fine: u32, most_part: f64) -> u32 {
-        let enough = |rays: &u32| self.missed_by_rays(*rays, fine) <= most_part * self.left_by_samples(scale, fine);
+        let enough =
+            |rays: &u32| self.missed_by_rays(*rays, fine) <= most_part * self.left_by_samples(scale, fine);
         let least = LEAST_RAYS + u32::from(self.moves());
         (least..MOST_RAYS).map(|log2| 1 << log2).find(enough).unwrap_or(1 << MOST_RAYS)
     }

@@ -15,16 +15,20 @@ use crate::{
 };
 use camsim_core::scene::TerrainDetail;
 
-/// Phases at which one probe in [`BETWEEN_STEP`] tries what lies between the depths of the exposure's ends. Seen from mid-exposure the depths of a bent surface are missed
-/// by a parabola that is 0 at both ends, and the way from there is 0 in the middle: the product is largest here, at 0.5 / sqrt(3). So is what a parabola through three depths
-/// misses of a cubic.
+/// Phases at which one probe in [`BETWEEN_STEP`] tries what lies between the depths of the exposure's ends.
+/// Seen from mid-exposure the depths of a bent surface are missed by a parabola that is 0 at both ends, and
+/// the way from there is 0 in the middle: the product is largest here, at 0.5 / sqrt(3). So is what a
+/// parabola through three depths misses of a cubic.
 const BETWEEN: [f64; 2] = [-0.289, 0.289];
 const BETWEEN_STEP: usize = 2;
-/// One probe in so many is asked first whether the depth of mid-exposure does for all of it; not in step with the grid, and with phases in turn.
+/// One probe in so many is asked first whether the depth of mid-exposure does for all of it; not in step with
+/// the grid, and with phases in turn.
 const MID_STEP: usize = 7;
-/// RMS over time of what a polynomial misses between its nodes, of the most: 0.73 of what straight lines miss of a parabola, 0.72 of what parabolas miss of a cubic.
+/// RMS over time of what a polynomial misses between its nodes, of the most: 0.73 of what straight lines miss
+/// of a parabola, 0.72 of what parabolas miss of a cubic.
 const OVER_TIME: f64 = 0.72;
-/// Instants of each probe at which a path is looked at whose nodes may all meet a vibration alike: multiples of the golden ratio are in step with nothing.
+/// Instants of each probe at which a path is looked at whose nodes may all meet a vibration alike: multiples
+/// of the golden ratio are in step with nothing.
 const ALIASED_INSTANTS: usize = 4;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Probes whose exposure is looked at.
@@ -33,7 +37,11 @@ const MISS_PROBES: usize = 32;
 const MISSED_STRETCHES: u32 = 8;
 
 impl<'a> Truths<'a> {
-    pub(super) fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>, ground: Option<Ground>) -> Forecast<'a> {
+    pub(super) fn forecast(
+        &'a self,
+        detail: Option<&'a TerrainDetail<'a>>,
+        ground: Option<Ground>,
+    ) -> Forecast<'a> {
         let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
         Forecast {
@@ -58,12 +66,14 @@ pub(super) struct Forecast<'a> {
     pub(super) outcomes: Vec<Outcome>,
     /// [`Forecast::between_px`] of both, of each probe and the largest, once it matters.
     between_px: OnceLock<(Vec<[f64; 2]>, [f64; 2])>,
-    /// With the depth that look-ups find at mid-exposure, of each of the probes, and of one in [`MID_STEP`]: once it matters.
+    /// With the depth that look-ups find at mid-exposure, of each of the probes, and of one in [`MID_STEP`]:
+    /// once it matters.
     of_mid: OnceLock<Vec<OfMid>>,
     of_mid_here_and_there: OnceLock<Vec<OfMid>>,
 }
 
-/// How far the curves between the exposure's nodes miss what they stand for, ideal pixels: the largest miss with a margin, and RMS over probes and time.
+/// How far the curves between the exposure's nodes miss what they stand for, ideal pixels: the largest miss
+/// with a margin, and RMS over probes and time.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Missed {
     pub largest_px: f64,
@@ -80,8 +90,9 @@ impl Forecast<'_> {
 
     /// Without the path between the exposure's nodes.
     fn total_px(&self, way: Way) -> f64 {
-        let of_one =
-            |i, looked: &Looked, run: &Outcome| SAFETY * self.error_px(i, way) + self.rounding(looked, run, way.temporal).total_px();
+        let of_one = |i, looked: &Looked, run: &Outcome| {
+            SAFETY * self.error_px(i, way) + self.rounding(looked, run, way.temporal).total_px()
+        };
         self.largest(of_one) + SAFETY * self.between_px(way)
     }
 
@@ -118,7 +129,9 @@ impl Forecast<'_> {
     /// Of one probe in `step`.
     fn of_mid_of(&self, step: usize) -> Vec<OfMid> {
         let Truths { trial, looked, .. } = self.truths;
-        let of = |(looked, run): (&Looked, &Outcome)| trial.of_mid(&looked.probe, &looked.truth, run.elsewhere, self.detail);
+        let of = |(looked, run): (&Looked, &Outcome)| {
+            trial.of_mid(&looked.probe, &looked.truth, run.elsewhere, self.detail)
+        };
         looked.par_iter().zip(&self.outcomes).step_by(step).with_min_len(16).map(of).collect()
     }
 
@@ -163,25 +176,30 @@ impl Forecast<'_> {
     pub(super) fn choose(&self, case: &Case<'_>, ways: Vec<Way>) -> Way {
         let tolerance_px = case.sequence.scenario.quality.max_error_px;
         // What a few probes rule out is looked at more closely only if nothing else keeps the tolerance.
-        let (ruled_out, in_question): (Vec<Way>, Vec<Way>) = ways.iter().copied().partition(|way| self.surely_misses(*way, tolerance_px));
+        let (ruled_out, in_question): (Vec<Way>, Vec<Way>) =
+            ways.iter().copied().partition(|way| self.surely_misses(*way, tolerance_px));
         match self.first_within(case, in_question) {
             Err(_) if !ruled_out.is_empty() => self.first_within(case, ways).unwrap_or_else(|best| best),
             Ok(way) | Err(way) => way,
         }
     }
 
-    /// The first way within the tolerances, of source coordinates and of what these cost in the picture; or else the best there is.
+    /// The first way within the tolerances, of source coordinates and of what these cost in the picture; or
+    /// else the best there is.
     fn first_within(&self, case: &Case<'_>, ways: Vec<Way>) -> Result<Way, Way> {
         let tolerance_px = case.sequence.scenario.quality.max_error_px;
         let mut best: Option<(f64, Way)> = None;
         let mut known_nodes: Vec<((u32, u32, bool), Missed)> = Vec::new();
         for way in ways {
-            let nodes = way.blur.map_or_else(Default::default, |blur| (blur.solved(), blur.path.steps(), blur.depths == NodeDepths::Each));
-            let missed = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
-                let missed = self.missed(way.blur);
-                known_nodes.push((nodes, missed));
-                missed
+            let nodes = way.blur.map_or_else(Default::default, |blur| {
+                (blur.solved(), blur.path.steps(), blur.depths == NodeDepths::Each)
             });
+            let missed =
+                known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
+                    let missed = self.missed(way.blur);
+                    known_nodes.push((nodes, missed));
+                    missed
+                });
             let of_px = (self.total_px(way) + missed.largest_px) / tolerance_px;
             // What gains less than a twentieth is not worth its time.
             let is_better = |of_tolerance: f64| best.is_none_or(|(least, _)| of_tolerance < 0.95 * least);
@@ -196,12 +214,14 @@ impl Forecast<'_> {
                 best = Some((of_tolerance, way));
             }
         }
-        Err(best.map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way))
+        Err(best
+            .map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way))
     }
 
     /// The errors of a stage by cause.
     pub(super) fn predict(&self, case: &Case<'_>, way: Way) -> Predicted {
-        let (Way { temporal: stage, blur }, max_error_px) = (way, case.sequence.scenario.quality.max_error_px);
+        let (Way { temporal: stage, blur }, max_error_px) =
+            (way, case.sequence.scenario.quality.max_error_px);
         let missed = self.missed(blur);
         let nodes_px = missed.largest_px;
         let total_px = self.total_px(way) + nodes_px;
@@ -218,20 +238,32 @@ impl Forecast<'_> {
         let covered = probes > 0 && void_share <= MOST_VOID_SHARE;
         let kept = total_px <= max_error_px && covered;
         let most = blur.is_some_and(|blur| blur.solved() > MOST_STEPS);
-        let at_most = if most { format!(", of which there are at most {}", MOST_STEPS + 1) } else { String::new() };
+        let at_most =
+            if most { format!(", of which there are at most {}", MOST_STEPS + 1) } else { String::new() };
         let nodes = format!("the path between the exposure's nodes{at_most}");
         let causes = [
             (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
-            (depth_px, "depth between the pixels of the ideal frame (quality.key_frames or quality.ideal_scale may do more)"),
+            (
+                depth_px,
+                "depth between the pixels of the ideal frame (quality.key_frames or quality.ideal_scale may do more)",
+            ),
             (nodes_px, nodes.as_str()),
         ];
-        let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
+        let largest = || {
+            causes
+                .into_iter()
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(px, what)| format!("{what}: {px:.2e} px"))
+        };
         let in_the_way = match (kept, covered) {
             (true, _) => None,
             (false, true) => largest(),
-            (false, false) => Some(format!("the ideal frame: {:.1} % of the pixels see what lies outside of it", 100.0 * void_share)),
+            (false, false) => Some(format!(
+                "the ideal frame: {:.1} % of the pixels see what lies outside of it",
+                100.0 * void_share
+            )),
         };
         Predicted {
             lens_px,
@@ -260,12 +292,18 @@ impl Forecast<'_> {
         }
     }
 
-    pub(super) fn rounding(&self, Looked { probe, truth, .. }: &Looked, run: &Outcome, stage: TemporalStage) -> Rounding {
+    pub(super) fn rounding(
+        &self,
+        Looked { probe, truth, .. }: &Looked,
+        run: &Outcome,
+        stage: TemporalStage,
+    ) -> Rounding {
         let Truths { reach, ray, trial, .. } = self.truths;
         Rounding::new(probe, truth.at_px, run.parallax_px, &reach.camera, trial.ideal, *ray, stage)
     }
 
-    /// Misses of the curves between the exposure's nodes: for a surface at one depth, and where each node finds its own, along what the rays meet.
+    /// Misses of the curves between the exposure's nodes: for a surface at one depth, and where each node
+    /// finds its own, along what the rays meet.
     pub(super) fn missed(&self, blur: Option<BlurStage>) -> Missed {
         let Some(blur) = blur else { return Missed::default() };
         let Truths { trial, looked, .. } = self.truths;
@@ -273,10 +311,13 @@ impl Forecast<'_> {
         let looked_at = MISSED_STRETCHES.min(stretches);
         let every = looked.len().div_ceil(MISS_PROBES).max(1);
         let miss = |(i, Looked { probe, truth, .. }): (usize, &Looked)| {
-            let of_stretch = |k| miss_px(blur.path, stretches, k, |share| trial.source_px(probe, truth, share));
-            let at_one_depth = (0..looked_at).map(|k| of_stretch(k * stretches / looked_at)).fold(0.0, f64::max);
+            let of_stretch =
+                |k| miss_px(blur.path, stretches, k, |share| trial.source_px(probe, truth, share));
+            let at_one_depth =
+                (0..looked_at).map(|k| of_stretch(k * stretches / looked_at)).fold(0.0, f64::max);
             let follows = blur.depths == NodeDepths::Each;
-            let along_surfaces = follows.then(|| trial.miss_along_surfaces_px(probe, blur.path, stretches, i as u32 % stretches));
+            let along_surfaces = follows
+                .then(|| trial.miss_along_surfaces_px(probe, blur.path, stretches, i as u32 % stretches));
             along_surfaces.map_or(at_one_depth, |px| px.max(at_one_depth))
         };
         let misses: Vec<f64> = looked.iter().step_by(every).enumerate().map(miss).collect();
@@ -285,12 +326,18 @@ impl Forecast<'_> {
             return between;
         }
         // Nodes and the middles between them may be whole periods apart.
-        let instants = |(i, looked)| (0..ALIASED_INSTANTS).map(move |n| (looked, (GOLDEN * (i * ALIASED_INSTANTS + n + 1) as f64).fract()));
+        let instants = |(i, looked)| {
+            (0..ALIASED_INSTANTS)
+                .map(move |n| (looked, (GOLDEN * (i * ALIASED_INSTANTS + n + 1) as f64).fract()))
+        };
         let at = |(Looked { probe, truth, .. }, share): (&Looked, f64)| {
             miss_at_px(blur.path, stretches, share, |share| trial.source_px(probe, truth, share))
         };
         let misses: Vec<f64> = looked.iter().step_by(every).enumerate().flat_map(instants).map(at).collect();
-        Missed { largest_px: between.largest_px.max(largest(&misses)), rms_px: between.rms_px.max(rms(&misses)) }
+        Missed {
+            largest_px: between.largest_px.max(largest(&misses)),
+            rms_px: between.rms_px.max(rms(&misses)),
+        }
     }
 }
 

@@ -34,7 +34,9 @@ pub(super) fn sampled(area: &Footprint, over: Over, f: DVec2) -> Wave {
 pub(super) fn read(kernel: Kernel, axis: usize, f: f64) -> f64 {
     match kernel {
         Kernel::Bilinear => sinc(f).powi(2),
-        Kernel::Spline(softness) => (1.0 - softness[axis]) * catmull_rom(f) + softness[axis] * sinc(f).powi(4),
+        Kernel::Spline(softness) => {
+            (1.0 - softness[axis]) * catmull_rom(f) + softness[axis] * sinc(f).powi(4)
+        }
         Kernel::Area(sides_px) => sinc(f) * sinc(sides_px[axis] * f),
     }
 }
@@ -63,7 +65,8 @@ struct Read {
     leaves: Wave,
 }
 
-/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far as they count.
+/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far
+/// as they count.
 fn reads_of(f: DVec2, area: &Footprint, beside_px: DVec2) -> impl Iterator<Item = Read> {
     let [x, y] = [0, 1].map(|k| aliases(area.kernel, k, f[k], beside_px[k]));
     let both = (0..9).map(move |i| {

@@ -1,4 +1,5 @@
-//! What reads leave of four waves at a time, in single precision: as `transfer.rs` has it of one, in a third of the time.
+//! What reads leave of four waves at a time, in single precision: as `transfer.rs` has it of one, in a third
+//! of the time.
 
 use glam::Vec4;
 
@@ -76,7 +77,8 @@ fn sinc(x: Vec4) -> Vec4 {
     ratio(sin_pi(x), std::f32::consts::PI * x)
 }
 
-/// `sin(pi n x) / (n sin(pi x))`. Both sines are of what `x` is beside a whole number, so that they vanish together however large it is.
+/// `sin(pi n x) / (n sin(pi x))`. Both sines are of what `x` is beside a whole number, so that they vanish
+/// together however large it is.
 fn mean_of(n: u32, x: Vec4) -> Vec4 {
     let (count, near) = (n as f32, whole(x));
     let beside = x - near;
@@ -106,7 +108,8 @@ impl Frequencies4 {
 pub(super) struct Sampler<'a> {
     area: &'a Footprint,
     over: Over,
-    /// Cells of the grid in the order in which samples take them; empty where all of them have as good as all samples.
+    /// Cells of the grid in the order in which samples take them; empty where all of them have as good as all
+    /// samples.
     turns: Vec<[usize; 2]>,
 }
 
@@ -122,8 +125,12 @@ impl<'a> Sampler<'a> {
         match self.over {
             Over::Instant => Waves4::real(self.grid(f)),
             Over::All(along) => Waves4::real(self.grid(f) * sinc(f.dot(along))),
-            Over::Samples(Path { along, samples }) if self.turns.is_empty() => Waves4::real(self.grid(f) * evenly(samples, f.dot(along))),
-            Over::Samples(path) if self.area.taps.iter().all(|&side| side as usize <= FEW_TAPS) => self.in_turns::<FEW_TAPS>(path, f),
+            Over::Samples(Path { along, samples }) if self.turns.is_empty() => {
+                Waves4::real(self.grid(f) * evenly(samples, f.dot(along)))
+            }
+            Over::Samples(path) if self.area.taps.iter().all(|&side| side as usize <= FEW_TAPS) => {
+                self.in_turns::<FEW_TAPS>(path, f)
+            }
             Over::Samples(path) => self.in_turns::<{ MAX_FOOTPRINT_TAPS as usize }>(path, f),
         }
     }
@@ -133,13 +140,15 @@ impl<'a> Sampler<'a> {
         evenly(taps[0], f.dot(dx)) * evenly(taps[1], f.dot(dy))
     }
 
-    /// Samples each at one of at most `SIDE` taps along each side, in turns: of each tap its samples' mean, turned by where the middle of them is on the path
-    /// and by where the tap is in the grid. From tap to tap both turn by as much again.
+    /// Samples each at one of at most `SIDE` taps along each side, in turns: of each tap its samples' mean,
+    /// turned by where the middle of them is on the path and by where the tap is in the grid. From tap to tap
+    /// both turn by as much again.
     fn in_turns<const SIDE: usize>(&self, Path { along, samples }: Path, f: Frequencies4) -> Waves4 {
         let (area, cycles, count) = (self.area, f.dot(along), samples as f32);
         let line = |side: glam::DVec2, taps: u32| -> [Waves4; SIDE] {
             let turns = f.dot(side) / taps as f32;
-            let (mut at, step) = (Waves4::turned_by(0.5 * turns * (1.0 - taps as f32)), Waves4::turned_by(turns));
+            let (mut at, step) =
+                (Waves4::turned_by(0.5 * turns * (1.0 - taps as f32)), Waves4::turned_by(turns));
             std::array::from_fn(|_| {
                 let next = at.times(step);
                 std::mem::replace(&mut at, next)
@@ -187,14 +196,29 @@ mod tests {
 
     #[test]
     fn samples_in_turns_are_the_sum_of_them_all() {
-        for (taps, samples) in
-            [([4, 4], 7), ([4, 4], 16), ([4, 4], 41), ([3, 2], 5), ([2, 4], 64), ([7, 3], 30), ([1, 5], 3), ([3, 2], 48), ([64, 64], 9000)]
-        {
-            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, kernel: Kernel::Bilinear };
+        for (taps, samples) in [
+            ([4, 4], 7),
+            ([4, 4], 16),
+            ([4, 4], 41),
+            ([3, 2], 5),
+            ([2, 4], 64),
+            ([7, 3], 30),
+            ([1, 5], 3),
+            ([3, 2], 48),
+            ([64, 64], 9000),
+        ] {
+            let area = Footprint {
+                dx: DVec2::new(3.1, 0.4),
+                dy: DVec2::new(-0.2, 2.7),
+                taps,
+                kernel: Kernel::Bilinear,
+            };
             let over = Over::Samples(Path { along: DVec2::new(5.3, -2.1), samples });
             for f in [DVec2::new(0.11, 0.05), DVec2::new(-0.7, 0.3), DVec2::new(1.4, 0.9), DVec2::ZERO] {
-                let found = Sampler::new(&area, over).leaves(Frequencies4 { x: Vec4::splat(f.x as f32), y: Vec4::splat(f.y as f32) });
-                let (found, all) = (DVec2::new(f64::from(found.re.z), f64::from(found.im.z)), sampled(&area, over, f));
+                let found = Sampler::new(&area, over)
+                    .leaves(Frequencies4 { x: Vec4::splat(f.x as f32), y: Vec4::splat(f.y as f32) });
+                let (found, all) =
+                    (DVec2::new(f64::from(found.re.z), f64::from(found.im.z)), sampled(&area, over, f));
                 // Each turn adds its rounding.
                 let bound = 2e-6 + 1e-7 * f64::from(taps[0] * taps[1]);
                 assert!(found.distance(all) < bound, "{taps:?} {samples} {f}: {found} {all}");

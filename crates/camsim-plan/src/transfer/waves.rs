@@ -1,5 +1,6 @@
-//! The waves of a texture that stand for all of them, and what is left of each. Their frequencies in the ideal frame are always the same, and so is what a
-//! single read leaves of each and of those that look like it: `TABLE`.
+//! The waves of a texture that stand for all of them, and what is left of each. Their frequencies in the
+//! ideal frame are always the same, and so is what a single read leaves of each and of those that look like
+//! it: `TABLE`.
 
 use std::{
     f64::consts::{LN_2, PI},
@@ -12,7 +13,8 @@ use super::{Alias, Footprint, Over, Reads, Wave, sinc, turned_by};
 use crate::grain::Spectrum;
 use camsim_core::scene::SurfaceFilter;
 
-/// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
+/// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a
+/// half-plane.
 const LOWEST: f64 = 0.062_5;
 const OCTAVES: u32 = 6;
 const AN_OCTAVE: u32 = 2;
@@ -72,8 +74,13 @@ impl Waves {
             if cycles.abs().max_element() > MOST_CYCLES {
                 return None;
             }
-            let power = known.weight * per_texel * spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
-            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * along.map_or(1.0, |along| sinc(along.dot(f)));
+            let power = known.weight
+                * per_texel
+                * spectrum.density_at(cycles)
+                * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
+            let exact = sinc(sides.x_axis.dot(f))
+                * sinc(sides.y_axis.dot(f))
+                * along.map_or(1.0, |along| sinc(along.dot(f)));
             Some(Seen { index, cycles, power, exact })
         };
         Self(TABLE.iter().enumerate().filter_map(wave).collect())
@@ -84,17 +91,21 @@ impl Waves {
         self.0.iter().map(|wave| filter.leaves(wave.cycles)).collect()
     }
 
-    /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
+    /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where
+    /// the source lies between ideal pixels.
     pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
         // Turns of whole cycles by the place of the read.
-        let turns =
-            |beside_px: f64| -> [Wave; 2 * MOST_AWAY + 1] { std::array::from_fn(|i| turned_by((i as f64 - MOST_AWAY as f64) * beside_px)) };
+        let turns = |beside_px: f64| -> [Wave; 2 * MOST_AWAY + 1] {
+            std::array::from_fn(|i| turned_by((i as f64 - MOST_AWAY as f64) * beside_px))
+        };
         let turns = [turns(beside_px.x), turns(beside_px.y)];
         let turn = |k: usize, away: i32| turns[k][(away + MOST_AWAY as i32) as usize];
         let mut reads = Reads::of_waves(self.0.len());
         for (of, wave) in self.0.iter().enumerate() {
             let aliases = &TABLE[wave.index].aliases;
-            reads.add(of, aliases, area, |[x, y]| turn(0, aliases[0][x].away).rotate(turn(1, aliases[1][y].away)));
+            reads.add(of, aliases, area, |[x, y]| {
+                turn(0, aliases[0][x].away).rotate(turn(1, aliases[1][y].away))
+            });
         }
         reads.sum(self.0.len(), area, over)
     }
@@ -103,7 +114,11 @@ impl Waves {
 /// Expected squared error of a pixel, of the linear range.
 pub(crate) fn error2(waves: &Waves, filtered: &[f64], read: &[Wave]) -> f64 {
     let parts = waves.0.iter().zip(filtered).zip(read);
-    parts.map(|((wave, &ideal), &read)| wave.power * (ideal * read - Wave::new(wave.exact, 0.0)).length_squared()).sum()
+    parts
+        .map(|((wave, &ideal), &read)| {
+            wave.power * (ideal * read - Wave::new(wave.exact, 0.0)).length_squared()
+        })
+        .sum()
 }
 
 #[cfg(test)]
@@ -117,10 +132,19 @@ mod tests {
 
     #[test]
     fn four_waves_at_a_time_are_as_one_by_one() {
-        let waves = Waves::new(&Spectrum::flat(-2.0), DMat2::from_diagonal(DVec2::splat(3.5)), DMat2::IDENTITY, None);
+        let waves =
+            Waves::new(&Spectrum::flat(-2.0), DMat2::from_diagonal(DVec2::splat(3.5)), DMat2::IDENTITY, None);
         assert_eq!(waves.0.len(), TABLE.len(), "all are seen");
-        let stages = [TapStage::Bilinear, TapStage::Spline, TapStage::Area, TapStage::Grid { most: 3 }, TapStage::SplineOrGrid { most: 7 }];
-        for (stage, scale) in stages.into_iter().flat_map(|stage| [0.9, 1.3, 2.9, 6.1].map(|scale| (stage, scale))) {
+        let stages = [
+            TapStage::Bilinear,
+            TapStage::Spline,
+            TapStage::Area,
+            TapStage::Grid { most: 3 },
+            TapStage::SplineOrGrid { most: 7 },
+        ];
+        for (stage, scale) in
+            stages.into_iter().flat_map(|stage| [0.9, 1.3, 2.9, 6.1].map(|scale| (stage, scale)))
+        {
             let area = Footprint::new(scale * DVec2::new(1.0, 0.2), scale * DVec2::new(-0.1, 0.8), stage);
             let along = DVec2::new(31.3, -17.9);
             let samples = [1, 2, 7, 40, 300].map(|samples| Over::Samples(Path { along, samples }));

@@ -30,7 +30,9 @@ fn a_look_takes_microseconds() {
         let mut hits = 0;
         for y in (0..480).step_by(4) {
             for x in (0..640).step_by(4) {
-                hits += u32::from(oracle.look(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()));
+                hits += u32::from(
+                    oracle.look(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()),
+                );
             }
         }
         let each_us = begin.elapsed().as_secs_f64() * 1e6 / (120.0 * 160.0);
@@ -53,7 +55,11 @@ fn rays_agree_with_a_look_at_every_triangle() {
         let found = oracle.cast(origin, direction);
         // The scene's own queries share no line with the oracle's.
         let ground = terrain.intersect(origin, direction, f64::INFINITY).map(|hit| (hit.t, hit.uv));
-        let all = scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, direction, f64::INFINITY)).chain(ground);
+        let all = scene
+            .meshes
+            .iter()
+            .filter_map(|mesh| mesh.intersect(origin, direction, f64::INFINITY))
+            .chain(ground);
         let expected = all.min_by(|a, b| a.0.total_cmp(&b.0));
         match (found, expected) {
             (Some(found), Some((t, uv))) => {
@@ -69,7 +75,8 @@ fn rays_agree_with_a_look_at_every_triangle() {
     assert!(hits > 2500 && misses > 1000, "{hits} {misses}");
 }
 
-/// Steep views through every vertex and along every edge of a grid: rays do not slip through where triangles meet.
+/// Steep views through every vertex and along every edge of a grid: rays do not slip through where triangles
+/// meet.
 #[test]
 fn no_ray_slips_through_at_vertices_and_edges() {
     let scene = Scene { terrain: Some(hills(20, 10.0)), ..Scene::default() };
@@ -78,8 +85,15 @@ fn no_ray_slips_through_at_vertices_and_edges() {
         // Quarters of a cell: vertices, middles of edges and of diagonals.
         for i in -16..=16 {
             for j in -16..=16 {
-                let above = DVec3::new(2.5 * f64::from(i) - 1000.0 * tilt_n, 2.5 * f64::from(j) - 1000.0 * tilt_e, -1000.0);
-                assert!(oracle.cast(above, DVec3::new(tilt_n, tilt_e, 1.0)).is_some(), "{i} {j} {tilt_n} {tilt_e}");
+                let above = DVec3::new(
+                    2.5 * f64::from(i) - 1000.0 * tilt_n,
+                    2.5 * f64::from(j) - 1000.0 * tilt_e,
+                    -1000.0,
+                );
+                assert!(
+                    oracle.cast(above, DVec3::new(tilt_n, tilt_e, 1.0)).is_some(),
+                    "{i} {j} {tilt_n} {tilt_e}"
+                );
             }
         }
     }

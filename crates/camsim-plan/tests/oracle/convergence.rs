@@ -24,7 +24,8 @@ fn camera() -> Scenario {
     scenario
 }
 
-/// Every pixel by a regular grid over its area; instants are the grid's numbers in an order without relation to it.
+/// Every pixel by a regular grid over its area; instants are the grid's numbers in an order without relation
+/// to it.
 fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
     let [width, height] = oracle.sequence().scenario.camera.size_px;
     let view = oracle.view(0);
@@ -32,9 +33,12 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
         let count = SIDE * SIDE;
         let sum: DVec3 = (0..count)
             .map(|k| {
-                let place = (DVec2::new(f64::from(k % SIDE), f64::from(k / SIDE)) + 0.5) / f64::from(SIDE) - 0.5;
+                let place =
+                    (DVec2::new(f64::from(k % SIDE), f64::from(k / SIDE)) + 0.5) / f64::from(SIDE) - 0.5;
                 // 5701 is prime to the count.
-                let phase = (f64::from((u64::from(k) * 5701 % u64::from(count)) as u32) + 0.5) / f64::from(count) - 0.5;
+                let phase = (f64::from((u64::from(k) * 5701 % u64::from(count)) as u32) + 0.5)
+                    / f64::from(count)
+                    - 0.5;
                 let look = view.look([i % width, i / width], place, phase).unwrap();
                 oracle.color(look.uv, look.hit.as_ref())
             })
@@ -46,10 +50,19 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
 
 /// RMS difference of a rendering with `samples` a pixel, and the error that it states; 1/255.
 fn errors_dn(oracle: &Oracle, truth: &[DVec3], samples: u32) -> (f64, f64) {
-    let options = RenderOptions { min_samples: samples, max_samples: samples, photometric: false, ..RenderOptions::default() };
+    let options = RenderOptions {
+        min_samples: samples,
+        max_samples: samples,
+        photometric: false,
+        ..RenderOptions::default()
+    };
     let (frame, convergence) = oracle.render_reported(0, &options);
     assert_eq!(convergence.samples, u64::from(samples) * truth.len() as u64);
-    let squares = frame.color_rgba.chunks_exact(4).zip(truth).map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
+    let squares = frame
+        .color_rgba
+        .chunks_exact(4)
+        .zip(truth)
+        .map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
     (255.0 * (squares.sum::<f64>() / truth.len() as f64).sqrt(), convergence.rms_error_dn)
 }
 
@@ -71,11 +84,14 @@ fn check(name: &str, oracle: &Oracle, truth: &[DVec3]) {
     for (samples, (found, stated)) in counts.iter().zip(&errors) {
         eprintln!("  {samples:5} {found:8.3} {stated:8.3}");
     }
-    // Least squares of log error over log samples: random samples fall as N^-1/2, even ones faster, up to N^-1.
-    let points: Vec<(f64, f64)> = counts.iter().zip(&errors).map(|(n, (found, _))| (f64::from(*n).ln(), found.ln())).collect();
+    // Least squares of log error over log samples: random samples fall as N^-1/2, even ones faster, up to
+    // N^-1.
+    let points: Vec<(f64, f64)> =
+        counts.iter().zip(&errors).map(|(n, (found, _))| (f64::from(*n).ln(), found.ln())).collect();
     let n = points.len() as f64;
     let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
-    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
     eprintln!("  error falls as N^{slope:.2}");
     assert!((-1.2..=-0.5).contains(&slope), "{name}: {slope}");
     for (found, stated) in errors {
@@ -97,12 +113,20 @@ fn error_falls_with_samples_by_the_law_and_is_stated_honestly() {
 fn pixels_are_refined_until_the_tolerance_is_kept() {
     let (oracle, truth) = &*TOWN;
     for tolerance_dn in [4.0, 1.0] {
-        let options = RenderOptions { tolerance_dn, max_samples: 8192, photometric: false, ..RenderOptions::default() };
+        let options =
+            RenderOptions { tolerance_dn, max_samples: 8192, photometric: false, ..RenderOptions::default() };
         let (frame, convergence) = oracle.render_reported(0, &options);
-        let squares = frame.color_rgba.chunks_exact(4).zip(truth).map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
+        let squares = frame
+            .color_rgba
+            .chunks_exact(4)
+            .zip(truth)
+            .map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
         let rms_dn = 255.0 * (squares.sum::<f64>() / truth.len() as f64).sqrt();
         let mean = convergence.samples as f64 / convergence.pixels as f64;
-        eprintln!("tolerance {tolerance_dn}: {rms_dn:.3} with {mean:.0} samples a pixel, {} unfinished", convergence.unfinished);
+        eprintln!(
+            "tolerance {tolerance_dn}: {rms_dn:.3} with {mean:.0} samples a pixel, {} unfinished",
+            convergence.unfinished
+        );
         assert!(
             rms_dn < tolerance_dn && convergence.rms_error_dn < tolerance_dn && convergence.unfinished == 0,
             "{rms_dn} {convergence:?}"

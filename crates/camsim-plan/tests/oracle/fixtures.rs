@@ -50,7 +50,12 @@ pub struct Steady {
 
 impl Steady {
     pub fn standing(position_ned_m: DVec3) -> Self {
-        Self { position_ned_m, velocity_ned_m_s: DVec3::ZERO, ned_from_body: DQuat::IDENTITY, rate_body_rad_s: DVec3::ZERO }
+        Self {
+            position_ned_m,
+            velocity_ned_m_s: DVec3::ZERO,
+            ned_from_body: DQuat::IDENTITY,
+            rate_body_rad_s: DVec3::ZERO,
+        }
     }
 
     /// Turning, drifting and climbing.
@@ -58,7 +63,9 @@ impl Steady {
         Self {
             position_ned_m: DVec3::new(3.0, -2.0, -height_m),
             velocity_ned_m_s: DVec3::new(25.0, -12.0, -18.0),
-            ned_from_body: DQuat::from_rotation_z(0.6) * DQuat::from_rotation_y(0.08) * DQuat::from_rotation_x(-0.05),
+            ned_from_body: DQuat::from_rotation_z(0.6)
+                * DQuat::from_rotation_y(0.08)
+                * DQuat::from_rotation_x(-0.05),
             rate_body_rad_s: DVec3::new(0.3, -0.4, 0.7),
         }
     }
@@ -95,7 +102,8 @@ pub fn sequence(scenario: Scenario, motion: Steady, scene: Scene) -> Arc<Sequenc
 
 pub fn checker(squares: u32) -> Arc<Texture> {
     let rgba8 = (0..64 * 64_u32).flat_map(|i| {
-        let level = if (i % 64 / (64 / squares) + i / 64 / (64 / squares)).is_multiple_of(2) { 255 } else { 0 };
+        let level =
+            if (i % 64 / (64 / squares) + i / 64 / (64 / squares)).is_multiple_of(2) { 255 } else { 0 };
         [level, level, level, 255]
     });
     Arc::new(Texture { size_px: [64, 64], rgba8: rgba8.collect(), encoding: Encoding::Linear })
@@ -103,7 +111,11 @@ pub fn checker(squares: u32) -> Arc<Texture> {
 
 /// A level picture at the origin.
 pub fn plane(width_m: f64) -> Scene {
-    Scene { meshes: vec![Mesh::level_picture(checker(8), DVec3::ZERO, width_m)], sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }
+    Scene {
+        meshes: vec![Mesh::level_picture(checker(8), DVec3::ZERO, width_m)],
+        sky_linear: [0.2, 0.4, 0.8],
+        ..Scene::default()
+    }
 }
 
 pub fn hills(side: u32, cell_m: f64) -> Terrain {
@@ -121,7 +133,11 @@ pub fn town(count: usize) -> Scene {
     let mut places = (0..).map(|i| (f64::from(i) * 0.618_033_988_749_894_9 + 0.1_f64).fract());
     for _ in 0..count {
         let [n, e, w, h] = [0; 4].map(|_: i32| places.next().unwrap());
-        scene.meshes.push(block(DVec3::new(800.0 * (n - 0.5), 800.0 * (e - 0.5), 0.0), 5.0 + 15.0 * w, 5.0 + 35.0 * h));
+        scene.meshes.push(block(
+            DVec3::new(800.0 * (n - 0.5), 800.0 * (e - 0.5), 0.0),
+            5.0 + 15.0 * w,
+            5.0 + 35.0 * h,
+        ));
     }
     scene
 }
@@ -148,5 +164,8 @@ pub fn tangential() -> LensSpec {
 
 /// A fisheye that folds within the picture.
 pub fn folding() -> LensSpec {
-    LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.428129, 0.158059, 0.000245, -0.002286, -0.029194] }
+    LensSpec {
+        model: LensModel::BrownConrady,
+        coefficients: vec![-0.428129, 0.158059, 0.000245, -0.002286, -0.029194],
+    }
 }

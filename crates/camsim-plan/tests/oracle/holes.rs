@@ -1,4 +1,5 @@
-//! What no ideal frame sees: predicted from a few hundred probes, counted by the oracle, and the ideal frames that are taken for it.
+//! What no ideal frame sees: predicted from a few hundred probes, counted by the oracle, and the ideal frames
+//! that are taken for it.
 
 use std::sync::Arc;
 
@@ -24,7 +25,10 @@ fn camera(readout_ms: f64, exposure_ms: f64) -> Scenario {
 
 /// Level flight to the north-east at 25 m/s.
 fn flight(height_m: f64) -> Steady {
-    Steady { velocity_ned_m_s: DVec3::new(20.0, 15.0, 0.0), ..Steady::standing(DVec3::new(0.0, 0.0, -height_m)) }
+    Steady {
+        velocity_ned_m_s: DVec3::new(20.0, 15.0, 0.0),
+        ..Steady::standing(DVec3::new(0.0, 0.0, -height_m))
+    }
 }
 
 fn plan(sequence: &Arc<Sequence>) -> FramePlan {
@@ -53,7 +57,11 @@ fn house() -> Scene {
 fn town() -> Scene {
     let mut scene = plane(4000.0);
     for (i, j) in (-6..=6).flat_map(|i| (-6..=6).map(move |j| (i, j))) {
-        scene.meshes.push(block(25.0 * DVec3::new(f64::from(i), f64::from(j), 0.0), 5.0, 6.0 + 2.5 * f64::from((3 * i + 5 * j) & 7)));
+        scene.meshes.push(block(
+            25.0 * DVec3::new(f64::from(i), f64::from(j), 0.0),
+            5.0,
+            6.0 + 2.5 * f64::from((3 * i + 5 * j) & 7),
+        ));
     }
     scene
 }
@@ -73,7 +81,8 @@ fn the_predicted_share_is_what_the_oracle_counts() {
             let (found, measured) = (plan.predicted.holes.unwrap(), counted(&sequence, &plan));
             eprintln!("{name}, {keys} keys: {found:?}, measured {measured:.2e}");
             assert!(measured > 1e-4 || keys > 1, "{name}: {measured:.1e}");
-            // The strips that two of them leave may be found in their true width alone: so much is for a single probe to say.
+            // The strips that two of them leave may be found in their true width alone: so much is for a
+            // single probe to say.
             let slack = if keys == 1 { 0.0 } else { 1.0 / f64::from(plan.predicted.probes) };
             assert!(
                 found.share < 2.0 * measured + slack && measured < 2.0 * found.share + slack,
@@ -92,12 +101,14 @@ fn a_second_ideal_frame_is_for_holes_that_show() {
     // The same house within 2 ms is passed by 5 cm.
     let short = with(&close, |scenario| scenario.camera.shutter.readout_ms = 2.0);
     assert_eq!(keys(&short), 1);
-    // Hills and a skyline, where the nearest surface moves by several pixels against the farthest: behind their crests there is little to miss.
+    // Hills and a skyline, where the nearest surface moves by several pixels against the farthest: behind
+    // their crests there is little to miss.
     let mut oblique = camera(33.0, 24.0);
     oblique.camera.mount.angles_deg = [0.0, -30.0, 0.0];
     // A finer ideal frame without rays, whose holes are told with its silhouettes, would do as well.
     oblique.quality.silhouettes = Silhouettes::Rays;
-    let over_hills = sequence(oblique, flight(120.0), Scene { terrain: Some(hills(257, 20.0)), ..Scene::default() });
+    let over_hills =
+        sequence(oblique, flight(120.0), Scene { terrain: Some(hills(257, 20.0)), ..Scene::default() });
     let of_hills = plan(&over_hills);
     assert!(of_hills.motion.parallax_px > 0.5 && of_hills.keys.len() == 1, "{of_hills}");
     assert!(of_hills.predicted.holes.is_some(), "{of_hills}");
@@ -113,7 +124,9 @@ fn a_tighter_tolerance_takes_a_second_ideal_frame_earlier() {
     // A finer ideal frame has wider strips.
     camera.quality.ideal_scale = Auto::Value(1.0);
     let over_town = sequence(camera, flight(80.0), town());
-    let keys = |max_error_dn: f64| plan(&with(&over_town, |scenario| scenario.quality.max_error_dn = max_error_dn)).keys.len();
+    let keys = |max_error_dn: f64| {
+        plan(&with(&over_town, |scenario| scenario.quality.max_error_dn = max_error_dn)).keys.len()
+    };
     assert_eq!([1.0, 0.1].map(keys), [1, 2]);
     // What is said is what is compared.
     let loose = plan(&over_town);

@@ -40,14 +40,21 @@ fn over(front: DVec3, alpha: f64, behind: DVec3) -> DVec3 {
 fn looks(meshes: Vec<Mesh>, fog_visibility_m: Option<f64>) -> (DVec3, Option<f64>) {
     let sky_linear = SKY.as_vec3().to_array();
     let scene = Scene { meshes, sky_linear, fog_visibility_m, ..Scene::default() };
-    let oracle = Oracle::new(sequence(scenario(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene)).unwrap();
+    let oracle =
+        Oracle::new(sequence(scenario(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene)).unwrap();
     // A pixel on no edge, and one on the edge between the triangles of every square.
     let seen = [DVec2::new(0.013, 0.029), DVec2::ZERO].map(|uv| {
         let pose = oracle.sequence().path.pose(0.0);
-        (oracle.light(&pose, uv), oracle.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map(|hit| hit.depth_m))
+        (
+            oracle.light(&pose, uv),
+            oracle.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map(|hit| hit.depth_m),
+        )
     });
     if fog_visibility_m.is_none() {
-        assert!(seen[0].0.distance(seen[1].0) < 1e-9 && seen[0].1.is_some() == seen[1].1.is_some(), "{seen:?}");
+        assert!(
+            seen[0].0.distance(seen[1].0) < 1e-9 && seen[0].1.is_some() == seen[1].1.is_some(),
+            "{seen:?}"
+        );
     }
     seen[1]
 }
@@ -85,7 +92,8 @@ fn what_is_hidden_turned_away_or_clear_adds_nothing() {
     let mut away = pane(RED, 0.6, 50.0);
     away.material.one_sided = true;
     let sides = [DMat3::IDENTITY, DMat3::from_rotation_x(std::f64::consts::PI)];
-    let found = sides.map(|ned_from_shape| looks(vec![wall.clone(), Mesh { ned_from_shape, ..away.clone() }], None).0);
+    let found = sides
+        .map(|ned_from_shape| looks(vec![wall.clone(), Mesh { ned_from_shape, ..away.clone() }], None).0);
     let mut distances = found.map(|color| color.distance(WALL));
     distances.sort_by(f64::total_cmp);
     assert!(distances[0] < 1e-7 && distances[1] > 0.3, "{found:?}");
@@ -105,15 +113,23 @@ fn each_layer_has_its_own_fog_and_light_of_its_own_is_as_clear_as_it() {
     assert!(found.distance(expected) < 1e-6, "{found} {expected}");
 }
 
-/// A camera that flies over a pane above a picture: what the plan says of the mixture's one depth against the difference that it makes.
+/// A camera that flies over a pane above a picture: what the plan says of the mixture's one depth against the
+/// difference that it makes.
 #[test]
 fn the_plan_tells_what_one_depth_costs() {
     let predicted = |meshes: Vec<Mesh>, speed_m_s: f64, keys: u32| {
         let mut scenario = scenario();
         scenario.quality.key_frames = Auto::Value(keys);
         scenario.camera.shutter.readout_ms = 60.0;
-        let motion = Steady { velocity_ned_m_s: DVec3::new(0.0, speed_m_s, 0.0), ..Steady::standing(DVec3::new(0.0, 0.0, -100.0)) };
-        let sequence = sequence(scenario, motion, Scene { meshes, sky_linear: SKY.as_vec3().to_array(), ..Scene::default() });
+        let motion = Steady {
+            velocity_ned_m_s: DVec3::new(0.0, speed_m_s, 0.0),
+            ..Steady::standing(DVec3::new(0.0, 0.0, -100.0))
+        };
+        let sequence = sequence(
+            scenario,
+            motion,
+            Scene { meshes, sky_linear: SKY.as_vec3().to_array(), ..Scene::default() },
+        );
         Planner::new(sequence, &[Channel::Color], 16_384).unwrap().plan(0).unwrap()
     };
     let ground = || crate::fixtures::plane(400.0).meshes;
@@ -121,13 +137,18 @@ fn the_plan_tells_what_one_depth_costs() {
     let none = predicted(ground(), 40.0, 1);
     assert!(none.predicted.layers.is_none() && none.skipped.iter().any(|skip| skip.what.contains("mixing")));
     // One colour: wherever the pane is seen, it is the same; but for its border.
-    let wide = Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(8.0, 8.0, 1.0)), ..pane(RED, 0.3, 40.0) };
+    let wide =
+        Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(8.0, 8.0, 1.0)), ..pane(RED, 0.3, 40.0) };
     let plain = predicted(with(std::slice::from_ref(&wide)), 40.0, 1).predicted.layers.unwrap();
     assert!(plain.share > 0.99 && plain.error_dn < 1e-6, "{plain:?}");
-    // Alpha from 0 to 0.48 over 480 m to the east, above ground of one colour: of a ray to a point of that, which comes from a camera d m further
-    // east, 40 m of 100 m below the pane, alpha differs by 0.001 * 0.4 d. Lines are even over the 60 ms.
+    // Alpha from 0 to 0.48 over 480 m to the east, above ground of one colour: of a ray to a point of that,
+    // which comes from a camera d m further east, 40 m of 100 m below the pane, alpha differs by 0.001 * 0.4
+    // d. Lines are even over the 60 ms.
     let mut ramp = wide.clone();
-    Arc::make_mut(&mut ramp.shape).vertices.iter_mut().for_each(|vertex| vertex.tint[3] = 0.48 * vertex.uv[0]);
+    Arc::make_mut(&mut ramp.shape)
+        .vertices
+        .iter_mut()
+        .for_each(|vertex| vertex.tint[3] = 0.48 * vertex.uv[0]);
     let ground = Mesh { ned_from_shape: wide.ned_from_shape, ..level(WALL, 1.0, 0.0) };
     for (speed_m_s, keys) in [(0.0, 1), (30.0, 1), (300.0, 1), (300.0, 2), (300.0, 4)] {
         let plan = predicted(vec![ground.clone(), ramp.clone()], speed_m_s, keys);
@@ -137,6 +158,9 @@ fn the_plan_tells_what_one_depth_costs() {
         let rms_m = 0.03 * speed_m_s / 3.0_f64.sqrt() / f64::from(keys);
         let expected_dn = 255.0 * 0.001 * 0.4 * rms_m * (RED - WALL).length() / 3.0_f64.sqrt();
         // Times a margin of 1.2; the pixels that are looked at are even over lines to some hundredths.
-        assert!((found.error_dn / 1.2 - expected_dn).abs() < 0.05 * expected_dn + 1e-6, "{found:?} {expected_dn}");
+        assert!(
+            (found.error_dn / 1.2 - expected_dn).abs() < 0.05 * expected_dn + 1e-6,
+            "{found:?} {expected_dn}"
+        );
     }
 }

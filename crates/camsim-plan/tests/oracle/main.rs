@@ -1,4 +1,5 @@
-//! The oracle against what is known without it: closed forms, every triangle looked at, planted faults, its own convergence.
+//! The oracle against what is known without it: closed forms, every triangle looked at, planted faults, its
+//! own convergence.
 
 #![allow(clippy::unwrap_used)]
 

@@ -27,21 +27,28 @@ fn one_block(at: DVec3, half_m: f64, height_m: f64) -> Scene {
 
 #[test]
 fn pixels_near_a_roof_are_at_a_silhouette_and_others_are_not() {
-    // Straight above its middle only the roof's border is seen: 20 m below the camera's 100, 10 m to each side: 12.5 px.
+    // Straight above its middle only the roof's border is seen: 20 m below the camera's 100, 10 m to each
+    // side: 12.5 px.
     let scene = one_block(DVec3::ZERO, 10.0, 20.0);
     // Two fields see the same while the camera stands, whenever they look.
     for interlace_ms in [0.0, 20.0] {
         let mut scenario = camera();
         scenario.camera.shutter.interlace_ms = FieldOr::Ms(interlace_ms);
-        let oracle = Oracle::new(sequence(scenario, Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene.clone())).unwrap();
+        let oracle =
+            Oracle::new(sequence(scenario, Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene.clone()))
+                .unwrap();
         let near = silhouettes(&oracle, 0, &[0.0]);
         for y in 0..120_u32 {
             for x in 0..160_u32 {
-                let from_middle = (DVec2::new(f64::from(x), f64::from(y)) - DVec2::new(79.5, 59.5)).abs().max_element();
+                let from_middle =
+                    (DVec2::new(f64::from(x), f64::from(y)) - DVec2::new(79.5, 59.5)).abs().max_element();
                 let from_border = (from_middle - 12.5).abs();
                 let marked = near[(y * 160 + x) as usize];
                 // Within 3 px of a pixel beside the border: surely at 3, surely not at 5.
-                assert!(if from_border <= 3.0 { marked } else { from_border < 5.0 || !marked }, "{x} {y}, {interlace_ms} ms: {marked}");
+                assert!(
+                    if from_border <= 3.0 { marked } else { from_border < 5.0 || !marked },
+                    "{x} {y}, {interlace_ms} ms: {marked}"
+                );
             }
         }
     }
@@ -52,16 +59,22 @@ fn fields_of_different_instants_make_no_silhouettes() {
     // Between the fields the camera turns by 4 degrees and comes 4 m nearer; the ground is a plane.
     let mut scenario = camera();
     scenario.camera.shutter.interlace_ms = FieldOr::Ms(200.0);
-    let oracle = |scene: Scene| Oracle::new(sequence(scenario.clone(), Steady::moving(100.0), scene)).unwrap();
+    let oracle =
+        |scene: Scene| Oracle::new(sequence(scenario.clone(), Steady::moving(100.0), scene)).unwrap();
     let on_plane = silhouettes(&oracle(plane(4000.0)), 0, &[-0.5, 0.0]);
     assert!(!on_plane.contains(&true), "{}", on_plane.iter().filter(|near| **near).count());
-    // Each field has the silhouettes of its own instant: those of a camera that shows both rows of a pair then.
+    // Each field has the silhouettes of its own instant: those of a camera that shows both rows of a pair
+    // then.
     let scene = one_block(DVec3::ZERO, 10.0, 40.0);
     let near = silhouettes(&oracle(scene.clone()), 0, &[0.0]);
     for (field, delay_ms) in [(0, 200.0), (1, 0.0)] {
         let mut one_field = camera();
         one_field.camera.shutter.delay_ms = delay_ms;
-        let own = silhouettes(&Oracle::new(sequence(one_field, Steady::moving(100.0), scene.clone())).unwrap(), 0, &[0.0]);
+        let own = silhouettes(
+            &Oracle::new(sequence(one_field, Steady::moving(100.0), scene.clone())).unwrap(),
+            0,
+            &[0.0],
+        );
         let rows = || (0..160 * 120_usize).filter(|i| i / 160 % 2 == field);
         let marked = rows().filter(|&i| own[i]).count();
         // At the outer end of the 3 px they may differ by a row.
@@ -96,7 +109,8 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     let own = sequence(scenario, Steady::moving(120.0), walled);
     let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
     let measured = near.iter().filter(|near| **near).count() as f64 / 4800.0;
-    let predicted = Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap().predicted.silhouette_share;
+    let predicted =
+        Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap().predicted.silhouette_share;
     assert!(measured > 0.1 && (predicted - measured).abs() < 0.15, "{measured} {predicted}");
 }
 
@@ -112,8 +126,16 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
         Planner::new(sequence, &[Channel::Coords], 4096).unwrap().plan(0).unwrap()
     };
     let beside = plan([400.0, 300.0]);
-    assert!(beside.predicted.probes == 0 && !beside.predicted.kept && beside.predicted.void_share == 1.0, "{:?}", beside.predicted);
-    assert!(beside.predicted.in_the_way.as_ref().is_some_and(|cause| cause.contains("ideal frame")), "{:?}", beside.predicted);
+    assert!(
+        beside.predicted.probes == 0 && !beside.predicted.kept && beside.predicted.void_share == 1.0,
+        "{:?}",
+        beside.predicted
+    );
+    assert!(
+        beside.predicted.in_the_way.as_ref().is_some_and(|cause| cause.contains("ideal frame")),
+        "{:?}",
+        beside.predicted
+    );
     let text = beside.to_string();
     assert!(text.contains("nothing predicted") && !text.contains("within the tolerance"), "{text}");
     // Half of it.
@@ -125,14 +147,16 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
 
 #[test]
 fn what_the_key_camera_cannot_see_counts_as_a_silhouette() {
-    // The block stands to the right; a key camera beyond it does not see the ground before it, nor its near wall.
+    // The block stands to the right; a key camera beyond it does not see the ground before it, nor its near
+    // wall.
     let scene = one_block(DVec3::new(0.0, 30.0, 0.0), 5.0, 60.0);
     let sequence = sequence(camera(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene);
     let oracle = Oracle::new(sequence.clone()).unwrap();
     let mut plan = Planner::new(sequence, &[Channel::Coords], 4096).unwrap().plan(0).unwrap();
     let at_silhouettes = |plan: &camsim_plan::FramePlan| {
         let key = Some(IdealView { pose: plan.key_pose, ideal: plan.ideal });
-        let frame = oracle.render(0, &RenderOptions { channels: vec![Channel::Coords], key, ..RenderOptions::default() });
+        let frame = oracle
+            .render(0, &RenderOptions { channels: vec![Channel::Coords], key, ..RenderOptions::default() });
         let errors = coord_errors(&oracle, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
         assert!(errors.all.max_px < 5e-5 && errors.all.count == 160 * 120, "{errors:?}");
         errors.silhouettes.count
@@ -140,8 +164,8 @@ fn what_the_key_camera_cannot_see_counts_as_a_silhouette() {
     let from_here = at_silhouettes(&plan);
     plan.key_pose.position_ned_m.y += 60.0;
     let from_there = at_silhouettes(&plan);
-    // From 60 m to the east the roof's near border (25 m east, 60 m high) hides the ground from 27.5 m west to the wall: 52 px, at least 10 wide;
-    // and the wall, 37 px from its foot to its top.
+    // From 60 m to the east the roof's near border (25 m east, 60 m high) hides the ground from 27.5 m west
+    // to the wall: 52 px, at least 10 wide; and the wall, 37 px from its foot to its top.
     assert!(from_here > 50 && from_there > from_here + 800, "{from_here} {from_there}");
 }
 
@@ -149,7 +173,13 @@ fn what_the_key_camera_cannot_see_counts_as_a_silhouette() {
 fn errors_of_light_are_what_was_added() {
     let frame = |offset: f32| {
         let color_rgba = (0..200)
-            .flat_map(|i| if i < 150 { [0.5 + offset, 0.5 + offset, 0.5 + offset, 1.0] } else { [0.5 + 10.0 * offset, 0.5, 0.5, 1.0] })
+            .flat_map(|i| {
+                if i < 150 {
+                    [0.5 + offset, 0.5 + offset, 0.5 + offset, 1.0]
+                } else {
+                    [0.5 + 10.0 * offset, 0.5, 0.5, 1.0]
+                }
+            })
             .collect();
         RenderedFrame { size_px: [20, 10], color_rgba, ..RenderedFrame::default() }
     };
@@ -159,7 +189,10 @@ fn errors_of_light_are_what_was_added() {
     // One channel of three is off by 0.1: 20 dB + 10 log 3.
     assert!((errors.silhouettes_db - 24.771).abs() < 1e-3, "{errors:?}");
     let mean = (150.0 * 1e-4 + 50.0 * 1e-2 / 3.0) / 200.0;
-    assert!((errors.all_db + 10.0 * f64::log10(mean)).abs() < 1e-3 && errors.pixels == [200, 50], "{errors:?}");
+    assert!(
+        (errors.all_db + 10.0 * f64::log10(mean)).abs() < 1e-3 && errors.pixels == [200, 50],
+        "{errors:?}"
+    );
     assert_eq!(image_errors(&frame(0.0), &frame(0.0), &near).unwrap().all_db, f64::INFINITY);
     // Nothing is farther off than what is not a number.
     let mut broken = frame(0.0);

@@ -1,4 +1,5 @@
-//! Faults planted into the renderer's side must be seen by the comparison with the oracle; the same without a fault must pass.
+//! Faults planted into the renderer's side must be seen by the comparison with the oracle; the same without a
+//! fault must pass.
 
 use camsim_core::{
     camera::CameraModel,
@@ -21,7 +22,8 @@ enum Fault {
     TangentialSwapped,
 }
 
-/// A frame's coordinates by the twins of the renderer's stages, over a plane whose depth in the ideal frame is exact.
+/// A frame's coordinates by the twins of the renderer's stages, over a plane whose depth in the ideal frame
+/// is exact.
 fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFrame {
     let mut spec = sequence.scenario.camera.clone();
     if fault == Fault::TangentialSwapped {
@@ -30,14 +32,18 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
     let camera = CameraModel::from_spec(&spec).unwrap();
     let normal = plan.key_pose.ned_from_camera.inverse() * glam::DVec3::Z / -plan.key_pose.position_ned_m.z;
     let [width, height] = plan.ideal.size_px;
-    let ideal_ray = |i: u32| (DVec2::new(f64::from(i % width), f64::from(i / width)) - plan.ideal.principal_px) / plan.ideal.focal_px;
+    let ideal_ray = |i: u32| {
+        (DVec2::new(f64::from(i % width), f64::from(i / width)) - plan.ideal.principal_px)
+            / plan.ideal.focal_px
+    };
     // n . x = 1 in the key camera: inverse depth is n . (x / z).
     let values: Vec<f32> = (0..width * height).map(|i| normal.dot(ideal_ray(i).extend(1.0)) as f32).collect();
     let depth = InverseDepthImage { size_px: plan.ideal.size_px, values: &values };
 
     let [width, height] = camera.size_px;
     let mut coords = Vec::new();
-    let key = KeyView { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px };
+    let key =
+        KeyView { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px };
     let mut color_rgba = Vec::new();
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let mut dt_s = plan.shutter.dt_pixel_s(x, y);
@@ -55,7 +61,13 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
         coords.push([uv.x, uv.y, at_px.x, at_px.y, dt_s, 0.0, 0.0, 0.0].map(|value| value as f32));
         color_rgba.extend([0.0, 0.0, 0.0, if source.is_some() { 1.0 } else { 0.0 }]);
     }
-    RenderedFrame { index: plan.frame, size_px: camera.size_px, color_rgba, coords: Some(coords), ..RenderedFrame::default() }
+    RenderedFrame {
+        index: plan.frame,
+        size_px: camera.size_px,
+        color_rgba,
+        coords: Some(coords),
+        ..RenderedFrame::default()
+    }
 }
 
 fn camera() -> Scenario {
@@ -82,7 +94,10 @@ fn the_twins_agree_with_the_oracle() {
     let errors = errors(Fault::None);
     // Coordinates and depths are stored in f32: half an ulp at 256 px is 1.5e-5.
     assert!(errors.smooth.max_px < 5e-5, "{errors:?}");
-    assert_eq!((errors.smooth.count, errors.falsely_valid, errors.missing, errors.silhouettes.count), (160 * 120, 0, 0, 0));
+    assert_eq!(
+        (errors.smooth.count, errors.falsely_valid, errors.missing, errors.silhouettes.count),
+        (160 * 120, 0, 0, 0)
+    );
 }
 
 #[test]

@@ -3,14 +3,16 @@ use camsim_io::scenario_file::parse_scenario;
 use super::*;
 
 fn demo() -> Document {
-    Document::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml")).expect("the built-in scenario")
+    Document::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml"))
+        .expect("the built-in scenario")
 }
 
 #[test]
 fn every_key_of_the_format_has_a_place() {
     let mut document = demo();
     for (key, kind) in keys() {
-        let under_list = keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
+        let under_list =
+            keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
         if matches!(kind, Kind::Tables | Kind::Later) || under_list {
             continue;
         }
@@ -78,7 +80,11 @@ fn a_saved_scenario_opens_as_the_same_one() {
 fn the_command_line_says_what_was_changed() {
     let mut document = demo();
     document.set("camera.shutter.readout_ms", Some(Value::Float(0.0)), false);
-    document.set("camera.lens.coefficients", Some(Value::Array(vec![Value::Float(0.1), Value::Float(0.0)])), false);
+    document.set(
+        "camera.lens.coefficients",
+        Some(Value::Array(vec![Value::Float(0.1), Value::Float(0.0)])),
+        false,
+    );
     let line = document.command_line();
     assert!(line.starts_with("camsim render "), "{line}");
     assert!(line.contains("--set camera.shutter.readout_ms=0.0"), "{line}");

@@ -18,8 +18,8 @@ const OF_GREY: f32 = 0.45;
 pub struct Errors {
     /// At the places where the plan tried its methods, pixels of the ideal frame.
     pub map: ErrorMap,
-    /// The picture, grey, in the colours of its places' errors: one colour for each part of the image that a place stands for. Where pixels are counted apart there is
-    /// none.
+    /// The picture, grey, in the colours of its places' errors: one colour for each part of the image that a
+    /// place stands for. Where pixels are counted apart there is none.
     pub image: Arc<ColorImage>,
 }
 
@@ -43,7 +43,8 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
     let mut cells = vec![None::<Option<f64>>; columns * rows];
     for place in &map.places {
         let [x, y] = place.pixel.map(|at| at as usize);
-        let at = (y * rows / height.max(1)).min(rows - 1) * columns + (x * columns / width.max(1)).min(columns - 1);
+        let at = (y * rows / height.max(1)).min(rows - 1) * columns
+            + (x * columns / width.max(1)).min(columns - 1);
         let Some(cell) = cells.get_mut(at) else { continue };
         let known = cell.flatten();
         *cell = Some(match place.error {
@@ -54,11 +55,15 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
     }
     // On a border between cells a pixel is in just one of them: the other has what is around.
     let around = |at: usize| {
-        map.around_px([(at % columns * 2 + 1) * width / (2 * columns), (at / columns * 2 + 1) * height / (2 * rows)].map(|v| v as u32))
+        map.around_px(
+            [(at % columns * 2 + 1) * width / (2 * columns), (at / columns * 2 + 1) * height / (2 * rows)]
+                .map(|v| v as u32),
+        )
     };
     let cells = cells.into_iter().enumerate().map(|(at, cell)| cell.unwrap_or_else(|| around(at)));
-    let colors: Vec<Option<[u8; 3]>> =
-        cells.map(|cell| cell.map(|px| ramp(if px > 0.0 { share_of_scale(px, largest_px) } else { 0.0 }))).collect();
+    let colors: Vec<Option<[u8; 3]>> = cells
+        .map(|cell| cell.map(|px| ramp(if px > 0.0 { share_of_scale(px, largest_px) } else { 0.0 })))
+        .collect();
     let pixels = image.pixels.iter().enumerate().map(|(i, pixel)| {
         if pixel.a() == 0 {
             return Color32::TRANSPARENT;
@@ -92,15 +97,29 @@ mod tests {
         ];
         let map = ErrorMap { places, everywhere_px: 1.0, grid: [2, 2], reach_px: 2.0 };
         let tinted = tinted(&image, &map);
-        let light = |i: usize| u32::from(tinted.pixels[i].r()) + u32::from(tinted.pixels[i].g()) + u32::from(tinted.pixels[i].b());
+        let light = |i: usize| {
+            u32::from(tinted.pixels[i].r())
+                + u32::from(tinted.pixels[i].g())
+                + u32::from(tinted.pixels[i].b())
+        };
         assert_eq!(tinted.pixels[0], tinted.pixels[1], "one place's");
         assert!(light(6) > light(0) && light(0) > 0, "{} {}", light(6), light(0));
-        assert_eq!([light(2), light(3), light(4), light(5)], [0; 4], "silhouettes and what has no source keep the picture's grey");
+        assert_eq!(
+            [light(2), light(3), light(4), light(5)],
+            [0; 4],
+            "silhouettes and what has no source keep the picture's grey"
+        );
         assert_eq!(tinted.pixels[7], Color32::TRANSPARENT);
         // A bright picture changes how light a colour is, not which.
         let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map);
         let share = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
-        assert!((share(white.pixels[6]) - share(tinted.pixels[6])).abs() < 0.02 && white.pixels[6].g() > tinted.pixels[6].g());
-        assert_eq!([share_of_scale(0.1, 0.1), share_of_scale(0.01, 0.1), share_of_scale(1e-6, 0.1)], [1.0, 0.5, 0.0]);
+        assert!(
+            (share(white.pixels[6]) - share(tinted.pixels[6])).abs() < 0.02
+                && white.pixels[6].g() > tinted.pixels[6].g()
+        );
+        assert_eq!(
+            [share_of_scale(0.1, 0.1), share_of_scale(0.01, 0.1), share_of_scale(1e-6, 0.1)],
+            [1.0, 0.5, 0.0]
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The oracle's thread: prepares looks into single pixels, and draws whole frames strip by strip while nobody wants something newer.
+//! The oracle's thread: prepares looks into single pixels, and draws whole frames strip by strip while nobody
+//! wants something newer.
 
 use std::{
     sync::Arc,
@@ -21,7 +22,8 @@ use super::{
 const STRIP_ROWS: usize = 4;
 /// Time between two replies: each carries the whole picture.
 const BETWEEN_REPLIES: Duration = Duration::from_millis(250);
-/// Share of `quality.max_error_dn` that a pixel's standard error may have, as for `camsim render --backend reference`.
+/// Share of `quality.max_error_dn` that a pixel's standard error may have, as for `camsim render --backend
+/// reference`.
 const SHARE_OF_TOLERANCE: f64 = 0.25;
 
 /// A frame as far as it has come.
@@ -33,11 +35,16 @@ struct Drawn {
 
 /// Serves requests until the box is closed.
 pub fn run(mailbox: &Mailbox<ExactWanted>, speaker: &Speaker) {
-    // Half of the processors, so that window and renderer stay quick; without a pool of its own it would take all.
+    // Half of the processors, so that window and renderer stay quick; without a pool of its own it would take
+    // all.
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(2);
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool,
-        Err(error) => return speaker.say(Reply::Failed(format!("no threads for exact rays: {error}; close other programs and try again"))),
+        Err(error) => {
+            return speaker.say(Reply::Failed(format!(
+                "no threads for exact rays: {error}; close other programs and try again"
+            )));
+        }
     };
     let mut known: Option<Arc<Oracle>> = None;
     let mut drawn: Option<Drawn> = None;
@@ -69,7 +76,13 @@ pub fn run(mailbox: &Mailbox<ExactWanted>, speaker: &Speaker) {
 }
 
 /// The strips that are missing, from the top.
-fn draw(oracle: &Oracle, wanted: &ExactWanted, drawn: &mut Drawn, mailbox: &Mailbox<ExactWanted>, speaker: &Speaker) {
+fn draw(
+    oracle: &Oracle,
+    wanted: &ExactWanted,
+    drawn: &mut Drawn,
+    mailbox: &Mailbox<ExactWanted>,
+    speaker: &Speaker,
+) {
     let scenario = &wanted.sequence.scenario;
     let size_px = scenario.camera.size_px;
     let [width, height] = size_px.map(|side| side as usize);
@@ -77,7 +90,9 @@ fn draw(oracle: &Oracle, wanted: &ExactWanted, drawn: &mut Drawn, mailbox: &Mail
         let difference = wanted.against.as_ref().and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
-                .then(|| difference(size_px, &against.color_rgba, &drawn.color_rgba, *gain, drawn.rows as u32))
+                .then(|| {
+                    difference(size_px, &against.color_rgba, &drawn.color_rgba, *gain, drawn.rows as u32)
+                })
                 .flatten()
         });
         speaker.say(Reply::Exact(Box::new(ExactPicture {
@@ -105,7 +120,8 @@ fn draw(oracle: &Oracle, wanted: &ExactWanted, drawn: &mut Drawn, mailbox: &Mail
         };
         let strip = oracle.render(drawn.frame, &options);
         let range = 4 * width * rows.start..4 * width * rows.end;
-        if let (Some(to), Some(from)) = (drawn.color_rgba.get_mut(range.clone()), strip.color_rgba.get(range)) {
+        if let (Some(to), Some(from)) = (drawn.color_rgba.get_mut(range.clone()), strip.color_rgba.get(range))
+        {
             to.copy_from_slice(from);
         }
         drawn.rows = bottom;

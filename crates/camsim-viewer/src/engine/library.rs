@@ -56,10 +56,12 @@ impl Library {
         self.latest.fetch_max(reading, Ordering::Relaxed);
     }
 
-    /// The files of a scenario, as far as they are not known. Who comes meanwhile waits: it is likely to want the same.
+    /// The files of a scenario, as far as they are not known. Who comes meanwhile waits: it is likely to want
+    /// the same.
     ///
     /// # Errors
-    /// Files that cannot be used; another scenario that was opened meanwhile, as hours of flight take their time.
+    /// Files that cannot be used; another scenario that was opened meanwhile, as hours of flight take their
+    /// time.
     pub fn load(&self, wanted: &Wanted, speaker: &Speaker) -> Result<Arc<Loaded>, LibraryError> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let same_files = known.as_ref().filter(|known| known.reading == wanted.reading);
@@ -75,8 +77,14 @@ impl Library {
         Ok(loaded)
     }
 
-    /// Reads on a thread of its own, which is left alone if nobody wants what it reads any more: it ends by itself.
-    fn read(&self, wanted: &Wanted, before: Option<Arc<Loaded>>, speaker: &Speaker) -> Result<Loaded, LibraryError> {
+    /// Reads on a thread of its own, which is left alone if nobody wants what it reads any more: it ends by
+    /// itself.
+    fn read(
+        &self,
+        wanted: &Wanted,
+        before: Option<Arc<Loaded>>,
+        speaker: &Speaker,
+    ) -> Result<Loaded, LibraryError> {
         if self.is_superseded(wanted) {
             return Err(LibraryError::Superseded);
         }
@@ -84,11 +92,15 @@ impl Library {
         let scenario = wanted.scenario.clone();
         let (sender, done) = channel();
         let work = move || {
-            let loaded = before.map_or_else(|| load_sequence(&scenario), |before| reload_sequence(&scenario, &before));
+            let loaded =
+                before.map_or_else(|| load_sequence(&scenario), |before| reload_sequence(&scenario, &before));
             // Nobody may wait for it any more.
             let _ = sender.send(loaded);
         };
-        std::thread::Builder::new().name("camsim files".into()).spawn(work).map_err(|_| LibraryError::Stopped)?;
+        std::thread::Builder::new()
+            .name("camsim files".into())
+            .spawn(work)
+            .map_err(|_| LibraryError::Stopped)?;
         let mut told = false;
         let read = loop {
             if !told && begun.elapsed() >= wait {
@@ -98,7 +110,9 @@ impl Library {
             match done.recv_timeout(LOOK) {
                 Ok(loaded) => break loaded.map_err(LibraryError::Load),
                 Err(RecvTimeoutError::Disconnected) => break Err(LibraryError::Stopped),
-                Err(RecvTimeoutError::Timeout) if self.is_superseded(wanted) => break Err(LibraryError::Superseded),
+                Err(RecvTimeoutError::Timeout) if self.is_superseded(wanted) => {
+                    break Err(LibraryError::Superseded);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
             }
         };
@@ -125,7 +139,16 @@ mod tests {
 
     fn wanted(path: &std::path::Path, reading: u64) -> Wanted {
         let scenario = Arc::new(read_scenario(path, &[], None).expect("legal"));
-        Wanted { scenario, reading, frame: 0, stages: vec![Stage::Ideal], size: Size::Preview, truth: false, errors: false, gain: None }
+        Wanted {
+            scenario,
+            reading,
+            frame: 0,
+            stages: vec![Stage::Ideal],
+            size: Size::Preview,
+            truth: false,
+            errors: false,
+            gain: None,
+        }
     }
 
     #[test]
@@ -141,12 +164,20 @@ mod tests {
         let left = library.load(&long, &speaker);
         assert!(matches!(left, Err(LibraryError::Superseded)), "{left:?}");
         let left_after = begun.elapsed();
-        assert!(matches!(library.load(&long, &speaker), Err(LibraryError::Superseded)), "also who comes late");
+        assert!(
+            matches!(library.load(&long, &speaker), Err(LibraryError::Superseded)),
+            "also who comes late"
+        );
         let other = library.load(&wanted(&pattern(), 1), &speaker).expect("loaded");
         assert_eq!(other.sequence.scenario, *wanted(&pattern(), 1).scenario);
-        let told: Vec<String> =
-            replies.try_iter().filter_map(|reply| if let Reply::Busy(what) = reply { Some(what) } else { None }).collect();
-        assert!(told.len() == 4 && told[0].contains("long.csv") && told[1].is_empty() && told[3].is_empty(), "{told:?}");
+        let told: Vec<String> = replies
+            .try_iter()
+            .filter_map(|reply| if let Reply::Busy(what) = reply { Some(what) } else { None })
+            .collect();
+        assert!(
+            told.len() == 4 && told[0].contains("long.csv") && told[1].is_empty() && told[3].is_empty(),
+            "{told:?}"
+        );
         // It was not waited for.
         let begun = Instant::now();
         assert!(load_sequence(&long.scenario).is_ok());

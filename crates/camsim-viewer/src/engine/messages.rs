@@ -47,8 +47,12 @@ impl Stage {
             Self::Ideal => "A pinhole with an instant shutter on a still mount, without noise and vignette",
             Self::Lens => "With lens distortion (the paper's eqs. 8 and 9)",
             Self::Time => "With delay t_d, readout t_r, exposure t_e, interlacing t_i and vibration too",
-            Self::Photometric => "With light, vignette and noise too: the very pixels that `camsim render` writes",
-            Self::Oracle => "The same by exact rays, each at its own instant, on the CPU: slow, drawn strip by strip",
+            Self::Photometric => {
+                "With light, vignette and noise too: the very pixels that `camsim render` writes"
+            }
+            Self::Oracle => {
+                "The same by exact rays, each at its own instant, on the CPU: slow, drawn strip by strip"
+            }
         }
     }
 }
@@ -77,7 +81,8 @@ pub struct Wanted {
     pub size: Size,
     /// Whether depth is wanted too.
     pub truth: bool,
-    /// Whether the predicted error from place to place is wanted too; of previews it never is: it would hold up the next one.
+    /// Whether the predicted error from place to place is wanted too; of previews it never is: it would hold
+    /// up the next one.
     pub errors: bool,
     /// Enlargement of the difference of the two stages, if it is wanted.
     pub gain: Option<f32>,

@@ -49,28 +49,29 @@ pub fn screen(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
     ColorImage::from_rgba_unmultiplied(size_px.map(|side| side as usize), &rgba)
 }
 
-/// `a - b` times `gain` about a middle grey, in linear values, of the first `rows`: one of them may not have come further. `None` for pictures of different
-/// size.
+/// `a - b` times `gain` about a middle grey, in linear values, of the first `rows`: one of them may not have
+/// come further. `None` for pictures of different size.
 pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32, rows: u32) -> Option<Difference> {
     if a.len() != b.len() || a.len() != 4 * size_px[0] as usize * size_px[1] as usize {
         return None;
     }
     let (mut squares, mut max, mut both, mut one) = (0.0_f64, 0.0_f64, 0_u64, 0_u64);
-    let pixels = a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0).map(|(a, b)| match (a[3] > 0.0, b[3] > 0.0) {
-        (true, true) => {
-            both += 1;
-            let rgb: [f32; 3] = std::array::from_fn(|k| a[k] - b[k]);
-            squares += rgb.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>();
-            max = rgb.iter().fold(max, |max, d| max.max(f64::from(d.abs())));
-            let [r, g, b] = rgb.map(|d| (255.0 * (0.5 + gain * d).clamp(0.0, 1.0)).round() as u8);
-            Color32::from_rgb(r, g, b)
-        }
-        (false, false) => Color32::TRANSPARENT,
-        _ => {
-            one += 1;
-            Color32::from_rgb(255, 0, 255)
-        }
-    });
+    let pixels =
+        a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0).map(|(a, b)| match (a[3] > 0.0, b[3] > 0.0) {
+            (true, true) => {
+                both += 1;
+                let rgb: [f32; 3] = std::array::from_fn(|k| a[k] - b[k]);
+                squares += rgb.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>();
+                max = rgb.iter().fold(max, |max, d| max.max(f64::from(d.abs())));
+                let [r, g, b] = rgb.map(|d| (255.0 * (0.5 + gain * d).clamp(0.0, 1.0)).round() as u8);
+                Color32::from_rgb(r, g, b)
+            }
+            (false, false) => Color32::TRANSPARENT,
+            _ => {
+                one += 1;
+                Color32::from_rgb(255, 0, 255)
+            }
+        });
     let all = a.len() / 4;
     let compared = all.min(size_px[0] as usize * rows as usize);
     let mut pixels: Vec<Color32> = pixels.take(compared).collect();
@@ -138,7 +139,12 @@ mod tests {
         let a = [0.5, 0.5, 0.5, 1.0, 0.2, 0.2, 0.2, 1.0, 0.7, 0.7, 0.7, 1.0];
         let b = [0.4, 0.5, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let found = difference([1, 3], &a, &b, 4.0, 1).expect("of one size");
-        assert!((found.max_dn - 25.5).abs() < 1e-4 && found.one_sided == 0.0, "{} {}", found.max_dn, found.one_sided);
+        assert!(
+            (found.max_dn - 25.5).abs() < 1e-4 && found.one_sided == 0.0,
+            "{} {}",
+            found.max_dn,
+            found.one_sided
+        );
         assert_eq!(found.image.pixels[1..], [Color32::TRANSPARENT; 2]);
         let all = difference([1, 3], &a, &b, 4.0, 3).expect("of one size");
         assert!((all.one_sided - 2.0 / 3.0).abs() < 1e-9 && all.image.pixels[2] != Color32::TRANSPARENT);

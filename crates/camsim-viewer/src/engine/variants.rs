@@ -43,12 +43,14 @@ pub fn preview(scenario: &Scenario) -> Scenario {
     quality.max_terrain_error_px = quality.max_terrain_error_px.max(1.0);
     quality.silhouettes = Silhouettes::Plain;
     quality.key_frames = Auto::Value(1);
-    // Frames are asked for one by one, and not in order: a group would be planned for the one frame of it that is shown.
+    // Frames are asked for one by one, and not in order: a group would be planned for the one frame of it
+    // that is shown.
     quality.frames_per_ideal = 1;
     preview
 }
 
-/// Each `factor` x `factor` pixels become one; the field of view stays but for a border of less than one of them.
+/// Each `factor` x `factor` pixels become one; the field of view stays but for a border of less than one of
+/// them.
 fn shrink(camera: &mut CameraSpec, factor: u32) {
     if factor == 1 {
         return;
@@ -57,8 +59,10 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
     let by = f64::from(factor);
     let centre = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
     let focal = |focal_px: [f64; 2]| focal_px.map(|f| f / by);
-    // Outer borders stay in place: pixel centres of the small picture lie in the middle of those they stand for.
-    let principal = |point_px: Option<[f64; 2]>| Some(point_px.unwrap_or(centre).map(|c| (c + 0.5) / by - 0.5));
+    // Outer borders stay in place: pixel centres of the small picture lie in the middle of those they stand
+    // for.
+    let principal =
+        |point_px: Option<[f64; 2]>| Some(point_px.unwrap_or(centre).map(|c| (c + 0.5) / by - 0.5));
     camera.size_px = camera.size_px.map(|side| side.div_ceil(factor));
     camera.focal_px = focal(camera.focal_px);
     camera.principal_point_px = principal(camera.principal_point_px);
@@ -101,7 +105,8 @@ mod tests {
         let scenario = scenario();
         let small = preview(&scenario);
         assert_eq!(small.camera.size_px, [320, 240]);
-        let [large, small] = [&scenario, &small].map(|s| CameraModel::from_spec(&s.camera).expect("a camera"));
+        let [large, small] =
+            [&scenario, &small].map(|s| CameraModel::from_spec(&s.camera).expect("a camera"));
         // The middle of the 2x2 pixels that the small one's pixel (x, y) stands for is at 2 x + 0.5.
         for (x, y) in [(0.0, 0.0), (160.0, 120.0), (319.0, 17.0)] {
             let of_large = large.unproject(DVec2::new(2.0 * x + 0.5, 2.0 * y + 0.5)).expect("a ray");

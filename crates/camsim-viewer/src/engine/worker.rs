@@ -56,8 +56,14 @@ pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
     run_on(|| Engine::new(AdapterChoice::Best), mailbox, library, speaker);
 }
 
-/// The same on what `open` gives: anew after a loss, with the request that met it once more, and with each request where there is nothing to run on.
-fn run_on(open: impl Fn() -> Result<Engine, GpuError>, mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
+/// The same on what `open` gives: anew after a loss, with the request that met it once more, and with each
+/// request where there is nothing to run on.
+fn run_on(
+    open: impl Fn() -> Result<Engine, GpuError>,
+    mailbox: &Mailbox<Wanted>,
+    library: &Library,
+    speaker: &Speaker,
+) {
     let mut waiting = None;
     // A request that loses one device after the other is told, not tried for ever.
     let mut lost_with: Option<Wanted> = None;
@@ -74,14 +80,18 @@ fn run_on(open: impl Fn() -> Result<Engine, GpuError>, mailbox: &Mailbox<Wanted>
             }
         };
         speaker.say(Reply::Adapter(engine.gpu().adapter.to_string()));
-        let mut worker = Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
+        let mut worker =
+            Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
         loop {
             let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
             // wgpu panics where a device goes while something is made on it.
-            let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&wanted, mailbox))).unwrap_or(Err(Fault::Stopped));
+            let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&wanted, mailbox)))
+                .unwrap_or(Err(Fault::Stopped));
             let Err(fault) = served else {
                 if lost_with.take().is_some_and(|lost| lost == wanted) {
-                    speaker.say(Reply::Told("the graphics device was lost; the frame is of another one, opened anew".into()));
+                    speaker.say(Reply::Told(
+                        "the graphics device was lost; the frame is of another one, opened anew".into(),
+                    ));
                 }
                 continue;
             };
@@ -150,7 +160,15 @@ impl<'a> Worker<'a> {
             _ => None,
         };
         let took = (self.rendered > before).then(|| begun.elapsed());
-        let reply = FrameReply { wanted: wanted.clone(), frame, pictures: pictures.clone(), truths, errors, difference, took };
+        let reply = FrameReply {
+            wanted: wanted.clone(),
+            frame,
+            pictures: pictures.clone(),
+            truths,
+            errors,
+            difference,
+            took,
+        };
         self.speaker.say(Reply::Frame(Box::new(reply)));
         if missing {
             self.tell_errors(wanted, sequence, &pictures, mailbox)?;
@@ -177,9 +195,17 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    fn picture(&mut self, sequence: &Arc<Sequence>, stage: Stage, size: Size, frame: u64) -> Result<Arc<Picture>, Fault> {
+    fn picture(
+        &mut self,
+        sequence: &Arc<Sequence>,
+        stage: Stage,
+        size: Size,
+        frame: u64,
+    ) -> Result<Arc<Picture>, Fault> {
         let same = |kept: &Kept| {
-            Arc::ptr_eq(&kept.sequence, sequence) && (kept.stage, kept.size) == (stage, size) && kept.picture.frame.index == frame
+            Arc::ptr_eq(&kept.sequence, sequence)
+                && (kept.stage, kept.size) == (stage, size)
+                && kept.picture.frame.index == frame
         };
         if let Some(kept) = self.kept.iter().find(|kept| same(kept)) {
             return Ok(kept.picture.clone());
@@ -191,11 +217,23 @@ impl<'a> Worker<'a> {
         if self.kept.len() >= KEPT {
             self.kept.remove(0);
         }
-        self.kept.push(Kept { sequence: sequence.clone(), stage, size, picture: picture.clone(), errors: None });
+        self.kept.push(Kept {
+            sequence: sequence.clone(),
+            stage,
+            size,
+            picture: picture.clone(),
+            errors: None,
+        });
         Ok(picture)
     }
 
-    fn truth(&mut self, sequence: &Arc<Sequence>, stage: Stage, size: Size, frame: u64) -> Result<Truth, Fault> {
+    fn truth(
+        &mut self,
+        sequence: &Arc<Sequence>,
+        stage: Stage,
+        size: Size,
+        frame: u64,
+    ) -> Result<Truth, Fault> {
         let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color, Channel::Depth], frame)?;
         let depth_m = done.frame.depth_m.unwrap_or_default();
         let range_m = depth_range_m(&depth_m);
@@ -205,12 +243,22 @@ impl<'a> Worker<'a> {
 
     /// What is predicted of all of the pictures, if all of it was worked out before.
     fn known_errors(&self, pictures: &[Arc<Picture>]) -> Vec<Arc<Errors>> {
-        let of = |picture| self.kept.iter().find(|kept| Arc::ptr_eq(&kept.picture, picture)).and_then(|kept| kept.errors.clone());
+        let of = |picture| {
+            self.kept
+                .iter()
+                .find(|kept| Arc::ptr_eq(&kept.picture, picture))
+                .and_then(|kept| kept.errors.clone())
+        };
         pictures.iter().map(of).collect::<Option<Vec<_>>>().unwrap_or_default()
     }
 
     /// What is predicted of a picture, from place to place.
-    fn errors(&mut self, sequence: &Arc<Sequence>, size: Size, picture: &Arc<Picture>) -> Result<Arc<Errors>, Fault> {
+    fn errors(
+        &mut self,
+        sequence: &Arc<Sequence>,
+        size: Size,
+        picture: &Arc<Picture>,
+    ) -> Result<Arc<Errors>, Fault> {
         if let Some(errors) = self.known_errors(std::slice::from_ref(picture)).pop() {
             return Ok(errors);
         }
@@ -224,7 +272,12 @@ impl<'a> Worker<'a> {
     }
 
     /// One frame, by the session that there is.
-    fn render(&mut self, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Result<Finished, Fault> {
+    fn render(
+        &mut self,
+        sequence: &Arc<Sequence>,
+        channels: &[Channel],
+        frame: u64,
+    ) -> Result<Finished, Fault> {
         let session = self.session(sequence, channels)?;
         let mut done = None;
         let mut keep = |finished| {

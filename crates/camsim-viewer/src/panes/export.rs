@@ -35,9 +35,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     ui.label("Renders frames to files: the same as `camsim render` writes with these keys of [output].");
     // Another scenario's frames go beside that one.
     let id = egui::Id::unique(("export", &document.path));
-    let start = || document.path.parent().unwrap_or(std::path::Path::new("")).join("frames").display().to_string();
-    let mut kept = ui.data(|data| data.get_temp::<Kept>(id)).unwrap_or_else(|| Kept { folder: start(), frames: None });
-    let edit = ui.add(egui::TextEdit::singleline(&mut kept.folder).desired_width(f32::INFINITY).hint_text("folder"));
+    let start =
+        || document.path.parent().unwrap_or(std::path::Path::new("")).join("frames").display().to_string();
+    let mut kept =
+        ui.data(|data| data.get_temp::<Kept>(id)).unwrap_or_else(|| Kept { folder: start(), frames: None });
+    let edit =
+        ui.add(egui::TextEdit::singleline(&mut kept.folder).desired_width(f32::INFINITY).hint_text("folder"));
     named(&edit, Role::TextInput, "folder");
     let [first, last] = frames(ui, state, &mut kept.frames, out);
     ui.data_mut(|data| data.insert_temp(id, kept.clone()));
@@ -51,7 +54,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.weak("without color no pictures are written");
     }
     let running = state.export.as_ref().is_some_and(|job| job.progress().ended.is_none());
-    let may_start = !running && !wish.folder.as_os_str().is_empty() && state.timeline.frames > 0 && document.problems.is_empty();
+    let may_start = !running
+        && !wish.folder.as_os_str().is_empty()
+        && state.timeline.frames > 0
+        && document.problems.is_empty();
     if ui.add_enabled(may_start, egui::Button::new("Render")).explained("to this folder").clicked() {
         out.push(Message::Export(wish.clone()));
     }
@@ -59,9 +65,17 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     egui::CollapsingHeader::new("as a command line").show(ui, |ui| {
         let left_out = document.left_out();
         if !left_out.is_empty() {
-            ui.label(format!("{} is left out, which a command line cannot say: save the scenario first", left_out.join(", ")));
+            ui.label(format!(
+                "{} is left out, which a command line cannot say: save the scenario first",
+                left_out.join(", ")
+            ));
         }
-        ui.add(egui::Label::new(RichText::new(document.render_command(&wish.folder, Some(wish.frames))).monospace()).wrap());
+        ui.add(
+            egui::Label::new(
+                RichText::new(document.render_command(&wish.folder, Some(wish.frames))).monospace(),
+            )
+            .wrap(),
+        );
     });
 }
 
@@ -69,25 +83,41 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut Outbox) -> [u64; 2] {
     let timeline = &state.timeline;
     let all_last = timeline.last();
-    let [mut first, mut last] = chosen.map_or(timeline.bounds(), |frames| frames.map(|frame| frame.min(all_last)));
+    let [mut first, mut last] =
+        chosen.map_or(timeline.bounds(), |frames| frames.map(|frame| frame.min(all_last)));
     ui.horizontal_wrapped(|ui| {
         ui.label("frames");
-        let field =
-            |name, tip| Field { name, label: "", unit: "", range: [0.0, all_last as f64], speed: 0.2, decimals: 0, whole: true, tip };
-        if let Some((frame, _)) = numbers::number(ui, &field("first frame to render", "the first one"), first as f64, out) {
+        let field = |name, tip| Field {
+            name,
+            label: "",
+            unit: "",
+            range: [0.0, all_last as f64],
+            speed: 0.2,
+            decimals: 0,
+            whole: true,
+            tip,
+        };
+        if let Some((frame, _)) =
+            numbers::number(ui, &field("first frame to render", "the first one"), first as f64, out)
+        {
             first = frame as u64;
             last = last.max(first);
             *chosen = Some([first, last]);
         }
         ui.label("to");
-        if let Some((frame, _)) =
-            numbers::number(ui, &field("last frame to render", "the last one, which is rendered, too"), last as f64, out)
-        {
+        if let Some((frame, _)) = numbers::number(
+            ui,
+            &field("last frame to render", "the last one, which is rendered, too"),
+            last as f64,
+            out,
+        ) {
             last = frame as u64;
             first = first.min(last);
             *chosen = Some([first, last]);
         }
-        if chosen.is_some() && ui.small_button("as the timeline").explained("the loop's frames, or all").clicked() {
+        if chosen.is_some()
+            && ui.small_button("as the timeline").explained("the loop's frames, or all").clicked()
+        {
             *chosen = None;
         }
     });
@@ -95,7 +125,9 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
     ui.weak(match (chosen, timeline.range) {
         (Some(_), _) => format!("{count} of {} frames", timeline.frames),
         (None, Some(_)) => format!("{count} frames, the loop's"),
-        (None, None) => format!("all {} frames; set a loop in the timeline, or type, for fewer", timeline.frames),
+        (None, None) => {
+            format!("all {} frames; set a loop in the timeline, or type, for fewer", timeline.frames)
+        }
     });
     [first, last]
 }
@@ -107,7 +139,8 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;
-            let left = job.left_s().map_or_else(String::new, |left_s| format!(", about {} left", span(left_s)));
+            let left =
+                job.left_s().map_or_else(String::new, |left_s| format!(", about {} left", span(left_s)));
             ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {

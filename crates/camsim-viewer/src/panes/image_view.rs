@@ -4,7 +4,9 @@ mod canvas;
 mod overlays;
 mod toolbar;
 
-use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2};
+use eframe::egui::{
+    self, Align2, Color32, CursorIcon, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
+};
 
 use self::canvas::Placement;
 use super::widgets::waiting;
@@ -31,7 +33,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         return;
     }
     // Of the camera that took what is shown: another one may never have a picture.
-    let Some(size_px) = state.heard.shown.as_ref().map(|shown| shown.reply.wanted.scenario.camera.size_px) else {
+    let Some(size_px) = state.heard.shown.as_ref().map(|shown| shown.reply.wanted.scenario.camera.size_px)
+    else {
         if state.heard.fault.is_none() {
             ui.put(pane, waiting);
         }
@@ -44,13 +47,15 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         }
         _ => vec![pane],
     };
-    let placements: Vec<Placement> = panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, ui.pixels_per_point())).collect();
+    let placements: Vec<Placement> =
+        panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, ui.pixels_per_point())).collect();
     toolbar::remember(ui, placements.first());
     draw(ui, state, &placements);
     for placement in &placements {
         pinned(ui, state, placement);
     }
-    let on_wipe = state.view.compare == Compare::Wipe && placements.first().is_some_and(|placement| wipe(ui, state, placement, out));
+    let on_wipe = state.view.compare == Compare::Wipe
+        && placements.first().is_some_and(|placement| wipe(ui, state, placement, out));
     canvas::interact(ui, &response, &placements, state, on_wipe, out);
 }
 
@@ -93,12 +98,22 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
     let depth = sight.depth.filter(|_| state.view.overlays.depth).map(|(_, sheet)| sheet);
     let errors = sight.errors.filter(|_| state.view.overlays.error).map(|(_, sheet)| sheet);
     placement.image(&painter, place, depth.or(errors).unwrap_or(sight.sheet), sight.size_px);
-    overlays::draw(&painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())), placement, state, &sight);
+    overlays::draw(
+        &painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())),
+        placement,
+        state,
+        &sight,
+    );
     let corner = clip.intersect(placement.pane).left_top() + egui::vec2(6.0, 4.0);
     label(
         &painter,
         corner,
-        &format!("{place:?}: {}{}{}", stage.label(), if depth.is_some() { ", depth" } else { "" }, progress(state, &sight)),
+        &format!(
+            "{place:?}: {}{}{}",
+            stage.label(),
+            if depth.is_some() { ", depth" } else { "" },
+            progress(state, &sight)
+        ),
     );
 }
 
@@ -107,7 +122,11 @@ fn progress(state: &State, sight: &Sight<'_>) -> String {
         return rows_done(state);
     }
     let is_preview = state.heard.shown.as_ref().is_some_and(|shown| shown.reply.wanted.size == Size::Preview);
-    let size = if is_preview { format!(", preview {}x{}", sight.size_px[0], sight.size_px[1]) } else { String::new() };
+    let size = if is_preview {
+        format!(", preview {}x{}", sight.size_px[0], sight.size_px[1])
+    } else {
+        String::new()
+    };
     let missing = state.view.overlays.error && sight.errors.is_none();
     if missing { format!("{size}; predicted error once the hand rests") } else { size }
 }
@@ -132,15 +151,21 @@ fn difference(ui: &Ui, state: &State, placement: &Placement) {
     };
     let size_px = difference.image.size.map(|side| side as u32);
     placement.image(&painter, Place::A, sheet, size_px);
-    let one_sided =
-        if difference.one_sided > 0.0 { format!(", {:.2} % valid in one alone", 100.0 * difference.one_sided) } else { String::new() };
+    let one_sided = if difference.one_sided > 0.0 {
+        format!(", {:.2} % valid in one alone", 100.0 * difference.one_sided)
+    } else {
+        String::new()
+    };
     // The oracle is always what is taken away.
     let pair = if view.a == Stage::Oracle { format!("{} - oracle", view.b.label()) } else { pair };
     let so_far = if view.wants_oracle() { rows_done(state) } else { String::new() };
     label(
         &painter,
         corner,
-        &format!("{pair}, x{:.0}: RMS {:.3}, largest {:.2} of 255{one_sided}{so_far}", view.gain, difference.rms_dn, difference.max_dn),
+        &format!(
+            "{pair}, x{:.0}: RMS {:.3}, largest {:.2} of 255{one_sided}{so_far}",
+            view.gain, difference.rms_dn, difference.max_dn
+        ),
     );
 }
 
@@ -157,7 +182,11 @@ fn pinned(ui: &Ui, state: &State, placement: &Placement) {
     let painter = ui.painter().with_clip_rect(placement.pane);
     let radius = (0.71 * placement.scale).max(6.0);
     for (width, color) in [(3.0, Color32::BLACK), (1.5, Color32::from_rgb(255, 220, 60))] {
-        painter.circle_stroke(placement.screen(f64::from(x), f64::from(y)), radius, Stroke::new(width, color));
+        painter.circle_stroke(
+            placement.screen(f64::from(x), f64::from(y)),
+            radius,
+            Stroke::new(width, color),
+        );
     }
 }
 
@@ -175,7 +204,9 @@ fn wipe(ui: &Ui, state: &State, placement: &Placement, out: &mut Outbox) -> bool
         ui.painter().vline(x, pane.y_range(), Stroke::new(width, color));
     }
     let handle = Rect::from_center_size(pos2(x, pane.center().y), egui::vec2(12.0, pane.height()));
-    let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
+    let response = ui
+        .interact(handle, ui.scope_id().with("wipe"), Sense::drag())
+        .on_hover_cursor(CursorIcon::ResizeHorizontal);
     response.widget_info(|| WidgetInfo::slider(true, f64::from(state.view.wipe), "wipe line"));
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
         let rect = placement.rect().intersect(pane);

@@ -1,6 +1,8 @@
 //! The pixel under the cursor: its value, its instant, its ray, what it sees, and how sure that is.
 
-use camsim_core::{camera::CameraModel, geodesy::LocalFrame, reference::Look, scenario::SceneSpec, temporal::samples_for};
+use camsim_core::{
+    camera::CameraModel, geodesy::LocalFrame, reference::Look, scenario::SceneSpec, temporal::samples_for,
+};
 use camsim_io::write::srgb8;
 use camsim_plan::FramePlan;
 use eframe::egui::{self, Ui};
@@ -28,7 +30,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     };
     ui.horizontal(|ui| {
         ui.heading(format!("pixel ({}, {})", pixel[0], pixel[1]));
-        if state.pinned.is_some() && ui.button("let go").explained("follow the cursor again (Esc)").clicked() {
+        if state.pinned.is_some() && ui.button("let go").explained("follow the cursor again (Esc)").clicked()
+        {
             out.push(Message::Pin(None));
         }
     });
@@ -43,13 +46,19 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 
 /// Values of a picture.
 fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
-    let full = state.heard.shown.as_ref().map_or(sight.size_px, |shown| shown.reply.wanted.scenario.camera.size_px);
+    let full =
+        state.heard.shown.as_ref().map_or(sight.size_px, |shown| shown.reply.wanted.scenario.camera.size_px);
     let factor = if full == sight.size_px { 1 } else { crate::engine::preview_factor(full) };
     let at = 4 * ((y / factor) as usize * sight.size_px[0] as usize + (x / factor) as usize);
-    let Some(&[r, g, b, a]) = sight.color_rgba.get(at..at + 4).and_then(|pixel| pixel.first_chunk::<4>()) else { return };
+    let Some(&[r, g, b, a]) = sight.color_rgba.get(at..at + 4).and_then(|pixel| pixel.first_chunk::<4>())
+    else {
+        return;
+    };
     ui.separator();
     ui.strong(sight.stage.label());
-    if sight.stage == crate::engine::Stage::Oracle && state.heard.current_exact().is_some_and(|exact| y >= exact.picture.rows) {
+    if sight.stage == crate::engine::Stage::Oracle
+        && state.heard.current_exact().is_some_and(|exact| y >= exact.picture.rows)
+    {
         ui.label("on its way: its rows come from the top");
         return;
     }
@@ -58,7 +67,12 @@ fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
         fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
         fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
         if let Some(depth_m) = sight.depth.and_then(|(truth, _)| truth.depth_m.get(at / 4)) {
-            fact(ui, "depth, rendered", format!("{depth_m:.3} m"), "as the depth channel has it; 0 = nothing there");
+            fact(
+                ui,
+                "depth, rendered",
+                format!("{depth_m:.3} m"),
+                "as the depth channel has it; 0 = nothing there",
+            );
         }
     });
 }
@@ -130,24 +144,43 @@ fn seen(ui: &mut Ui, state: &State, look: &Look) {
         return fact(ui, "sees", "sky", "no surface along the ray");
     };
     let scene = state.heard.sequence().map(|sequence| &sequence.scenario.scene);
-    fact(ui, "sees", scene.map_or_else(String::new, |scene| surface(scene, hit.surface)), "the first surface along the ray");
-    fact(ui, "depth", format!("{:.3} m", hit.depth_m), "planar, along the optical axis at the row's mid-exposure");
+    fact(
+        ui,
+        "sees",
+        scene.map_or_else(String::new, |scene| surface(scene, hit.surface)),
+        "the first surface along the ray",
+    );
+    fact(
+        ui,
+        "depth",
+        format!("{:.3} m", hit.depth_m),
+        "planar, along the optical axis at the row's mid-exposure",
+    );
     let point = hit.point_ned_m;
     let range_m = point.distance(look.pose.position_ned_m);
     fact(ui, "range", format!("{range_m:.3} m"), "from the optical centre");
-    fact(ui, "north, east, down", format!("{}, {}, {} m", fixed(point.x, 3), fixed(point.y, 3), fixed(point.z, 3)), "in the local frame");
+    fact(
+        ui,
+        "north, east, down",
+        format!("{}, {}, {} m", fixed(point.x, 3), fixed(point.y, 3), fixed(point.z, 3)),
+        "in the local frame",
+    );
     if let Some(frame) = state.heard.loaded.as_ref().and_then(|loaded| loaded.log.frame) {
         world(ui, &frame, point);
     }
 }
 
-/// What a surface is called: the terrain, then the pattern, the board and the models as the scene counts them.
+/// What a surface is called: the terrain, then the pattern, the board and the models as the scene counts
+/// them.
 fn surface(scene: &SceneSpec, number: u32) -> String {
     let flat = [("pattern", scene.pattern.is_some()), ("board", scene.board.is_some())];
-    let named = std::iter::once("terrain").chain(flat.into_iter().filter_map(|(name, is_there)| is_there.then_some(name)));
+    let named = std::iter::once("terrain")
+        .chain(flat.into_iter().filter_map(|(name, is_there)| is_there.then_some(name)));
     let known = named.clone().nth(number as usize).map(str::to_owned);
     known.unwrap_or_else(|| match scene.gltf.as_slice() {
-        [only] => format!("model {}", only.file.file_name().unwrap_or(only.file.as_os_str()).to_string_lossy()),
+        [only] => {
+            format!("model {}", only.file.file_name().unwrap_or(only.file.as_os_str()).to_string_lossy())
+        }
         _ => format!("model, mesh {}", number as usize + 1 - named.count()),
     })
 }
@@ -162,9 +195,16 @@ fn moved(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
     let Some(path) = path else { return };
     let here = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]));
     let shift = path.at_stamp_px.map(|at| here - at);
-    let text =
-        shift.map_or_else(|| "out of sight at the stamp".to_owned(), |shift| format!("{}, {} px", signed(shift.x, 3), signed(shift.y, 3)));
-    fact(ui, "displacement", text, "from where it would be in a frame taken at the stamp at once (the paper's Delta x)");
+    let text = shift.map_or_else(
+        || "out of sight at the stamp".to_owned(),
+        |shift| format!("{}, {} px", signed(shift.x, 3), signed(shift.y, 3)),
+    );
+    fact(
+        ui,
+        "displacement",
+        text,
+        "from where it would be in a frame taken at the stamp at once (the paper's Delta x)",
+    );
     let length_px: f64 = path.exposure_px.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
     fact(ui, "blur", format!("{} px", fixed(length_px, 3)), "length of its way over the exposure t_e");
 }
@@ -183,7 +223,8 @@ fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
     );
 }
 
-/// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the kernel counts them. For taps it may have more.
+/// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the
+/// kernel counts them. For taps it may have more.
 fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
     let Some(blur) = plan.blur else { return };
     let key = plan.ideal_view();
@@ -191,7 +232,8 @@ fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
     let at = |piece: u32| look(f64::from(piece) / f64::from(pieces) - 0.5).map(|look| key.source_px(&look));
     let Some(way) = (0..=pieces).map(at).collect::<Option<Vec<DVec2>>>() else { return };
     let steps: Vec<f64> = way.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-    let of_stretch = |steps: &[f64]| samples_for(steps.iter().sum(), blur.samples_per_px, 1, blur.max_samples);
+    let of_stretch =
+        |steps: &[f64]| samples_for(steps.iter().sum(), blur.samples_per_px, 1, blur.max_samples);
     let count: u32 = steps.chunks(PIECES as usize).map(of_stretch).sum();
     let length_px: f64 = steps.iter().sum();
     fact(
@@ -244,11 +286,24 @@ fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
         );
         let samples = plan.blur.map_or_else(
             || "1".to_owned(),
-            |blur| format!("{} nodes, {:.2} a px of path, {} at most", blur.solved(), blur.samples_per_px, blur.max_samples),
+            |blur| {
+                format!(
+                    "{} nodes, {:.2} a px of path, {} at most",
+                    blur.solved(),
+                    blur.samples_per_px,
+                    blur.max_samples
+                )
+            },
         );
         fact(ui, "samples", samples, "of the exposure");
     });
     if plan.predicted.void_share > 0.0 {
-        ui.label(egui::RichText::new(format!("{:.1} % of the pixels have no source", 100.0 * plan.predicted.void_share)).weak());
+        ui.label(
+            egui::RichText::new(format!(
+                "{:.1} % of the pixels have no source",
+                100.0 * plan.predicted.void_share
+            ))
+            .weak(),
+        );
     }
 }

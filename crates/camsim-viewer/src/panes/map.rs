@@ -1,4 +1,5 @@
-//! The flight from above: track, terrain, what stands on it, where the camera is and what it sees of the ground. A click jumps to the nearest frame.
+//! The flight from above: track, terrain, what stands on it, where the camera is and what it sees of the
+//! ground. A click jumps to the nearest frame.
 
 pub(super) mod chart;
 pub(super) mod footprint;
@@ -6,7 +7,9 @@ pub(super) mod footprint;
 use std::sync::{Arc, Weak};
 
 use camsim_core::{camera::CameraModel, pose::CameraPose, sequence::Sequence};
-use eframe::egui::{Color32, Id, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
+use eframe::egui::{
+    Color32, Id, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
 use glam::{DVec2, DVec3};
 
 use self::chart::Chart;
@@ -24,7 +27,8 @@ const LOOK: f64 = 0.08;
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
-    let (Some(loaded), Some(stamp_s)) = (&state.heard.loaded, state.heard.stamp_s(state.timeline.frame)) else {
+    let (Some(loaded), Some(stamp_s)) = (&state.heard.loaded, state.heard.stamp_s(state.timeline.frame))
+    else {
         ui.label("no flight yet");
         return;
     };
@@ -37,7 +41,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let scale = f64::from(side) / size.max_element();
     let middle = 0.5 * (chart.bounds[0] + chart.bounds[1]);
     // North is up.
-    let screen = |ne: DVec2| rect.center() + vec2(((ne.y - middle.y) * scale) as f32, (-(ne.x - middle.x) * scale) as f32);
+    let screen = |ne: DVec2| {
+        rect.center() + vec2(((ne.y - middle.y) * scale) as f32, (-(ne.x - middle.x) * scale) as f32)
+    };
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     background(&painter, &chart, ui.visuals().text_color(), &screen);
@@ -47,8 +53,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         seen(&painter, &camera, &footprint, &pose, LOOK * size.x, &screen);
     }
     let metres = |size: f64| if size < 100.0 { fixed(size, 1) } else { fixed(size, 0) };
-    let models = if chart.boxes.is_empty() && chart.flats.is_empty() { "" } else { ", boards and models in blue" };
-    ui.label(format!("{} x {} m, north is up; what the camera sees of the ground in orange{models}", metres(size.y), metres(size.x)));
+    let models =
+        if chart.boxes.is_empty() && chart.flats.is_empty() { "" } else { ", boards and models in blue" };
+    ui.label(format!(
+        "{} x {} m, north is up; what the camera sees of the ground in orange{models}",
+        metres(size.y),
+        metres(size.x)
+    ));
     let place = pose.position_ned_m;
     let decimals = if size.max_element() < 20.0 { 3 } else { 1 };
     let [north, east, down] = place.to_array().map(|m| fixed(m, decimals));
@@ -73,7 +84,10 @@ fn background(painter: &Painter, chart: &Chart, text: Color32, screen: &impl Fn(
         painter.rect_filled(seen, 0.0, OF_THINGS.gamma_multiply(0.6));
     }
     for corners in chart.flats.iter() {
-        painter.add(Shape::closed_line(corners.map(|corner| screen(corner.truncate())).to_vec(), Stroke::new(2.0, OF_THINGS)));
+        painter.add(Shape::closed_line(
+            corners.map(|corner| screen(corner.truncate())).to_vec(),
+            Stroke::new(2.0, OF_THINGS),
+        ));
     }
     let points: Vec<Pos2> = chart.track.iter().map(|(ned, _)| screen(ned.truncate())).collect();
     // A relief is dark in both themes.
@@ -99,18 +113,27 @@ fn seen(
     for side in [DVec2::NEG_X, DVec2::X] {
         if let Some(uv) = footprint::outermost(camera, side, Some) {
             let ray = pose.ned_from_camera * uv.extend(1.0).normalize();
-            painter.line_segment([here, screen(place + look_m * ray.truncate())], Stroke::new(1.0, OF_CAMERA));
+            painter
+                .line_segment([here, screen(place + look_m * ray.truncate())], Stroke::new(1.0, OF_CAMERA));
         }
     }
     painter.circle_filled(here, 4.0, Color32::from_rgb(255, 60, 60));
 }
 
 /// Found once a frame: it takes hundreds of rays.
-pub fn footprint(ui: &Ui, sequence: &Arc<Sequence>, frame: u64, camera: &CameraModel, pose: &CameraPose) -> Arc<Vec<Vec<DVec3>>> {
+pub fn footprint(
+    ui: &Ui,
+    sequence: &Arc<Sequence>,
+    frame: u64,
+    camera: &CameraModel,
+    pose: &CameraPose,
+) -> Arc<Vec<Vec<DVec3>>> {
     type Kept = (Weak<Sequence>, u64, Arc<Vec<Vec<DVec3>>>);
     let id = Id::unique("footprint");
     let kept = ui.data(|data| data.get_temp::<Kept>(id));
-    if let Some((_, _, runs)) = kept.filter(|(of, at, _)| std::ptr::eq(of.as_ptr(), Arc::as_ptr(sequence)) && *at == frame) {
+    if let Some((_, _, runs)) =
+        kept.filter(|(of, at, _)| std::ptr::eq(of.as_ptr(), Arc::as_ptr(sequence)) && *at == frame)
+    {
         return runs;
     }
     let runs = Arc::new(footprint::footprint(&sequence.scene, camera, pose));

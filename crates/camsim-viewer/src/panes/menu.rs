@@ -70,21 +70,29 @@ fn file_buttons(ui: &mut Ui, state: &State, out: &mut Outbox) {
 
 fn status(ui: &mut Ui, state: &State) {
     if let Some(document) = &state.document {
-        let name =
-            document.path.file_name().map_or_else(|| document.path.display().to_string(), |name| name.to_string_lossy().into_owned());
+        let name = document
+            .path
+            .file_name()
+            .map_or_else(|| document.path.display().to_string(), |name| name.to_string_lossy().into_owned());
         let mark = if document.is_unsaved() { " (changed)" } else { "" };
         ui.label(format!("{name}{mark}")).explained(document.path.display().to_string());
     }
     warnings(ui, state);
     let time = |what: &str, ms: Option<f64>| ms.map(|ms| format!("{what} {ms:.0} ms"));
-    let times: Vec<String> = [time("frame", state.heard.full_ms), time("preview", state.heard.preview_ms)].into_iter().flatten().collect();
+    let times: Vec<String> = [time("frame", state.heard.full_ms), time("preview", state.heard.preview_ms)]
+        .into_iter()
+        .flatten()
+        .collect();
     ui.weak(times.join(", ")).explained(format!("rendered on {}", state.heard.adapter));
     if let Some(refusal) = &state.refused {
         ui.separator();
-        let text = egui::RichText::new(format!("{}: {}", refusal.name, refusal.text)).color(ui.visuals().warn_fg_color);
+        let text = egui::RichText::new(format!("{}: {}", refusal.name, refusal.text))
+            .color(ui.visuals().warn_fg_color);
         // In what is left of the line: panes do not jump for it.
         let room = ui.available_size_before_wrap().x.max(SHORTEST);
-        ui.allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| ui.add(egui::Label::new(text).truncate()));
+        ui.allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
+            ui.add(egui::Label::new(text).truncate())
+        });
     }
     if let Some(news) = &state.news {
         ui.separator();
@@ -100,7 +108,8 @@ fn warnings(ui: &mut Ui, state: &State) {
     if warnings.is_empty() {
         return;
     }
-    let text = if let [_] = warnings { "1 warning".to_owned() } else { format!("{} warnings", warnings.len()) };
+    let text =
+        if let [_] = warnings { "1 warning".to_owned() } else { format!("{} warnings", warnings.len()) };
     let color = ui.visuals().warn_fg_color;
     ui.menu_button(egui::RichText::new(text).color(color), |ui| {
         ui.set_max_width(420.0);
@@ -112,8 +121,11 @@ fn warnings(ui: &mut Ui, state: &State) {
 
 /// Asks for what to open; begins in the folder of what is open.
 pub fn open_question(state: &State) -> Question {
-    let folder =
-        state.document.as_ref().and_then(|document| document.path.parent()).map_or(String::new(), |folder| folder.display().to_string());
+    let folder = state
+        .document
+        .as_ref()
+        .and_then(|document| document.path.parent())
+        .map_or(String::new(), |folder| folder.display().to_string());
     Question { saves: false, path: folder }
 }
 
@@ -150,7 +162,8 @@ fn unsaved(context: &Context, leaving: &Leaving, document: &Document, out: &mut 
         ui.heading("Changes that are not saved");
         ui.label(format!("{} has changes that are in no file.", document.path.display()));
         ui.horizontal(|ui| {
-            if ui.button("Save as").explained("asks for a name; what you wanted is then asked anew").clicked() {
+            if ui.button("Save as").explained("asks for a name; what you wanted is then asked anew").clicked()
+            {
                 out.extend([Message::Stay, Message::Ask(Some(save_question(document)))]);
             }
             let (text, wish) = match leaving {
@@ -179,7 +192,9 @@ fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Out
     let title = if question.saves { "Save scenario" } else { "Open scenario" };
     let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
         ui.heading(title);
-        let edit = ui.add(egui::TextEdit::singleline(&mut path).desired_width(460.0).hint_text("path of a .toml file"));
+        let edit = ui.add(
+            egui::TextEdit::singleline(&mut path).desired_width(460.0).hint_text("path of a .toml file"),
+        );
         named(&edit, Role::TextInput, "path");
         if !edit.has_focus() && !edit.lost_focus() {
             edit.request_focus();
@@ -198,7 +213,10 @@ fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Out
             }
         }
         if question.saves && std::path::Path::new(&path).is_file() {
-            ui.label(egui::RichText::new("this file is there already and will be replaced").color(ui.visuals().warn_fg_color));
+            ui.label(
+                egui::RichText::new("this file is there already and will be replaced")
+                    .color(ui.visuals().warn_fg_color),
+            );
         }
         ui.horizontal(|ui| {
             done |= ui.button(if question.saves { "Save here" } else { "Open this" }).clicked();
@@ -232,7 +250,10 @@ fn entries(ui: &mut Ui, path: &mut String, done: &mut bool) {
     found.sort();
     found.reverse();
     egui::ScrollArea::vertical().max_height(200.0).show(ui, |ui| {
-        if let Some(parent) = folder.parent().filter(|_| ui.selectable_label(false, "..").explained("the folder above").clicked()) {
+        if let Some(parent) = folder
+            .parent()
+            .filter(|_| ui.selectable_label(false, "..").explained("the folder above").clicked())
+        {
             *path = parent.display().to_string();
         }
         found.sort_by(|a, b| (b.0, &a.1).cmp(&(a.0, &b.1)));

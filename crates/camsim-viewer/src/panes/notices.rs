@@ -1,4 +1,5 @@
-//! Faults and news, above the picture: what went wrong is told where one looks, and nothing disappears unread.
+//! Faults and news, above the picture: what went wrong is told where one looks, and nothing disappears
+//! unread.
 
 use eframe::egui;
 

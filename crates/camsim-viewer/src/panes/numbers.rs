@@ -1,4 +1,5 @@
-//! Numbers to drag or to type, each within its range. What is asked for beyond the range, or cannot be read, is told: nothing is changed without a word.
+//! Numbers to drag or to type, each within its range. What is asked for beyond the range, or cannot be read,
+//! is told: nothing is changed without a word.
 
 use std::cell::{Cell, RefCell};
 
@@ -85,7 +86,9 @@ fn refusal(
     }
     let text = typed.unread.borrow();
     // Half a number is none either: only what is left there counts.
-    text.as_ref().filter(|_| response.lost_focus()).map(|text| format!("\"{text}\" is not a number: {value} stays ({range})"))
+    text.as_ref()
+        .filter(|_| response.lost_focus())
+        .map(|text| format!("\"{text}\" is not a number: {value} stays ({range})"))
 }
 
 /// What a hand has typed in a pass.
@@ -107,7 +110,11 @@ impl Typed {
         if text == *self.shown.borrow() {
             return Some(value);
         }
-        let plain: String = text.chars().filter(|c| !c.is_whitespace()).map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
+        let plain: String = text
+            .chars()
+            .filter(|c| !c.is_whitespace())
+            .map(|c| if c == '\u{2212}' { '-' } else { c })
+            .collect();
         let number = plain.parse().ok().filter(|number: &f64| !number.is_nan());
         self.number.set(number);
         if number.is_none() {
@@ -121,8 +128,11 @@ impl Typed {
 pub fn slider(ui: &mut Ui, field: &Field<'_>, value: f64, out: &mut Outbox) -> f64 {
     let [low, high] = field.range;
     let mut changed = value;
-    let editor = egui::Slider::new(&mut changed, low..=high).logarithmic(true).clamping(SliderClamping::Never);
-    let response = ui.add(editor.prefix(field.label).suffix(field.unit).max_decimals(field.decimals)).explained(field.tip);
+    let editor =
+        egui::Slider::new(&mut changed, low..=high).logarithmic(true).clamping(SliderClamping::Never);
+    let response = ui
+        .add(editor.prefix(field.label).suffix(field.unit).max_decimals(field.decimals))
+        .explained(field.tip);
     named(&response, Role::Slider, field.name);
     let kept = if changed.is_finite() { changed.clamp(low, high) } else { value };
     if kept != changed {

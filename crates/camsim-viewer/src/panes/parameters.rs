@@ -59,7 +59,9 @@ pub fn section_names() -> Vec<&'static str> {
 
 /// Whether a key is of the elements of a list.
 fn is_element(key: &str) -> bool {
-    keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')))
+    keys().iter().any(|(list, kind)| {
+        *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
+    })
 }
 
 /// A table of the format.
@@ -109,7 +111,15 @@ fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, o
 }
 
 /// The same for an element of a list, whose key has an index that its facts have not.
-fn row_at(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+fn row_at(
+    ui: &mut Ui,
+    state: &State,
+    document: &Document,
+    key: &str,
+    kind: Kind,
+    param: &Param,
+    out: &mut Outbox,
+) {
     let leaf = key.rsplit('.').next().unwrap_or(key);
     let changed = document.is_changed(key);
     let problem = document.problem(key);

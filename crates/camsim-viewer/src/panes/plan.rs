@@ -41,7 +41,12 @@ fn passes(ui: &mut Ui, picture: &Picture) {
     }
     let times = &picture.times;
     facts(ui, &format!("times {}", picture.stage.label()), |ui| {
-        fact(ui, "planned in", format!("{:.1} ms", times.plan_ms), "on the host: choice of methods by dry runs, triangles, poses");
+        fact(
+            ui,
+            "planned in",
+            format!("{:.1} ms", times.plan_ms),
+            "on the host: choice of methods by dry runs, triangles, poses",
+        );
         fact(ui, "recorded in", format!("{:.1} ms", times.record_ms), "on the host");
         fact(ui, "submitted in", format!("{:.1} ms", times.submit_ms), "by the driver");
         fact(ui, "waited", format!("{:.1} ms", times.wait_ms), "for the device");
@@ -56,7 +61,11 @@ fn passes(ui: &mut Ui, picture: &Picture) {
 fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let predicted = &picture.plan.predicted;
     if predicted.probes == 0 {
-        verdict(ui, false, Some("no pixel that was tried has a source in the ideal frame: the picture is empty"));
+        verdict(
+            ui,
+            false,
+            Some("no pixel that was tried has a source in the ideal frame: the picture is empty"),
+        );
         return;
     }
     facts(ui, &format!("errors {}", picture.stage.label()), |ui| sources(ui, picture, has_terrain));
@@ -64,7 +73,10 @@ fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     facts(ui, &format!("levels {}", picture.stage.label()), |ui| levels(ui, predicted));
     verdict(ui, predicted.levels_kept, predicted.levels_in_the_way.as_deref());
     if picture.plan.extrapolated {
-        ui.label(RichText::new("reaches outside the log: extrapolated at constant velocity").color(ui.visuals().warn_fg_color));
+        ui.label(
+            RichText::new("reaches outside the log: extrapolated at constant velocity")
+                .color(ui.visuals().warn_fg_color),
+        );
     }
 }
 
@@ -81,7 +93,12 @@ fn verdict(ui: &mut Ui, kept: bool, cause: Option<&str>) {
 fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let plan = &picture.plan;
     let predicted = &plan.predicted;
-    fact(ui, "predicted error", format!("{:.4} px", predicted.total_px), "bound on the 99th percentile of the source coordinate's error");
+    fact(
+        ui,
+        "predicted error",
+        format!("{:.4} px", predicted.total_px),
+        "bound on the 99th percentile of the source coordinate's error",
+    );
     let parts = [
         ("lens", predicted.lens_px, "lens inverse"),
         ("temporal", predicted.temporal_px, "model of the motion"),
@@ -102,7 +119,12 @@ fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     }
     if predicted.silhouette_share > 0.0 {
         let share = format!("at least {:.1} %", 100.0 * predicted.silhouette_share);
-        fact(ui, "counted apart", share, "pixels at a step or fold of depth: no bound on their source coordinates");
+        fact(
+            ui,
+            "counted apart",
+            share,
+            "pixels at a step or fold of depth: no bound on their source coordinates",
+        );
     }
     if let Some(holes) = predicted.holes {
         let text = format!("{:.4} %, {:.2} px wide", 100.0 * holes.share, holes.width_px);
@@ -112,15 +134,35 @@ fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
 
 /// Of grey levels, by cause.
 fn levels(ui: &mut Ui, predicted: &Predicted) {
-    fact(ui, "grey levels", format!("{:.3} of 255", predicted.picture_dn()), "expected RMS of the picture, all causes together");
-    fact(ui, "resampling", format!("{:.3}", predicted.resampling_dn), "of the ideal frame, away from silhouettes");
+    fact(
+        ui,
+        "grey levels",
+        format!("{:.3} of 255", predicted.picture_dn()),
+        "expected RMS of the picture, all causes together",
+    );
+    fact(
+        ui,
+        "resampling",
+        format!("{:.3}", predicted.resampling_dn),
+        "of the ideal frame, away from silhouettes",
+    );
     fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
-    fact(ui, "beside their place", format!("{:.3}", predicted.displaced_dn), "sources of pixels, away from silhouettes");
+    fact(
+        ui,
+        "beside their place",
+        format!("{:.3}", predicted.displaced_dn),
+        "sources of pixels, away from silhouettes",
+    );
     if let Some(ground) = predicted.ground {
         fact(ui, "terrain", format!("{:.3}", ground.error_dn()), "drawn coarser than it is, its borders too");
     }
     if let Some(silhouettes) = predicted.silhouettes {
-        fact(ui, "silhouettes", format!("{:.3}", silhouettes.error_dn), "as they are made: by the ideal frame's pixels or by rays");
+        fact(
+            ui,
+            "silhouettes",
+            format!("{:.3}", silhouettes.error_dn),
+            "as they are made: by the ideal frame's pixels or by rays",
+        );
     }
     if let Some(layers) = predicted.layers {
         let text = format!("{:.3}, {:.0} % of the picture", layers.error_dn, 100.0 * layers.share);

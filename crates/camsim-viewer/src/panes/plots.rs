@@ -1,4 +1,5 @@
-//! The flight over time: log against tracker, speeds, blur and row skew. The cursor is the timeline's; a click jumps.
+//! The flight over time: log against tracker, speeds, blur and row skew. The cursor is the timeline's; a
+//! click jumps.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,7 +20,8 @@ use crate::{
 /// Points for numbers on the left, so that instants lie above each other.
 const AXIS: f32 = 40.0;
 /// Colours of the log, of the tracker and of errors.
-const LINES: [Color32; 3] = [Color32::from_rgb(150, 150, 150), Color32::from_rgb(90, 180, 250), Color32::from_rgb(250, 150, 60)];
+const LINES: [Color32; 3] =
+    [Color32::from_rgb(150, 150, 150), Color32::from_rgb(90, 180, 250), Color32::from_rgb(250, 150, 60)];
 /// The shortest time that is shown, seconds: closer, nothing is left of the numbers.
 const SHORTEST_S: f64 = 0.02;
 /// Rows of the log that are marked, at most: more of them in a plot are a thick line.
@@ -120,9 +122,12 @@ impl Sheet<'_> {
         let plot = Plot::new(channel.name)
             .height(110.0)
             .show_x(true)
-            // Numbers stand closer than in plots that have a window of their own, and are not faint where there is room for them.
+            // Numbers stand closer than in plots that have a window of their own, and are not faint where
+            // there is room for them.
             .custom_x_axes(vec![AxisHints::new_x().label_spacing(Rangef::new(44.0, 56.0))])
-            .custom_y_axes(vec![AxisHints::new_y().label_spacing(Rangef::new(14.0, 20.0)).min_thickness(AXIS)])
+            .custom_y_axes(vec![
+                AxisHints::new_y().label_spacing(Rangef::new(14.0, 20.0)).min_thickness(AXIS),
+            ])
             .allow_scroll(false)
             // Up and down each shows what there is.
             .allow_zoom([true, false])
@@ -167,18 +172,24 @@ impl Sheet<'_> {
     /// Dots for rows of the log, if there are few.
     fn marks(&self, channel: &Channel) -> PlotPoints<'static> {
         let rows = &self.series.rows_s;
-        let [first, end] = [rows.partition_point(|t_s| *t_s < self.seen_s[0]), rows.partition_point(|t_s| *t_s <= self.seen_s[1])];
-        let Some((_, log)) = channel.lines.first().filter(|_| end - first <= MOST_MARKS) else { return PlotPoints::new(Vec::new()) };
+        let [first, end] = [
+            rows.partition_point(|t_s| *t_s < self.seen_s[0]),
+            rows.partition_point(|t_s| *t_s <= self.seen_s[1]),
+        ];
+        let Some((_, log)) = channel.lines.first().filter(|_| end - first <= MOST_MARKS) else {
+            return PlotPoints::new(Vec::new());
+        };
         let on_line = |t_s: &f64| log.get(log.partition_point(|point| point[0] < *t_s)).copied();
         PlotPoints::new(rows[first..end].iter().filter_map(on_line).collect())
     }
 
-    /// From the least to the largest value that is seen, with a margin; the limit counts where all is seen, or values come near it.
+    /// From the least to the largest value that is seen, with a margin; the limit counts where all is seen,
+    /// or values come near it.
     fn range(&self, channel: &Channel) -> std::ops::RangeInclusive<f64> {
         let [from_s, to_s] = self.seen_s;
         let errors = channel.error.as_ref().filter(|_| self.errors);
-        let lines: Vec<&Vec<[f64; 2]>> =
-            errors.map_or_else(|| channel.lines.iter().map(|(_, points)| points).collect(), |errors| vec![errors]);
+        let lines: Vec<&Vec<[f64; 2]>> = errors
+            .map_or_else(|| channel.lines.iter().map(|(_, points)| points).collect(), |errors| vec![errors]);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for points in lines {
             // With the points on either side, to which lines go.

@@ -22,7 +22,12 @@ const fn plain(key: Key, what: &'static str, wish: fn(&State) -> Option<Message>
     Shortcut { keys: KeyboardShortcut::new(Modifiers::NONE, key), what, wish, repeats: false }
 }
 
-const fn command(modifiers: Modifiers, key: Key, what: &'static str, wish: fn(&State) -> Option<Message>) -> Shortcut {
+const fn command(
+    modifiers: Modifiers,
+    key: Key,
+    what: &'static str,
+    wish: fn(&State) -> Option<Message>,
+) -> Shortcut {
     Shortcut { keys: KeyboardShortcut::new(modifiers, key), what, wish, repeats: false }
 }
 
@@ -33,7 +38,9 @@ const fn held(shortcut: Shortcut) -> Shortcut {
 
 /// Combinations stand before the keys that they contain.
 const SHORTCUTS: &[Shortcut] = &[
-    command(Modifiers::COMMAND, Key::O, "open a scenario", |state| Some(Message::Ask(Some(menu::open_question(state))))),
+    command(Modifiers::COMMAND, Key::O, "open a scenario", |state| {
+        Some(Message::Ask(Some(menu::open_question(state))))
+    }),
     command(Modifiers::COMMAND, Key::S, "save the scenario", |state| {
         state.document.as_ref().map(|document| Message::Ask(Some(menu::save_question(document))))
     }),
@@ -48,15 +55,24 @@ const SHORTCUTS: &[Shortcut] = &[
     plain(Key::Home, "to the first frame", |_| Some(Message::Seek(0))),
     plain(Key::End, "to the last frame", |state| Some(Message::Seek(state.timeline.last()))),
     plain(Key::F, "fit the picture into the pane", |state| view(state, |view| view.zoom = None)),
-    plain(Key::Num1, "a pixel of the screen for each pixel of the picture", |state| view(state, |view| view.zoom = Some(1.0))),
+    plain(Key::Num1, "a pixel of the screen for each pixel of the picture", |state| {
+        view(state, |view| view.zoom = Some(1.0))
+    }),
     plain(Key::W, "wipe between A and B, or A alone", |state| {
-        view(state, |view| view.compare = if view.compare == Compare::Wipe { Compare::Single } else { Compare::Wipe })
+        view(state, |view| {
+            view.compare = if view.compare == Compare::Wipe { Compare::Single } else { Compare::Wipe }
+        })
     }),
     plain(Key::D, "difference of A and B, or A alone", |state| {
-        view(state, |view| view.compare = if view.compare == Compare::Difference { Compare::Single } else { Compare::Difference })
+        view(state, |view| {
+            view.compare =
+                if view.compare == Compare::Difference { Compare::Single } else { Compare::Difference }
+        })
     }),
     plain(Key::X, "exchange A and B", |state| view(state, |view| std::mem::swap(&mut view.a, &mut view.b))),
-    plain(Key::I, "mark invalid pixels", |state| view(state, |view| view.overlays.invalid = !view.overlays.invalid)),
+    plain(Key::I, "mark invalid pixels", |state| {
+        view(state, |view| view.overlays.invalid = !view.overlays.invalid)
+    }),
     plain(Key::G, "distortion grid", |state| view(state, |view| view.overlays.grid = !view.overlays.grid)),
     plain(Key::M, "motion", |state| view(state, |view| view.overlays.motion = !view.overlays.motion)),
     plain(Key::Questionmark, "this list", |state| Some(Message::Help(!state.help))),
@@ -71,8 +87,9 @@ fn view(state: &State, change: impl FnOnce(&mut View)) -> Option<Message> {
     Some(Message::View(view))
 }
 
-/// Does what keys say, each press on its own and in order: many may arrive in one pass, and the second of two presses goes on from what the first one did.
-/// Keys go to text that is being typed, or to windows that are open, first.
+/// Does what keys say, each press on its own and in order: many may arrive in one pass, and the second of two
+/// presses goes on from what the first one did. Keys go to text that is being typed, or to windows that are
+/// open, first.
 pub fn listen(context: &Context, state: &mut State) {
     let mut from = 0;
     while !is_typed_elsewhere(context, state)
@@ -89,16 +106,25 @@ pub fn listen(context: &Context, state: &mut State) {
 }
 
 fn is_typed_elsewhere(context: &Context, state: &State) -> bool {
-    context.egui_wants_keyboard_input() || state.question.is_some() || state.dropped_picture.is_some() || state.leaving.is_some()
+    context.egui_wants_keyboard_input()
+        || state.question.is_some()
+        || state.dropped_picture.is_some()
+        || state.leaving.is_some()
 }
 
-/// Takes the first press of a shortcut's keys at or behind `from` out of what came in; where it was, and whether it is the repeat of a key that is held.
+/// Takes the first press of a shortcut's keys at or behind `from` out of what came in; where it was, and
+/// whether it is the repeat of a key that is held.
 fn next(context: &Context, from: usize) -> Option<(usize, &'static Shortcut, bool)> {
     context.input_mut(|input| {
         let found = input.events.iter().enumerate().skip(from).find_map(|(at, event)| match event {
             Event::Key { key, modifiers, pressed: true, repeat, .. } => {
-                let is_meant = |keys: &KeyboardShortcut| keys.logical_key == *key && modifiers.matches_logically(keys.modifiers);
-                SHORTCUTS.iter().find(|shortcut| is_meant(&shortcut.keys)).map(|shortcut| (at, shortcut, *repeat))
+                let is_meant = |keys: &KeyboardShortcut| {
+                    keys.logical_key == *key && modifiers.matches_logically(keys.modifiers)
+                };
+                SHORTCUTS
+                    .iter()
+                    .find(|shortcut| is_meant(&shortcut.keys))
+                    .map(|shortcut| (at, shortcut, *repeat))
             }
             _ => None,
         })?;

@@ -1,5 +1,6 @@
-//! The flight in three dimensions: terrain, what stands on it, the log's rows, the tracked path, and the camera with what it sees. Drag to turn, with the
-//! right button (or Shift) to move, wheel to zoom; a click jumps to the nearest frame.
+//! The flight in three dimensions: terrain, what stands on it, the log's rows, the tracked path, and the
+//! camera with what it sees. Drag to turn, with the right button (or Shift) to move, wheel to zoom; a click
+//! jumps to the nearest frame.
 
 mod canvas;
 mod scene;
@@ -7,7 +8,9 @@ mod sight;
 
 #[cfg(test)]
 use eframe::egui::Pos2;
-use eframe::egui::{Align2, Color32, FontId, PointerButton, Rect, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
+use eframe::egui::{
+    Align2, Color32, FontId, PointerButton, Rect, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
+};
 use glam::{DVec2, DVec3};
 
 use self::{
@@ -45,7 +48,8 @@ const HEIGHT: f32 = 0.95;
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
-    let (Some(loaded), Some(stamp_s)) = (&state.heard.loaded, state.heard.stamp_s(state.timeline.frame)) else {
+    let (Some(loaded), Some(stamp_s)) = (&state.heard.loaded, state.heard.stamp_s(state.timeline.frame))
+    else {
         ui.label("no flight yet");
         return;
     };
@@ -96,7 +100,11 @@ fn controls(ui: &mut Ui, orbit: &mut Orbit, ball: Ball, camera_ned_m: DVec3, out
         if ui.button("from above").explained("north up, as the map").clicked() {
             *orbit = Orbit::from_above();
         }
-        if ui.button("to the camera").explained("the camera in the middle; then the wheel goes nearer").clicked() {
+        if ui
+            .button("to the camera")
+            .explained("the camera in the middle; then the wheel goes nearer")
+            .clicked()
+        {
             *orbit = orbit.centred(camera_ned_m, ball);
         }
         for (text, name, factor) in [("-", "farther", 1.0 / 1.5), ("+", "nearer", 1.5)] {
@@ -108,12 +116,34 @@ fn controls(ui: &mut Ui, orbit: &mut Orbit, ball: Ball, camera_ned_m: DVec3, out
         }
     });
     ui.horizontal_wrapped(|ui| {
-        let angle = |name, label, range, tip| Field { name, label, unit: "deg", range, speed: 0.5, decimals: 1, whole: false, tip };
-        let zoom = Field { unit: "x", speed: 0.01, decimals: 2, ..angle("view zoom", "zoom", ZOOM, "1 shows all of the scene (wheel)") };
+        let angle = |name, label, range, tip| Field {
+            name,
+            label,
+            unit: "deg",
+            range,
+            speed: 0.5,
+            decimals: 1,
+            whole: false,
+            tip,
+        };
+        let zoom = Field {
+            unit: "x",
+            speed: 0.01,
+            decimals: 2,
+            ..angle("view zoom", "zoom", ZOOM, "1 shows all of the scene (wheel)")
+        };
         for (field, value) in [
-            (angle("view azimuth", "azimuth", [0.0, 360.0], "where the look goes, east of north (drag)"), &mut orbit.azimuth_deg),
             (
-                angle("view depression", "down", DEPRESSION_DEG, "how far the look goes down; 90 is from above (drag)"),
+                angle("view azimuth", "azimuth", [0.0, 360.0], "where the look goes, east of north (drag)"),
+                &mut orbit.azimuth_deg,
+            ),
+            (
+                angle(
+                    "view depression",
+                    "down",
+                    DEPRESSION_DEG,
+                    "how far the look goes down; 90 is from above (drag)",
+                ),
                 &mut orbit.depression_deg,
             ),
             (zoom, &mut orbit.zoom),
@@ -132,7 +162,15 @@ fn wheel(ui: &Ui) -> f64 {
     zoom * (f64::from(turn) / 200.0).exp()
 }
 
-fn draw(ui: &Ui, rect: Rect, eye: &Eye, model: &Model, chart: &Chart, sight: Option<&Sight>, camera_ned_m: DVec3) {
+fn draw(
+    ui: &Ui,
+    rect: Rect,
+    eye: &Eye,
+    model: &Model,
+    chart: &Chart,
+    sight: Option<&Sight>,
+    camera_ned_m: DVec3,
+) {
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, BEHIND);
     let mut canvas = Canvas::new(*eye, rect.center());
@@ -178,7 +216,13 @@ fn compass(painter: &eframe::egui::Painter, rect: Rect, eye: &Eye) {
         painter.line_segment([middle, middle + 20.0 * towards], Stroke::new(1.5, Color32::from_gray(220)));
         if towards.length() > 0.2 {
             let at = middle + 20.0 * towards + 8.0 * towards.normalized();
-            painter.text(at, Align2::CENTER_CENTER, name, FontId::proportional(11.0), Color32::from_gray(220));
+            painter.text(
+                at,
+                Align2::CENTER_CENTER,
+                name,
+                FontId::proportional(11.0),
+                Color32::from_gray(220),
+            );
         }
     }
 }
@@ -195,7 +239,12 @@ fn legend(ui: &mut Ui, chart: &Chart, sight: Option<&Sight>, camera_ned_m: DVec3
     let decimals = if size.max_element() < 20.0 { 3 } else { 1 };
     facts(ui, "3D", |ui| {
         let [north, east, down] = camera_ned_m.to_array().map(|m| fixed(m, decimals));
-        fact(ui, &format!("frame {frame}"), format!("{north} N, {east} E, {down} D m"), "where the camera is at the frame's stamp");
+        fact(
+            ui,
+            &format!("frame {frame}"),
+            format!("{north} N, {east} E, {down} D m"),
+            "where the camera is at the frame's stamp",
+        );
         if let Some(sight) = sight {
             let [across, down, corners] = sight.field_deg.map(|deg| fixed(deg, 2));
             fact(
@@ -218,7 +267,9 @@ fn legend(ui: &mut Ui, chart: &Chart, sight: Option<&Sight>, camera_ned_m: DVec3
 fn nearest(eye: &Eye, chart: &Chart, at: Vec2) -> Option<f64> {
     let away = |ned: &DVec3| {
         let seen = eye.seen(*ned);
-        (seen.z >= eye.near_m()).then(|| (on_screen(eye.place(seen)) - at).length()).filter(|points| *points < REACH)
+        (seen.z >= eye.near_m())
+            .then(|| (on_screen(eye.place(seen)) - at).length())
+            .filter(|points| *points < REACH)
     };
     let near = chart.track.iter().filter_map(|(ned, after_s)| Some((away(ned)?, *after_s)));
     near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, after_s)| after_s)

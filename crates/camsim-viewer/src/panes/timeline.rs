@@ -45,7 +45,12 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     };
     button(ui, "|<", "first frame", Message::Seek(timeline.bounds()[0]));
     button(ui, "<", "previous frame", Message::Step(-1));
-    button(ui, if timeline.playing { "stop" } else { "play" }, if timeline.playing { "stop" } else { "play" }, Message::TogglePlay);
+    button(
+        ui,
+        if timeline.playing { "stop" } else { "play" },
+        if timeline.playing { "stop" } else { "play" },
+        Message::TogglePlay,
+    );
     button(ui, ">", "next frame", Message::Step(1));
     button(ui, ">|", "last frame", Message::Seek(timeline.bounds()[1]));
     let mut changed = timeline.clone();
@@ -80,15 +85,20 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
         out.push(Message::Seek(timeline.frame_at(seconds)));
     }
     ui.label(format!("of {last_s:.2} s"));
-    let flight = state.heard.stamp_s(timeline.frame).map_or_else(String::new, |t_s| format!(", flight time {} s", fixed(t_s, 3)));
-    ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames))
-        .explained("frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row");
+    let flight = state
+        .heard
+        .stamp_s(timeline.frame)
+        .map_or_else(String::new, |t_s| format!(", flight time {} s", fixed(t_s, 3)));
+    ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames)).explained(
+        "frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row",
+    );
 }
 
 fn loop_controls(ui: &mut Ui, timeline: &Timeline, changed: &mut Timeline) {
     let [first, last] = timeline.bounds();
     let frame = timeline.frame;
-    if ui.button("loop from").explained("the loop begins at this frame").clicked() && frame < timeline.last() {
+    if ui.button("loop from").explained("the loop begins at this frame").clicked() && frame < timeline.last()
+    {
         changed.range = Some([frame, if last > frame { last } else { timeline.last() }]);
     }
     if ui.button("loop to").explained("the loop ends at this frame").clicked() && frame > 0 {
@@ -155,7 +165,11 @@ fn gaps(state: &State) -> impl Iterator<Item = [f64; 2]> + '_ {
         let sequence = sequence.clone();
         move |span: &[f64; 2]| span.map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps)
     };
-    let spans = state.heard.sequence().into_iter().flat_map(move |sequence| state.heard.gaps_s.iter().map(of(sequence)));
+    let spans = state
+        .heard
+        .sequence()
+        .into_iter()
+        .flat_map(move |sequence| state.heard.gaps_s.iter().map(of(sequence)));
     spans.filter(move |[from, to]| *to >= 0.0 && *from <= last)
 }
 
@@ -166,7 +180,8 @@ fn repaired(state: &State) -> impl Iterator<Item = f64> + '_ {
         let sequence = loaded.sequence.clone();
         move |t_s: &f64| (t_s - sequence.start_s) * sequence.scenario.camera.fps
     };
-    let frames = state.heard.loaded.iter().flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(of(loaded)));
+    let frames =
+        state.heard.loaded.iter().flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(of(loaded)));
     frames.filter(move |frame| (0.0..=last).contains(frame))
 }
 
@@ -194,11 +209,16 @@ fn row_times(ui: &mut Ui, state: &State) {
     let (first_s, last_s) = shutter.window_s();
     let period_s = 1.0 / camera.fps;
     // Two periods, or what the frame takes.
-    let (left_s, right_s) = (first_s.min(-period_s) - 0.05 * period_s, last_s.max(period_s) + 0.05 * period_s);
+    let (left_s, right_s) =
+        (first_s.min(-period_s) - 0.05 * period_s, last_s.max(period_s) + 0.05 * period_s);
     let x_of = |t_s: f64| rect.left() + rect.width() * ((t_s - left_s) / (right_s - left_s)) as f32;
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     for period in -3..=3 {
-        painter.vline(x_of(f64::from(period) * period_s), rect.y_range(), Stroke::new(1.0, ui.visuals().weak_text_color()));
+        painter.vline(
+            x_of(f64::from(period) * period_s),
+            rect.y_range(),
+            Stroke::new(1.0, ui.visuals().weak_text_color()),
+        );
     }
     let steps = 64.min(shutter.lines());
     let half_s = 0.5 * shutter.exposure_s();
@@ -207,13 +227,20 @@ fn row_times(ui: &mut Ui, state: &State) {
         let line = (u64::from(step) * u64::from(shutter.lines() - 1) / u64::from(steps.max(2) - 1)) as u32;
         let y = rect.top() + rect.height() * (line as f32 + 0.5) / shutter.lines() as f32;
         let mid_s = shutter.dt_line_s(line);
-        let ends = [pos2(x_of(mid_s - half_s), y), pos2((x_of(mid_s + half_s)).max(x_of(mid_s - half_s) + 2.0), y)];
+        let ends =
+            [pos2(x_of(mid_s - half_s), y), pos2((x_of(mid_s + half_s)).max(x_of(mid_s - half_s) + 2.0), y)];
         painter.line_segment(ends, Stroke::new((rect.height() / steps as f32).max(1.0), exposed));
     }
     painter.vline(x_of(0.0), rect.y_range(), Stroke::new(1.5, Color32::from_rgb(220, 70, 60)));
     let text = format!("{} to {} ms", signed(1e3 * first_s, 1), signed(1e3 * last_s, 1));
     // Left of the next frame's line.
     let at = pos2(x_of(period_s).min(rect.right()) - 4.0, rect.top() + 2.0);
-    painter.text(at, egui::Align2::RIGHT_TOP, text, egui::FontId::proportional(11.0), ui.visuals().text_color());
+    painter.text(
+        at,
+        egui::Align2::RIGHT_TOP,
+        text,
+        egui::FontId::proportional(11.0),
+        ui.visuals().text_color(),
+    );
     response.explained("each row's exposure about the frame's stamp (red), with the periods of the frames beside it; time to the right");
 }

@@ -1,13 +1,17 @@
-//! Explanations of controls. They come when the hand rests, and beside the pane or the line that a control is in: neither it nor its neighbours are covered.
+//! Explanations of controls. They come when the hand rests, and beside the pane or the line that a control is
+//! in: neither it nor its neighbours are covered.
 
-use eframe::egui::{Context, Id, LayerId, Popup, Rangef, Rect, RectAlign, Response, Tooltip, Ui, WidgetText, accesskit};
+use eframe::egui::{
+    Context, Id, LayerId, Popup, Rangef, Rect, RectAlign, Response, Tooltip, Ui, WidgetText, accesskit,
+};
 
 /// Rest of the hand before an explanation comes, seconds.
 const DELAY_S: f32 = 0.7;
 /// Points that explanations are wide, at most.
 const WIDTH: f32 = 340.0;
 
-/// Where explanations go of what is drawn from here on in the window itself. What lies over it, as menus and questions do, has its own below.
+/// Where explanations go of what is drawn from here on in the window itself. What lies over it, as menus and
+/// questions do, has its own below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aside {
     /// Below lines of controls that reach from the first to the second height.
@@ -28,17 +32,28 @@ impl Aside {
 
     fn of(response: &Response) -> Option<Self> {
         let is_window = response.layer_id == LayerId::background();
-        is_window.then(|| response.ctx.data(|data| data.get_temp(Id::unique("where explanations go")))).flatten()
+        is_window
+            .then(|| response.ctx.data(|data| data.get_temp(Id::unique("where explanations go"))))
+            .flatten()
     }
 
     fn place<'a>(self, popup: Popup<'a>, control: Rect) -> Popup<'a> {
         // A line that is not yet as high as it will be still has the control in it.
         let hull = |range: Rangef, own: Rangef| Rangef::new(range.min.min(own.min), range.max.max(own.max));
         let (anchor, align) = match self {
-            Self::Below(y) => (Rect::from_x_y_ranges(control.x_range(), hull(y, control.y_range())), RectAlign::BOTTOM_START),
-            Self::Above(y) => (Rect::from_x_y_ranges(control.x_range(), hull(y, control.y_range())), RectAlign::TOP_START),
-            Self::Right(x) => (Rect::from_x_y_ranges(hull(x, control.x_range()), control.y_range()), RectAlign::RIGHT_START),
-            Self::Left(x) => (Rect::from_x_y_ranges(hull(x, control.x_range()), control.y_range()), RectAlign::LEFT_START),
+            Self::Below(y) => (
+                Rect::from_x_y_ranges(control.x_range(), hull(y, control.y_range())),
+                RectAlign::BOTTOM_START,
+            ),
+            Self::Above(y) => {
+                (Rect::from_x_y_ranges(control.x_range(), hull(y, control.y_range())), RectAlign::TOP_START)
+            }
+            Self::Right(x) => {
+                (Rect::from_x_y_ranges(hull(x, control.x_range()), control.y_range()), RectAlign::RIGHT_START)
+            }
+            Self::Left(x) => {
+                (Rect::from_x_y_ranges(hull(x, control.x_range()), control.y_range()), RectAlign::LEFT_START)
+            }
         };
         popup.anchor(anchor).align(align)
     }
@@ -90,7 +105,10 @@ fn describe(response: &Response, text: &str) {
                 node.set_description(text);
             }
             // A label is named by what it says.
-            if node.role() != accesskit::Role::Label && node.labelled_by().is_empty() && node.label().is_none_or(str::is_empty) {
+            if node.role() != accesskit::Role::Label
+                && node.labelled_by().is_empty()
+                && node.label().is_none_or(str::is_empty)
+            {
                 node.set_label(text);
             }
         });

@@ -11,15 +11,16 @@ const BEAT: Duration = Duration::from_millis(250);
 /// Steps of it in a turn.
 const BEATS: u64 = 8;
 
-/// One choice of several. `name` is what assistive technology and tests call it, where the text alone would not tell.
+/// One choice of several. `name` is what assistive technology and tests call it, where the text alone would
+/// not tell.
 pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, explanation: &str) -> Response {
     let response = ui.selectable_label(selected, text).explained(explanation);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, ui.is_enabled(), selected, name));
     response
 }
 
-/// Says that something takes a while. egui's own spinner has the window drawn as often as it can be, which on a software adapter takes the very
-/// processors that are waited for: this one moves four times a second.
+/// Says that something takes a while. egui's own spinner has the window drawn as often as it can be, which on
+/// a software adapter takes the very processors that are waited for: this one moves four times a second.
 pub fn waiting(ui: &mut Ui) -> Response {
     let side = ui.spacing().interact_size.y;
     let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
@@ -29,7 +30,10 @@ pub fn waiting(ui: &mut Ui) -> Response {
         let angle = TAU * (beat as f32 / BEATS as f32 + 0.7 * f32::from(step) / 20.0);
         rect.center() + 0.35 * side * vec2(angle.cos(), angle.sin())
     };
-    ui.painter().add(Shape::line((0..=20).map(point).collect(), Stroke::new(0.1 * side, ui.visuals().strong_text_color())));
+    ui.painter().add(Shape::line(
+        (0..=20).map(point).collect(),
+        Stroke::new(0.1 * side, ui.visuals().strong_text_color()),
+    ));
     ui.ctx().request_repaint_after(BEAT);
     response
 }

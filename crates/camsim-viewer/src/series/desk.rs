@@ -1,4 +1,5 @@
-//! Works series out beside the window: of hours of flight they take a good fraction of a second, and while a parameter is dragged each preview wants others.
+//! Works series out beside the window: of hours of flight they take a good fraction of a second, and while a
+//! parameter is dragged each preview wants others.
 
 use std::sync::{
     Arc,
@@ -12,7 +13,8 @@ use super::Series;
 
 /// Who sees less than this share of a span is shown it closer.
 const LEAST_SEEN: f64 = 0.5;
-/// A part that is worked out closer reaches so far beyond what is seen, to either side, as a share of that: for the hand that moves on.
+/// A part that is worked out closer reaches so far beyond what is seen, to either side, as a share of that:
+/// for the hand that moves on.
 const BEYOND: f64 = 0.5;
 /// ... and is enough as long as this share of it is seen.
 const LEAST_OF_CLOSER: f64 = 0.25;
@@ -26,9 +28,15 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// The series of what is loaded, closer where only a part of it is seen (path time). Until they are there: coarser ones, or those of the same log before the
-    /// last change, `None` without any. Asks for a repaint when there are others.
-    pub fn series(&mut self, loaded: &Arc<Loaded>, seen_s: Option<[f64; 2]>, context: &Context) -> Option<Arc<Series>> {
+    /// The series of what is loaded, closer where only a part of it is seen (path time). Until they are
+    /// there: coarser ones, or those of the same log before the last change, `None` without any. Asks for a
+    /// repaint when there are others.
+    pub fn series(
+        &mut self,
+        loaded: &Arc<Loaded>,
+        seen_s: Option<[f64; 2]>,
+        context: &Context,
+    ) -> Option<Arc<Series>> {
         match self.coming.as_ref().map(Receiver::try_recv) {
             Some(Ok(series)) => {
                 let place = if series.closer_s.is_some() { &mut self.closer } else { &mut self.whole };
@@ -41,7 +49,9 @@ impl Desk {
         let whole = self.whole.as_ref().filter(|series| series.is_of(loaded));
         let closer = self.closer.as_ref().filter(|series| series.is_of(loaded));
         let part_s = whole.zip(seen_s).and_then(|(whole, seen_s)| part_to_show(whole.span_s, seen_s));
-        let is_close = |part_s: [f64; 2]| closer.and_then(|series| series.closer_s).is_some_and(|known_s| is_enough(known_s, part_s));
+        let is_close = |part_s: [f64; 2]| {
+            closer.and_then(|series| series.closer_s).is_some_and(|known_s| is_enough(known_s, part_s))
+        };
         if self.coming.is_none() {
             let work: Option<Box<dyn FnOnce() -> Series + Send>> = match (whole, part_s) {
                 (None, _) => {
@@ -75,7 +85,9 @@ fn with_margin(span_s: [f64; 2], part_s: [f64; 2]) -> [f64; 2] {
 }
 
 fn is_enough(known_s: [f64; 2], part_s: [f64; 2]) -> bool {
-    known_s[0] <= part_s[0] && known_s[1] >= part_s[1] && part_s[1] - part_s[0] >= LEAST_OF_CLOSER * (known_s[1] - known_s[0])
+    known_s[0] <= part_s[0]
+        && known_s[1] >= part_s[1]
+        && part_s[1] - part_s[0] >= LEAST_OF_CLOSER * (known_s[1] - known_s[0])
 }
 
 fn begin(work: impl FnOnce() -> Series + Send + 'static, context: Context) -> Receiver<Series> {
@@ -103,9 +115,12 @@ mod tests {
         let part_s = part_to_show(span_s, [5_000.0, 5_002.0]).expect("little");
         let known_s = with_margin(span_s, part_s);
         assert_eq!(known_s, [4_999.0, 5_003.0]);
-        for (seen_s, enough) in
-            [([5_000.5, 5_002.5], true), ([5_001.5, 5_003.5], false), ([5_000.0, 5_001.0], true), ([5_000.0, 5_000.5], false)]
-        {
+        for (seen_s, enough) in [
+            ([5_000.5, 5_002.5], true),
+            ([5_001.5, 5_003.5], false),
+            ([5_000.0, 5_001.0], true),
+            ([5_000.0, 5_000.5], false),
+        ] {
             assert_eq!(is_enough(known_s, seen_s), enough, "{seen_s:?}");
         }
         assert_eq!(with_margin(span_s, [100.0, 102.0]), [100.0, 103.0]);

@@ -21,7 +21,8 @@ impl Errors {
     /// From errors in order of time, so many for each point.
     pub fn of(errors: &[[f64; 2]], for_each: usize) -> Self {
         let larger = |a: [f64; 2], b: [f64; 2]| if b[1].abs() > a[1].abs() { b } else { a };
-        let points: Vec<[f64; 2]> = errors.chunks(for_each.max(1)).filter_map(|part| part.iter().copied().reduce(larger)).collect();
+        let points: Vec<[f64; 2]> =
+            errors.chunks(for_each.max(1)).filter_map(|part| part.iter().copied().reduce(larger)).collect();
         let squares: f64 = errors.iter().map(|error| error[1] * error[1]).sum();
         let largest = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
         Self { rms: (squares / errors.len().max(1) as f64).sqrt(), largest, points }

@@ -1,4 +1,5 @@
-//! When to look at a flight: often enough that nothing that a log tells is passed over, and what is left of it for a plot.
+//! When to look at a flight: often enough that nothing that a log tells is passed over, and what is left of
+//! it for a plot.
 
 use super::POINTS;
 
@@ -21,7 +22,8 @@ pub struct Instants {
 }
 
 impl Instants {
-    /// For a span with so many `rows` of the log. `marked` ones are instants of their own, and nothing is then left out.
+    /// For a span with so many `rows` of the log. `marked` ones are instants of their own, and nothing is
+    /// then left out.
     pub fn of(span_s: [f64; 2], rows: usize, marked_s: &[f64]) -> Self {
         if marked_s.is_empty() {
             let between = (rows as u64 / POINTS + 1).min(MOST_BETWEEN);
@@ -41,7 +43,8 @@ pub fn even([from_s, to_s]: [f64; 2], steps: u64) -> impl Iterator<Item = f64> {
     (0..=steps).map(move |k| from_s + (to_s - from_s) * k as f64 / steps as f64)
 }
 
-/// Of so many points at a time the least and the largest, in order of time: a line through every so-manyth would show slow waves where there are quick ones.
+/// Of so many points at a time the least and the largest, in order of time: a line through every so-manyth
+/// would show slow waves where there are quick ones.
 pub fn thinned(points: Vec<[f64; 2]>, for_each: usize) -> Vec<[f64; 2]> {
     if for_each <= 1 {
         return points;
@@ -64,14 +67,22 @@ mod tests {
 
     #[test]
     fn of_each_step_the_least_and_the_largest_are_left_in_order() {
-        let points: Vec<[f64; 2]> = [3.0, 9.0, -1.0, 2.0, 2.0, 2.0, 7.0].into_iter().enumerate().map(|(k, v)| [k as f64, v]).collect();
+        let points: Vec<[f64; 2]> = [3.0, 9.0, -1.0, 2.0, 2.0, 2.0, 7.0]
+            .into_iter()
+            .enumerate()
+            .map(|(k, v)| [k as f64, v])
+            .collect();
         assert_eq!(thinned(points.clone(), 3), [[1.0, 9.0], [2.0, -1.0], [3.0, 2.0], [6.0, 7.0]]);
         assert_eq!(thinned(points.clone(), 1), points);
         // A wave quicker than the steps keeps its height.
         let wave: Vec<[f64; 2]> = even([0.0, 1000.0], 400_000).map(|t_s| [t_s, (t_s * 37.0).sin()]).collect();
         let left = thinned(wave, 500);
         assert!(
-            left.len() > 1500 && left.chunks(2).take(799).all(|pair| pair.iter().any(|p| p[1] > 0.99) && pair.iter().any(|p| p[1] < -0.99))
+            left.len() > 1500
+                && left
+                    .chunks(2)
+                    .take(799)
+                    .all(|pair| pair.iter().any(|p| p[1] > 0.99) && pair.iter().any(|p| p[1] < -0.99))
         );
     }
 
@@ -84,6 +95,10 @@ mod tests {
             assert_eq!(found.of_ground.len(), POINTS as usize * found.for_each_of_ground + 1);
         }
         let marked = Instants::of([0.0, 800.0], 3, &[0.5, 1.0, 7.25]);
-        assert!(marked.all.len() == 803 && [0.5, 1.0, 7.25].iter().all(|t_s| marked.all.contains(t_s)) && marked.all.is_sorted());
+        assert!(
+            marked.all.len() == 803
+                && [0.5, 1.0, 7.25].iter().all(|t_s| marked.all.contains(t_s))
+                && marked.all.is_sorted()
+        );
     }
 }

@@ -59,7 +59,10 @@ impl Kept {
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 buffers: &[],
             },
-            primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..wgpu::PrimitiveState::default() },
+            primitive: wgpu::PrimitiveState {
+                topology: wgpu::PrimitiveTopology::TriangleStrip,
+                ..wgpu::PrimitiveState::default()
+            },
             depth_stencil: None,
             multisample: wgpu::MultisampleState::default(),
             fragment: Some(wgpu::FragmentState {
@@ -89,10 +92,17 @@ impl Kept {
     }
 
     /// The slot of a place with the picture in it; what is there already stays.
-    fn fill(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, place: Place, image: &Arc<ColorImage>) -> &Slot {
+    fn fill(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        place: Place,
+        image: &Arc<ColorImage>,
+    ) -> &Slot {
         let before = self.slots.remove(&place).filter(|slot| slot.image.size == image.size);
         let is_there = before.as_ref().is_some_and(|slot| Arc::ptr_eq(&slot.image, image));
-        let slot = before.map_or_else(|| self.slot(device, image), |slot| Slot { image: image.clone(), ..slot });
+        let slot =
+            before.map_or_else(|| self.slot(device, image), |slot| Slot { image: image.clone(), ..slot });
         if !is_there {
             upload(queue, &slot.texture, image);
         }
@@ -137,12 +147,19 @@ fn extent(image: &ColorImage) -> wgpu::Extent3d {
 }
 
 fn upload(queue: &wgpu::Queue, texture: &wgpu::Texture, image: &ColorImage) {
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * image.size[0] as u32), rows_per_image: None };
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(4 * image.size[0] as u32),
+        rows_per_image: None,
+    };
     queue.write_texture(texture.as_image_copy(), image.as_raw(), layout, extent(image));
 }
 
 impl CallbackTrait for Blit {
-    #[expect(clippy::disallowed_methods, reason = "sixteen bytes a pass on egui's device, which has no recorder")]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "sixteen bytes a pass on egui's device, which has no recorder"
+    )]
     fn prepare(
         &self,
         device: &wgpu::Device,
@@ -159,7 +176,12 @@ impl CallbackTrait for Blit {
         Vec::new()
     }
 
-    fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, resources: &CallbackResources) {
+    fn paint(
+        &self,
+        _info: PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
         let Some(kept) = resources.get::<Kept>() else { return };
         let Some(slot) = kept.slots.get(&self.place) else { return };
         pass.set_pipeline(&kept.pipeline);

@@ -1,4 +1,5 @@
-//! What becomes of each kind of file that is dropped. Without an engine: whether a file can be read is told by whoever loads it.
+//! What becomes of each kind of file that is dropped. Without an engine: whether a file can be read is told
+//! by whoever loads it.
 
 use std::path::{Path, PathBuf};
 
@@ -58,12 +59,21 @@ fn each_kind_of_file_becomes_what_it_is() {
         drop::take(&mut state, &path);
         let document = state.document.as_ref().expect("open");
         // Of the calibration, that its pose is not taken.
-        assert!(state.notices.iter().all(|notice| word == "481" && notice.contains("T_BS")), "{}: {:?}", path.display(), state.notices);
+        assert!(
+            state.notices.iter().all(|notice| word == "481" && notice.contains("T_BS")),
+            "{}: {:?}",
+            path.display(),
+            state.notices
+        );
         let text = toml::to_string(&*document.scenario).expect("text");
         assert!(text.contains(word), "{}: {text}", path.display());
         assert!(state.is_unsaved(), "and it can be undone: {}", path.display());
         send(&mut state, Message::Undo);
-        assert!(!toml::to_string(&*state.document.as_ref().expect("open").scenario).expect("text").contains(word), "{}", path.display());
+        assert!(
+            !toml::to_string(&*state.document.as_ref().expect("open").scenario).expect("text").contains(word),
+            "{}",
+            path.display()
+        );
     }
 }
 
@@ -75,7 +85,10 @@ fn a_target_takes_the_place_of_a_board_that_has_parameters_of_its_own() {
         "target.yaml",
         "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\ncolSpacingMeters: 0.07\n",
     );
-    for own in ["kind = \"chessboard\"\ncolumns = 9\nrows = 6\nsize_m = 2.0\nmargin_m = 1.0", "target = \"other.yaml\"\nmargin_m = 1.0"] {
+    for own in [
+        "kind = \"chessboard\"\ncolumns = 9\nrows = 6\nsize_m = 2.0\nmargin_m = 1.0",
+        "target = \"other.yaml\"\nmargin_m = 1.0",
+    ] {
         let mut state = state(Some(demo()));
         let place = "at = [10.0, 20.0, -30.0]\nangles_deg = [0.0, 90.0, 45.0]";
         let board: toml::Value = toml::Value::Table(format!("{own}\n{place}").parse().expect("toml"));
@@ -87,7 +100,12 @@ fn a_target_takes_the_place_of_a_board_that_has_parameters_of_its_own() {
         let scenario = state.document.as_ref().expect("open").scenario.clone();
         let board = scenario.scene.board.as_ref().expect("a board");
         let there = before.scene.board.as_ref().expect("a board");
-        let expected = BoardSpec { target: Some(target.clone()), at: there.at, angles_deg: there.angles_deg, ..BoardSpec::default() };
+        let expected = BoardSpec {
+            target: Some(target.clone()),
+            at: there.at,
+            angles_deg: there.angles_deg,
+            ..BoardSpec::default()
+        };
         assert_eq!(board, &expected, "what was on the other board is gone, its place stays");
         camsim_io::board_file::read_board(board).expect("Kalibr's board");
         send(&mut state, Message::Undo);
@@ -102,7 +120,12 @@ fn without_a_scenario_each_says_what_it_needs() {
     for path in parts(folder.path()).into_iter().map(|(path, _)| path).chain([picture]) {
         let mut state = state(None);
         drop::take(&mut state, &path);
-        assert!(state.notices.len() == 1 && state.notices[0].contains("open a scenario first"), "{}: {:?}", path.display(), state.notices);
+        assert!(
+            state.notices.len() == 1 && state.notices[0].contains("open a scenario first"),
+            "{}: {:?}",
+            path.display(),
+            state.notices
+        );
         assert!(state.document.is_none() && state.dropped_picture.is_none());
     }
     let mut state = state(None);
@@ -113,8 +136,9 @@ fn without_a_scenario_each_says_what_it_needs() {
 #[test]
 fn folders_empty_files_and_those_that_are_gone_are_told_and_change_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (path, _) in
-        parts(folder.path()).into_iter().chain([(write(folder.path(), "p.png", "x"), ""), (write(folder.path(), "s.toml", "x"), "")])
+    for (path, _) in parts(folder.path())
+        .into_iter()
+        .chain([(write(folder.path(), "p.png", "x"), ""), (write(folder.path(), "s.toml", "x"), "")])
     {
         let mut state = state(Some(demo()));
         let before = state.document.as_ref().expect("open").scenario.clone();
@@ -126,8 +150,14 @@ fn folders_empty_files_and_those_that_are_gone_are_told_and_change_nothing() {
             }
             drop::take(&mut state, &path);
             let notice = state.notices.last().cloned().unwrap_or_default();
-            assert!(notice.contains(told) && notice.contains(&path.display().to_string()), "{}: {notice}", path.display());
-            assert!(state.document.as_ref().expect("open").scenario == before && state.dropped_picture.is_none());
+            assert!(
+                notice.contains(told) && notice.contains(&path.display().to_string()),
+                "{}: {notice}",
+                path.display()
+            );
+            assert!(
+                state.document.as_ref().expect("open").scenario == before && state.dropped_picture.is_none()
+            );
         }
     }
 }
@@ -152,7 +182,10 @@ fn of_files_dropped_together_the_scenario_comes_first_and_pictures_wait_for_each
     assert_eq!(state.dropped_picture.as_ref(), Some(&first));
     assert!(state.notices.len() == 1 && state.notices[0].contains("2.png"), "{:?}", state.notices);
     send(&mut state, Message::UsePicture(Some("camera.photometric.vignette")));
-    assert_eq!(state.document.as_ref().expect("open").scenario.camera.photometric.vignette.as_ref(), Some(&first));
+    assert_eq!(
+        state.document.as_ref().expect("open").scenario.camera.photometric.vignette.as_ref(),
+        Some(&first)
+    );
     for (_, key) in drop::PICTURE_USES {
         let mut state = self::state(Some(demo.clone()));
         drop::take(&mut state, &second);
@@ -165,10 +198,17 @@ fn of_files_dropped_together_the_scenario_comes_first_and_pictures_wait_for_each
 #[test]
 fn a_calibration_keeps_what_it_does_not_tell() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (calibration, _) = parts(folder.path()).into_iter().find(|(path, _)| path.ends_with("sensor.yaml")).expect("one of them");
+    let (calibration, _) = parts(folder.path())
+        .into_iter()
+        .find(|(path, _)| path.ends_with("sensor.yaml"))
+        .expect("one of them");
     let mut state = state(Some(demo()));
     let before = state.document.as_ref().expect("open").scenario.camera.clone();
-    assert!(before.shutter.readout_ms > 0.0 && before.photometric.noise_sigma > 0.0 && before.photometric.vignette.is_some());
+    assert!(
+        before.shutter.readout_ms > 0.0
+            && before.photometric.noise_sigma > 0.0
+            && before.photometric.vignette.is_some()
+    );
     drop::take(&mut state, &calibration);
     let after = state.document.as_ref().expect("open").scenario.camera.clone();
     assert_eq!((after.size_px, after.focal_px), ([752, 481], [458.654, 457.296]));
@@ -176,7 +216,11 @@ fn a_calibration_keeps_what_it_does_not_tell() {
     assert_eq!(after.photometric.noise_sigma, before.photometric.noise_sigma);
     assert_eq!(after.photometric.vignette, None, "that was the other lens's");
     // A camera file of camsim's own tells all of it.
-    let (own, _) = parts(folder.path()).into_iter().find(|(path, _)| path.ends_with("lens.toml")).expect("one of them");
+    let (own, _) =
+        parts(folder.path()).into_iter().find(|(path, _)| path.ends_with("lens.toml")).expect("one of them");
     drop::take(&mut state, &own);
-    assert_eq!(state.document.as_ref().expect("open").scenario.camera.shutter, camsim_core::scenario::ShutterSpec::default());
+    assert_eq!(
+        state.document.as_ref().expect("open").scenario.camera.shutter,
+        camsim_core::scenario::ShutterSpec::default()
+    );
 }

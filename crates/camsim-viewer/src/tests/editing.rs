@@ -21,7 +21,9 @@ fn an_edit_gives_a_new_frame_and_undo_the_old_one() {
     window.step();
     assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 30.0);
     assert!(has(&window, &format!("reset {key}")), "what is changed can be reset");
-    window.wait("a preview", |state| shown(state).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 30.0));
+    window.wait("a preview", |state| {
+        shown(state).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 30.0)
+    });
     window.settle();
     let after = window.state().heard.picture().expect("a picture");
     assert_ne!(after.frame.color_rgba, before);
@@ -29,7 +31,11 @@ fn an_edit_gives_a_new_frame_and_undo_the_old_one() {
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     window.step();
     window.settle();
-    assert_eq!(window.state().heard.picture().expect("a picture").frame.color_rgba, before, "undone to the last bit");
+    assert_eq!(
+        window.state().heard.picture().expect("a picture").frame.color_rgba,
+        before,
+        "undone to the last bit"
+    );
     window.click("Redo");
     assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 30.0);
     window.click(&format!("reset {key}"));
@@ -46,7 +52,11 @@ fn what_is_not_legal_is_told_where_it_stands_and_the_picture_stays() {
     window.settle();
     let problem = window.state().document.as_ref().expect("open").problems[0].message.clone();
     assert!(window.harness.query_all_by_label(&problem).next().is_some(), "{problem}");
-    assert!(shown(window.state()).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 8.0 && wanted.size == Size::Full));
+    assert!(
+        shown(window.state()).is_some_and(
+            |wanted| wanted.scenario.camera.shutter.exposure_ms == 8.0 && wanted.size == Size::Full
+        )
+    );
 }
 
 #[test]
@@ -56,7 +66,10 @@ fn saved_and_opened_again_it_is_the_same() {
     let demo = camsim_io::builtin::unpack(folder.path()).expect("unpacked");
     let mut window = Window::open(Some(demo));
     window.settle();
-    send(&mut window, Message::Set("camera.lens.coefficients".into(), Some(Value::Array(vec![Value::Float(0.1)])), false));
+    send(
+        &mut window,
+        Message::Set("camera.lens.coefficients".into(), Some(Value::Array(vec![Value::Float(0.1)])), false),
+    );
     let saved = folder.path().join("mine.toml");
     window.click("Save");
     window.harness.get_by_label("path").set_text_value_accesskit(&saved.display().to_string());
@@ -109,10 +122,17 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     // A camera of camsim's own, and a log that is none: the engine says so, and the next good one is shown.
     let camera = write("camera.toml", "size_px = [320, 240]\nfocal_px = [200.0, 200.0]\n");
     send(&mut window, Message::Drop(camera));
-    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.size_px, [320, 240], "{:?}", window.state().notices);
+    assert_eq!(
+        window.state().document.as_ref().expect("open").scenario.camera.size_px,
+        [320, 240],
+        "{:?}",
+        window.state().notices
+    );
     let log = write("none.csv", "this is,no log\n");
     send(&mut window, Message::Drop(log));
-    window.wait("the fault", |state| state.heard.fault.as_deref().is_some_and(|fault| fault.contains("none.csv")));
+    window.wait("the fault", |state| {
+        state.heard.fault.as_deref().is_some_and(|fault| fault.contains("none.csv"))
+    });
     send(&mut window, Message::Undo);
     window.settle();
     assert!(window.state().heard.fault.is_none());
@@ -137,7 +157,9 @@ fn text_goes_to_the_clipboard() {
             _ => None,
         })
     };
-    for (button, told) in [("as TOML", "readout_ms = 0.0"), ("as command line", "--set camera.shutter.readout_ms=0.0")] {
+    for (button, told) in
+        [("as TOML", "readout_ms = 0.0"), ("as command line", "--set camera.shutter.readout_ms=0.0")]
+    {
         window.click("Copy");
         window.harness.get_by_label(button).click();
         let mut found = None;
@@ -156,13 +178,21 @@ fn what_render_would_warn_of_is_on_show() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     let shown = |window: &Window| window.harness.query_all_by_label_contains("warning").count();
-    assert_eq!((shown(&window), &window.state().heard.loaded.as_ref().expect("loaded").warnings), (0, &Vec::new()));
+    assert_eq!(
+        (shown(&window), &window.state().heard.loaded.as_ref().expect("loaded").warnings),
+        (0, &Vec::new())
+    );
     send(&mut window, Message::Set("tracker.max_acceleration_m_s2".into(), Some(Value::Float(0.2)), false));
     window.settle();
     let warnings = window.state().heard.loaded.as_ref().expect("loaded").warnings.clone();
-    let told = warnings.iter().find(|warning| warning.contains("tracker.max_acceleration_m_s2")).expect("held back");
+    let told =
+        warnings.iter().find(|warning| warning.contains("tracker.max_acceleration_m_s2")).expect("held back");
     assert!(!has(&window, told));
-    window.click(&if warnings.len() == 1 { "1 warning".to_owned() } else { format!("{} warnings", warnings.len()) });
+    window.click(&if warnings.len() == 1 {
+        "1 warning".to_owned()
+    } else {
+        format!("{} warnings", warnings.len())
+    });
     assert!(has(&window, told));
     send(&mut window, Message::Undo);
     window.settle();

@@ -42,7 +42,10 @@ pub fn long_flight(folder: &Path) -> PathBuf {
     for second in (0..36_000).filter(|second| !(5_000..5_060).contains(second)) {
         let angle = f64::from(second) * 0.01;
         let [north_m, east_m] = [900.0 * angle.cos(), 900.0 * angle.sin()];
-        log += &format!("{second},{north_m:.3},{east_m:.3},-500,0,0,{:.3}\n", (angle.to_degrees() + 90.0) % 360.0);
+        log += &format!(
+            "{second},{north_m:.3},{east_m:.3},-500,0,0,{:.3}\n",
+            (angle.to_degrees() + 90.0) % 360.0
+        );
     }
     std::fs::write(folder.join("long.csv"), log).expect("written");
     let pattern = std::fs::read_to_string(folder.join("pattern.toml")).expect("text");
@@ -71,11 +74,20 @@ impl Window {
     }
 
     /// With pictures drawn by their own pipeline, as in a window of eframe's, or by egui.
-    pub fn drawn(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2], by_own_pipeline: bool) -> Self {
+    pub fn drawn(
+        scenario: Option<PathBuf>,
+        exporter: Option<Exporter>,
+        size: [f32; 2],
+        by_own_pipeline: bool,
+    ) -> Self {
         let mut start = Some((scenario, exporter));
-        // egui's predictable filter takes the nearest texel also where a picture is made smaller; a window of eframe's does not.
+        // egui's predictable filter takes the nearest texel also where a picture is made smaller; a window of
+        // eframe's does not.
         let of_window = RendererOptions { dithering: false, ..RendererOptions::default() };
-        let render = create_render_state(default_wgpu_setup(), if by_own_pipeline { RendererOptions::PREDICTABLE } else { of_window });
+        let render = create_render_state(
+            default_wgpu_setup(),
+            if by_own_pipeline { RendererOptions::PREDICTABLE } else { of_window },
+        );
         let of_window = render.clone();
         let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
             if let Some((scenario, exporter)) = start.take() {
@@ -89,7 +101,8 @@ impl Window {
             viewer.as_mut().expect("made in the first pass").show(ui);
         };
         let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
-        let harness = builder.renderer(WgpuTestRenderer::from_render_state(render)).build_ui_state(show, None);
+        let harness =
+            builder.renderer(WgpuTestRenderer::from_render_state(render)).build_ui_state(show, None);
         let (sender, repaints) = channel();
         harness.ctx.set_request_repaint_callback(move |_| {
             // The window may be gone.
@@ -174,13 +187,14 @@ impl Window {
         self.harness.render().expect("rendered")
     }
 
-    /// Holds a part of the window against its picture in `tests/snapshots`: what tells times, paths or noise is left out. Fonts and lines may
-    /// differ a little between drivers.
+    /// Holds a part of the window against its picture in `tests/snapshots`: what tells times, paths or noise
+    /// is left out. Fonts and lines may differ a little between drivers.
     #[track_caller]
     pub fn snapshot(&mut self, name: &str, part: egui::Rect) {
         self.harness.check_accessibility();
         let whole = self.picture();
-        let [x, y, width, height] = [part.left(), part.top(), part.width(), part.height()].map(|v| v.max(0.0).round() as u32);
+        let [x, y, width, height] =
+            [part.left(), part.top(), part.width(), part.height()].map(|v| v.max(0.0).round() as u32);
         let part = image::imageops::crop_imm(&whole, x, y, width, height).to_image();
         let options = SnapshotOptions::new().threshold(1.5).max_failed_pixels(200_usize);
         egui_kittest::image_snapshot_options(&part, name, &options);

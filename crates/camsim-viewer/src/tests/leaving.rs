@@ -42,11 +42,29 @@ fn closing_asks_once() {
     use eframe::egui::{ViewportCommand, ViewportEvent};
     let mut window = changed();
     let close = |window: &mut Window| {
-        window.harness.input_mut().viewports.entry(eframe::egui::ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
+        window
+            .harness
+            .input_mut()
+            .viewports
+            .entry(eframe::egui::ViewportId::ROOT)
+            .or_default()
+            .events
+            .push(ViewportEvent::Close);
         window.step();
-        window.harness.input_mut().viewports.entry(eframe::egui::ViewportId::ROOT).or_default().events.clear();
+        window
+            .harness
+            .input_mut()
+            .viewports
+            .entry(eframe::egui::ViewportId::ROOT)
+            .or_default()
+            .events
+            .clear();
         let output = window.harness.output();
-        output.viewport_output.values().flat_map(|viewport| &viewport.commands).any(|command| *command == ViewportCommand::CancelClose)
+        output
+            .viewport_output
+            .values()
+            .flat_map(|viewport| &viewport.commands)
+            .any(|command| *command == ViewportCommand::CancelClose)
     };
     assert!(close(&mut window), "held back");
     assert_eq!(window.state().leaving, Some(Leaving::Closing));
@@ -66,7 +84,11 @@ fn hours_of_flight_need_not_be_waited_for() {
     window.wait("reading", |state| state.heard.busy.contains("long.csv"));
     send(&mut window, Message::Open(pattern()));
     window.settle();
-    assert!(window.state().timeline.frames < 1_000_000 && window.state().heard.fault.is_none() && window.state().notices.is_empty());
+    assert!(
+        window.state().timeline.frames < 1_000_000
+            && window.state().heard.fault.is_none()
+            && window.state().notices.is_empty()
+    );
     assert_eq!(window.state().document.as_ref().expect("open").path, pattern());
     window.wait("no word of it", |state| state.heard.busy.is_empty());
 }

@@ -19,7 +19,12 @@ fn type_into(window: &mut Window, name: &str, text: &str) {
 }
 
 fn press(window: &mut Window, at: Pos2, pressed: bool) {
-    window.harness.event(Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE });
+    window.harness.event(Event::PointerButton {
+        pos: at,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    });
     window.step();
 }
 
@@ -83,7 +88,8 @@ fn a_drag_that_goes_on_at_the_end_is_told() {
     send(&mut window, Message::Undo);
     window.step();
     assert!(
-        window.state().refused.is_none() && window.state().document.as_ref().expect("open").scenario.camera.photometric.noise_sigma < 1.0
+        window.state().refused.is_none()
+            && window.state().document.as_ref().expect("open").scenario.camera.photometric.noise_sigma < 1.0
     );
 }
 
@@ -135,7 +141,11 @@ fn times_speeds_and_whole_numbers_are_told_too() {
     let last = window.state().timeline.last();
     type_into(&mut window, "time", "1e6");
     assert_eq!(window.state().timeline.frame, last);
-    assert!(window.state().refused.as_ref().is_some_and(|refusal| refusal.name == "time"), "{:?}", window.state().refused);
+    assert!(
+        window.state().refused.as_ref().is_some_and(|refusal| refusal.name == "time"),
+        "{:?}",
+        window.state().refused
+    );
     window.harness.get_by_label("speed").set_value_accesskit(99.0);
     (0..3).for_each(|_| window.step());
     assert_eq!(window.state().timeline.speed, 10.0);

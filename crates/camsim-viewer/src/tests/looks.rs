@@ -10,7 +10,9 @@ use crate::{message::Message, view::Tab};
 
 /// From the top of one label to the bottom of another, over the width of a pane.
 fn rows(window: &Window, x: [f32; 2], first: &str, last: &str) -> Rect {
-    let rect = |label: &str| window.harness.query_all_by_label(label).next().unwrap_or_else(|| panic!("no {label}")).rect();
+    let rect = |label: &str| {
+        window.harness.query_all_by_label(label).next().unwrap_or_else(|| panic!("no {label}")).rect()
+    };
     Rect::from_min_max(pos2(x[0], rect(first).top() - 3.0), pos2(x[1], rect(last).bottom() + 3.0))
 }
 
@@ -25,7 +27,10 @@ fn panes_look_as_they_did() {
 
     let menu = window.harness.get_by_label("Open").rect().union(window.harness.get_by_label("?").rect());
     window.snapshot("menu", menu.expand(4.0));
-    send(&mut window, Message::Set("camera.shutter.exposure_ms".into(), Some(toml::Value::Float(-1.0)), false));
+    send(
+        &mut window,
+        Message::Set("camera.shutter.exposure_ms".into(), Some(toml::Value::Float(-1.0)), false),
+    );
     window.step();
     window.settle();
     let part = rows(&window, [4.0, 304.0], "camera.lens", "interlace_ms");
@@ -33,12 +38,16 @@ fn panes_look_as_they_did() {
     let notice = "a notice, until somebody reads it";
     window.state_mut().notice(notice.into());
     window.step();
-    let part = Rect::from_min_max(pos2(308.0, 28.0), window.harness.get_by_label(notice).rect().right_bottom() + egui::vec2(4.0, 4.0));
+    let part = Rect::from_min_max(
+        pos2(308.0, 28.0),
+        window.harness.get_by_label(notice).rect().right_bottom() + egui::vec2(4.0, 4.0),
+    );
     window.snapshot("notices", part);
     send(&mut window, Message::Dismiss(0));
     send(&mut window, Message::Undo);
     window.settle_exact();
-    let part = window.harness.get_by_label("single").rect().union(window.harness.get_by_label("depth").rect());
+    let part =
+        window.harness.get_by_label("single").rect().union(window.harness.get_by_label("depth").rect());
     let pane = window.harness.get_by_label("picture").rect();
     window.snapshot("toolbar", Rect::from_x_y_ranges(pane.x_range(), part.expand(3.0).y_range()));
     window.state_mut().pinned = Some([400, 300]);

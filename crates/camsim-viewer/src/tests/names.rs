@@ -52,14 +52,16 @@ fn every_control_of_every_pane_has_a_name() {
     for compare in Compare::ALL {
         let view = &mut window.state_mut().view;
         (view.compare, view.a, view.b) = (compare, Stage::Photometric, Stage::Lens);
-        view.overlays = Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
+        view.overlays =
+            Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
         window.step();
         window.harness.check_accessibility();
     }
     window.state_mut().view.compare = Compare::Single;
     window.state_mut().notice("something".into());
     for question in [true, false] {
-        window.state_mut().question = Some(Question { saves: question, path: folder.path().display().to_string() });
+        window.state_mut().question =
+            Some(Question { saves: question, path: folder.path().display().to_string() });
         (0..3).for_each(|_| window.step());
         assert!(has(&window, "Browse..."));
         window.harness.check_accessibility();
@@ -81,8 +83,10 @@ fn every_key_of_the_format_has_an_editor_with_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::with(Some(everything(folder.path())), None, SIZE);
     window.settle();
-    let closed: Vec<&str> =
-        section_names().into_iter().filter(|name| !["camera.lens", "camera.shutter", "camera.photometric"].contains(name)).collect();
+    let closed: Vec<&str> = section_names()
+        .into_iter()
+        .filter(|name| !["camera.lens", "camera.shutter", "camera.photometric"].contains(name))
+        .collect();
     for name in closed {
         // A key may be called as a section further down is.
         let header = window.harness.query_all_by_label(name).last().expect("a section");
@@ -93,7 +97,8 @@ fn every_key_of_the_format_has_an_editor_with_its_name() {
     (0..40).for_each(|_| window.step());
     window.harness.check_accessibility();
     let elements = |key: &str| {
-        let list = keys().iter().find(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
+        let list =
+            keys().iter().find(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
         list.map_or_else(|| key.to_owned(), |(list, _)| key.replacen(list, &format!("{list}.0"), 1))
     };
     let labels: Vec<String> = window

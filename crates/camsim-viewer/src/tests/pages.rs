@@ -30,20 +30,28 @@ fn the_inspector_tells_what_the_pixel_sees() {
     let camera = CameraModel::from_spec(&scenario.camera).expect("a camera");
     let uv = camera.unproject(DVec2::new(300.0, 400.0)).expect("a ray");
     assert!(has(&window, &format!("{:.6}, {:.6}", uv.x, uv.y)), "the ray");
-    let shutter = Shutter::from_spec(&scenario.camera.shutter, scenario.camera.fps, scenario.camera.size_px).expect("a shutter");
+    let shutter = Shutter::from_spec(&scenario.camera.shutter, scenario.camera.fps, scenario.camera.size_px)
+        .expect("a shutter");
     assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_line_s(400))), "the row's time");
     assert!(has(&window, "terrain"));
-    let [r, g, b, a] = window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
+    let [r, g, b, a] =
+        window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
     assert_eq!(a, 255);
     assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
     // Asked for with the pixel: what the plan's dry runs around it say, which the oracle's source bears out.
     window.settle_exact();
-    window.wait("its errors", |state| state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty()));
+    window.wait("its errors", |state| {
+        state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty())
+    });
     let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
     let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
     let around_px = map.around_px(pixel).expect("ground");
     // The plan answers for the frames that are made like this one too.
-    assert!(around_px > 0.0 && around_px <= map.largest_px() && map.largest_px() <= plan.predicted.total_px + 1e-9);
+    assert!(
+        around_px > 0.0
+            && around_px <= map.largest_px()
+            && map.largest_px() <= plan.predicted.total_px + 1e-9
+    );
     assert!(has(&window, &format!("{around_px:.5} px")), "what is predicted here");
     window.harness.key_press(Key::Escape);
     window.step();
@@ -73,7 +81,9 @@ fn plan_plots_map_and_export_have_what_they_should() {
     window.click("Plan");
     assert!(has(&window, "- readback"), "the last pass");
     assert!(has(&window, "predicted error"));
-    let is_broken = |window: &Window| window.harness.query_all_by_label_contains("the tolerance is NOT KEPT: ").next().is_some();
+    let is_broken = |window: &Window| {
+        window.harness.query_all_by_label_contains("the tolerance is NOT KEPT: ").next().is_some()
+    };
     assert!(!is_broken(&window));
     send(&mut window, Message::Set("quality.max_error_dn".into(), Some(toml::Value::Float(0.02)), false));
     window.settle();
@@ -132,7 +142,11 @@ fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
     let seen: Arc<Mutex<Vec<Seen>>> = Arc::default();
     let of_exporter = seen.clone();
     let exporter: crate::Exporter = Arc::new(move |job| {
-        of_exporter.lock().expect("one at a time").push((job.scenario.output.clone(), job.frames, job.folder.clone()));
+        of_exporter.lock().expect("one at a time").push((
+            job.scenario.output.clone(),
+            job.frames,
+            job.folder.clone(),
+        ));
         Ok("all written".into())
     });
     let mut window = Window::with(Some(pattern()), Some(exporter), [1280.0, 800.0]);
@@ -158,7 +172,11 @@ fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
     let flip = |set: bool| !set;
     let mut expected = before.clone();
     for channel in [Channel::Depth, Channel::Coords] {
-        if flip(before.channels.contains(&channel)) { expected.channels.push(channel) } else { expected.channels.retain(|c| *c != channel) }
+        if flip(before.channels.contains(&channel)) {
+            expected.channels.push(channel)
+        } else {
+            expected.channels.retain(|c| *c != channel)
+        }
     }
     let png = ImageFormat::Png;
     if flip(before.format.contains(&png)) {
@@ -169,7 +187,8 @@ fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
     (expected.exr_pixel, expected.exr_compression) = (ExrPixel::Float, ExrCompression::Piz);
     expected.channels.sort_by_key(|channel| *channel as u8);
     // What the page says of it is what `camsim render` would be told.
-    let commands: Vec<_> = window.harness.query_all_by_label_contains("--frames 3..8 -o '/tmp/some where'").collect();
+    let commands: Vec<_> =
+        window.harness.query_all_by_label_contains("--frames 3..8 -o '/tmp/some where'").collect();
     assert_eq!(commands.len(), 1);
     window.click("Render");
     window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
@@ -209,17 +228,26 @@ fn small_large_and_minimised_windows_behave() {
         window.step();
     }
     // The picture keeps its place: pages, then parameters, go before they would lie on it.
-    for (width, pages, parameters) in [(500.0, false, false), (700.0, false, true), (900.0, true, true), (1000.0, true, true)] {
+    for (width, pages, parameters) in
+        [(500.0, false, false), (700.0, false, true), (900.0, true, true), (1000.0, true, true)]
+    {
         window.harness.set_size(egui::vec2(width, 700.0));
         (0..3).for_each(|_| window.step());
-        assert_eq!((has(&window, "Export"), has(&window, "camera preset")), (pages, parameters), "at {width}");
+        assert_eq!(
+            (has(&window, "Export"), has(&window, "camera preset")),
+            (pages, parameters),
+            "at {width}"
+        );
         let picture = window.harness.get_by_label("picture").rect();
         assert!(picture.width() > 100.0, "{picture} at {width}");
         if pages {
             assert!(window.harness.get_by_label("Pixel").rect().left() > picture.right(), "at {width}");
         }
         if parameters {
-            assert!(window.harness.get_by_label("camera preset").rect().right() < picture.left(), "at {width}");
+            assert!(
+                window.harness.get_by_label("camera preset").rect().right() < picture.left(),
+                "at {width}"
+            );
         }
     }
     // A minimised window gets no passes; the clock then jumps, and play goes on from where it was.

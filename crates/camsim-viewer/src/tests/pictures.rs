@@ -28,7 +28,8 @@ fn the_picture_on_show_is_what_render_writes() {
     let scenario = read_scenario(&demo(), &[], None).expect("legal");
     let sequence = load_sequence(&scenario).expect("loaded").sequence;
     let engine = Engine::new(AdapterChoice::Best).expect("an adapter");
-    let mut session = engine.session::<Infallible>(Arc::clone(&sequence), &scenario.output.channels).expect("a session");
+    let mut session =
+        engine.session::<Infallible>(Arc::clone(&sequence), &scenario.output.channels).expect("a session");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("frame.png");
     let mut write = |finished: camsim_gpu::engine::Finished| {
@@ -70,7 +71,9 @@ fn codes_on_the_screen(window: &mut Window, pixels_per_point: f32) {
             let (px, py) = (width / 2 - 20 + x, height / 2 - 20 + y);
             let at = [origin.x + px as f32 + 0.5, origin.y + py as f32 + 0.5].map(|v| v.floor() as u32);
             all += 1;
-            same += u32::from(screen.get_pixel(at[0], at[1]).0[..3] == image.pixels[py * width + px].to_array()[..3]);
+            same += u32::from(
+                screen.get_pixel(at[0], at[1]).0[..3] == image.pixels[py * width + px].to_array()[..3],
+            );
         }
     }
     assert_eq!(same, all, "pixels with the codes of the picture");
@@ -85,18 +88,23 @@ fn both_ways_of_drawing_agree_at_any_zoom() {
         // Invalid pixels show what is behind them.
         window.state_mut().view.overlays.invalid = true;
         let mut screens = Vec::new();
-        for (compare, zoom) in [(Compare::Single, Some(0.4)), (Compare::Wipe, Some(3.0)), (Compare::SideBySide, Some(17.0))] {
-            window.state_mut().view = View { compare, zoom, centre: [0.31, 0.62], b: Stage::Lens, ..window.state().view.clone() };
+        for (compare, zoom) in
+            [(Compare::Single, Some(0.4)), (Compare::Wipe, Some(3.0)), (Compare::SideBySide, Some(17.0))]
+        {
+            window.state_mut().view =
+                View { compare, zoom, centre: [0.31, 0.62], b: Stage::Lens, ..window.state().view.clone() };
             window.settle();
             window.step();
             let pane = window.harness.get_by_label("picture").rect();
-            let [x, y, width, height] = [pane.left(), pane.top(), pane.width(), pane.height()].map(|v| v.round() as u32);
+            let [x, y, width, height] =
+                [pane.left(), pane.top(), pane.width(), pane.height()].map(|v| v.round() as u32);
             screens.push(image::imageops::crop_imm(&window.picture(), x, y, width, height).to_image());
         }
         screens
     });
     for (step, (own, of_egui)) in own.iter().zip(&of_egui).enumerate() {
-        // Where a texel ends between two pixels of the screen either may show it; smooth ones are rounded otherwise.
+        // Where a texel ends between two pixels of the screen either may show it; smooth ones are rounded
+        // otherwise.
         let far = |(a, b): &(&image::Rgba<u8>, &image::Rgba<u8>)| (0..3).any(|k| a.0[k].abs_diff(b.0[k]) > 2);
         let differing = own.pixels().zip(of_egui.pixels()).filter(far).count();
         assert!(differing * 500 < own.pixels().len(), "{differing} of {} in step {step}", own.pixels().len());
@@ -138,7 +146,8 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
     let mut window = Window::open(Some(pattern()));
     window.settle_exact();
     let plain = window.picture();
-    let overlays = Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
+    let overlays =
+        Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
     for (name, only) in [
         ("grid", Overlays { grid: true, ..Overlays::default() }),
         ("motion", Overlays { motion: true, ..Overlays::default() }),
@@ -171,17 +180,29 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
             && without.get_pixel(*x, (pane.center().y + 20.0) as u32) != *pixel
     };
     let row = (pane.center().y + 20.0) as u32;
-    assert!(with.enumerate_pixels().filter(|(_, y, _)| *y == row).filter(differs).count() >= 5, "row times right of the line");
-    window.state_mut().view = View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
+    assert!(
+        with.enumerate_pixels().filter(|(_, y, _)| *y == row).filter(differs).count() >= 5,
+        "row times right of the line"
+    );
+    window.state_mut().view =
+        View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
     window.settle();
-    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truths.first().cloned()).expect("depth");
+    let truth = window
+        .state()
+        .heard
+        .shown
+        .as_ref()
+        .and_then(|shown| shown.reply.truths.first().cloned())
+        .expect("depth");
     assert_eq!(truth.depth_m.len(), 640 * 480);
     assert!(truth.depth_m.iter().any(|depth| *depth > 100.0));
 }
 
 /// Whether what is predicted of the pictures on show has come.
 fn has_errors(state: &State) -> bool {
-    state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty() && shown.errors.len() == shown.reply.pictures.len())
+    state.heard.shown.as_ref().is_some_and(|shown| {
+        !shown.reply.errors.is_empty() && shown.errors.len() == shown.reply.pictures.len()
+    })
 }
 
 #[test]
@@ -194,18 +215,29 @@ fn the_oracle_draws_strip_by_strip_and_agrees() {
     window.click("B: oracle");
     window.settle();
     window.wait("all rows", |state| {
-        state.heard.current_exact().is_some_and(|exact| exact.picture.rows == 24 && exact.picture.difference.is_some())
+        state
+            .heard
+            .current_exact()
+            .is_some_and(|exact| exact.picture.rows == 24 && exact.picture.difference.is_some())
     });
     let (difference, _) = window.state().heard.difference(true).expect("a difference");
     let predicted_dn = window.state().heard.picture().expect("a picture").plan.predicted.picture_dn();
     // The oracle's pixels have a standard error of a quarter of max_error_dn, which is 1.
-    assert!(difference.rms_dn < predicted_dn.max(1.0) + 0.5, "{} of {predicted_dn} predicted", difference.rms_dn);
+    assert!(
+        difference.rms_dn < predicted_dn.max(1.0) + 0.5,
+        "{} of {predicted_dn} predicted",
+        difference.rms_dn
+    );
     assert_eq!(window.state().view.compare, Compare::Difference);
 }
 
 /// The pattern by a camera of 32 x 24 pixels.
 fn small(folder: &std::path::Path) -> std::path::PathBuf {
-    let sets = [("camera.size_px", "[32, 24]"), ("camera.focal_px", "[28.0, 28.0]"), ("camera.principal_point_px", "[15.5, 11.5]")];
+    let sets = [
+        ("camera.size_px", "[32, 24]"),
+        ("camera.focal_px", "[28.0, 28.0]"),
+        ("camera.principal_point_px", "[15.5, 11.5]"),
+    ];
     let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
     let scenario = read_scenario(&pattern(), &sets, None).expect("legal");
     let path = folder.join("small.toml");
@@ -224,7 +256,9 @@ fn a_camera_without_a_picture_leaves_the_last_one_as_it_was() {
     let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![0.0] };
     let camera = CameraSpec { size_px: [512, 512], focal_px: [150.0, 150.0], lens, ..CameraSpec::default() };
     send(&mut window, Message::Camera(Box::new(camera)));
-    window.wait("the fault", |state| state.heard.fault.as_ref().is_some_and(|fault| fault.contains("too wide")));
+    window.wait("the fault", |state| {
+        state.heard.fault.as_ref().is_some_and(|fault| fault.contains("too wide"))
+    });
     // The fault's text has moved the pane.
     let pane = window.harness.get_by_label("picture").rect();
     assert!(pane.contains(middle));

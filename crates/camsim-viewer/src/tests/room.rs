@@ -23,7 +23,10 @@ fn overlays_stand_in_one_line_at_1280_points_and_wrap_in_narrower_windows() {
         let pane = rect(&window, "picture");
         let rects = OVERLAYS.map(|label| rect(&window, label));
         for (label, of) in OVERLAYS.iter().zip(&rects) {
-            assert!((of.center().y - rects[0].center().y).abs() < 1.0 && of.right() <= pane.right(), "{label} at {of} in {compare:?}");
+            assert!(
+                (of.center().y - rects[0].center().y).abs() < 1.0 && of.right() <= pane.right(),
+                "{label} at {of} in {compare:?}"
+            );
         }
     }
     window.harness.set_size(vec2(900.0, 700.0));
@@ -31,14 +34,18 @@ fn overlays_stand_in_one_line_at_1280_points_and_wrap_in_narrower_windows() {
     let pane = rect(&window, "picture");
     for label in OVERLAYS {
         let of = rect(&window, label);
-        assert!(of.right() <= pane.right() && of.bottom() <= pane.top(), "{label} at {of}, the picture at {pane}");
+        assert!(
+            of.right() <= pane.right() && of.bottom() <= pane.top(),
+            "{label} at {of}, the picture at {pane}"
+        );
     }
 }
 
 /// Rests on a place until its explanation is there; where that is.
 fn explanation(window: &mut Window, at: Pos2, begins: &str) -> Rect {
     window.harness.event(Event::PointerMoved(at));
-    let shown = |window: &Window| window.harness.query_all_by_label_contains(begins).next().map(|node| node.rect());
+    let shown =
+        |window: &Window| window.harness.query_all_by_label_contains(begins).next().map(|node| node.rect());
     // 0.02 s a step.
     for _ in 0..20 {
         window.step();
@@ -55,8 +62,11 @@ fn explanations_cover_neither_their_control_nor_those_beside_it() {
     let mut window = Window::with(Some(pattern()), Some(exporter), [1280.0, 800.0]);
     window.settle();
     let center = |window: &Window, label: &str| rect(window, label).center();
-    let of_toolbar =
-        [("single", "how A and B are held"), ("motion", "8 times as large"), ("A: ideal", "A pinhole with an instant shutter")];
+    let of_toolbar = [
+        ("single", "how A and B are held"),
+        ("motion", "8 times as large"),
+        ("A: ideal", "A pinhole with an instant shutter"),
+    ];
     for (label, begins) in of_toolbar {
         let at = center(&window, label);
         let shown = explanation(&mut window, at, begins);

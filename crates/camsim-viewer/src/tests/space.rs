@@ -1,6 +1,8 @@
 //! The flight in three dimensions.
 
-use eframe::egui::{Event, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, TouchPhase, Vec2, vec2};
+use eframe::egui::{
+    Event, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, TouchPhase, Vec2, vec2,
+};
 use egui_kittest::kittest::Queryable;
 
 use super::harness::{Window, demo, has, pattern, send};
@@ -57,11 +59,17 @@ fn it_turns_moves_and_zooms_by_mouse_and_by_name() {
     drag(&mut window, PointerButton::Primary, vec2(50.0, 20.0));
     let turned = orbit(&window);
     let expected = [(before.azimuth_deg + 20.0).rem_euclid(360.0), before.depression_deg + 8.0];
-    assert!((turned.azimuth_deg - expected[0]).abs() < 0.01 && (turned.depression_deg - expected[1]).abs() < 0.01, "{turned:?}");
+    assert!(
+        (turned.azimuth_deg - expected[0]).abs() < 0.01 && (turned.depression_deg - expected[1]).abs() < 0.01,
+        "{turned:?}"
+    );
     drag(&mut window, PointerButton::Secondary, vec2(30.0, 0.0));
     let moved = orbit(&window);
     assert_eq!((moved.azimuth_deg, moved.depression_deg), (turned.azimuth_deg, turned.depression_deg));
-    assert!(moved.middle != turned.middle && (moved.middle[2] - turned.middle[2]).abs() < 1e-9, "to the side: {moved:?}");
+    assert!(
+        moved.middle != turned.middle && (moved.middle[2] - turned.middle[2]).abs() < 1e-9,
+        "to the side: {moved:?}"
+    );
     // The wheel is the picture's own: the page stays where it is.
     let place = middle(&window);
     window.harness.event(Event::PointerMoved(place));
@@ -86,7 +94,11 @@ fn it_turns_moves_and_zooms_by_mouse_and_by_name() {
     window.harness.get_by_label("view depression").set_value_accesskit(200.0);
     (0..3).for_each(|_| window.step());
     assert_eq!(orbit(&window).depression_deg, 90.0);
-    assert!(has(&window, "view depression: 200 is not within -30 to 90 deg: 90 was taken"), "{:?}", window.state().refused);
+    assert!(
+        has(&window, "view depression: 200 is not within -30 to 90 deg: 90 was taken"),
+        "{:?}",
+        window.state().refused
+    );
     window.click("reset");
     assert_eq!(orbit(&window), Orbit::default());
 }
@@ -97,12 +109,15 @@ fn it_shows_where_the_camera_is_and_what_it_sees_and_a_click_jumps() {
     let mut window = open(demo());
     let loaded = window.state().heard.loaded.clone().expect("loaded");
     let camera = &loaded.sequence.scenario.camera;
-    let place = |frame: u64| loaded.sequence.path.pose(loaded.sequence.start_s + frame as f64 / camera.fps).position_ned_m;
+    let place = |frame: u64| {
+        loaded.sequence.path.pose(loaded.sequence.start_s + frame as f64 / camera.fps).position_ned_m
+    };
     let [north, east, down] = place(0).to_array().map(|m| format!("{m:.1}"));
     assert!(has(&window, &format!("{north} N, {east} E, {down} D m")));
     // Of the camera's barrel distortion: wider than a pinhole of its focal length.
     let field: String = {
-        let node = window.harness.query_all_by_label_contains(" between corners").next().expect("a field of view");
+        let node =
+            window.harness.query_all_by_label_contains(" between corners").next().expect("a field of view");
         use egui_kittest::kittest::NodeT;
         let node = node.accesskit_node();
         node.label().or_else(|| node.value()).expect("text")
@@ -162,7 +177,10 @@ fn ground_and_path_have_their_colours_in_it() {
             }
         }
         let all = (rect.width() * rect.height()) as i32;
-        assert!(path > 20 && log > 20 && seen > 100, "path {path}, log {log}, camera {seen}, terrain {has_terrain}");
+        assert!(
+            path > 20 && log > 20 && seen > 100,
+            "path {path}, log {log}, camera {seen}, terrain {has_terrain}"
+        );
         assert!(behind < 8 * all / 10, "{behind} of {all} are empty, terrain {has_terrain}");
     }
 }

@@ -2,7 +2,8 @@
 
 // Depths this near to each other, relative to the nearest, are of one surface.
 const ONE_SURFACE: f32 = 0.02;
-// Bilinear weight from which pixels of the same surface give its colour: less is lost in the rounding of places far out in the frame.
+// Bilinear weight from which pixels of the same surface give its colour: less is lost in the rounding of
+// places far out in the frame.
 const LEAST_WEIGHT: f32 = 1e-3;
 
 // Inverse depth at the middle of a pixel, 1/m.
@@ -10,8 +11,9 @@ fn centre_inverse_depth(texel: vec2<i32>) -> f32 {
     return textureLoad(ideal_depth, texel, 0).x / frame.near_m;
 }
 
-// Colour of the surface that is seen at a place: bilinear between the pixels around it, or, where those show two surfaces, between those on
-// the place's side of the mean of their depths; where that is none, the nearest in depth of the sixteen around it.
+// Colour of the surface that is seen at a place: bilinear between the pixels around it, or, where those show
+// two surfaces, between those on the place's side of the mean of their depths; where that is none, the
+// nearest in depth of the sixteen around it.
 fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
     let depth = surface_inverse_depth(at_px);
     let around = texels_around(at_px);

@@ -1,5 +1,5 @@
-// The key frame's depth is looked up in each node of the exposure, beginning with what the node before has found.
-// Twin: camsim_core::temporal::reproject_nodes.
+// The key frame's depth is looked up in each node of the exposure, beginning with what the node before has
+// found. Twin: camsim_core::temporal::reproject_nodes.
 var<private> found_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {

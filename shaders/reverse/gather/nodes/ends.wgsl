@@ -1,5 +1,6 @@
-// The key frame's depth is looked up in the first and the last node of the exposure; nodes in between take what lies between. The second look-up
-// begins with what the first has found. Twin: camsim_core::temporal::reproject_nodes.
+// The key frame's depth is looked up in the first and the last node of the exposure; nodes in between take
+// what lies between. The second look-up begins with what the first has found. Twin:
+// camsim_core::temporal::reproject_nodes.
 var<private> first_depth: f32;
 var<private> depth_step: f32;
 

@@ -1,4 +1,5 @@
-// All nodes of the exposure take the key frame's depth that mid-exposure finds. Twin: camsim_core::temporal::reproject_nodes.
+// All nodes of the exposure take the key frame's depth that mid-exposure finds. Twin:
+// camsim_core::temporal::reproject_nodes.
 var<private> exposure_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {

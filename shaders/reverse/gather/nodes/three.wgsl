@@ -1,5 +1,5 @@
-// The key frame's depth is looked up at mid-exposure and, beginning with what that has found, in the first and the last node; nodes take the parabola
-// through the three. Twin: camsim_core::temporal::reproject_nodes.
+// The key frame's depth is looked up at mid-exposure and, beginning with what that has found, in the first
+// and the last node; nodes take the parabola through the three. Twin: camsim_core::temporal::reproject_nodes.
 var<private> begin_depth: f32;
 var<private> depth_slope: f32;
 var<private> depth_bend: f32;

@@ -1,4 +1,5 @@
-// A parabola of time through three nodes, by Newton's forward differences. Twin: camsim_core::temporal::path::Curve.
+// A parabola of time through three nodes, by Newton's forward differences. Twin:
+// camsim_core::temporal::path::Curve.
 const STEPS: u32 = 2u;
 
 struct Curve {

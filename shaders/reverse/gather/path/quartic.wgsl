@@ -1,4 +1,5 @@
-// A polynomial of time through five nodes, by Newton's forward differences. Twin: camsim_core::temporal::path::Curve.
+// A polynomial of time through five nodes, by Newton's forward differences. Twin:
+// camsim_core::temporal::path::Curve.
 const STEPS: u32 = 4u;
 
 struct Curve {

@@ -1,5 +1,6 @@
-// The mean over a pixel's area, ideal pixels being squares of one colour, in reads of two by two of them; a spline where the pixel is narrow. Reads are taken one at a time, whatever they
-// are of, as in spline_or_grid.wgsl. Twin: camsim_core::temporal::ColorImage::over_area.
+// The mean over a pixel's area, ideal pixels being squares of one colour, in reads of two by two of them; a
+// spline where the pixel is narrow. Reads are taken one at a time, whatever they are of, as in
+// spline_or_grid.wgsl. Twin: camsim_core::temporal::ColorImage::over_area.
 
 // Sides that are read, squared: areas that are narrower are splines, of wider ones the middle is read.
 const NARROWEST_PX2: f32 = 1.0;
@@ -43,7 +44,8 @@ fn area_read(area: Footprint, source_px: vec2<f32>, read: u32) -> WeighedRead {
     let pairs = pairs_of(area);
     let row = floor((f32(read) + 0.5) / pairs.x);
     let reach = 0.5 * (area.dx + 1.0);
-    // From the place within its texel on, which is known to the last bit however far from the first one that is.
+    // From the place within its texel on, which is known to the last bit however far from the first one that
+    // is.
     let base_px = floor(source_px);
     let within_px = source_px - base_px;
     let begin_px = floor(within_px - reach) + 1.0 + 2.0 * vec2<f32>(f32(read) - pairs.x * row, row);

@@ -1,6 +1,7 @@
 // The grid's reads of a pixel that is wide enough for more than one. Twin: camsim_core::temporal::Footprint.
 
-// A bilinear read has itself the variance of a pixel this wide (squared: 1 of the ideal pixel, 2 of the tent).
+// A bilinear read has itself the variance of a pixel this wide (squared: 1 of the ideal pixel, 2 of the
+// tent).
 const WIDEST_SPLINE_PX: f32 = 1.7320508;
 
 fn taps_of(stretch: vec2<f32>) -> vec2<u32> {
@@ -21,8 +22,9 @@ fn grid_of(ray: Ray, stretch: vec2<f32>) -> Footprint {
     return Footprint(dx, dy, softness_of(stretch), taps, turns_of(taps));
 }
 
-// The order in which cells are read while the exposure goes by, four bits each and the first one lowest, by columns and rows, of which there are no fewer columns;
-// 0 of grids that have none of their own. Twin: camsim_core::temporal::footprint, which says where they come from.
+// The order in which cells are read while the exposure goes by, four bits each and the first one lowest, by
+// columns and rows, of which there are no fewer columns; 0 of grids that have none of their own. Twin:
+// camsim_core::temporal::footprint, which says where they come from.
 fn turns_of(taps: vec2<u32>) -> vec2<u32> {
     let grid = 8u * max(taps.x, taps.y) + min(taps.x, taps.y);
     var turns = vec2<u32>(0u);
@@ -34,7 +36,8 @@ fn turns_of(taps: vec2<u32>) -> vec2<u32> {
     return select(turns, vec2<u32>(0xc5be318au, 0x64df2790u), grid == 36u);
 }
 
-// Where read number `tap` (cyclic) lies around the source. In floats, exact up to 2^20 reads: llvmpipe divides integers one lane after the other.
+// Where read number `tap` (cyclic) lies around the source. In floats, exact up to 2^20 reads: llvmpipe
+// divides integers one lane after the other.
 fn cell_px(area: Footprint, tap: u32) -> vec2<f32> {
     let side = vec2<f32>(area.taps);
     let count = side.x * side.y;

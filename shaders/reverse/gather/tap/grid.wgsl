@@ -1,5 +1,6 @@
-// A grid of bilinear reads, up to `frame.max_taps` along each side: where nearly all pixels are wide enough. It knows no spline, because llvmpipe goes
-// through both sides of a condition: six reads for each of the grid.
+// A grid of bilinear reads, up to `frame.max_taps` along each side: where nearly all pixels are wide enough.
+// It knows no spline, because llvmpipe goes through both sides of a condition: six reads for each of the
+// grid.
 #import reverse/gather/tap/cells.wgsl
 #import reverse/gather/tap/single.wgsl
 

@@ -1,6 +1,7 @@
-// A spline where a pixel is up to WIDEST_SPLINE_PX wide, a grid of bilinear reads where it is wider. Reads are taken one at a time, whatever they are
-// of: five of them are a sample of the spline. llvmpipe goes through both sides of a condition, so that a spline beside each read of the grid would
-// cost six times as many.
+// A spline where a pixel is up to WIDEST_SPLINE_PX wide, a grid of bilinear reads where it is wider. Reads
+// are taken one at a time, whatever they are of: five of them are a sample of the spline. llvmpipe goes
+// through both sides of a condition, so that a spline beside each read of the grid would cost six times as
+// many.
 #import reverse/gather/tap/cells.wgsl
 
 fn footprint(ray: Ray) -> Footprint {

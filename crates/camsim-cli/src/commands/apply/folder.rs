@@ -41,7 +41,8 @@ pub enum Format {
     Png,
 }
 
-/// What the frames of a folder follow from; `--resume` goes on only with the same. Paths are relative to the folder.
+/// What the frames of a folder follow from; `--resume` goes on only with the same. Paths are relative to the
+/// folder.
 #[derive(Debug, Serialize)]
 struct Inputs {
     camera: CameraSpec,
@@ -82,7 +83,10 @@ pub(super) fn run(
     let folder = &args.output;
     if super::ends_as_picture(args) {
         let (frame, count) = (args.frame.display(), set.entries().len());
-        return Err(Failure::bad_input(anyhow!("-o {}: {frame} names {count} frames, so it must be a folder", folder.display())));
+        return Err(Failure::bad_input(anyhow!(
+            "-o {}: {frame} names {count} frames, so it must be a folder",
+            folder.display()
+        )));
     }
     let frames = chosen(args, set)?;
     check_motion(args, spec, set, &frames)?;
@@ -106,7 +110,8 @@ pub(super) fn run(
     if !is_ours {
         files.remove(&numbers).or_failed()?;
     }
-    let todo: Vec<u64> = frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
+    let todo: Vec<u64> =
+        frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
     let mut manifest = Manifest {
         version: env!("CARGO_PKG_VERSION"),
         paths: PATHS,
@@ -134,13 +139,20 @@ pub(super) fn run(
     if !manifest.finished {
         let done = manifest.written + manifest.skipped;
         let go_on = console.command_with("--resume");
-        return Err(Failure::interrupted(anyhow!("{done} of {} frames are in {}; to go on: {go_on}", frames.len(), folder.display())));
+        return Err(Failure::interrupted(anyhow!(
+            "{done} of {} frames are in {}; to go on: {go_on}",
+            frames.len(),
+            folder.display()
+        )));
     }
     let (elapsed_s, skipped) = (begin.elapsed().as_secs_f64(), manifest.skipped);
     let skipped = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
     console.note(format_args!("{} frames{skipped} in {elapsed_s:.2} s in {}", todo.len(), folder.display()));
     if set.left_out() > 0 {
-        console.warn(format_args!("{} colour pictures have no depth of about their time, and are left out", set.left_out()));
+        console.warn(format_args!(
+            "{} colour pictures have no depth of about their time, and are left out",
+            set.left_out()
+        ));
     }
     let pixels = f64::from(spec.size_px[0]) * f64::from(spec.size_px[1]) * todo.len() as f64;
     tell_unseen(&unseen, pixels, console);
@@ -151,22 +163,32 @@ fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
     let count = set.entries().len() as u64;
     let Some(list) = &args.frames else { return Ok((0..count).collect()) };
     list.resolve(count).map_err(|error| match error {
-        FrameListError::Outside { frame, .. } => {
-            Failure::bad_input(anyhow!("--frames asks for frame {frame}, but {} names frames 0 to {}", args.frame.display(), count - 1))
-        }
+        FrameListError::Outside { frame, .. } => Failure::bad_input(anyhow!(
+            "--frames asks for frame {frame}, but {} names frames 0 to {}",
+            args.frame.display(),
+            count - 1
+        )),
         error => Failure::bad_input(error),
     })
 }
 
 /// A frame's first and last instant, after its stamp.
 fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], Failure> {
-    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| in_file(args, &error.into())).or_bad_input()?;
+    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
+        .map_err(|error| in_file(args, &error.into()))
+        .or_bad_input()?;
     let (first_s, last_s) = shutter.window_s();
     Ok([first_s.min(set.instant_s()), last_s.max(set.instant_s())])
 }
 
 /// Warns of frames that are taken where the trajectory has no rows.
-pub(super) fn tell_gaps(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64], console: &mut Console<'_>) -> Result<(), Failure> {
+pub(super) fn tell_gaps(
+    args: &Args,
+    spec: &CameraSpec,
+    set: &FrameSet,
+    frames: &[u64],
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
     let [first_s, last_s] = window_s(args, spec, set)?;
     let mut steps = Vec::new();
     for &frame in frames {
@@ -203,7 +225,10 @@ fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) 
     };
     let bad = frames.len() - covered.len();
     let frames = frames.len();
-    Err(Failure::bad_input(anyhow!("{}: {bad} of {frames} frames, first frame {frame}: {error}; {covers}", args.frame.display())))
+    Err(Failure::bad_input(anyhow!(
+        "{}: {bad} of {frames} frames, first frame {frame}: {error}; {covers}",
+        args.frame.display()
+    )))
 }
 
 fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Failure> {
@@ -214,10 +239,20 @@ fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Fail
     for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
         *path = relative_to(path, folder);
     }
-    let files = inputs::of_files(set.motion_file().into_iter().chain(spec.photometric.vignette.as_deref()).map(Path::to_owned).collect());
+    let files = inputs::of_files(
+        set.motion_file()
+            .into_iter()
+            .chain(spec.photometric.vignette.as_deref())
+            .map(Path::to_owned)
+            .collect(),
+    );
     let picture = |entry: &Entry| {
         let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
-        format!("{}, {}, {stamp}", text(&entry.color), entry.depth.as_deref().map_or("no depth".to_owned(), text))
+        format!(
+            "{}, {}, {stamp}",
+            text(&entry.color),
+            entry.depth.as_deref().map_or("no depth".to_owned(), text)
+        )
     };
     Ok(Inputs {
         camera,
@@ -228,7 +263,12 @@ fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Fail
         seed: args.seed,
         frame_number: args.frame_number,
         files: portable_inputs(&files, folder),
-        pictures: set.entries().iter().enumerate().map(|(index, entry)| (format!("{index:06}"), picture(entry))).collect(),
+        pictures: set
+            .entries()
+            .iter()
+            .enumerate()
+            .map(|(index, entry)| (format!("{index:06}"), picture(entry)))
+            .collect(),
     })
 }
 
@@ -248,7 +288,11 @@ fn output_spec(args: &Args, set: &FrameSet) -> OutputSpec {
     }
     let has_depth = set.entries().iter().any(|entry| entry.depth.is_some());
     let depth = has_depth.then_some(Channel::Depth);
-    OutputSpec { channels: [Channel::Color, Channel::Valid].into_iter().chain(depth).collect(), format, ..OutputSpec::default() }
+    OutputSpec {
+        channels: [Channel::Color, Channel::Valid].into_iter().chain(depth).collect(),
+        format,
+        ..OutputSpec::default()
+    }
 }
 
 fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
@@ -259,7 +303,9 @@ fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
 /// `frames.csv` of all frames whose files are there.
 fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Failure> {
     let _lock = Lock::take(&args.output)?;
-    let there: Vec<u64> = (0..set.entries().len() as u64).filter(|&index| files.exist(args.frame_number.saturating_add(index))).collect();
+    let there: Vec<u64> = (0..set.entries().len() as u64)
+        .filter(|&index| files.exist(args.frame_number.saturating_add(index)))
+        .collect();
     write_atomic(&args.output.join("frames.csv"), &frames_csv(args, set, files, &there)?).or_failed()
 }
 
@@ -267,7 +313,9 @@ fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Fa
 fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let (columns, names) = (["frame", "stamp_ns", "from_color", "from_depth"], files.names(0));
-    writer.write_record(columns.into_iter().chain(names.iter().map(|(column, _)| column.as_str()))).or_failed()?;
+    writer
+        .write_record(columns.into_iter().chain(names.iter().map(|(column, _)| column.as_str())))
+        .or_failed()?;
     let relative = |path: &Path| relative_to(path, &args.output).display().to_string();
     for &index in frames {
         let Some(entry) = set.entries().get(index as usize) else { continue };
@@ -307,14 +355,17 @@ fn render(
         for note in &file.notes {
             // Of one kind the first is enough: the next is of another file, with another number.
             let (file, what) = note.split_once(": ").unwrap_or(("", note));
-            let kind = what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
+            let kind =
+                what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
             if !told.contains(&kind) {
                 console.warn(format_args!("{file}: {what} (others like it are not told of)"));
                 told.push(kind);
             }
         }
         let settings = settings(args, &file, index);
-        let pipeline = Pipeline::new(spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
+        let pipeline = Pipeline::new(spec, &file.frame, &file.motion, &settings)
+            .map_err(|error| in_file(args, &error))
+            .or_bad_input()?;
         let (picture, counts) = pipeline.render_and_count(vignette);
         unseen += counts;
         writer.write(picture).or_failed()?;

@@ -1,4 +1,5 @@
-//! A tree of boxes over the cells: from it follows where none of a block's cells can be, so that a look opens few of them.
+//! A tree of boxes over the cells: from it follows where none of a block's cells can be, so that a look opens
+//! few of them.
 
 use std::ops::ControlFlow;
 
@@ -35,7 +36,9 @@ impl Block {
     fn of_cell(grid: &Grid, [column, row]: [u32; 2]) -> Self {
         let cell = grid.cell(column, row);
         let [a, b, c, d] = cell.flows.map(DVec2::as_vec2);
-        let steep = [b - a, d - c, c - a, d - b].into_iter().fold(0.0_f32, |most, step| most.max(step.abs().max_element()));
+        let steep = [b - a, d - c, c - a, d - b]
+            .into_iter()
+            .fold(0.0_f32, |most, step| most.max(step.abs().max_element()));
         let tear = cell.across.into_iter().chain(cell.down).fold(0.0, f64::max) as f32;
         Self { low: a.min(b).min(c).min(d), high: a.max(b).max(c).max(d), tear, steep }
     }
@@ -52,7 +55,8 @@ impl Block {
     }
 }
 
-/// One level: blocks of `2^k` cells each way, k = 1 for the first; those of single cells are worked out when they are asked for.
+/// One level: blocks of `2^k` cells each way, k = 1 for the first; those of single cells are worked out when
+/// they are asked for.
 #[derive(Clone, Debug)]
 struct Level {
     count: [u32; 2],
@@ -78,8 +82,8 @@ impl Blocks {
         Self { count, levels }
     }
 
-    /// Calls for each cell that can be within `reach_px` of where `look` looks. `left` counts down the boxes that may still be opened; at 0
-    /// the rest is left out.
+    /// Calls for each cell that can be within `reach_px` of where `look` looks. `left` counts down the boxes
+    /// that may still be opened; at 0 the rest is left out.
     pub(super) fn visit(
         &self,
         look: &Look<'_>,

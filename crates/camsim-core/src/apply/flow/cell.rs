@@ -1,8 +1,10 @@
-//! The sheet over four pixels: where it is when a share of the interval has gone by, and what of it is at a place then.
+//! The sheet over four pixels: where it is when a share of the interval has gone by, and what of it is at a
+//! place then.
 
 use glam::{DMat2, DVec2};
 
-/// Neighbours that part by more than what is beside them goes on with are of two things: of the displacement that happens, pixels.
+/// Neighbours that part by more than what is beside them goes on with are of two things: of the displacement
+/// that happens, pixels.
 const JUMP_PX: f64 = 0.5;
 /// Slack at a cell's border, so that two that share it leave no crack, pixels.
 const SEAM_PX: f64 = 1e-6;
@@ -26,7 +28,8 @@ impl Cell {
     pub(super) fn sources(&self, at_px: DVec2, share: f64, mut found: impl FnMut(DVec2, bool)) {
         if !self.is_torn(share) {
             for within in self.roots(at_px, share) {
-                // From the flow there, not from `within`: without motion it is the place itself, to the last bit.
+                // From the flow there, not from `within`: without motion it is the place itself, to the last
+                // bit.
                 let source_px = at_px - share * self.flow(within);
                 found(source_px, (DMat2::IDENTITY + self.bilinear_slope(within) * share).determinant() > 0.0);
             }
@@ -37,11 +40,13 @@ impl Cell {
             let slope = self.slope(corner, share);
             let forward = DMat2::IDENTITY + slope * share;
             let from_corner = forward.inverse() * (at_px - self.place_px - corner - share * self.flows[k]);
-            // Its own half of the way to each neighbour. What is torn there has no slack: beyond, the nearest pixel is of another thing.
+            // Its own half of the way to each neighbour. What is torn there has no slack: beyond, the nearest
+            // pixel is of another thing.
             let [is_whole_across, is_whole_down] = self.whole(corner, share);
             let own = |from_corner: f64, corner: f64, is_whole: bool| {
                 let inwards = if corner > 0.5 { -from_corner } else { from_corner };
-                inwards >= -RIM_PX && if is_whole { inwards <= 0.5 + RIM_PX } else { (-0.5..0.5).contains(&from_corner) }
+                inwards >= -RIM_PX
+                    && if is_whole { inwards <= 0.5 + RIM_PX } else { (-0.5..0.5).contains(&from_corner) }
             };
             if own(from_corner.x, corner.x, is_whole_across) && own(from_corner.y, corner.y, is_whole_down) {
                 found(at_px - share * (self.flows[k] + slope * from_corner), forward.determinant() > 0.0);
@@ -49,8 +54,8 @@ impl Cell {
         }
     }
 
-    /// Where the cell is torn, what stands in for that which its things bared: that of its pixels which is farthest, by their rank, continued
-    /// along the edges that are whole.
+    /// Where the cell is torn, what stands in for that which its things bared: that of its pixels which is
+    /// farthest, by their rank, continued along the edges that are whole.
     pub(super) fn stand_ins(
         &self,
         at_px: DVec2,
@@ -65,7 +70,10 @@ impl Cell {
             let ranks = [0, 1, 2, 3].map(|k| (k, rank(self.place_px + corner(k))));
             // A pixel whose flow is not known only where none is.
             let best_known = ranks.iter().fold(0.0_f64, |most, (_, rank)| most.max(rank[0]));
-            let farthest = ranks.into_iter().filter(|(_, rank)| rank[0] == best_known).reduce(|a, b| if b.1 < a.1 { b } else { a });
+            let farthest = ranks
+                .into_iter()
+                .filter(|(_, rank)| rank[0] == best_known)
+                .reduce(|a, b| if b.1 < a.1 { b } else { a });
             let Some((k, rank)) = farthest else { continue };
             let corner = corner(k);
             let [is_whole_across, is_whole_down] = self.whole(corner, share);
@@ -83,7 +91,10 @@ impl Cell {
         let nearest = within.round();
         let [is_whole_across, is_whole_down] = self.whole(nearest, share);
         let slope = self.bilinear_slope(nearest);
-        DMat2::from_cols(if is_whole_across { slope.x_axis } else { DVec2::ZERO }, if is_whole_down { slope.y_axis } else { DVec2::ZERO })
+        DMat2::from_cols(
+            if is_whole_across { slope.x_axis } else { DVec2::ZERO },
+            if is_whole_down { slope.y_axis } else { DVec2::ZERO },
+        )
     }
 
     /// Whether the sheet turns over somewhere in the cell.
@@ -112,8 +123,8 @@ impl Cell {
         DMat2::from_cols((b - a).lerp(d - c, within.y), (c - a).lerp(d - b, within.x))
     }
 
-    /// Where a bilinear sheet over the displaced corners is at a place: `q = u e + v g + u v h`, up to two. Eliminating u leaves
-    /// `(q - v g) x (e + v h) = 0`, a quadratic in v.
+    /// Where a bilinear sheet over the displaced corners is at a place: `q = u e + v g + u v h`, up to two.
+    /// Eliminating u leaves `(q - v g) x (e + v h) = 0`, a quadratic in v.
     fn roots(&self, at_px: DVec2, share: f64) -> impl Iterator<Item = DVec2> {
         let [a, b, c, d] = self.flows;
         let q = at_px - self.place_px - share * a;
@@ -127,7 +138,9 @@ impl Cell {
             let along = e + v * h;
             DVec2::new((q - v * g).dot(along) / along.length_squared(), v)
         };
-        let inside = |within: &DVec2| within.cmpge(DVec2::splat(-SEAM_PX)).all() && within.cmple(DVec2::splat(1.0 + SEAM_PX)).all();
+        let inside = |within: &DVec2| {
+            within.cmpge(DVec2::splat(-SEAM_PX)).all() && within.cmple(DVec2::splat(1.0 + SEAM_PX)).all()
+        };
         [root(constant / half), root(half / square)].into_iter().filter(inside)
     }
 }

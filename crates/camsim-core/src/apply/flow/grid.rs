@@ -1,10 +1,11 @@
 //! A flow's pixels, with what is not known filled in, and where neighbours are of two things.
 //!
-//! What tells a border from a slope: along a line of pixels, differences `d` of neighbours. A smooth field's are between those beside
-//! them, however steep it is; a border's is larger than what either side goes on with. By how much is the tear, in the flow's own pixels:
-//! the distance of `d` from the hull of 0 (what is level is no border) and the differences beside it. The same with those two pixels
-//! away, because where a border is mixed into one pixel, as by antialiasing or a flow of half the size, it is two halves beside each
-//! other. A flow of `a sin(2 pi x / L)` has tears of up to `a (2 pi / L)^3 * 2`.
+//! What tells a border from a slope: along a line of pixels, differences `d` of neighbours. A smooth field's
+//! are between those beside them, however steep it is; a border's is larger than what either side goes on
+//! with. By how much is the tear, in the flow's own pixels: the distance of `d` from the hull of 0 (what is
+//! level is no border) and the differences beside it. The same with those two pixels away, because where a
+//! border is mixed into one pixel, as by antialiasing or a flow of half the size, it is two halves beside
+//! each other. A flow of `a sin(2 pi x / L)` has tears of up to `a (2 pi / L)^3 * 2`.
 
 use std::collections::VecDeque;
 
@@ -60,17 +61,19 @@ impl Grid {
         self.known[self.nearest_index(at_px)]
     }
 
-    /// Cells have pixels' middles for corners; a ring of them around the picture, over which its border's slope goes on, makes one more than
-    /// there are pixels each way. Cell (0, 0) begins at pixel (-1, -1).
+    /// Cells have pixels' middles for corners; a ring of them around the picture, over which its border's
+    /// slope goes on, makes one more than there are pixels each way. Cell (0, 0) begins at pixel (-1, -1).
     pub(super) fn cell(&self, column: u32, row: u32) -> Cell {
         let [width, height] = self.size_px;
-        let (x, y) = ([column.saturating_sub(1), column.min(width - 1)], [row.saturating_sub(1), row.min(height - 1)]);
+        let (x, y) =
+            ([column.saturating_sub(1), column.min(width - 1)], [row.saturating_sub(1), row.min(height - 1)]);
         let tear = |x: u32, y: u32, way: usize, is_ring: bool| {
             if is_ring { 0.0 } else { f64::from(self.tears[(y * width + x) as usize][way]) }
         };
         Cell {
             place_px: DVec2::new(f64::from(column) - 1.0, f64::from(row) - 1.0),
-            flows: [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| self.corner([x[i], y[j]], [column + i as u32, row + j as u32])),
+            flows: [(0, 0), (1, 0), (0, 1), (1, 1)]
+                .map(|(i, j)| self.corner([x[i], y[j]], [column + i as u32, row + j as u32])),
             across: [0, 1].map(|k: usize| tear(x[0], y[k], 0, x[0] == x[1])),
             down: [0, 1].map(|k: usize| tear(x[k], y[0], 1, y[0] == y[1])),
         }
@@ -108,7 +111,8 @@ impl Grid {
     }
 }
 
-/// How far the difference between pixel `at` of a line of `count` and the next is from what its sides go on with; 0 behind the last.
+/// How far the difference between pixel `at` of a line of `count` and the next is from what its sides go on
+/// with; 0 behind the last.
 fn tear(at: i64, count: i64, texel: impl Fn(i64) -> DVec2) -> f32 {
     if at + 1 >= count {
         return 0.0;
@@ -138,8 +142,12 @@ fn filled(flow: &FlowField, known: &[bool]) -> Vec<[f32; 2]> {
     }
     while let Some(i) = front.pop_front() {
         let (x, y) = (i % width, i / width);
-        let beside =
-            [(x > 0).then(|| i - 1), (x + 1 < width).then(|| i + 1), (y > 0).then(|| i - width), (y + 1 < height).then(|| i + width)];
+        let beside = [
+            (x > 0).then(|| i - 1),
+            (x + 1 < width).then(|| i + 1),
+            (y > 0).then(|| i - width),
+            (y + 1 < height).then(|| i + width),
+        ];
         for other in beside.into_iter().flatten().filter(|other| !is_set[*other]).collect::<Vec<_>>() {
             is_set[other] = true;
             px[other] = px[i];
@@ -154,7 +162,11 @@ mod tests {
     use super::*;
 
     fn tears(flow: &[f32]) -> Vec<f32> {
-        let field = FlowField { size_px: [flow.len() as u32, 1], px: flow.iter().map(|u| [*u, 0.0]).collect(), interval_s: 1.0 };
+        let field = FlowField {
+            size_px: [flow.len() as u32, 1],
+            px: flow.iter().map(|u| [*u, 0.0]).collect(),
+            interval_s: 1.0,
+        };
         Grid::new(&field).tears.iter().map(|[across, _]| *across).collect()
     }
 
@@ -163,7 +175,8 @@ mod tests {
         assert_eq!(tears(&[0.0, 3.0, 6.0, 9.0, 12.0, 15.0]), [0.0; 6]);
         // Where it begins and ends neither.
         assert_eq!(tears(&[0.0, 0.0, 0.0, 3.0, 6.0, 9.0, 12.0, 12.0, 12.0]), [0.0; 9]);
-        let wave: Vec<f32> = (0..64).map(|i| (5.0 * (std::f64::consts::TAU * f64::from(i) / 32.0).sin()) as f32).collect();
+        let wave: Vec<f32> =
+            (0..64).map(|i| (5.0 * (std::f64::consts::TAU * f64::from(i) / 32.0).sin()) as f32).collect();
         let most = 5.0 * (std::f32::consts::TAU / 32.0).powi(3) * 2.0;
         assert!(tears(&wave)[2..60].iter().all(|tear| *tear <= most), "{:?}", tears(&wave));
     }
@@ -184,7 +197,11 @@ mod tests {
     #[test]
     fn what_is_not_known_is_as_what_is_beside_it() {
         let nan = f32::NAN;
-        let field = FlowField { size_px: [5, 1], px: [1.0, nan, nan, nan, 2.0].map(|u| [u, 0.0]).to_vec(), interval_s: 1.0 };
+        let field = FlowField {
+            size_px: [5, 1],
+            px: [1.0, nan, nan, nan, 2.0].map(|u| [u, 0.0]).to_vec(),
+            interval_s: 1.0,
+        };
         let grid = Grid::new(&field);
         assert_eq!(grid.px.iter().map(|uv| uv[0]).collect::<Vec<_>>(), [1.0, 1.0, 1.0, 2.0, 2.0]);
         assert_eq!(grid.known, [true, false, false, false, true]);

@@ -3,16 +3,22 @@
 use super::*;
 
 pub(super) fn of(size_px: [u32; 2], interval_s: f64, flow: impl Fn(DVec2) -> DVec2) -> Motion {
-    let at = |i: u32| flow(DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0]))).as_vec2().to_array();
+    let at =
+        |i: u32| flow(DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0]))).as_vec2().to_array();
     Motion::Flow(FlowField { size_px, px: (0..size_px[0] * size_px[1]).map(at).collect(), interval_s })
 }
 
-/// A camera that flies sideways over a tilted plane moves every pixel straight on and evenly: then a flow is the motion.
+/// A camera that flies sideways over a tilted plane moves every pixel straight on and evenly: then a flow is
+/// the motion.
 #[test]
 fn the_flow_of_a_flight_gives_the_sources_of_the_flight() {
     let spec = CameraSpec {
         lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.28, 0.07, 1e-3, -5e-4] },
-        ..camera([160, 120], 110.0, ShutterSpec { readout_ms: 33.0, exposure_ms: 8.0, delay_ms: 7.0, ..ShutterSpec::default() })
+        ..camera(
+            [160, 120],
+            110.0,
+            ShutterSpec { readout_ms: 33.0, exposure_ms: 8.0, delay_ms: 7.0, ..ShutterSpec::default() },
+        )
     };
     let ideal = frame([400, 320], 130.0, tilted_plane);
     let flight = Motion::Twist(Twist { velocity_m_s: DVec3::new(6.0, -4.0, 0.0), ..Twist::default() });
@@ -27,8 +33,9 @@ fn the_flow_of_a_flight_gives_the_sources_of_the_flight() {
         let error = worst(&pipeline, |uv, dt_s| on_plane(uv, flight.key_from(dt_s, 0.0), &geometry));
         // f32 flow of up to 2 px: 1e-7 of it.
         assert!(error < 1e-6, "{interval_s}: {error}");
-        let [flown, flowed] =
-            [&flight, &flow].map(|motion| Pipeline::new(&spec, &ideal, motion, &Settings::default()).unwrap().render(None).color_rgba);
+        let [flown, flowed] = [&flight, &flow].map(|motion| {
+            Pipeline::new(&spec, &ideal, motion, &Settings::default()).unwrap().render(None).color_rgba
+        });
         assert!(flown.iter().zip(&flowed).all(|(a, b)| (a - b).abs() < 1e-6));
     }
 }
@@ -42,7 +49,8 @@ fn a_turn_is_off_by_half_its_acceleration() {
     let rate = 2.0;
     let turn = Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 0.0, rate), ..Twist::default() });
     let centre = ideal.geometry.principal_px;
-    let flow = of([200, 200], 0.04, |at_px| DVec2::from_angle(-rate * 0.04).rotate(at_px - centre) + centre - at_px);
+    let flow =
+        of([200, 200], 0.04, |at_px| DVec2::from_angle(-rate * 0.04).rotate(at_px - centre) + centre - at_px);
     let pipeline = Pipeline::new(&spec, &ideal, &flow, &Settings::default()).unwrap();
     let at_most = |uv: DVec2| 100.0 * uv.length() * rate * rate / 2.0 * 0.02 * 0.02;
     let mut farthest = 0.0_f64;
@@ -50,7 +58,11 @@ fn a_turn_is_off_by_half_its_acceleration() {
         let uv = pipeline.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))).unwrap();
         let dt_s = pipeline.shutter.dt_pixel_s(pixel[0], pixel[1]);
         let (rotation, _) = turn.key_from(dt_s, -0.02);
-        let error = pipeline.source(pixel, 0.0).unwrap().at_px.distance(ideal.geometry.px_from_point(rotation * uv.extend(1.0)));
+        let error = pipeline
+            .source(pixel, 0.0)
+            .unwrap()
+            .at_px
+            .distance(ideal.geometry.px_from_point(rotation * uv.extend(1.0)));
         // What the flow itself shortens of the way is of the next order: a hundredth.
         assert!(error <= 1.01 * at_most(uv) + 1e-6, "{pixel:?}: {error} {}", at_most(uv));
         farthest = farthest.max(error);
@@ -85,13 +97,15 @@ fn things_that_move_cover_and_bare_what_is_behind_them() {
             let share = pipeline.shutter.dt_pixel_s(0, y) / 0.1 + 0.5;
             for x in 0..200_u32 {
                 let now = [0, 1].map(|k: usize| BOX_PX[k] - 0.5 + 10.0 * share - f64::from(x));
-                // The spline that is read reaches two pixels, there and in the ideal frame (what is bared has one pixel's own colour); and what
-                // lies on the picture's very border may be on either side of it.
+                // The spline that is read reaches two pixels, there and in the ideal frame (what is bared has
+                // one pixel's own colour); and what lies on the picture's very border may be on either side
+                // of it.
                 let at_rim = (f64::from(x) - share * back - 199.5).abs() < 1e-6;
                 let was = f64::from(x) - share * back;
                 let covered = now[0] < 0.0 && now[1] > 0.0;
                 let is_bared = !covered && (BOX_PX[0] - 0.5..BOX_PX[1] - 0.5).contains(&was);
-                let is_mixed = !covered && !is_bared && BOX_PX.iter().any(|border| (border - 0.5 - was).abs() < 2.6);
+                let is_mixed =
+                    !covered && !is_bared && BOX_PX.iter().any(|border| (border - 0.5 - was).abs() < 2.6);
                 if at_rim || is_mixed || now.iter().any(|border| border.abs() < 2.6) {
                     continue;
                 }
@@ -100,7 +114,10 @@ fn things_that_move_cover_and_bare_what_is_behind_them() {
                 let beyond = !covered && f64::from(x) - share * back > 199.5;
                 let expected = if covered { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 1.0, 1.0] };
                 let expected = if beyond { [0.0; 4] } else { expected };
-                assert!(pixel.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{with_depth} {back}, {x} {y}: {pixel:?}");
+                assert!(
+                    pixel.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6),
+                    "{with_depth} {back}, {x} {y}: {pixel:?}"
+                );
                 on_box += u32::from(covered);
                 bared += u32::from(is_bared);
             }
@@ -129,16 +146,24 @@ fn a_moving_thing_is_blurred_and_what_stands_is_not() {
 fn what_is_not_known_is_empty_and_what_does_not_fit_is_refused() {
     let spec = camera([60, 20], 50.0, ShutterSpec::default());
     let ideal = frame([120, 40], 50.0, |_| (0.1, [0.5; 3]));
-    let motion = of([120, 40], 0.1, |at_px| if (55.0..65.0).contains(&at_px.x) { DVec2::NAN } else { DVec2::ZERO });
-    let (rendered, counts) = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None);
+    let motion =
+        of([120, 40], 0.1, |at_px| if (55.0..65.0).contains(&at_px.x) { DVec2::NAN } else { DVec2::ZERO });
+    let (rendered, counts) =
+        Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None);
     assert_eq!(counts, UnseenCounts { unknown_flow: 10 * 20, ..UnseenCounts::default() });
     let alpha: Vec<f32> = (24..36).map(|x| rendered.color_rgba[4 * (60 * 7 + x) + 3]).collect();
     assert_eq!(alpha, [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.]);
     let nowhere = of([120, 40], 0.1, |_| DVec2::NAN);
-    let counts = Pipeline::new(&spec, &ideal, &nowhere, &Settings::default()).unwrap().render_and_count(None).1;
+    let counts =
+        Pipeline::new(&spec, &ideal, &nowhere, &Settings::default()).unwrap().render_and_count(None).1;
     assert_eq!(counts, UnseenCounts { unknown_flow: 60 * 20, ..UnseenCounts::default() });
-    let error = |motion: &Motion, settings: &Settings| Pipeline::new(&spec, &ideal, motion, settings).unwrap_err().to_string();
-    assert!(error(&of([60, 20], 0.1, |_| DVec2::ZERO), &Settings::default()).contains("60x20 pixels beside a picture of 120x40"));
+    let error = |motion: &Motion, settings: &Settings| {
+        Pipeline::new(&spec, &ideal, motion, settings).unwrap_err().to_string()
+    };
+    assert!(
+        error(&of([60, 20], 0.1, |_| DVec2::ZERO), &Settings::default())
+            .contains("60x20 pixels beside a picture of 120x40")
+    );
     assert!(error(&of([120, 40], 0.0, |_| DVec2::ZERO), &Settings::default()).contains("over 0 s"));
     for settings in [solver(Solver::Rk2), Settings { preset: Preset::Paper, ..Settings::default() }] {
         assert!(error(&motion, &settings).contains("leave --preset and --solver out"));

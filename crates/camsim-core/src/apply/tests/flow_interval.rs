@@ -12,8 +12,8 @@ fn rolling(delay_ms: f64) -> CameraSpec {
     camera(SIZE, 300.0, ShutterSpec { readout_ms: 30.0, delay_ms, ..ShutterSpec::default() })
 }
 
-/// Largest error of the sources of a picture that moves by `x += dt / T a x` about its middle, pixels, if its flow is written over `T / part`;
-/// and how many there are.
+/// Largest error of the sources of a picture that moves by `x += dt / T a x` about its middle, pixels, if its
+/// flow is written over `T / part`; and how many there are.
 fn worst_of_linear(a: DMat2, part: f64, delay_ms: f64) -> (f64, u32) {
     let spec = rolling(delay_ms);
     let ideal = frame(IDEAL, 300.0, |_| (0.1, [0.5; 3]));
@@ -27,7 +27,11 @@ fn worst_of_linear(a: DMat2, part: f64, delay_ms: f64) -> (f64, u32) {
             let look = DVec2::new(f64::from(x), f64::from(y)) - DVec2::new(69.5, 49.5);
             let truth_px = forward.inverse() * look + centre;
             if ideal.geometry.contains(truth_px) {
-                worst = worst.max(pipeline.source([x, y], 0.0).map_or(f64::INFINITY, |source| source.at_px.distance(truth_px)));
+                worst = worst.max(
+                    pipeline
+                        .source([x, y], 0.0)
+                        .map_or(f64::INFINITY, |source| source.at_px.distance(truth_px)),
+                );
                 count += 1;
             }
         }
@@ -91,8 +95,9 @@ fn a_thing_that_moves_has_its_borders_where_they_are_over_any_interval() {
             let velocity = DVec2::new(px_per_ms, 0.6 * px_per_ms);
             let (mut of_first, mut all) = (Vec::new(), 0);
             for interval_ms in [33.0, 11.0, 1.0] {
-                let motion =
-                    of(IDEAL, 1e-3 * interval_ms, |at_px| if into_box(at_px) > 0.0 { velocity * interval_ms } else { DVec2::ZERO });
+                let motion = of(IDEAL, 1e-3 * interval_ms, |at_px| {
+                    if into_box(at_px) > 0.0 { velocity * interval_ms } else { DVec2::ZERO }
+                });
                 let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
                 let mut sources = Vec::new();
                 for y in 0..SIZE[1] {
@@ -106,9 +111,15 @@ fn a_thing_that_moves_has_its_borders_where_they_are_over_any_interval() {
                         if inside.abs() <= 0.5 || is_bared {
                             continue;
                         }
-                        let at = format!("{px_per_ms} px/ms over {interval_ms} ms, {delay_ms} ms, {x} {y}: {source:?}");
-                        assert!((source.inverse_depth - if inside > 0.0 { 0.2 } else { 0.1 }).abs() < 1e-6, "{at}");
-                        // Where a border has moved by less than half a pixel it is no border, but between two pixels stretched or pressed.
+                        let at = format!(
+                            "{px_per_ms} px/ms over {interval_ms} ms, {delay_ms} ms, {x} {y}: {source:?}"
+                        );
+                        assert!(
+                            (source.inverse_depth - if inside > 0.0 { 0.2 } else { 0.1 }).abs() < 1e-6,
+                            "{at}"
+                        );
+                        // Where a border has moved by less than half a pixel it is no border, but between two
+                        // pixels stretched or pressed.
                         if inside.abs() > 1.0 && into_box(look).abs() > 1.0 {
                             let truth_px = if inside > 0.0 { look - moved_px } else { look };
                             assert!(source.at_px.distance(truth_px) < 1e-4, "{at} {truth_px}");
@@ -120,18 +131,24 @@ fn a_thing_that_moves_has_its_borders_where_they_are_over_any_interval() {
                     of_first.clone_from(&sources);
                 }
                 let apart = of_first.iter().zip(&sources).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-                assert!(apart < 1e-4, "{px_per_ms} px/ms over {interval_ms} ms: {apart} px from that over 33 ms");
+                assert!(
+                    apart < 1e-4,
+                    "{px_per_ms} px/ms over {interval_ms} ms: {apart} px from that over 33 ms"
+                );
             }
             assert!(all > 30_000, "{all}");
         }
     }
 }
 
-/// Noise in which every pixel goes its own way is not followed: it is counted, and takes no longer than it may.
+/// Noise in which every pixel goes its own way is not followed: it is counted, and takes no longer than it
+/// may.
 #[test]
 fn what_cannot_be_followed_is_empty_and_counted() {
     let ideal = frame([220, 200], 300.0, |_| (0.1, [0.5; 3]));
-    let noise = |at_px: DVec2, k: f64| ((at_px.dot(DVec2::new(12.9898, 78.233)) + k).sin() * 43_758.547).fract() * 500.0;
+    let noise = |at_px: DVec2, k: f64| {
+        ((at_px.dot(DVec2::new(12.9898, 78.233)) + k).sin() * 43_758.547).fract() * 500.0
+    };
     let motion = of([220, 200], 0.033, |at_px| DVec2::new(noise(at_px, 0.0), noise(at_px, 1.0)));
     let spec = camera([20, 20], 300.0, ShutterSpec { delay_ms: 33.0, ..ShutterSpec::default() });
     let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
@@ -146,14 +163,20 @@ fn a_flow_of_zero_is_no_motion_with_holes_marked() {
         lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.28, 0.07, 1e-3, -5e-4] },
         ..camera(SIZE, 240.0, ShutterSpec { readout_ms: 30.0, exposure_ms: 10.0, ..ShutterSpec::default() })
     };
-    let mut ideal =
-        frame(IDEAL, 300.0, |uv| (if uv.x > 0.1 { 0.2 } else { 0.1 }, [(40.0 * uv.x).sin().abs() as f32, uv.y.abs() as f32, 0.3]));
+    let mut ideal = frame(IDEAL, 300.0, |uv| {
+        (if uv.x > 0.1 { 0.2 } else { 0.1 }, [(40.0 * uv.x).sin().abs() as f32, uv.y.abs() as f32, 0.3])
+    });
     ideal.holes = (0..IDEAL[0] * IDEAL[1]).map(|i| i % 7 == 0 && i % IDEAL[0] > 90).collect();
     ideal.inverse_depth.iter_mut().zip(&ideal.holes).filter(|(_, hole)| **hole).for_each(|(w, _)| *w = 0.0);
     let motions = [Motion::Twist(Twist::default()), of(IDEAL, 0.033, |_| DVec2::ZERO)];
-    let [still, flowed] = motions.map(|motion| Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None));
+    let [still, flowed] = motions.map(|motion| {
+        Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None)
+    });
     assert!(still.1.holes > 500, "{:?}", still.1);
-    assert_eq!((still.1, &still.0.color_rgba, &still.0.depth_m), (flowed.1, &flowed.0.color_rgba, &flowed.0.depth_m));
+    assert_eq!(
+        (still.1, &still.0.color_rgba, &still.0.depth_m),
+        (flowed.1, &flowed.0.color_rgba, &flowed.0.depth_m)
+    );
     // A hole moves with what it is in.
     let motion = of(IDEAL, 0.033, |_| DVec2::new(12.0, -5.0));
     let late = rolling(33.0);

@@ -7,7 +7,8 @@ use crate::{
 };
 
 pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
-    let has_surface = scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
+    let has_surface =
+        scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
     check.require(has_surface, "scene", || {
         "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 }, a [scene.board] or a [[scene.gltf]]"
             .into()
@@ -21,11 +22,18 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
             "needs a terrain to stand on: give scene.terrain, or heights in the places".into()
         });
-        let twice = model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
-        check.require(!twice, format!("{table}.placements"), || "takes the place of at and geodetic: leave those out".into());
+        let twice =
+            model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
+        check.require(!twice, format!("{table}.placements"), || {
+            "takes the place of at and geodetic: leave those out".into()
+        });
     }
     if let Some(white) = scene.terrain.as_ref().and_then(|terrain| terrain.ortho_white) {
-        check.positive("scene.terrain.ortho_white", white, "give the stored number that is white, 2047 for 11 bits");
+        check.positive(
+            "scene.terrain.ortho_white",
+            white,
+            "give the stored number that is white, 2047 for 11 bits",
+        );
     }
     if let Some(board) = &scene.board {
         check_board(check, board);
@@ -58,7 +66,9 @@ fn check_light(check: &mut Check, light: &LightSpec) {
         )
     });
     for (key, share) in [("scene.light.sun", light.sun), ("scene.light.sky", light.sky)] {
-        check.require((0.0..=1.0).contains(&share), key, || format!("must be 0 to 1 of a colour, not {share}"));
+        check.require((0.0..=1.0).contains(&share), key, || {
+            format!("must be 0 to 1 of a colour, not {share}")
+        });
     }
     // Not more than white; a brighter day is the camera's matter. A hair for sums like 0.7 + 0.3.
     // Each by itself has been told.
@@ -75,8 +85,11 @@ fn check_board(check: &mut Check, board: &BoardSpec) {
             check.fail(format!("scene.board.{key}"), message);
         }
     } else {
-        let given = board.kind.is_some() || board.columns.is_some() || board.rows.is_some() || board.size_m.is_some();
-        check.require(!given, "scene.board.target", || "takes the place of kind, columns, rows and size_m: leave those out".into());
+        let given =
+            board.kind.is_some() || board.columns.is_some() || board.rows.is_some() || board.size_m.is_some();
+        check.require(!given, "scene.board.target", || {
+            "takes the place of kind, columns, rows and size_m: leave those out".into()
+        });
     }
     check_place(check, "scene.board", board.at, board.geodetic);
     check.finite("scene.board.angles_deg", &board.angles_deg);
@@ -93,6 +106,8 @@ fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Opti
         check.require(ok, key.clone(), || {
             format!("must be [latitude_deg -90..90, longitude_deg, height_m], not [{lat_deg}, {lon_deg}, {height_m}]")
         });
-        check.require(at == PatternCentre::Origin, key, || format!("takes the place of {table}.at: leave one of them out"));
+        check.require(at == PatternCentre::Origin, key, || {
+            format!("takes the place of {table}.at: leave one of them out")
+        });
     }
 }

@@ -41,22 +41,36 @@ fn count(n: u32) -> f64 {
 pub(super) fn chessboard(columns: u32, rows: u32, square_m: DVec2) -> Layout {
     let high_m = 0.5 * square_m * DVec2::new(count(columns + 1), count(rows + 1));
     let at = |i: u32, j: u32| -high_m + square_m * DVec2::new(count(i), count(j));
-    let squares = (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 0);
+    let squares =
+        (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 0);
     let shapes = squares.map(|(i, j)| Shape::Rect { low_m: at(i, j), high_m: at(i + 1, j + 1) }).collect();
     let point = |id: u32| BoardPoint { id, at_m: at(1 + id % columns, 1 + id / columns) };
     let points = (0..columns * rows).map(point).collect();
-    Layout { shapes, points, low_m: -high_m, high_m, unit_m: square_m, units: 1.0, usual_margin_m: square_m.max_element() }
+    Layout {
+        shapes,
+        points,
+        low_m: -high_m,
+        high_m,
+        unit_m: square_m,
+        units: 1.0,
+        usual_margin_m: square_m.max_element(),
+    }
 }
 
-/// Circles `spacing_m` apart. Asymmetric ones: those of a row are two spacings apart, and every other row is shifted by one.
+/// Circles `spacing_m` apart. Asymmetric ones: those of a row are two spacings apart, and every other row is
+/// shifted by one.
 pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, asymmetric: bool) -> Layout {
     let place = |i: u32, j: u32| match asymmetric {
         true => DVec2::new(count(2 * i + j % 2), count(j)),
         false => DVec2::new(count(i), count(j)),
     };
-    let last = DVec2::new(count(if asymmetric { 2 * (columns - 1) + u32::from(rows > 1) } else { columns - 1 }), count(rows - 1));
+    let last = DVec2::new(
+        count(if asymmetric { 2 * (columns - 1) + u32::from(rows > 1) } else { columns - 1 }),
+        count(rows - 1),
+    );
     let radius_m = 0.5 * diameter_m;
-    let point = |id: u32| BoardPoint { id, at_m: spacing_m * (place(id % columns, id / columns) - 0.5 * last) };
+    let point =
+        |id: u32| BoardPoint { id, at_m: spacing_m * (place(id % columns, id / columns) - 0.5 * last) };
     let points: Vec<BoardPoint> = (0..columns * rows).map(point).collect();
     let high_m = 0.5 * spacing_m * last + radius_m;
     Layout {
@@ -73,7 +87,8 @@ pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, 
 /// Kalibr's grid of AprilTags 36h11: tag 0 at the bottom left, small squares at the corners of all tags.
 pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, first_id: u32) -> Layout {
     let pitch_m = (1.0 + spacing) * tag_m;
-    let high_m = 0.5 * DVec2::new(count(columns) * pitch_m + spacing * tag_m, count(rows) * pitch_m + spacing * tag_m);
+    let high_m =
+        0.5 * DVec2::new(count(columns) * pitch_m + spacing * tag_m, count(rows) * pitch_m + spacing * tag_m);
     let (mut shapes, mut points) = (Vec::new(), Vec::new());
     for number in 0..columns * rows {
         let (i, j) = (number % columns, rows - 1 - number / columns);
@@ -81,7 +96,12 @@ pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, firs
         let code = codes::APRIL_36H11.get((first_id + number) as usize).copied().unwrap_or(0);
         tag(&mut shapes, low_m, tag_m, 6, code, APRIL_BORDER);
         let corners = [DVec2::Y, DVec2::ONE, DVec2::X, DVec2::ZERO];
-        points.extend((0..).zip(corners).map(|(k, corner)| BoardPoint { id: 4 * (first_id + number) + k, at_m: low_m + tag_m * corner }));
+        points.extend(
+            (0..).zip(corners).map(|(k, corner)| BoardPoint {
+                id: 4 * (first_id + number) + k,
+                at_m: low_m + tag_m * corner,
+            }),
+        );
     }
     for (i, j) in (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))) {
         let low_m = -high_m + pitch_m * DVec2::new(count(i), count(j));
@@ -89,11 +109,27 @@ pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, firs
     }
     let cell_m = tag_m / count(6 + 2 * APRIL_BORDER);
     let units = count(6 + 2 * APRIL_BORDER);
-    Layout { shapes, points, low_m: -high_m, high_m, unit_m: DVec2::splat(cell_m), units, usual_margin_m: 0.5 * tag_m }
+    Layout {
+        shapes,
+        points,
+        low_m: -high_m,
+        high_m,
+        unit_m: DVec2::splat(cell_m),
+        units,
+        usual_margin_m: 0.5 * tag_m,
+    }
 }
 
-/// OpenCV's ChArUco board of `columns` x `rows` squares: the one at the top left is black, the white ones have markers, row by row.
-pub(super) fn charuco(columns: u32, rows: u32, square_m: f64, marker_m: f64, dictionary: Dictionary, first_id: u32) -> Layout {
+/// OpenCV's ChArUco board of `columns` x `rows` squares: the one at the top left is black, the white ones
+/// have markers, row by row.
+pub(super) fn charuco(
+    columns: u32,
+    rows: u32,
+    square_m: f64,
+    marker_m: f64,
+    dictionary: Dictionary,
+    first_id: u32,
+) -> Layout {
     let mut layout = chessboard(columns - 1, rows - 1, DVec2::splat(square_m));
     let white = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1);
     for (id, (i, j)) in (first_id..).zip(white) {

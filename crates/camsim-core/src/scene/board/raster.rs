@@ -24,7 +24,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// The first number of texels a unit, from what the board needs to twice that, at which all edges lie between texels; else the first.
+    /// The first number of texels a unit, from what the board needs to twice that, at which all edges lie
+    /// between texels; else the first.
     pub fn new(layout: &Layout, margin_m: f64) -> Self {
         let across = ((layout.high_m - layout.low_m) / layout.unit_m).max_element();
         let least = (LEAST_TEXELS / layout.units).max(AIM_TEXELS / across).ceil() as u32;
@@ -58,7 +59,9 @@ pub(super) fn draw(layout: &Layout, scale: &Scale) -> Texture {
         match *shape {
             Shape::Rect { low_m, high_m } => {
                 let (low, high) = (scale.texel_of(layout, low_m), scale.texel_of(layout, high_m));
-                add(&mut black, size, low, high, |x, y| overlap(x, low.x, high.x) * overlap(y, low.y, high.y));
+                add(&mut black, size, low, high, |x, y| {
+                    overlap(x, low.x, high.x) * overlap(y, low.y, high.y)
+                });
             }
             Shape::Disc { centre_m, radius_m } => {
                 let (centre, radii) = (scale.texel_of(layout, centre_m), radius_m / scale.texel_m);
@@ -67,12 +70,18 @@ pub(super) fn draw(layout: &Layout, scale: &Scale) -> Texture {
         }
     }
     let gray = black.iter().map(|black| (255.0 * (1.0 - black.clamp(0.0, 1.0)) + 0.5) as u8);
-    Texture { size_px: size, rgba8: gray.flat_map(|gray| [gray, gray, gray, 255]).collect(), encoding: Encoding::Linear }
+    Texture {
+        size_px: size,
+        rgba8: gray.flat_map(|gray| [gray, gray, gray, 255]).collect(),
+        encoding: Encoding::Linear,
+    }
 }
 
 /// Adds a share to each texel between two corners.
 fn add(black: &mut [f32], size: [u32; 2], low: DVec2, high: DVec2, share: impl Fn(f64, f64) -> f64) {
-    let range = |low: f64, high: f64, side: u32| (low.floor().max(0.0) as u32)..(high.ceil().clamp(0.0, f64::from(side)) as u32);
+    let range = |low: f64, high: f64, side: u32| {
+        (low.floor().max(0.0) as u32)..(high.ceil().clamp(0.0, f64::from(side)) as u32)
+    };
     for y in range(low.y, high.y, size[1]) {
         for x in range(low.x, high.x, size[0]) {
             if let Some(texel) = black.get_mut((y * size[0] + x) as usize) {

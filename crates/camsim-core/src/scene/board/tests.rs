@@ -3,7 +3,13 @@
 use super::*;
 
 fn spec(kind: BoardKind, columns: u32, rows: u32, size_m: f64) -> BoardSpec {
-    BoardSpec { kind: Some(kind), columns: Some(columns), rows: Some(rows), size_m: Some(size_m), ..BoardSpec::default() }
+    BoardSpec {
+        kind: Some(kind),
+        columns: Some(columns),
+        rows: Some(rows),
+        size_m: Some(size_m),
+        ..BoardSpec::default()
+    }
 }
 
 /// Light of the picture as a mesh shows it, at a place of the board: bilinear, by hand.
@@ -11,7 +17,8 @@ fn light(board: &Board, picture: &Texture, at_m: DVec2) -> f64 {
     let scale = board.scale();
     let texel = (at_m - board.layout.low_m) / scale.texel_m + scale.margin_texels - 0.5;
     let read = |x: f64, y: f64| {
-        let [x, y] = [x.clamp(0.0, scale.texels.x - 1.0) as usize, y.clamp(0.0, scale.texels.y - 1.0) as usize];
+        let [x, y] =
+            [x.clamp(0.0, scale.texels.x - 1.0) as usize, y.clamp(0.0, scale.texels.y - 1.0) as usize];
         f64::from(picture.rgba8[4 * (y * picture.size_px[0] as usize + x)]) / 255.0
     };
     let (low, part) = (texel.floor(), texel - texel.floor());
@@ -25,21 +32,36 @@ fn edge_m(board: &Board, picture: &Texture, from_m: DVec2, to_m: DVec2) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if (light(board, picture, from_m.lerp(to_m, middle)) < 0.5) == dark_first { low = middle } else { high = middle }
+        if (light(board, picture, from_m.lerp(to_m, middle)) < 0.5) == dark_first {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low * from_m.distance(to_m)
 }
 
 #[test]
 fn edges_of_squares_are_between_texels() {
-    let board = Board::from_spec(&BoardSpec { row_size_m: Some(0.041), ..spec(BoardKind::Chessboard, 8, 5, 0.0333) }).unwrap();
+    let board =
+        Board::from_spec(&BoardSpec { row_size_m: Some(0.041), ..spec(BoardKind::Chessboard, 8, 5, 0.0333) })
+            .unwrap();
     let picture = board.picture();
     for point in board.points() {
         let square = DVec2::new(0.0333, 0.041);
         for half in [-0.25, 0.25] {
-            let across =
-                edge_m(&board, &picture, point.at_m + square * DVec2::new(-0.4, half), point.at_m + square * DVec2::new(0.4, half));
-            let down = edge_m(&board, &picture, point.at_m + square * DVec2::new(half, -0.4), point.at_m + square * DVec2::new(half, 0.4));
+            let across = edge_m(
+                &board,
+                &picture,
+                point.at_m + square * DVec2::new(-0.4, half),
+                point.at_m + square * DVec2::new(0.4, half),
+            );
+            let down = edge_m(
+                &board,
+                &picture,
+                point.at_m + square * DVec2::new(half, -0.4),
+                point.at_m + square * DVec2::new(half, 0.4),
+            );
             let error = DVec2::new(across, down) / square - 0.4;
             assert!(error.abs().max_element() < 1e-9, "{point:?} {half}: {error}");
         }
@@ -52,16 +74,27 @@ fn edges_of_squares_are_between_texels() {
 #[test]
 fn edges_within_texels_are_within_a_thousandth() {
     // An AprilGrid whose gaps have no common measure with its tags' squares: outer edges of every tag.
-    let board = Board::from_spec(&BoardSpec { spacing: Some(0.2718), ..spec(BoardKind::Aprilgrid, 4, 3, 0.088) }).unwrap();
+    let board =
+        Board::from_spec(&BoardSpec { spacing: Some(0.2718), ..spec(BoardKind::Aprilgrid, 4, 3, 0.088) })
+            .unwrap();
     let picture = board.picture();
     let mut worst = 0.0_f64;
     for tag in board.points().chunks_exact(4) {
         let (corner, right) = (tag[3].at_m, tag[2].at_m);
         let gap = 0.2718 * 0.088;
         for share in [0.1, 0.5, 0.9] {
-            let left = edge_m(&board, &picture, corner + DVec2::new(-0.5 * gap, share * 0.088), corner + DVec2::new(0.008, share * 0.088));
-            let on_right =
-                edge_m(&board, &picture, right + DVec2::new(-0.008, share * 0.088), right + DVec2::new(0.5 * gap, share * 0.088));
+            let left = edge_m(
+                &board,
+                &picture,
+                corner + DVec2::new(-0.5 * gap, share * 0.088),
+                corner + DVec2::new(0.008, share * 0.088),
+            );
+            let on_right = edge_m(
+                &board,
+                &picture,
+                right + DVec2::new(-0.008, share * 0.088),
+                right + DVec2::new(0.5 * gap, share * 0.088),
+            );
             worst = worst.max((left - 0.5 * gap).abs()).max((on_right - 0.008).abs());
         }
     }
@@ -71,7 +104,8 @@ fn edges_within_texels_are_within_a_thousandth() {
 #[test]
 fn circles_have_their_middle_and_area() {
     for kind in [BoardKind::Circles, BoardKind::AsymmetricCircles] {
-        let board = Board::from_spec(&BoardSpec { diameter_m: Some(0.031), ..spec(kind, 4, 7, 0.05) }).unwrap();
+        let board =
+            Board::from_spec(&BoardSpec { diameter_m: Some(0.031), ..spec(kind, 4, 7, 0.05) }).unwrap();
         let (picture, scale) = (board.picture(), board.scale());
         for point in board.points() {
             let (mut sum, mut first) = (0.0, DVec2::ZERO);
@@ -79,7 +113,8 @@ fn circles_have_their_middle_and_area() {
             let reach = 0.5 * 0.04 / scale.texel_m.x;
             for y in (middle.y - reach) as usize..(middle.y + reach) as usize {
                 for x in (middle.x - reach) as usize..(middle.x + reach) as usize {
-                    let black = 1.0 - f64::from(picture.rgba8[4 * (y * picture.size_px[0] as usize + x)]) / 255.0;
+                    let black =
+                        1.0 - f64::from(picture.rgba8[4 * (y * picture.size_px[0] as usize + x)]) / 255.0;
                     sum += black;
                     first += black * (DVec2::new(x as f64, y as f64) + 0.5);
                 }
@@ -93,15 +128,18 @@ fn circles_have_their_middle_and_area() {
     // OpenCV's order of an asymmetric grid.
     let board = Board::from_spec(&spec(BoardKind::AsymmetricCircles, 4, 11, 0.02)).unwrap();
     let of = |id: usize| board.points()[id].at_m - board.points()[0].at_m;
-    assert!((of(1) - DVec2::new(0.04, 0.0)).length() < 1e-12 && (of(4) - DVec2::new(0.02, 0.02)).length() < 1e-12);
+    assert!(
+        (of(1) - DVec2::new(0.04, 0.0)).length() < 1e-12 && (of(4) - DVec2::new(0.02, 0.02)).length() < 1e-12
+    );
 }
 
 #[test]
 fn tags_are_numbered_and_turned_as_their_readers_expect() {
     let board = Board::from_spec(&spec(BoardKind::Aprilgrid, 6, 6, 0.1)).unwrap();
     let picture = board.picture();
-    let of_tag =
-        |tag: usize, i: f64, j: f64| light(&board, &picture, board.points()[4 * tag + 3].at_m + 0.01 * DVec2::new(i + 0.5, j + 0.5));
+    let of_tag = |tag: usize, i: f64, j: f64| {
+        light(&board, &picture, board.points()[4 * tag + 3].at_m + 0.01 * DVec2::new(i + 0.5, j + 0.5))
+    };
     // Code 0 is d5d628584: its first row 110101, the last 000100; two black squares around.
     let row = |j: f64| (2..8).map(|i| of_tag(0, f64::from(i), j) as u32).collect::<Vec<_>>();
     assert_eq!((row(2.0), row(7.0)), (vec![1, 1, 0, 1, 0, 1], vec![0, 0, 0, 1, 0, 0]));
@@ -114,7 +152,9 @@ fn tags_are_numbered_and_turned_as_their_readers_expect() {
     // The first marker of 4x4 is 1011 0101 0011 0010, in the square right of the top-left one.
     let picture = charuco.picture();
     let corner = charuco.layout.low_m + DVec2::new(0.045, 0.005);
-    let cell = |i: u32, j: u32| light(&charuco, &picture, corner + 0.005 * DVec2::new(f64::from(i) + 0.5, f64::from(j) + 0.5)) as u32;
+    let cell = |i: u32, j: u32| {
+        light(&charuco, &picture, corner + 0.005 * DVec2::new(f64::from(i) + 0.5, f64::from(j) + 0.5)) as u32
+    };
     let code: Vec<u32> = (1..5).flat_map(|j| (1..5).map(move |i| (i, j))).map(|(i, j)| cell(i, j)).collect();
     assert_eq!(code, [1, 0, 1, 1, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]);
 }

@@ -1,8 +1,9 @@
 //! Fewer triangles for the same surface: corners are drawn into neighbours, the cheapest first.
 //!
-//! What a collapse costs is how far all corners that have gone by then are from the triangles that take their place, those of the surface's border from the
-//! border: a corner of a window's opening that were drawn across it would be covered, and cost nothing. That steers the order alone: how far a level is from
-//! the full shape is measured afterwards (`measure.rs`).
+//! What a collapse costs is how far all corners that have gone by then are from the triangles that take their
+//! place, those of the surface's border from the border: a corner of a window's opening that were drawn
+//! across it would be covered, and cost nothing. That steers the order alone: how far a level is from the
+//! full shape is measured afterwards (`measure.rs`).
 
 use std::{
     cmp::Ordering,
@@ -38,7 +39,8 @@ pub(super) struct Simplifier<const AXES: usize> {
     /// Counts the changes around a place.
     changes: Vec<u32>,
     queue: BinaryHeap<Candidate>,
-    /// After how many changes each place was last looked at, and the cost that it is in the queue for; infinite if it is not.
+    /// After how many changes each place was last looked at, and the cost that it is in the queue for;
+    /// infinite if it is not.
     offered: Vec<(u32, f64)>,
 }
 
@@ -79,7 +81,8 @@ impl<const AXES: usize> Simplifier<AXES> {
         let first = shape.first_equals();
         let mut places = HashMap::new();
         let place = |vertex: &MeshVertex| vertex.position_m.map(|part| (part + 0.0).to_bits());
-        let place_of: Vec<u32> = (0..).zip(&shape.vertices).map(|(i, vertex)| *places.entry(place(vertex)).or_insert(i)).collect();
+        let place_of: Vec<u32> =
+            (0..).zip(&shape.vertices).map(|(i, vertex)| *places.entry(place(vertex)).or_insert(i)).collect();
         let triangles: Vec<[u32; 3]> = shape
             .indices
             .chunks_exact(3)
@@ -104,14 +107,21 @@ impl<const AXES: usize> Simplifier<AXES> {
             place_of,
             around,
         };
-        simplifier.at_border = (0..simplifier.around.len() as u32).map(|place| !simplifier.along_border(place).is_empty()).collect();
+        simplifier.at_border = (0..simplifier.around.len() as u32)
+            .map(|place| !simplifier.along_border(place).is_empty())
+            .collect();
         (0..simplifier.around.len() as u32).for_each(|place| simplifier.offer(place));
         simplifier
     }
 
     /// The triangles that are left.
     pub fn left(&self) -> Vec<[u32; 3]> {
-        self.triangles.iter().zip(&self.alive).filter(|(_, alive)| **alive).map(|(triangle, _)| *triangle).collect()
+        self.triangles
+            .iter()
+            .zip(&self.alive)
+            .filter(|(_, alive)| **alive)
+            .map(|(triangle, _)| *triangle)
+            .collect()
     }
 
     pub fn count(&self) -> usize {
@@ -145,7 +155,8 @@ impl<const AXES: usize> Simplifier<AXES> {
 
     fn neighbours(&self, place: u32) -> Vec<u32> {
         let corners = self.star(place).flat_map(|triangle| self.triangles[triangle as usize]);
-        let mut found: Vec<u32> = corners.map(|vertex| self.place(vertex)).filter(|&other| other != place).collect();
+        let mut found: Vec<u32> =
+            corners.map(|vertex| self.place(vertex)).filter(|&other| other != place).collect();
         found.sort_unstable();
         found.dedup();
         found
@@ -153,7 +164,8 @@ impl<const AXES: usize> Simplifier<AXES> {
 
     /// Whether an edge is of one triangle alone.
     fn is_border(&self, a: u32, b: u32) -> bool {
-        let has_b = |triangle: u32| self.triangles[triangle as usize].iter().any(|&vertex| self.place(vertex) == b);
+        let has_b =
+            |triangle: u32| self.triangles[triangle as usize].iter().any(|&vertex| self.place(vertex) == b);
         self.star(a).filter(|&triangle| has_b(triangle)).count() == 1
     }
 
@@ -171,7 +183,12 @@ impl<const AXES: usize> Simplifier<AXES> {
         let mut best: Option<Candidate> = None;
         for to in self.neighbours(from) {
             let less2 = best.map_or(f64::INFINITY, |best| best.cost2);
-            let found = self.collapse(from, to, less2).map(|Collapse { cost2, .. }| Candidate { cost2, from, to, changes });
+            let found = self.collapse(from, to, less2).map(|Collapse { cost2, .. }| Candidate {
+                cost2,
+                from,
+                to,
+                changes,
+            });
             best = best.max(found);
         }
         self.offered[from as usize] = (changes, best.map_or(f64::INFINITY, |best| best.cost2));
@@ -193,14 +210,17 @@ impl<const AXES: usize> Simplifier<AXES> {
             if before.iter().any(|&vertex| self.place(vertex) == to) {
                 continue;
             }
-            let after = before.map(|vertex| becomes.iter().find(|pair| pair.0 == vertex).map_or(vertex, |pair| pair.1));
+            let after = before
+                .map(|vertex| becomes.iter().find(|pair| pair.0 == vertex).map_or(vertex, |pair| pair.1));
             if self.folds(before, after) {
                 return None;
             }
             kept.push((triangle, after));
             let edges = [(0, 1), (1, 2), (2, 0)].into_iter();
             border.extend(
-                edges.filter(|&(i, k)| self.is_border(self.place(before[i]), self.place(before[k]))).map(|(i, k)| [after[i], after[k]]),
+                edges
+                    .filter(|&(i, k)| self.is_border(self.place(before[i]), self.place(before[k])))
+                    .map(|(i, k)| [after[i], after[k]]),
             );
         }
         if kept.is_empty() {
@@ -214,7 +234,11 @@ impl<const AXES: usize> Simplifier<AXES> {
         };
         let from_border2 = |&point: &u32| {
             let of = |edge: &[u32; 2]| {
-                from_segment2(&self.points[point as usize], &self.points[edge[0] as usize], &self.points[edge[1] as usize])
+                from_segment2(
+                    &self.points[point as usize],
+                    &self.points[edge[0] as usize],
+                    &self.points[edge[1] as usize],
+                )
             };
             border.iter().map(of).fold(f64::INFINITY, f64::min)
         };
@@ -232,22 +256,28 @@ impl<const AXES: usize> Simplifier<AXES> {
         Some(Collapse { kept, cost2 })
     }
 
-    /// How far what takes the place of a corner's triangles is from them, by a look at its middles: what is hollow would else be filled for nothing.
+    /// How far what takes the place of a corner's triangles is from them, by a look at its middles: what is
+    /// hollow would else be filled for nothing.
     fn beside2(&self, from: u32, kept: &[(u32, [u32; 3])]) -> f64 {
         let points = |corners: [u32; 3]| corners.map(|vertex| &self.points[vertex as usize]);
         let from_star2 = |point: &Point<AXES>| {
-            self.star(from).map(|t| distance2(point, points(self.triangles[t as usize]))).fold(f64::INFINITY, f64::min)
+            self.star(from)
+                .map(|t| distance2(point, points(self.triangles[t as usize])))
+                .fold(f64::INFINITY, f64::min)
         };
         let of = |(before, after): &(u32, [u32; 3])| {
             let [a, b, c] = points(*after);
-            let turned = (0..3).find(|&k| self.place(self.triangles[*before as usize][k]) == from).unwrap_or(0);
-            let [first, next] = [after[turned], after[(turned + 1) % 3]].map(|vertex| &self.points[vertex as usize]);
+            let turned =
+                (0..3).find(|&k| self.place(self.triangles[*before as usize][k]) == from).unwrap_or(0);
+            let [first, next] =
+                [after[turned], after[(turned + 1) % 3]].map(|vertex| &self.points[vertex as usize]);
             from_star2(&middle(&[*a, *b, *c])).max(from_star2(&between(first, next)))
         };
         kept.iter().map(of).fold(0.0, f64::max)
     }
 
-    /// What each vertex of a place becomes: the vertex at the other place that shares a triangle with it. `None` where that is none, or several.
+    /// What each vertex of a place becomes: the vertex at the other place that shares a triangle with it.
+    /// `None` where that is none, or several.
     fn partners(&self, from: u32, to: u32) -> Option<Vec<(u32, u32)>> {
         let mut becomes: Vec<(u32, Option<u32>)> = Vec::new();
         for triangle in self.star(from) {
@@ -280,8 +310,13 @@ impl<const AXES: usize> Simplifier<AXES> {
 
     fn apply(&mut self, from: u32, to: u32, collapse: Collapse, most2: f64) {
         let star: Vec<u32> = self.star(from).collect();
-        let mut points: Vec<u32> = star.iter().flat_map(|&triangle| std::mem::take(&mut self.gone[triangle as usize])).collect();
-        points.extend(star.iter().flat_map(|&t| self.triangles[t as usize]).filter(|&vertex| self.place(vertex) == from));
+        let mut points: Vec<u32> =
+            star.iter().flat_map(|&triangle| std::mem::take(&mut self.gone[triangle as usize])).collect();
+        points.extend(
+            star.iter()
+                .flat_map(|&t| self.triangles[t as usize])
+                .filter(|&vertex| self.place(vertex) == from),
+        );
         points.sort_unstable();
         points.dedup();
         let changed = self.neighbours(from);
@@ -310,8 +345,13 @@ impl<const AXES: usize> Simplifier<AXES> {
     fn remember(&mut self, points: &[u32], kept: &[(u32, [u32; 3])]) {
         let mut of: HashMap<u32, Vec<(f64, u32)>> = HashMap::new();
         for &point in points {
-            let away2 = |corners: &[u32; 3]| distance2(&self.points[point as usize], corners.each_ref().map(|&v| &self.points[v as usize]));
-            let nearest = kept.iter().map(|(triangle, corners)| (away2(corners), *triangle)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let away2 = |corners: &[u32; 3]| {
+                distance2(&self.points[point as usize], corners.each_ref().map(|&v| &self.points[v as usize]))
+            };
+            let nearest = kept
+                .iter()
+                .map(|(triangle, corners)| (away2(corners), *triangle))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((away2, triangle)) = nearest {
                 of.entry(triangle).or_default().push((away2, point));
             }

@@ -1,8 +1,9 @@
-//! Where simpler shapes are compared with the full one: a space of position, texture coordinates, colour and, where light falls, normal, all
-//! in metres.
+//! Where simpler shapes are compared with the full one: a space of position, texture coordinates, colour and,
+//! where light falls, normal, all in metres.
 //!
-//! A point of a surface then has a place that says what is seen there, too, and one distance bounds them all: a surface within a
-//! distance of another one has each of its colours and each place of its picture within that distance.
+//! A point of a surface then has a place that says what is seen there, too, and one distance bounds them all:
+//! a surface within a distance of another one has each of its colours and each place of its picture within
+//! that distance.
 
 use crate::scene::{MeshVertex, Shape};
 
@@ -19,7 +20,8 @@ pub(super) type Point<const AXES: usize> = [f64; AXES];
 pub(super) struct Space {
     /// Metres of the surface for each unit of texture coordinates, as its triangles have it on average.
     uv_m: f64,
-    /// The same for a colour's whole range: the shape's diagonal, as if colour changed evenly from one of its ends to the other.
+    /// The same for a colour's whole range: the shape's diagonal, as if colour changed evenly from one of its
+    /// ends to the other.
     tint_m: f64,
 }
 
@@ -36,19 +38,23 @@ impl Space {
         }
         let bounds = shape.bounds();
         let diagonal_m = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() };
-        // Where the picture is spread over no area its coordinates are palette entries, and each is another colour.
+        // Where the picture is spread over no area its coordinates are palette entries, and each is another
+        // colour.
         let uv_m = if areas[1] > 1e-12 * areas[0] { (areas[0] / areas[1]).sqrt() } else { 1e3 * diagonal_m };
         Self { uv_m, tint_m: diagonal_m }
     }
 
-    /// Those of a shape's corners, in as many axes as there are. A normal of another direction is another colour: light differs by less than
-    /// normals do (`scene/light.rs`).
+    /// Those of a shape's corners, in as many axes as there are. A normal of another direction is another
+    /// colour: light differs by less than normals do (`scene/light.rs`).
     pub fn points<const AXES: usize>(&self, shape: &Shape) -> Vec<Point<AXES>> {
         let point = |(i, vertex): (usize, &MeshVertex)| {
             let [x, y, z] = vertex.position_m.map(f64::from);
             let [u, v] = vertex.uv.map(|part| f64::from(part) * self.uv_m);
             let [r, g, b, a] = vertex.tint.map(|part| f64::from(part) * self.tint_m);
-            let [n0, n1, n2] = shape.normals.get(i).map_or([0.0; 3], |normal| normal.map(|part| f64::from(part) * self.tint_m));
+            let [n0, n1, n2] = shape
+                .normals
+                .get(i)
+                .map_or([0.0; 3], |normal| normal.map(|part| f64::from(part) * self.tint_m));
             let all = [x, y, z, u, v, r, g, b, a, n0, n1, n2];
             std::array::from_fn(|axis| all[axis])
         };
@@ -72,7 +78,8 @@ pub(super) fn middle<const AXES: usize>([a, b, c]: &[Point<AXES>; 3]) -> Point<A
     std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0)
 }
 
-/// Squared distance of a point from a triangle, which is a convex set: of no point between three others it is more than of the farthest one.
+/// Squared distance of a point from a triangle, which is a convex set: of no point between three others it is
+/// more than of the farthest one.
 pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Point<AXES>; 3]) -> f64 {
     let (e, f, v) = (minus(b, a), minus(c, a), minus(point, a));
     let (ee, ef, ff) = (dot(&e, &e), dot(&e, &f), dot(&f, &f));
@@ -85,7 +92,10 @@ pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Poi
             return dot(&left, &left);
         }
     }
-    [(a, b), (a, c), (b, c)].into_iter().map(|(a, b)| from_segment2(point, a, b)).fold(f64::INFINITY, f64::min)
+    [(a, b), (a, c), (b, c)]
+        .into_iter()
+        .map(|(a, b)| from_segment2(point, a, b))
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Squared distance of a point from a straight line between two others.
@@ -105,7 +115,8 @@ mod tests {
     fn the_distance_from_a_triangle_is_that_of_its_nearest_point() {
         let part = |k: u32| f64::from(crate::noise::pcg4d([k, 3, 1, 4])[0] >> 8) / f64::from(1 << 24);
         for k in 0..50 {
-            let point = |n: u32| -> Point<UNLIT> { std::array::from_fn(|axis| part(100 * k + 10 * n + axis as u32)) };
+            let point =
+                |n: u32| -> Point<UNLIT> { std::array::from_fn(|axis| part(100 * k + 10 * n + axis as u32)) };
             let (p, corners) = (point(0), [point(1), point(2), point(3)]);
             let [a, b, c] = &corners;
             let found = distance2(&p, [a, b, c]).sqrt();
@@ -114,7 +125,8 @@ mod tests {
             for i in 0..=steps {
                 for j in 0..=steps - i {
                     let (s, t) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
-                    let left: Point<UNLIT> = std::array::from_fn(|n| p[n] - a[n] - s * (b[n] - a[n]) - t * (c[n] - a[n]));
+                    let left: Point<UNLIT> =
+                        std::array::from_fn(|n| p[n] - a[n] - s * (b[n] - a[n]) - t * (c[n] - a[n]));
                     nearest = nearest.min(dot(&left, &left).sqrt());
                 }
             }

@@ -1,8 +1,9 @@
 //! Light on the ground, in its picture: each texel is multiplied by the light of the ground below it.
 //!
-//! The ground is drawn with fewer triangles where they are far, and light by triangle would change with that. In the picture it is what it is
-//! from everywhere, for the renderer as for the oracle. Normals are those of smooth ground (central differences between neighbouring
-//! heights): a DEM's facets are not what stands there, and their edges would be marks that the ground does not have. Light is linear within the DEM's
+//! The ground is drawn with fewer triangles where they are far, and light by triangle would change with that.
+//! In the picture it is what it is from everywhere, for the renderer as for the oracle. Normals are those of
+//! smooth ground (central differences between neighbouring heights): a DEM's facets are not what stands
+//! there, and their edges would be marks that the ground does not have. Light is linear within the DEM's
 //! triangles.
 
 use std::{ops::Range, sync::Arc};
@@ -15,14 +16,16 @@ use crate::scene::{CHUNK_CELLS, Encoding, Terrain, Texture, Wrap, linear_from_sr
 
 /// Rows of the picture that a thread does at once.
 const BAND_ROWS: usize = 64;
-/// A texel centre counts as within a triangle this far outside of it, of its height: no texel on an edge may fall between two.
+/// A texel centre counts as within a triangle this far outside of it, of its height: no texel on an edge may
+/// fall between two.
 const HAIR: f64 = 1e-6;
 /// Sides of a picture that is made finer, at most.
 const MOST_TEXELS: u32 = 1 << 14;
 
 impl Terrain {
-    /// Multiplies the picture by the light on the ground. It is made finer first where it has less than a texel for each height, so that the
-    /// light has all of the DEM's detail; gives how many times along each side.
+    /// Multiplies the picture by the light on the ground. It is made finer first where it has less than a
+    /// texel for each height, so that the light has all of the DEM's detail; gives how many times along each
+    /// side.
     pub fn light_up(&mut self, light: &Light) -> u32 {
         let ground = Ground::new(self, light);
         let times = ground.times(self.texture.size_px);
@@ -39,7 +42,8 @@ impl Terrain {
     }
 }
 
-/// What is known at each height, and at a ring of places around the DEM that go on as its border does: a picture's texels reach half a cell beyond.
+/// What is known at each height, and at a ring of places around the DEM that go on as its border does: a
+/// picture's texels reach half a cell beyond.
 struct Ground {
     /// Columns and rows, with the ring.
     size: [usize; 2],
@@ -64,10 +68,12 @@ impl Ground {
             if !own.is_nan() {
                 return own;
             }
-            let around =
-                (j.saturating_sub(1)..(j + 2).min(rows)).flat_map(|j| (i.saturating_sub(1)..(i + 2).min(cols)).map(move |i| (i, j)));
-            let (sum, count) =
-                around.map(|(i, j)| here[j * cols + i]).filter(|l| !l.is_nan()).fold((0.0, 0.0), |(sum, n), l| (sum + l, n + 1.0));
+            let around = (j.saturating_sub(1)..(j + 2).min(rows))
+                .flat_map(|j| (i.saturating_sub(1)..(i + 2).min(cols)).map(move |i| (i, j)));
+            let (sum, count) = around
+                .map(|(i, j)| here[j * cols + i])
+                .filter(|l| !l.is_nan())
+                .fold((0.0, 0.0), |(sum, n), l| (sum + l, n + 1.0));
             if count > 0.0 { sum / count } else { level }
         };
         let size = [cols + 2, rows + 2];
@@ -77,19 +83,27 @@ impl Ground {
             let (x, y) = (k % size[0], k / size[0]);
             let (i, j) = (inside(x, cols), inside(y, rows));
             // The ring is as far from the border as the border from the row within.
-            let mirrored = [(x, i, cols), (y, j, rows)]
-                .map(|(at, near, of)| if at == near + 1 { near } else { (2 * near + 1).saturating_sub(at).min(of - 1) });
+            let mirrored = [(x, i, cols), (y, j, rows)].map(|(at, near, of)| {
+                if at == near + 1 { near } else { (2 * near + 1).saturating_sub(at).min(of - 1) }
+            });
             let (edge, within) = (vertex(terrain, [i, j]).1, vertex(terrain, mirrored).1);
             if mirrored == [i, j] { edge } else { [0, 1].map(|axis: usize| 2.0 * edge[axis] - within[axis]) }
         };
         let all = 0..size[0] * size[1];
-        Self { size, uv: all.clone().into_par_iter().map(uv).collect(), light: all.into_par_iter().map(lit).collect(), level }
+        Self {
+            size,
+            uv: all.clone().into_par_iter().map(uv).collect(),
+            light: all.into_par_iter().map(lit).collect(),
+            level,
+        }
     }
 
     /// How many times finer a picture must be along each side to have a texel for each cell.
     fn times(&self, size_px: [u32; 2]) -> u32 {
         let [cols, rows] = self.size;
-        let texel = |x: usize, y: usize| glam::Vec2::from(self.uv[y * cols + x]).as_dvec2() * DVec2::from(size_px.map(f64::from));
+        let texel = |x: usize, y: usize| {
+            glam::Vec2::from(self.uv[y * cols + x]).as_dvec2() * DVec2::from(size_px.map(f64::from))
+        };
         let across = texel(1, 1).distance(texel(cols - 2, 1)) / (cols - 3) as f64;
         let down = texel(1, 1).distance(texel(1, rows - 2)) / (rows - 3) as f64;
         let most = f64::from((MOST_TEXELS / size_px[0].max(size_px[1]).max(1)).max(1));
@@ -101,7 +115,8 @@ impl Ground {
     fn paint(&self, texture: &mut Texture) {
         let size_px = texture.size_px.map(|side| side as usize);
         let bytes = Bytes::new(texture.encoding);
-        let rows_of: Vec<[f64; 2]> = (0..self.size[1] - 1).into_par_iter().map(|j| self.texel_rows(j, size_px[1])).collect();
+        let rows_of: Vec<[f64; 2]> =
+            (0..self.size[1] - 1).into_par_iter().map(|j| self.texel_rows(j, size_px[1])).collect();
         texture.rgba8.par_chunks_mut(4 * size_px[0] * BAND_ROWS).enumerate().for_each(|(band, pixels)| {
             let first = band * BAND_ROWS;
             let rows = first..first + pixels.len() / (4 * size_px[0]);
@@ -121,7 +136,9 @@ impl Ground {
     fn texel_rows(&self, j: usize, height: usize) -> [f64; 2] {
         let both = &self.uv[j * self.size[0]..(j + 2) * self.size[0]];
         let rows = both.iter().map(|uv| f64::from(uv[1]) * height as f64 - 0.5);
-        rows.fold([f64::INFINITY, f64::NEG_INFINITY], |[top, bottom], row| [top.min(row.floor()), bottom.max(row.ceil())])
+        rows.fold([f64::INFINITY, f64::NEG_INFINITY], |[top, bottom], row| {
+            [top.min(row.floor()), bottom.max(row.ceil())]
+        })
     }
 
     /// Light of the texels whose centres are in a cell, as its two triangles have it.
@@ -142,11 +159,19 @@ fn fill_triangle(corners: [(DVec2, f64); 3], width: usize, rows: &Range<usize>, 
     let [(a, of_a), (b, of_b), (c, of_c)] = corners;
     let area = (b - a).perp_dot(c - a);
     let (low, high) = (a.min(b).min(c) - HAIR, a.max(b).max(c) + HAIR);
-    if area == 0.0 || !area.is_finite() || high.x < 0.0 || low.x > width as f64 || high.y < rows.start as f64 || low.y > rows.end as f64 {
+    if area == 0.0
+        || !area.is_finite()
+        || high.x < 0.0
+        || low.x > width as f64
+        || high.y < rows.start as f64
+        || low.y > rows.end as f64
+    {
         return;
     }
     let columns = low.x.ceil().max(0.0) as usize..(high.x.floor() as usize + 1).min(width);
-    for y in (low.y.ceil().max(rows.start as f64) as usize)..(high.y.floor().max(0.0) as usize + 1).min(rows.end) {
+    for y in
+        (low.y.ceil().max(rows.start as f64) as usize)..(high.y.floor().max(0.0) as usize + 1).min(rows.end)
+    {
         for x in columns.clone() {
             let texel = DVec2::new(x as f64, y as f64);
             let (s, t) = ((texel - a).perp_dot(c - a) / area, (b - a).perp_dot(texel - a) / area);
@@ -171,7 +196,9 @@ fn vertex(terrain: &Terrain, [i, j]: [usize; 2]) -> (DVec3, [f32; 2]) {
 fn normal(terrain: &Terrain, [i, j]: [usize; 2]) -> Option<DVec3> {
     let [cols, rows] = terrain.cells.map(|n| n as usize + 1);
     let here = vertex(terrain, [i, j]).0;
-    let near = |i: usize, j: usize| Some(vertex(terrain, [i, j]).0).filter(|point| point.is_finite()).unwrap_or(here);
+    let near = |i: usize, j: usize| {
+        Some(vertex(terrain, [i, j]).0).filter(|point| point.is_finite()).unwrap_or(here)
+    };
     if !here.is_finite() {
         return None;
     }
@@ -222,12 +249,18 @@ fn finer(texture: &Texture, times: u32) -> Texture {
         for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
             let (xs, across) = between(x, texture.size_px[0]);
             for (channel, byte) in pixel.iter_mut().enumerate() {
-                let stored = |k: usize, l: usize| usize::from(texture.rgba8[4 * (ys[l] * texture.size_px[0] as usize + xs[k]) + channel]);
+                let stored = |k: usize, l: usize| {
+                    usize::from(texture.rgba8[4 * (ys[l] * texture.size_px[0] as usize + xs[k]) + channel])
+                };
                 let mix = |of: &dyn Fn(usize) -> f32| {
                     let row = |l: usize| of(stored(0, l)) * (1.0 - across) + of(stored(1, l)) * across;
                     row(0) * (1.0 - down) + row(1) * down
                 };
-                *byte = if channel < 3 { bytes.of(mix(&|byte| bytes.linear[byte])) } else { (mix(&|byte| byte as f32) + 0.5) as u8 };
+                *byte = if channel < 3 {
+                    bytes.of(mix(&|byte| bytes.linear[byte]))
+                } else {
+                    (mix(&|byte| byte as f32) + 0.5) as u8
+                };
             }
         }
     });

@@ -18,11 +18,13 @@ fn uniform(rgba: [u8; 4], encoding: Encoding) -> Option<Arc<Texture>> {
 #[test]
 fn a_tilted_plane_has_one_colour_to_its_border() {
     // 20 % up to the north, 35 % down to the east.
-    let heights: Vec<f64> = (0..90 * 70).map(|k| -0.2 * 10.0 * f64::from(k / 90) - 0.35 * 10.0 * f64::from(k % 90)).collect();
+    let heights: Vec<f64> =
+        (0..90 * 70).map(|k| -0.2 * 10.0 * f64::from(k / 90) - 0.35 * 10.0 * f64::from(k % 90)).collect();
     let upwards = DVec3::new(-0.2, 0.35, -1.0).normalize();
     let factor = sun().on(upwards);
     assert!((factor - (0.75 * upwards.dot(sun().to_sun_ned) + 0.125 * (1.0 - upwards.z))).abs() < 1e-12);
-    let mut terrain = Terrain::from_heights(90, 70, 10.0, &heights, uniform([200, 100, 5, 77], Encoding::Linear)).unwrap();
+    let mut terrain =
+        Terrain::from_heights(90, 70, 10.0, &heights, uniform([200, 100, 5, 77], Encoding::Linear)).unwrap();
     // A texel for each height, of a picture that had one in all.
     assert_eq!(terrain.light_up(&sun()), 90);
     assert_eq!(terrain.texture.size_px, [90, 90]);
@@ -32,12 +34,16 @@ fn a_tilted_plane_has_one_colour_to_its_border() {
         }
         assert_eq!(pixel[3], 77);
     }
-    let mut srgb = Terrain::from_heights(90, 70, 10.0, &heights, uniform([200, 100, 5, 255], Encoding::Srgb)).unwrap();
+    let mut srgb =
+        Terrain::from_heights(90, 70, 10.0, &heights, uniform([200, 100, 5, 255], Encoding::Srgb)).unwrap();
     srgb.light_up(&sun());
     let decode = |byte: f64| f64::from(linear_from_srgb(byte as f32 / 255.0));
     for (byte, before) in srgb.texture.rgba8[..3].iter().zip([200.0, 100.0, 5.0]) {
         let wanted = factor * decode(before);
-        assert!(decode(f64::from(*byte) - 0.51) <= wanted && wanted <= decode(f64::from(*byte) + 0.51), "{byte} {before}");
+        assert!(
+            decode(f64::from(*byte) - 0.51) <= wanted && wanted <= decode(f64::from(*byte) + 0.51),
+            "{byte} {before}"
+        );
     }
 }
 
@@ -50,10 +56,17 @@ fn hills(turn: f64, side_px: u32, void: impl Fn(u32, u32) -> bool) -> (Terrain, 
         if void(i, j) { DVec3::NAN } else { at }
     };
     let points: Vec<DVec3> = (0..40 * 30).map(point).collect();
-    let uv =
-        |k: u32| (0.5 + DVec2::from_angle(turn).rotate(DVec2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 15.0)) / 60.0).as_vec2();
+    let uv = |k: u32| {
+        (0.5 + DVec2::from_angle(turn).rotate(DVec2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 15.0))
+            / 60.0)
+            .as_vec2()
+    };
     let uvs: Vec<[f32; 2]> = (0..40 * 30).map(|k| uv(k).to_array()).collect();
-    let texture = Texture { size_px: [side_px; 2], rgba8: vec![255; 4 * (side_px * side_px) as usize], encoding: Encoding::Linear };
+    let texture = Texture {
+        size_px: [side_px; 2],
+        rgba8: vec![255; 4 * (side_px * side_px) as usize],
+        encoding: Encoding::Linear,
+    };
     (Terrain::new(40, 30, &points, &uvs, Arc::new(texture)).unwrap(), points)
 }
 
@@ -83,8 +96,16 @@ fn texels_have_the_light_of_the_ground_that_they_lie_on() {
                 let (s, t) = (place.x - i as f64, place.y - j as f64);
                 let [nw, ne, sw, se] = [light(i, j), light(i + 1, j), light(i, j + 1), light(i + 1, j + 1)];
                 // The diagonal runs from north-west to south-east.
-                let wanted = if s > t { nw + s * (ne - nw) + t * (se - ne) } else { nw + s * (se - sw) + t * (sw - nw) };
-                assert!((f64::from(byte) - 255.0 * wanted).abs() <= 0.55, "{turn} {x} {y}: {byte} {}", 255.0 * wanted);
+                let wanted = if s > t {
+                    nw + s * (ne - nw) + t * (se - ne)
+                } else {
+                    nw + s * (se - sw) + t * (sw - nw)
+                };
+                assert!(
+                    (f64::from(byte) - 255.0 * wanted).abs() <= 0.55,
+                    "{turn} {x} {y}: {byte} {}",
+                    255.0 * wanted
+                );
                 (inside, least, most) = (inside + 1, least.min(byte), most.max(byte));
             }
         }
@@ -95,7 +116,8 @@ fn texels_have_the_light_of_the_ground_that_they_lie_on() {
 #[test]
 fn voids_are_lit_as_what_is_around_them() {
     let (mut whole, _) = hills(0.3, 240, |_, _| false);
-    let (mut holed, _) = hills(0.3, 240, |i, j| (10..16).contains(&i) && (8..14).contains(&j) || i == 30 && j == 20);
+    let (mut holed, _) =
+        hills(0.3, 240, |i, j| (10..16).contains(&i) && (8..14).contains(&j) || i == 30 && j == 20);
     whole.light_up(&sun());
     holed.light_up(&sun());
     let level = (255.0 * sun().on(DVec3::NEG_Z)).round();

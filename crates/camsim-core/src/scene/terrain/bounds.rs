@@ -68,10 +68,11 @@ impl Aabb {
         (normal * self.min).max(normal * self.max).element_sum()
     }
 
-    /// First ray parameter in `0..=t_max` inside the box, for a ray given by its origin and [`inverse`] direction.
+    /// First ray parameter in `0..=t_max` inside the box, for a ray given by its origin and [`inverse`]
+    /// direction.
     ///
-    /// The box is taken a nanometre larger, and both ends are widened by some rounding errors: it must never hide a hit of a triangle
-    /// within it, nor one that a ray within the plane of a face meets.
+    /// The box is taken a nanometre larger, and both ends are widened by some rounding errors: it must never
+    /// hide a hit of a triangle within it, nor one that a ray within the plane of a face meets.
     #[cfg(test)]
     pub(in crate::scene) fn enter(&self, origin: DVec3, inverse_direction: DVec3, t_max: f64) -> Option<f64> {
         const WIDER: f64 = 1e-14;
@@ -84,7 +85,8 @@ impl Aabb {
     }
 }
 
-/// 1 / direction for [`Aabb::enter`]. A component of 0 counts as one too small to matter: its inverse is finite, and times 0 it is 0.
+/// 1 / direction for [`Aabb::enter`]. A component of 0 counts as one too small to matter: its inverse is
+/// finite, and times 0 it is 0.
 #[cfg(test)]
 pub(in crate::scene) fn inverse(direction: DVec3) -> DVec3 {
     const NONE: f64 = 1e-290;

@@ -17,16 +17,18 @@ use crate::scene::{Encoding, Texture};
 /// Coordinates beyond this would not stay exact, metres.
 const MAX_COORDINATE_M: f64 = 1e7;
 
-/// Finest grid of vertex positions: 2^-24 m, so that position / quantum stays exact in f64 up to [`MAX_COORDINATE_M`].
+/// Finest grid of vertex positions: 2^-24 m, so that position / quantum stays exact in f64 up to
+/// [`MAX_COORDINATE_M`].
 const MIN_QUANTUM_EXPONENT: i32 = -24;
 
 /// Chunks that tell how positions are rounded.
 const SOME_CHUNKS: usize = 16;
 
-/// Where the points of a grid lie. They are asked for chunk by chunk, some more than once, by several threads, and never kept: what computes them
-/// needs no memory for all of them.
+/// Where the points of a grid lie. They are asked for chunk by chunk, some more than once, by several
+/// threads, and never kept: what computes them needs no memory for all of them.
 pub trait TerrainGrid: Sync {
-    /// NED position of the point in a column (from the west) and row (from the north), metres; not finite for a void.
+    /// NED position of the point in a column (from the west) and row (from the north), metres; not finite for
+    /// a void.
     fn point_ned_m(&self, at: [u32; 2]) -> DVec3;
     /// Its texture coordinates.
     fn uv(&self, at: [u32; 2]) -> [f32; 2];
@@ -85,15 +87,23 @@ struct Part {
 }
 
 impl Terrain {
-    /// A terrain from NED positions (metres) of `cols` x `rows` grid points, row after row from the north, each from the west; points that
-    /// are not finite are voids. `uvs` are texture coordinates of the same points.
+    /// A terrain from NED positions (metres) of `cols` x `rows` grid points, row after row from the north,
+    /// each from the west; points that are not finite are voids. `uvs` are texture coordinates of the same
+    /// points.
     ///
-    /// Positions are rounded to [`Terrain::quantum_m`] (at most the chunk's size * 2^-23: half a millimetre for cells of 90 m).
+    /// Positions are rounded to [`Terrain::quantum_m`] (at most the chunk's size * 2^-23: half a millimetre
+    /// for cells of 90 m).
     ///
     /// # Errors
     ///
     /// [`TerrainError`] says what is wrong with the grid.
-    pub fn new(cols: u32, rows: u32, points: &[DVec3], uvs: &[[f32; 2]], texture: Arc<Texture>) -> Result<Self, TerrainError> {
+    pub fn new(
+        cols: u32,
+        rows: u32,
+        points: &[DVec3],
+        uvs: &[[f32; 2]],
+        texture: Arc<Texture>,
+    ) -> Result<Self, TerrainError> {
         if cols < 2 || rows < 2 {
             return Err(TerrainError::TooSmall { cols, rows });
         }
@@ -104,13 +114,18 @@ impl Terrain {
         Self::of_grid(cols, rows, &Listed { cols, points, uvs }, texture)
     }
 
-    /// As [`Terrain::new`], of points that are computed when they are asked for: no memory is needed but the terrain's own
-    /// ([`Terrain::host_bytes`]).
+    /// As [`Terrain::new`], of points that are computed when they are asked for: no memory is needed but the
+    /// terrain's own ([`Terrain::host_bytes`]).
     ///
     /// # Errors
     ///
     /// As [`Terrain::new`].
-    pub fn of_grid(cols: u32, rows: u32, grid: &dyn TerrainGrid, texture: Arc<Texture>) -> Result<Self, TerrainError> {
+    pub fn of_grid(
+        cols: u32,
+        rows: u32,
+        grid: &dyn TerrainGrid,
+        texture: Arc<Texture>,
+    ) -> Result<Self, TerrainError> {
         if cols < 2 || rows < 2 {
             return Err(TerrainError::TooSmall { cols, rows });
         }
@@ -119,13 +134,19 @@ impl Terrain {
         let places = places(cells, chunk_grid)?;
         let mut vertices = vec![TerrainVertex::default(); places.iter().map(Place::count).sum()];
         let mut errors = vec![0; places.len() * errors::PER_CHUNK];
-        // Positions take long to compute. A few chunks nearly always tell how they are rounded; where another one is larger, it is done again.
-        let some = places.iter().step_by(places.len().div_ceil(SOME_CHUNKS)).map(|place| points_of(grid, *place).1);
+        // Positions take long to compute. A few chunks nearly always tell how they are rounded; where another
+        // one is larger, it is done again.
+        let some =
+            places.iter().step_by(places.len().div_ceil(SOME_CHUNKS)).map(|place| points_of(grid, *place).1);
         let mut quantum_m = quantum(some);
         let parts = loop {
             let parts: Vec<Part> = places
                 .par_iter()
-                .zip(split(&mut vertices, &places).into_par_iter().zip(errors.par_chunks_exact_mut(errors::PER_CHUNK)))
+                .zip(
+                    split(&mut vertices, &places)
+                        .into_par_iter()
+                        .zip(errors.par_chunks_exact_mut(errors::PER_CHUNK)),
+                )
                 .map(|(place, (vertices, errors))| part(grid, *place, quantum_m, vertices, errors))
                 .collect();
             let exact_m = quantum(parts.iter().map(|part| part.bounds));
@@ -134,7 +155,9 @@ impl Terrain {
             }
             quantum_m = exact_m;
         };
-        let farthest = |bounds: &Aabb| if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+        let farthest = |bounds: &Aabb| {
+            if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() }
+        };
         let distance_m = parts.iter().map(|part| farthest(&part.bounds)).fold(0.0, f64::max);
         if distance_m > MAX_COORDINATE_M {
             return Err(TerrainError::TooFar { distance_m });
@@ -172,21 +195,32 @@ impl Terrain {
         Ok(terrain)
     }
 
-    /// Memory that it takes without its picture, bytes: 20 a vertex, 3 for the errors of the hierarchy and 4 for boxes, or 27 a height.
+    /// Memory that it takes without its picture, bytes: 20 a vertex, 3 for the errors of the hierarchy and 4
+    /// for boxes, or 27 a height.
     pub fn host_bytes(&self) -> u64 {
-        let lists = size_of_val(&*self.vertices) + size_of_val(&*self.errors) + size_of_val(&*self.chunks) + size_of_val(&*self.border);
+        let lists = size_of_val(&*self.vertices)
+            + size_of_val(&*self.errors)
+            + size_of_val(&*self.chunks)
+            + size_of_val(&*self.border);
         (lists + self.tree.bytes()) as u64
     }
 
-    /// A flat-earth terrain about the origin: `heights` (metres, up; NaN = void) at square cells of `cell_m`, row after row from the
-    /// north. The texture (white if none) covers one pixel a height.
+    /// A flat-earth terrain about the origin: `heights` (metres, up; NaN = void) at square cells of `cell_m`,
+    /// row after row from the north. The texture (white if none) covers one pixel a height.
     ///
     /// # Errors
     ///
     /// As [`Terrain::new`].
-    pub fn from_heights(cols: u32, rows: u32, cell_m: f64, heights: &[f64], texture: Option<Arc<Texture>>) -> Result<Self, TerrainError> {
+    pub fn from_heights(
+        cols: u32,
+        rows: u32,
+        cell_m: f64,
+        heights: &[f64],
+        texture: Option<Arc<Texture>>,
+    ) -> Result<Self, TerrainError> {
         let middle = [0.5 * (f64::from(cols) - 1.0), 0.5 * (f64::from(rows) - 1.0)];
-        let place = |index: usize| [f64::from(index as u32 % cols.max(1)), f64::from(index as u32 / cols.max(1))];
+        let place =
+            |index: usize| [f64::from(index as u32 % cols.max(1)), f64::from(index as u32 / cols.max(1))];
         let points: Vec<_> = heights
             .iter()
             .enumerate()
@@ -282,13 +316,20 @@ fn quantum(boxes: impl Iterator<Item = Aabb>) -> f64 {
     2f64.powi((largest.log2().ceil() as i32 - 23).max(MIN_QUANTUM_EXPONENT))
 }
 
-fn part(grid: &dyn TerrainGrid, place: Place, quantum_m: f64, vertices: &mut [TerrainVertex], errors: &mut [u16]) -> Part {
+fn part(
+    grid: &dyn TerrainGrid,
+    place: Place,
+    quantum_m: f64,
+    vertices: &mut [TerrainVertex],
+    errors: &mut [u16],
+) -> Part {
     let (points, bounds) = points_of(grid, place);
     let centre_ned_m = chunk_centre(&bounds);
     let mut exact_bounds = Aabb::EMPTY;
     for ((vertex, point), at) in vertices.iter_mut().zip(points).zip(place.vertices()) {
         let offset_m = if point.is_finite() {
-            // Rounding the position, not the offset, is what makes chunks agree on shared vertices. Both steps are exact in f64.
+            // Rounding the position, not the offset, is what makes chunks agree on shared vertices. Both
+            // steps are exact in f64.
             let rounded = (point / quantum_m).round() * quantum_m;
             exact_bounds.include(rounded);
             (rounded - centre_ned_m).as_vec3().to_array()
@@ -317,7 +358,9 @@ fn count_without_voids(cells: [u32; 2], vertices: &[TerrainVertex]) -> (u64, u64
     let (mut triangles, mut void_cells) = (0, 0);
     for b in 0..cells[1] {
         for a in 0..cells[0] {
-            let is_valid = |t: &[[u32; 2]; 3]| t.iter().all(|[i, j]| !vertices[(j * (cells[0] + 1) + i) as usize].offset_m[0].is_nan());
+            let is_valid = |t: &[[u32; 2]; 3]| {
+                t.iter().all(|[i, j]| !vertices[(j * (cells[0] + 1) + i) as usize].offset_m[0].is_nan())
+            };
             let valid = cell_triangles([a, b]).iter().filter(|t| is_valid(t)).count();
             triangles += valid as u64;
             void_cells += u64::from(valid < 2);

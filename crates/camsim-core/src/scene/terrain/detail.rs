@@ -37,8 +37,9 @@ const FIRST: [usize; NODE_CELLS.len() + 1] = {
 
 /// How a camera sees deviations of a surface.
 ///
-/// A point p (from the camera, z along its axis) that is moved by d is seen at another place by
-/// `focal |(z d - d_z p)_xy| / (z (z + d_z))`. For a vertical d the numerator is that of the horizontal part of p alone; for any d it is `|d| |p|` at most.
+/// A point p (from the camera, z along its axis) that is moved by d is seen at another place by `focal |(z d
+/// - d_z p)_xy| / (z (z + d_z))`. For a vertical d the numerator is that of the horizontal part of p alone;
+/// for any d it is `|d| |p|` at most.
 #[derive(Debug)]
 struct Judge {
     frustum: Frustum,
@@ -55,7 +56,8 @@ struct Judge {
 impl Judge {
     fn new(camera: &CameraPose, tangents: [f64; 4], focal_px: f64, max_error_px: f64) -> Self {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.ned_from_camera * axis);
-        let radius2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
+        let radius2 = tangents[0].abs().max(tangents[1].abs()).powi(2)
+            + tangents[2].abs().max(tangents[3].abs()).powi(2);
         Self {
             frustum: Frustum::new(camera, tangents),
             position_ned_m: camera.position_ned_m,
@@ -73,31 +75,37 @@ impl Judge {
         (depth_m.max(from_camera.distance_m(DVec3::ZERO) / self.slant), from_camera.farthest_m(DVec3::ZERO))
     }
 
-    /// Largest vertical deviation within a box that moves nothing by more than the tolerance, if points are off by up to `horizontal_m` also
-    /// in the north-east plane, and that is none either if it is looked at from any side.
+    /// Largest vertical deviation within a box that moves nothing by more than the tolerance, if points are
+    /// off by up to `horizontal_m` also in the north-east plane, and that is none either if it is looked at
+    /// from any side.
     ///
-    /// From `focal (e across + h far) <= tolerance z (z - e |axis_z| - h)` and `focal e <= tolerance z`: from straight above heights that are off move nothing in the
-    /// picture, but all of it is in the depth. Each step rounds the way its arguments go, so of two boxes
-    /// that hold one another the larger never gets the larger tolerance.
+    /// From `focal (e across + h far) <= tolerance z (z - e |axis_z| - h)` and `focal e <= tolerance z`: from
+    /// straight above heights that are off move nothing in the picture, but all of it is in the depth. Each
+    /// step rounds the way its arguments go, so of two boxes that hold one another the larger never gets the
+    /// larger tolerance.
     fn tolerance(&self, bounds: &Aabb, horizontal_m: f64) -> u16 {
         if !self.frustum.may_see(bounds) {
             return OUT_OF_SIGHT;
         }
-        let from_camera = Aabb { min: bounds.min - self.position_ned_m, max: bounds.max - self.position_ned_m };
+        let from_camera =
+            Aabb { min: bounds.min - self.position_ned_m, max: bounds.max - self.position_ned_m };
         let (depth_m, far_m) = self.depths(&from_camera);
         if depth_m <= 0.0 {
             return 0;
         }
         let [x, y] = self.across_ned.map(|n| from_camera.support(n).max(from_camera.support(-n)));
         let across_m = (x * x + y * y).sqrt();
-        let left_px_m = self.max_error_px * (depth_m - horizontal_m) - self.focal_px * horizontal_m * far_m / depth_m;
-        let in_picture_m = left_px_m / (self.focal_px * across_m / depth_m + self.max_error_px * self.axis_ned.z.abs());
+        let left_px_m =
+            self.max_error_px * (depth_m - horizontal_m) - self.focal_px * horizontal_m * far_m / depth_m;
+        let in_picture_m =
+            left_px_m / (self.focal_px * across_m / depth_m + self.max_error_px * self.axis_ned.z.abs());
         key_of_tolerance(in_picture_m.min(self.max_error_px * depth_m / self.focal_px))
     }
 
     /// What horizontal deviations alone move within a box, pixels.
     fn horizontal_px(&self, bounds: &Aabb, horizontal_m: f64) -> f64 {
-        let from_camera = Aabb { min: bounds.min - self.position_ned_m, max: bounds.max - self.position_ned_m };
+        let from_camera =
+            Aabb { min: bounds.min - self.position_ned_m, max: bounds.max - self.position_ned_m };
         let (depth_m, far_m) = self.depths(&from_camera);
         match (horizontal_m > 0.0, depth_m > horizontal_m) {
             (false, _) => 0.0,
@@ -107,7 +115,8 @@ impl Judge {
     }
 }
 
-/// What a chunk's triangles are judged by, as far as it was asked for. Whoever finds a number first finds the same.
+/// What a chunk's triangles are judged by, as far as it was asked for. Whoever finds a number first finds the
+/// same.
 #[derive(Debug)]
 pub(super) struct Tolerances {
     chunk: u32,
@@ -118,7 +127,11 @@ pub(super) struct Tolerances {
 impl Tolerances {
     pub fn new(chunk: u32) -> Self {
         let unknown = || AtomicU16::new(UNKNOWN);
-        Self { chunk, of_set: LATTICE.sets.iter().map(|_| unknown()).collect(), of_square: std::array::from_fn(|_| unknown()) }
+        Self {
+            chunk,
+            of_set: LATTICE.sets.iter().map(|_| unknown()).collect(),
+            of_square: std::array::from_fn(|_| unknown()),
+        }
     }
 
     /// For another chunk.
@@ -128,8 +141,8 @@ impl Tolerances {
     }
 }
 
-/// A terrain as one camera needs it: triangles are halved until their vertical errors are within the tolerance. A pure function of
-/// terrain, camera and tolerance.
+/// A terrain as one camera needs it: triangles are halved until their vertical errors are within the
+/// tolerance. A pure function of terrain, camera and tolerance.
 #[derive(Debug)]
 pub struct TerrainDetail<'a> {
     pub(super) terrain: &'a Terrain,
@@ -141,10 +154,18 @@ pub struct TerrainDetail<'a> {
 }
 
 impl<'a> TerrainDetail<'a> {
-    /// `tangents` = [u_min, u_max, v_min, v_max] of the ideal frame (u = x/z, v = y/z in the optical frame), `focal_px` its larger focal
-    /// length. Nothing that is seen is moved by more than `max_error_px`, and heights are off by no more than that looks from the side, so that from straight above depth is off by
-    /// `max_error_px / focal_px` of it at most; with a tolerance too small for anything it is the full surface.
-    pub fn new(terrain: &'a Terrain, camera: &CameraPose, tangents: [f64; 4], focal_px: f64, max_error_px: f64) -> Self {
+    /// `tangents` = [u_min, u_max, v_min, v_max] of the ideal frame (u = x/z, v = y/z in the optical frame),
+    /// `focal_px` its larger focal length. Nothing that is seen is moved by more than `max_error_px`, and
+    /// heights are off by no more than that looks from the side, so that from straight above depth is off by
+    /// `max_error_px / focal_px` of it at most; with a tolerance too small for anything it is the full
+    /// surface.
+    pub fn new(
+        terrain: &'a Terrain,
+        camera: &CameraPose,
+        tangents: [f64; 4],
+        focal_px: f64,
+        max_error_px: f64,
+    ) -> Self {
         let judge = Judge::new(camera, tangents, focal_px, max_error_px);
         let mut in_sight = Vec::new();
         terrain.tree.visit(CHUNK_CELLS, &|bounds| judge.frustum.may_see(bounds), &mut |[x, y]| {
@@ -218,7 +239,8 @@ impl<'a> TerrainDetail<'a> {
 
     /// Least depth of what is in sight of a square, and distance over depth at most; `None` out of sight.
     pub(super) fn least_depth(&self, cells: u32, at: [i64; 2]) -> Option<(f64, f64)> {
-        let bounds = self.terrain.tree.square(cells, at).filter(|bounds| self.judge.frustum.may_see(bounds))?;
+        let bounds =
+            self.terrain.tree.square(cells, at).filter(|bounds| self.judge.frustum.may_see(bounds))?;
         let position_ned_m = self.judge.position_ned_m;
         let from_camera = Aabb { min: bounds.min - position_ned_m, max: bounds.max - position_ned_m };
         Some((self.judge.depths(&from_camera).0, self.judge.slant))
@@ -236,7 +258,8 @@ impl<'a> TerrainDetail<'a> {
 
     /// Tolerance of a square by its place, counted from the chunk's first.
     fn of_square(&self, known: &Tolerances, size: usize, column: i32, row: i32) -> u16 {
-        let of_square = &known.of_square[FIRST[size] + (row + 1) as usize * AROUND[size] + (column + 1) as usize];
+        let of_square =
+            &known.of_square[FIRST[size] + (row + 1) as usize * AROUND[size] + (column + 1) as usize];
         match of_square.load(Relaxed) {
             UNKNOWN => {
                 let tolerance = self.find(known.chunk, size, column, row);

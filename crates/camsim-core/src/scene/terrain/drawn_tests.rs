@@ -53,7 +53,8 @@ fn vertex_m(terrain: &Terrain, [i, j]: [u32; 2]) -> DVec3 {
 fn full_m(terrain: &Terrain, at: [f64; 2]) -> DVec3 {
     let [i, j] = [0, 1].map(|k: usize| (at[k].max(0.0) as u32).min(terrain.cells[k] - 1));
     let (x, y) = (at[0] - f64::from(i), at[1] - f64::from(j));
-    let [nw, ne, sw, se] = [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]].map(|place| vertex_m(terrain, place));
+    let [nw, ne, sw, se] =
+        [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]].map(|place| vertex_m(terrain, place));
     if x > y { nw + x * (ne - nw) + y * (se - ne) } else { nw + y * (sw - nw) + x * (se - sw) }
 }
 
@@ -61,7 +62,8 @@ fn full_m(terrain: &Terrain, at: [f64; 2]) -> DVec3 {
 fn seen(camera: &CameraPose, point: DVec3) -> Option<[f64; 2]> {
     let p = camera.ned_from_camera.inverse() * (point - camera.position_ned_m);
     let [u, v] = [p.x / p.z, p.y / p.z];
-    let is_in_sight = p.z > 1e-6 && (TANGENTS[0]..=TANGENTS[1]).contains(&u) && (TANGENTS[2]..=TANGENTS[3]).contains(&v);
+    let is_in_sight =
+        p.z > 1e-6 && (TANGENTS[0]..=TANGENTS[1]).contains(&u) && (TANGENTS[2]..=TANGENTS[3]).contains(&v);
     is_in_sight.then_some([u, v])
 }
 
@@ -70,7 +72,8 @@ fn area2([a, b, c]: [[i64; 2]; 3]) -> i64 {
     (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
 }
 
-/// Two places of each cell, in hundredths: how many triangles hold them within. On an edge, as may be where triangles are cut, it is none.
+/// Two places of each cell, in hundredths: how many triangles hold them within. On an edge, as may be where
+/// triangles are cut, it is none.
 fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], u32> {
     let mut found: HashMap<[i64; 2], u32> = HashMap::new();
     for triangle in triangles {
@@ -96,10 +99,12 @@ fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], 
     found
 }
 
-/// Triangles meet edge to edge, but where the terrain ends or out of sight; every place in sight is covered, and none twice.
+/// Triangles meet edge to edge, but where the terrain ends or out of sight; every place in sight is covered,
+/// and none twice.
 fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
     let triangles = triangles(terrain, mesh);
-    let edges: Vec<[[u32; 2]; 2]> = triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+    let edges: Vec<[[u32; 2]; 2]> =
+        triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
     let known: HashSet<_> = edges.iter().collect();
     assert_eq!(known.len(), edges.len(), "two triangles on the same side of an edge");
     for &[a, b] in &edges {
@@ -139,7 +144,9 @@ fn nothing_in_sight_is_left_open() {
 
 /// Where a ray first meets one of some triangles: the parameter.
 fn first_met(triangles: &[[DVec3; 3]], origin: DVec3, direction: DVec3) -> Option<f64> {
-    let met = triangles.iter().filter_map(|&triangle| Some(intersect_triangle(triangle, origin, direction, f64::INFINITY)?.0));
+    let met = triangles
+        .iter()
+        .filter_map(|&triangle| Some(intersect_triangle(triangle, origin, direction, f64::INFINITY)?.0));
     met.min_by(f64::total_cmp)
 }
 
@@ -152,15 +159,25 @@ fn what_faces_away_is_never_what_is_seen() {
         let terrain = hills(cols, rows, 10.0, 70.0);
         for _ in 0..6 {
             let over = [random.within(-300.0, 300.0), random.within(-300.0, 300.0)];
-            let position = DVec3::new(over[0], over[1], terrain.down_at(over[0], over[1]).unwrap() - random.within(2.0, 90.0));
+            let position = DVec3::new(
+                over[0],
+                over[1],
+                terrain.down_at(over[0], over[1]).unwrap() - random.within(2.0, 90.0),
+            );
             let camera = forward(position, random.within(0.0, 0.6));
             let detail = TerrainDetail::new(&terrain, &camera, TANGENTS, FOCAL_PX, random.within(0.1, 2.0));
             let (all, drawn) = (detail.mesh(), detail.mesh_to_draw());
             assert_eq!(all.lod.triangles, drawn.lod.triangles + drawn.lod.away);
-            assert_eq!((all.lod.away, all.lod.max_error_px, &all.chunks), (0, drawn.lod.max_error_px, &drawn.chunks));
+            assert_eq!(
+                (all.lod.away, all.lod.max_error_px, &all.chunks),
+                (0, drawn.lod.max_error_px, &drawn.chunks)
+            );
             (away, kept) = (away + drawn.lod.away, kept + drawn.lod.triangles);
             let corners = |mesh: &TerrainMesh| -> Vec<[DVec3; 3]> {
-                triangles(&terrain, mesh).into_iter().map(|t| t.map(|place| vertex_m(&terrain, place))).collect()
+                triangles(&terrain, mesh)
+                    .into_iter()
+                    .map(|t| t.map(|place| vertex_m(&terrain, place)))
+                    .collect()
             };
             let (all, drawn) = (corners(&all), corners(&drawn));
             for _ in 0..60 {
@@ -175,7 +192,10 @@ fn what_faces_away_is_never_what_is_seen() {
             }
         }
     }
-    eprintln!("{away} of {} triangles face away; {met} rays meet the ground, {behind} go on to meet it again", away + kept);
+    eprintln!(
+        "{away} of {} triangles face away; {met} rays meet the ground, {behind} go on to meet it again",
+        away + kept
+    );
     assert!(6 * away > kept && met > 300 && behind > 60, "{away} {kept} {met} {behind}");
 }
 
@@ -201,7 +221,8 @@ fn all_is_drawn_where_an_underside_can_be_seen() {
     holed[64 * 129 + 64] = f64::NAN;
     let (to_draw, all) = drawn(&Terrain::from_heights(129, 129, 10.0, &holed, None).unwrap(), above);
     assert_eq!(to_draw, all);
-    // A border that bends inwards far away, as a circle of latitude does: a ray along it leaves the ground and comes back.
+    // A border that bends inwards far away, as a circle of latitude does: a ray along it leaves the ground
+    // and comes back.
     let bent = |bend_m: f64| {
         let at = |k: usize| [(k % 129) as f64 - 64.0, 64.0 - (k / 129) as f64];
         let points: Vec<_> = heights
@@ -228,7 +249,11 @@ fn nothing_is_left_open_from_anywhere() {
     let mut random = Random(17);
     let mut halved = 0;
     for _ in 0..40 {
-        let position = DVec3::new(random.within(-900.0, 900.0), random.within(-900.0, 900.0), random.within(-1500.0, 40.0));
+        let position = DVec3::new(
+            random.within(-900.0, 900.0),
+            random.within(-900.0, 900.0),
+            random.within(-1500.0, 40.0),
+        );
         let camera = forward(position, random.within(-0.2, 1.5));
         let mesh = detail(&terrain, &camera, 10f64.powf(random.within(-2.0, 1.5)));
         halved += usize::from(mesh.lod.triangles > 100 && mesh.lod.triangles < 20_000);
@@ -253,12 +278,14 @@ fn the_selection_keeps_its_promise() {
                     let [a, b] = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
                     let weights = [1.0 - a - b, a, b];
                     let drawn: DVec3 = (0..3).map(|k| weights[k] * corners[k]).sum();
-                    let at = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(triangle[k][axis])).sum());
+                    let at = [0, 1]
+                        .map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(triangle[k][axis])).sum());
                     let full = full_m(&terrain, at);
                     if let (Some(a), Some(b)) = (seen(&camera, full), seen(&camera, drawn)) {
                         worst = worst.max(FOCAL_PX * (a[0] - b[0]).hypot(a[1] - b[1]));
                         let depth_m = (camera.ned_from_camera.inverse() * (full - camera.position_ned_m)).z;
-                        worst_from_aside = worst_from_aside.max(FOCAL_PX * (full.z - drawn.z).abs() / depth_m);
+                        worst_from_aside =
+                            worst_from_aside.max(FOCAL_PX * (full.z - drawn.z).abs() / depth_m);
                     }
                 }
             }
@@ -266,7 +293,10 @@ fn the_selection_keeps_its_promise() {
             assert!(worst_from_aside <= max_error_px, "{worst_from_aside} > {max_error_px} px");
             // Not only bounds.
             let worst = worst.max(worst_from_aside);
-            assert!(mesh.lod.triangles > 50_000 || worst > 0.3 * max_error_px, "{worst} of {max_error_px} px");
+            assert!(
+                mesh.lod.triangles > 50_000 || worst > 0.3 * max_error_px,
+                "{worst} of {max_error_px} px"
+            );
         }
     }
     let fine = detail(&terrain, &cameras()[3], 0.25).lod.triangles;
@@ -281,8 +311,11 @@ fn without_any_tolerance_it_is_the_full_surface() {
     let mesh = detail(&terrain, &camera, 0.0);
     assert_eq!((mesh.lod.triangles, mesh.lod.max_error_px), (2 * 139 * 99, 0.0));
     // Every diagonal runs from north-west to south-east.
-    let diagonals =
-        |t: &[[u32; 2]; 3]| (0..3).filter(|&k| t[k].map(|n| n + 1) == t[(k + 1) % 3] || t[(k + 1) % 3].map(|n| n + 1) == t[k]).count();
+    let diagonals = |t: &[[u32; 2]; 3]| {
+        (0..3)
+            .filter(|&k| t[k].map(|n| n + 1) == t[(k + 1) % 3] || t[(k + 1) % 3].map(|n| n + 1) == t[k])
+            .count()
+    };
     assert!(triangles(&terrain, &mesh).iter().all(|t| diagonals(t) == 1));
 }
 
@@ -310,7 +343,9 @@ fn what_lies_beyond_the_view_costs_nothing() {
     // The same hills in a wider terrain: whole chunks more on each side.
     let heights = |side: u32| -> Vec<f64> {
         let at = |index: u32| f64::from(index) - f64::from(side / 2);
-        (0..side * side).map(|k| 20.0 * ((0.3 * at(k % side)).sin() + (0.23 * at(k / side) + 0.1 * at(k % side)).cos())).collect()
+        (0..side * side)
+            .map(|k| 20.0 * ((0.3 * at(k % side)).sin() + (0.23 * at(k / side) + 0.1 * at(k % side)).cos()))
+            .collect()
     };
     let camera = nadir(DVec3::new(0.0, 0.0, -1300.0));
     let [small, large] = [257, 641].map(|side| {
@@ -319,7 +354,12 @@ fn what_lies_beyond_the_view_costs_nothing() {
     });
     assert!(small.triangles > 10_000 && small.chunks == large.chunks);
     // At its end the smaller one does without halves that its continuation would ask for.
-    assert!(large.triangles.abs_diff(small.triangles) < small.triangles / 100, "{} {}", small.triangles, large.triangles);
+    assert!(
+        large.triangles.abs_diff(small.triangles) < small.triangles / 100,
+        "{} {}",
+        small.triangles,
+        large.triangles
+    );
 }
 
 #[test]
@@ -346,7 +386,9 @@ fn errors_are_exact() {
                     // Multiples of a fraction hit many corners of the overlay exactly.
                     let weights = [random.next(), random.next(), random.next()].map(|w| (6.0 * w).round());
                     let sum = weights.iter().sum::<f64>().max(1e-9);
-                    let at = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] / sum * f64::from(corners[k][axis])).sum::<f64>());
+                    let at = [0, 1].map(|axis: usize| {
+                        (0..3).map(|k| weights[k] / sum * f64::from(corners[k][axis])).sum::<f64>()
+                    });
                     let coarse: DVec3 = (0..3).map(|k| weights[k] / sum * points[k]).sum();
                     if sum >= 1.0 {
                         worst = worst.max((full_m(&terrain, at) - coarse).z.abs());
@@ -377,7 +419,9 @@ fn numbers_of_errors_order_as_errors_do() {
     assert_eq!(errors::key_of_error(0.0), errors::key_of_tolerance(0.0));
     assert_eq!([-1.0, f64::NAN].map(errors::key_of_tolerance), [0; 2]);
     assert!(errors::key_of_error(f64::INFINITY) < detail::OUT_OF_SIGHT);
-    assert!(errors::key_of_tolerance(f64::INFINITY) < detail::OUT_OF_SIGHT && detail::OUT_OF_SIGHT < errors::VOID);
+    assert!(
+        errors::key_of_tolerance(f64::INFINITY) < detail::OUT_OF_SIGHT && detail::OUT_OF_SIGHT < errors::VOID
+    );
 }
 
 #[test]
@@ -386,15 +430,25 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
     for (cols, rows) in [(129, 129), (90, 75)] {
         let terrain = hills(cols, rows, 10.0, 30.0);
         for max_error_px in [0.0, 0.3, 3.0] {
-            let detail = TerrainDetail::new(&terrain, &nadir(DVec3::new(0.0, 0.0, -3000.0)), TANGENTS, FOCAL_PX, max_error_px);
-            let drawn: Vec<[DVec3; 3]> =
-                triangles(&terrain, &detail.mesh()).into_iter().map(|t| t.map(|place| vertex_m(&terrain, place))).collect();
+            let detail = TerrainDetail::new(
+                &terrain,
+                &nadir(DVec3::new(0.0, 0.0, -3000.0)),
+                TANGENTS,
+                FOCAL_PX,
+                max_error_px,
+            );
+            let drawn: Vec<[DVec3; 3]> = triangles(&terrain, &detail.mesh())
+                .into_iter()
+                .map(|t| t.map(|place| vertex_m(&terrain, place)))
+                .collect();
             let (mut met, mut moved, mut known) = (0, 0.0_f64, [0; 2]);
             for _ in 0..200 {
                 let above = DVec3::new(random.within(-640.0, 640.0), random.within(-640.0, 640.0), -500.0);
                 // Straight down the two surfaces are met in one and the same cell.
                 let Some(hit) = terrain.intersect(above, DVec3::Z, f64::INFINITY) else { continue };
-                let exact = drawn.iter().filter_map(|&t| Some(intersect_triangle(t, above, DVec3::Z, f64::INFINITY)?.0));
+                let exact = drawn
+                    .iter()
+                    .filter_map(|&t| Some(intersect_triangle(t, above, DVec3::Z, f64::INFINITY)?.0));
                 let exact = exact.min_by(f64::total_cmp).unwrap();
                 let drawn_here = detail.drawn_at(&hit);
                 let found = drawn_here.t(&hit, above, DVec3::Z);
@@ -404,7 +458,10 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
                 // What is drawn there is known for the same cell, and not for its like in the next chunk.
                 for (of, aside_m) in [1.0, 640.0].into_iter().enumerate() {
                     let beside = above + aside_m * DVec3::Y;
-                    let Some(hit) = terrain.intersect(beside, DVec3::Z, f64::INFINITY).filter(|hit| drawn_here.is_of(hit)) else {
+                    let Some(hit) = terrain
+                        .intersect(beside, DVec3::Z, f64::INFINITY)
+                        .filter(|hit| drawn_here.is_of(hit))
+                    else {
                         continue;
                     };
                     known[of] += 1;
@@ -431,8 +488,9 @@ fn voids_lose_their_triangles_only() {
     let all = 2 * 129 * 129;
     let camera = nadir(DVec3::new(0.0, 0.0, -2000.0));
     let full = detail(&terrain, &camera, 0.0);
-    // (0,0) and (0,1) take both triangles of cell (0,0); (0,1) is also the north-west of cell (0,1): both of its triangles.
-    // (64,0) is the north-east of cell (63,0), one triangle, and the north-west of cell (64,0), both.
+    // (0,0) and (0,1) take both triangles of cell (0,0); (0,1) is also the north-west of cell (0,1): both of
+    // its triangles. (64,0) is the north-east of cell (63,0), one triangle, and the north-west of cell
+    // (64,0), both.
     assert_eq!(full.lod.triangles, all - 7);
     let lost = |mesh: &TerrainMesh| {
         let covered = covered(&terrain, &triangles(&terrain, mesh));
@@ -448,7 +506,9 @@ fn voids_lose_their_triangles_only() {
     assert_eq!(lost(&loose), 7);
     assert!(loose.lod.triangles < 200, "{}", loose.lod.triangles);
     let is_finite = |t: &[[u32; 2]; 3]| t.iter().all(|&place| vertex_m(&terrain, place).is_finite());
-    assert!(triangles(&terrain, &loose).iter().all(is_finite) && triangles(&terrain, &full).iter().all(is_finite));
+    assert!(
+        triangles(&terrain, &loose).iter().all(is_finite) && triangles(&terrain, &full).iter().all(is_finite)
+    );
 }
 
 #[test]
@@ -467,7 +527,11 @@ fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
     let mut random = Random(31);
     let (mut found, mut hidden) = (0, 0);
     for _ in 0..60 {
-        let position = DVec3::new(random.within(-6000.0, 4000.0), random.within(-5000.0, 5000.0), random.within(-2500.0, -100.0));
+        let position = DVec3::new(
+            random.within(-6000.0, 4000.0),
+            random.within(-5000.0, 5000.0),
+            random.within(-2500.0, -100.0),
+        );
         let camera = forward(position, random.within(0.0, 1.5));
         let mesh = detail(&terrain, &camera, random.within(0.2, 20.0));
         let frustum = Frustum::new(&camera, TANGENTS);
@@ -482,7 +546,8 @@ fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
         // Drawn one after the other, the nearest first.
         let mut places: Vec<u32> = mesh.indices.iter().map(|index| index >> VERTEX_BITS).collect();
         places.dedup();
-        let distance_m = |&place: &u32| terrain.chunks[mesh.chunks[place as usize] as usize].bounds.distance_m(position);
+        let distance_m =
+            |&place: &u32| terrain.chunks[mesh.chunks[place as usize] as usize].bounds.distance_m(position);
         assert!(places.is_sorted_by(|a, b| distance_m(a) <= distance_m(b)));
         places.sort_unstable();
         assert!(places.windows(2).all(|pair| pair[0] < pair[1]));

@@ -1,4 +1,5 @@
-//! How far the full surface is from the triangles of the hierarchy: exact, over the corners of the overlay of both triangulations.
+//! How far the full surface is from the triangles of the hierarchy: exact, over the corners of the overlay of
+//! both triangulations.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,8 +15,8 @@ pub(super) const PER_CHUNK: usize = VERTICES + CELLS;
 /// A void is near: whatever the tolerance, the triangle is halved.
 pub(super) const VOID: u16 = u16::MAX;
 
-/// An error in metres as a number that orders as errors do: the upper half of its f32, rounded up (by 0.8 % at most). 0 stands for what
-/// is more exact than an exact surface.
+/// An error in metres as a number that orders as errors do: the upper half of its f32, rounded up (by 0.8 %
+/// at most). 0 stands for what is more exact than an exact surface.
 pub(super) fn key_of_error(metres: f64) -> u16 {
     // Rounded up twice: a bound must stay one.
     let bits = if metres > 0.0 { (metres as f32).next_up().min(f32::MAX).to_bits() } else { 0 };
@@ -54,7 +55,8 @@ impl Worst {
 
 /// What one chunk knows about its errors.
 pub(super) struct ChunkErrors {
-    /// [`PER_CHUNK`] numbers, of the triangles within this chunk alone: [`saturate`] makes them those of everything that needs a vertex.
+    /// [`PER_CHUNK`] numbers, of the triangles within this chunk alone: [`saturate`] makes them those of
+    /// everything that needs a vertex.
     pub keys: Vec<u16>,
     /// Largest horizontal deviation of what is judged by squares of each of [`NODE_CELLS`].
     pub horizontal_m: [f64; NODE_CELLS.len()],
@@ -62,7 +64,8 @@ pub(super) struct ChunkErrors {
 
 /// Errors of the triangles of one chunk.
 pub(super) fn chunk_errors(grid: &ChunkGrid<'_>) -> ChunkErrors {
-    let mut errors = ChunkErrors { keys: vec![key_of_error(0.0); PER_CHUNK], horizontal_m: [0.0; NODE_CELLS.len()] };
+    let mut errors =
+        ChunkErrors { keys: vec![key_of_error(0.0); PER_CHUNK], horizontal_m: [0.0; NODE_CELLS.len()] };
     for root in ROOTS {
         add_triangle(grid, root, 0, &mut errors);
     }
@@ -114,10 +117,12 @@ fn add_cell(grid: &ChunkGrid<'_>, [i, j]: [u32; 2], errors: &mut ChunkErrors) {
     }
 }
 
-/// Corners are vertices of the chunk; where it is smaller than 64x64 cells they were moved to its border, and form any kind of triangle.
+/// Corners are vertices of the chunk; where it is smaller than 64x64 cells they were moved to its border, and
+/// form any kind of triangle.
 fn triangle_error(grid: &ChunkGrid<'_>, corners: [[i32; 2]; 3]) -> Worst {
     let mut worst = Worst::default();
-    let cross = |a: [i32; 2], b: [i32; 2], p: [i32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let cross =
+        |a: [i32; 2], b: [i32; 2], p: [i32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
     let area2 = cross(corners[0], corners[1], corners[2]);
     if area2 == 0 {
         return worst;
@@ -129,12 +134,14 @@ fn triangle_error(grid: &ChunkGrid<'_>, corners: [[i32; 2]; 3]) -> Worst {
     });
     // The plane, from its corner 0: what a step along a row or column adds.
     let (to_1, to_2) = (points[1] - points[0], points[2] - points[0]);
-    let [[i1, j1], [i2, j2]] = [1, 2].map(|k: usize| [0, 1].map(|axis: usize| f64::from(corners[k][axis] - corners[0][axis])));
+    let [[i1, j1], [i2, j2]] =
+        [1, 2].map(|k: usize| [0, 1].map(|axis: usize| f64::from(corners[k][axis] - corners[0][axis])));
     let scale = 1.0 / f64::from(area2);
     let [per_column, per_row] = [(to_1 * j2 - to_2 * j1) * scale, (to_2 * i1 - to_1 * i2) * scale];
     for j in rows {
         let start = points[0] + f64::from(j - corners[0][1]) * per_row;
-        // All of area2's sign, which is negative, inside the triangle; along a row they change by the same number from column to column.
+        // All of area2's sign, which is negative, inside the triangle; along a row they change by the same
+        // number from column to column.
         let outside = |i: i32| [0, 1, 2].map(|k: usize| cross(corners[k], corners[(k + 1) % 3], [i, j]));
         let mut sides = outside(*columns.start());
         let steps: [i32; 3] = std::array::from_fn(|k| corners[k][1] - corners[(k + 1) % 3][1]);
@@ -174,7 +181,9 @@ fn edge_error(grid: &ChunkGrid<'_>, p: [i32; 2], q: [i32; 2], p_m: DVec3, q_m: D
             let full = match family {
                 Line::I => grid.between([line, j.floor() as i32], [0, 1], j - j.floor()),
                 Line::J => grid.between([i.floor() as i32, line], [1, 0], i - i.floor()),
-                Line::Diagonal => grid.between([i.floor() as i32, i.floor() as i32 - line], [1, 1], i - i.floor()),
+                Line::Diagonal => {
+                    grid.between([i.floor() as i32, i.floor() as i32 - line], [1, 1], i - i.floor())
+                }
             };
             worst.add(full - p_m.lerp(q_m, t));
         }
@@ -203,22 +212,25 @@ impl ChunkGrid<'_> {
     }
 }
 
-/// Raises the error of each vertex to that of all vertices and cells that need it, chunk borders included: what is exact enough at a
-/// vertex then is so at all of them. `keys` holds [`PER_CHUNK`] numbers of each chunk.
+/// Raises the error of each vertex to that of all vertices and cells that need it, chunk borders included:
+/// what is exact enough at a vertex then is so at all of them. `keys` holds [`PER_CHUNK`] numbers of each
+/// chunk.
 pub(super) fn saturate(keys: &mut [u16], chunk_grid: [u32; 2]) {
     for depth in (0..DEPTHS).rev() {
         keys.par_chunks_exact_mut(PER_CHUNK).for_each(|chunk| {
             for &vertex in &LATTICE.by_depth[depth as usize] {
                 let [i, j] = lattice::place(vertex).map(|n| n as i32);
-                chunk[vertex as usize] = needing(depth).iter().fold(chunk[vertex as usize], |worst, [di, dj]| {
-                    let [i, j] = [i + di, j + dj];
-                    let cells = if depth + 1 < DEPTHS { 0..=SIDE as i32 - 1 } else { 0..=SIDE as i32 - 2 };
-                    if !cells.contains(&i) || !cells.contains(&j) {
-                        return worst;
-                    }
-                    let other = (j * SIDE as i32 + i) as usize;
-                    worst.max(chunk[if depth + 1 < DEPTHS { other } else { VERTICES + other / 2 }])
-                });
+                chunk[vertex as usize] =
+                    needing(depth).iter().fold(chunk[vertex as usize], |worst, [di, dj]| {
+                        let [i, j] = [i + di, j + dj];
+                        let cells =
+                            if depth + 1 < DEPTHS { 0..=SIDE as i32 - 1 } else { 0..=SIDE as i32 - 2 };
+                        if !cells.contains(&i) || !cells.contains(&j) {
+                            return worst;
+                        }
+                        let other = (j * SIDE as i32 + i) as usize;
+                        worst.max(chunk[if depth + 1 < DEPTHS { other } else { VERTICES + other / 2 }])
+                    });
             }
         });
         if !depth.is_multiple_of(2) {
@@ -227,7 +239,8 @@ pub(super) fn saturate(keys: &mut [u16], chunk_grid: [u32; 2]) {
     }
 }
 
-/// Where the vertices are that need one of a depth; at the last depth the cells, by their north-west vertices.
+/// Where the vertices are that need one of a depth; at the last depth the cells, by their north-west
+/// vertices.
 fn needing(depth: u32) -> [[i32; 2]; 4] {
     let step = 32 >> (depth / 2);
     match depth {

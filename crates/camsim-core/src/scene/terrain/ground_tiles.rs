@@ -1,8 +1,9 @@
 //! Which tiles of a large picture of the ground a frame may read.
 //!
-//! What lies in a box at depth z and distance d is at least `z^2 / (d focal)` metres a pixel wide, along the contours of a slope; across them its
-//! horizontal part is at least the cosine of the slope of that. Times the picture's texels a metre these are bounds on both axes of a pixel on the
-//! picture, and with them on the version that is read ([`SurfaceReads`]). Boxes are those of the terrain's own hierarchy.
+//! What lies in a box at depth z and distance d is at least `z^2 / (d focal)` metres a pixel wide, along the
+//! contours of a slope; across them its horizontal part is at least the cosine of the slope of that. Times
+//! the picture's texels a metre these are bounds on both axes of a pixel on the picture, and with them on the
+//! version that is read ([`SurfaceReads`]). Boxes are those of the terrain's own hierarchy.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -14,10 +15,12 @@ use crate::scene::{
     texture::TexelForm,
 };
 
-/// A triangle over several cells is at most this much steeper than the steepest cell below it: it follows from the cells' slopes along two
-/// directions, at right angles or not, for cells up to 1.4 times as long as wide.
+/// A triangle over several cells is at most this much steeper than the steepest cell below it: it follows
+/// from the cells' slopes along two directions, at right angles or not, for cells up to 1.4 times as long as
+/// wide.
 const STEEPER: f64 = 2.0;
-/// What derivatives over a whole pixel may be less than those at a place: texels a pixel on a plane change along with its depth.
+/// What derivatives over a whole pixel may be less than those at a place: texels a pixel on a plane change
+/// along with its depth.
 const MARGIN: f64 = 0.9;
 /// A square of cells whose picture lies in more tiles than this is looked at in quarters.
 const MANY_TILES: u32 = 4;
@@ -47,7 +50,8 @@ struct ChunkPicture {
     slope: f64,
 }
 
-/// How a filter reads: the version is at least that of `cell` texels, and reads lie within `reach` of its texels from the pixel's centre.
+/// How a filter reads: the version is at least that of `cell` texels, and reads lie within `reach` of its
+/// texels from the pixel's centre.
 struct Reads {
     of_longer: f64,
     of_shorter: f64,
@@ -69,8 +73,8 @@ impl Reads {
         }
     }
 
-    /// The finest version for axes of at least so many texels. A version of 2^level texels stands for a cell of 1.4 times as many at least;
-    /// the grid's for as many.
+    /// The finest version for axes of at least so many texels. A version of 2^level texels stands for a cell
+    /// of 1.4 times as many at least; the grid's for as many.
     fn finest(&self, reads: SurfaceReads, longer: f64, shorter: f64) -> usize {
         let cell = MARGIN * (self.of_longer * longer).max(self.of_shorter * shorter);
         let texels2 = if reads == SurfaceReads::Grid { cell * cell } else { 0.5 * cell * cell + 1.0 };
@@ -94,7 +98,8 @@ impl GroundTiles {
     fn uvs(&self, chunk: u32, at: [i64; 2], size: usize) -> [[f64; 2]; 2] {
         let along = i64::from(CHUNK_CELLS / NODE_CELLS[size]);
         let [column, row] = at.map(|n| (n % along) as usize);
-        self.uvs[chunk as usize * SQUARES + FIRST[size] + row * along as usize + column].map(|uv| uv.map(f64::from))
+        self.uvs[chunk as usize * SQUARES + FIRST[size] + row * along as usize + column]
+            .map(|uv| uv.map(f64::from))
     }
 
     /// Memory that all tiles of the picture would take on a device.
@@ -115,13 +120,28 @@ impl TerrainDetail<'_> {
         }
         for &chunk in &self.in_sight {
             let [column, row] = [chunk % self.terrain.chunk_grid[0], chunk / self.terrain.chunk_grid[0]];
-            self.mark_tiles(ground, reads, chunk, [column, row].map(i64::from), NODE_CELLS.len() - 1, &mut is_read);
+            self.mark_tiles(
+                ground,
+                reads,
+                chunk,
+                [column, row].map(i64::from),
+                NODE_CELLS.len() - 1,
+                &mut is_read,
+            );
         }
         (0..ground.grid.count).filter(|&tile| is_read[tile as usize]).collect()
     }
 
     /// Marks the tiles of a square of a chunk's cells, of one of [`NODE_CELLS`].
-    fn mark_tiles(&self, ground: &GroundTiles, reads: SurfaceReads, chunk: u32, at: [i64; 2], size: usize, is_read: &mut [bool]) {
+    fn mark_tiles(
+        &self,
+        ground: &GroundTiles,
+        reads: SurfaceReads,
+        chunk: u32,
+        at: [i64; 2],
+        size: usize,
+        is_read: &mut [bool],
+    ) {
         let cells = NODE_CELLS[size];
         let Some((depth_m, slant)) = self.least_depth(cells, at) else { return };
         let metres = depth_m / (slant * self.seen_from().1);
@@ -133,7 +153,10 @@ impl TerrainDetail<'_> {
         let finest = filter.finest(reads, longer, shorter).min(grid.sizes.len() - 1);
         let [low, high] = ground.uvs(chunk, at, size);
         let [columns, rows] = grid.between(finest, low, high, filter.reach);
-        if size > 0 && finest + 1 < grid.sizes.len() && (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1) > MANY_TILES {
+        if size > 0
+            && finest + 1 < grid.sizes.len()
+            && (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1) > MANY_TILES
+        {
             for [i, j] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
                 self.mark_tiles(ground, reads, chunk, [2 * at[0] + i, 2 * at[1] + j], size - 1, is_read);
             }
@@ -162,7 +185,10 @@ fn chunk_uvs(terrain: &Terrain, chunk: u32) -> Vec<UvBox> {
             for j in j0..=(j0 + cells).min(of.cells[1]) {
                 for i in i0..=(i0 + cells).min(of.cells[0]) {
                     let uv = terrain.vertices[(of.first_vertex + j * (of.cells[0] + 1) + i) as usize].uv;
-                    *range = [[0, 1].map(|k: usize| range[0][k].min(uv[k])), [0, 1].map(|k: usize| range[1][k].max(uv[k]))];
+                    *range = [
+                        [0, 1].map(|k: usize| range[0][k].min(uv[k])),
+                        [0, 1].map(|k: usize| range[1][k].max(uv[k])),
+                    ];
                 }
             }
         }
@@ -193,10 +219,15 @@ fn chunk_picture(terrain: &Terrain, chunk: u32) -> ChunkPicture {
             let texels = DMat2::from_cols(at_b - at_a, at_c - at_a);
             let most_metres = larger(metres * texels.inverse());
             // A cell that shows a line or a point of the picture has no bound.
-            picture.texels_a_metre = picture.texels_a_metre.min(if most_metres.is_finite() { most_metres.recip() } else { 0.0 });
+            picture.texels_a_metre =
+                picture.texels_a_metre.min(if most_metres.is_finite() { most_metres.recip() } else { 0.0 });
         }
     }
-    if picture.texels_a_metre.is_finite() { picture } else { ChunkPicture { texels_a_metre: 0.0, slope: f64::INFINITY } }
+    if picture.texels_a_metre.is_finite() {
+        picture
+    } else {
+        ChunkPicture { texels_a_metre: 0.0, slope: f64::INFINITY }
+    }
 }
 
 /// The larger singular value.
@@ -226,7 +257,8 @@ mod tests {
         // Five texels a metre, over some slopes of more than 1.
         let size_px = [10_000, 7500];
         let texture = Arc::new(Texture { size_px, rgba8: Vec::new(), encoding: Encoding::Srgb });
-        let terrain = Terrain::from_heights(200, 150, 10.0, &hill_heights(200, 150, 70.0), Some(texture)).unwrap();
+        let terrain =
+            Terrain::from_heights(200, 150, 10.0, &hill_heights(200, 150, 70.0), Some(texture)).unwrap();
         let ground = GroundTiles::new(&terrain);
         let mut random = Random(41);
         let (mut looked, mut needed, mut used) = (0, 0, 0);
@@ -234,36 +266,49 @@ mod tests {
             let over = [random.within(-600.0, 600.0), random.within(-800.0, 800.0)];
             let top = terrain.down_at(over[0], over[1]).unwrap();
             let position = DVec3::new(over[0], over[1], top - random.within(5.0, 1500.0));
-            let camera = if i % 4 == 0 { nadir(position) } else { forward(position, random.within(0.0, 1.2)) };
+            let camera =
+                if i % 4 == 0 { nadir(position) } else { forward(position, random.within(0.0, 1.2)) };
             // The full surface, whose triangles rays meet.
             let detail = TerrainDetail::new(&terrain, &camera, TANGENTS, FOCAL_PX, 1e-6);
             for reads in SurfaceReads::ALL {
                 let tiles = detail.tiles(&ground, reads);
                 let mut is_used = vec![false; ground.grid.count as usize];
                 for _ in 0..900 {
-                    let at = DVec2::new(random.within(TANGENTS[0], TANGENTS[1]), random.within(TANGENTS[2], TANGENTS[3]));
-                    let meet = |at: DVec2| terrain.intersect(position, camera.ned_from_camera * at.extend(1.0), f64::INFINITY);
+                    let at = DVec2::new(
+                        random.within(TANGENTS[0], TANGENTS[1]),
+                        random.within(TANGENTS[2], TANGENTS[3]),
+                    );
+                    let meet = |at: DVec2| {
+                        terrain.intersect(position, camera.ned_from_camera * at.extend(1.0), f64::INFINITY)
+                    };
                     let step = 1e-4 / FOCAL_PX;
-                    let near = [DVec2::ZERO, DVec2::new(step, 0.0), DVec2::new(0.0, step)].map(|off| meet(at + off));
+                    let near =
+                        [DVec2::ZERO, DVec2::new(step, 0.0), DVec2::new(0.0, step)].map(|off| meet(at + off));
                     let [Some(hit), Some(right), Some(below)] = near else { continue };
-                    let is_one = [&right, &below]
-                        .iter()
-                        .all(|other| (other.chunk, other.cell, other.normal_ned) == (hit.chunk, hit.cell, hit.normal_ned));
+                    let is_one = [&right, &below].iter().all(|other| {
+                        (other.chunk, other.cell, other.normal_ned) == (hit.chunk, hit.cell, hit.normal_ned)
+                    });
                     if !is_one {
                         continue;
                     }
                     let size = DVec2::from_array(size_px.map(f64::from));
                     let texels = |uv: [f64; 2]| DVec2::from_array(uv) * size;
                     let a_pixel = |uv: [f64; 2]| (texels(uv) - texels(hit.uv)) / (step * FOCAL_PX);
-                    let filter = SurfaceFilter::new(DMat2::from_cols(a_pixel(right.uv), a_pixel(below.uv)), reads);
+                    let filter =
+                        SurfaceFilter::new(DMat2::from_cols(a_pixel(right.uv), a_pixel(below.uv)), reads);
                     let (level, sides) = filter.reads();
                     for corner in [DVec2::ONE, DVec2::NEG_ONE, DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)] {
-                        let uv = ((texels(hit.uv) + 0.5 * (corner.x * sides[0] + corner.y * sides[1])) / size).to_array();
+                        let uv = ((texels(hit.uv) + 0.5 * (corner.x * sides[0] + corner.y * sides[1]))
+                            / size)
+                            .to_array();
                         for level in [level.floor() as usize, level.ceil() as usize] {
                             let level = level.min(ground.grid.sizes.len() - 1);
                             let [[column, _], [row, _]] = ground.grid.between(level, uv, uv, 0.0);
                             let tile = ground.grid.first[level] + row * ground.grid.tiles(level)[0] + column;
-                            assert!(tiles.binary_search(&tile).is_ok(), "{reads:?}: version {level}, {column}, {row} at {uv:?}");
+                            assert!(
+                                tiles.binary_search(&tile).is_ok(),
+                                "{reads:?}: version {level}, {column}, {row} at {uv:?}"
+                            );
                             is_used[tile as usize] = true;
                         }
                     }
@@ -272,7 +317,10 @@ mod tests {
                 (needed, used) = (needed + tiles.len(), used + is_used.iter().filter(|used| **used).count());
             }
         }
-        eprintln!("{looked} pixels; {needed} tiles of {} for 48 frames, of which {used} are read by them", 48 * ground.grid.count);
+        eprintln!(
+            "{looked} pixels; {needed} tiles of {} for 48 frames, of which {used} are read by them",
+            48 * ground.grid.count
+        );
         assert!(looked > 15_000 && needed < 24 * ground.grid.count as usize, "{looked} {needed}");
     }
 }

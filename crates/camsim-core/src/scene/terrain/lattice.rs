@@ -1,12 +1,14 @@
-//! The vertices of a chunk as a hierarchy: right triangles, each of which may be halved at the middle of its longest side.
+//! The vertices of a chunk as a hierarchy: right triangles, each of which may be halved at the middle of its
+//! longest side.
 //!
-//! A chunk is a lattice of 65x65 vertices, numbered row after row from the north-west. Two triangles of half a chunk are halved and halved
-//! again, 12 times until every triangle is half a cell. A vertex is the middle of the longest sides of two triangles that mirror each
-//! other, its *diamond*; those of a vertex on the chunk's border lie in two chunks. Halving both or none leaves no gap, and a triangle is
-//! there to be halved only if the triangles it came from were: a vertex needs those that its diamond's triangles came from.
+//! A chunk is a lattice of 65x65 vertices, numbered row after row from the north-west. Two triangles of half
+//! a chunk are halved and halved again, 12 times until every triangle is half a cell. A vertex is the middle
+//! of the longest sides of two triangles that mirror each other, its *diamond*; those of a vertex on the
+//! chunk's border lie in two chunks. Halving both or none leaves no gap, and a triangle is there to be halved
+//! only if the triangles it came from were: a vertex needs those that its diamond's triangles came from.
 //!
-//! Every other cell ends up with a diagonal from north-east to south-west, where the full surface has one from north-west to
-//! south-east. Turning it is one more step of the hierarchy, of the *cell*.
+//! Every other cell ends up with a diagonal from north-east to south-west, where the full surface has one
+//! from north-west to south-east. Turning it is one more step of the hierarchy, of the *cell*.
 
 use std::{collections::BTreeMap, ops::RangeInclusive, sync::LazyLock};
 
@@ -16,7 +18,8 @@ use super::CHUNK_CELLS;
 pub(super) const SIDE: u32 = CHUNK_CELLS + 1;
 /// Vertices of a chunk.
 pub(super) const VERTICES: usize = (SIDE * SIDE) as usize;
-/// Places for the cells whose diagonal can be turned: by half the number of their north-west vertex, which is odd.
+/// Places for the cells whose diagonal can be turned: by half the number of their north-west vertex, which is
+/// odd.
 pub(super) const CELLS: usize = VERTICES / 2;
 /// A triangle halved so many times is half of a cell.
 pub(super) const DEPTHS: u32 = 12;
@@ -25,7 +28,8 @@ pub(super) const NODE_CELLS: [u32; 4] = [8, 16, 32, 64];
 /// Depth from which on a triangle lies within a square of 8x8 cells.
 pub(super) const BLOCK_DEPTH: u32 = 6;
 
-/// The two triangles of a chunk: ends of the longest side, then the corner of the right angle. All triangles turn alike.
+/// The two triangles of a chunk: ends of the longest side, then the corner of the right angle. All triangles
+/// turn alike.
 pub(super) const ROOTS: [[u32; 3]; 2] = {
     let [nw, ne, sw, se] = [0, CHUNK_CELLS, CHUNK_CELLS * SIDE, CHUNK_CELLS * SIDE + CHUNK_CELLS];
     [[se, nw, sw], [nw, se, ne]]
@@ -37,7 +41,8 @@ pub(super) fn halves([a, b, c]: [u32; 3]) -> (u32, [[u32; 3]; 2]) {
     (middle, [[c, a, middle], [b, c, middle]])
 }
 
-/// North-west vertex of the cell that holds a triangle of half a cell, if its diagonal must be turned to be the full surface's.
+/// North-west vertex of the cell that holds a triangle of half a cell, if its diagonal must be turned to be
+/// the full surface's.
 pub(super) fn cell_to_turn([a, b, _]: [u32; 3]) -> Option<u32> {
     (a.abs_diff(b) == CHUNK_CELLS).then(|| a.min(b) - 1)
 }
@@ -63,14 +68,15 @@ pub(super) fn depth_of(vertex: u32) -> Option<u32> {
     Some(2 * step + u32::from(!of_square))
 }
 
-/// Cells from a vertex of a depth to where the vertices around it that may need it can have an influence: the half side of a square that holds
-/// its diamond and the squares of all vertices and cells that need it.
+/// Cells from a vertex of a depth to where the vertices around it that may need it can have an influence: the
+/// half side of a square that holds its diamond and the squares of all vertices and cells that need it.
 fn reach(depth: u32) -> u32 {
     let step = CHUNK_CELLS >> (depth / 2 + 1);
     if depth.is_multiple_of(2) { 3 * step - 1 } else { 2 * step - 1 }
 }
 
-/// Which of [`NODE_CELLS`] a vertex of a depth is judged by: a square that reaches as far meets three of them along a side at most.
+/// Which of [`NODE_CELLS`] a vertex of a depth is judged by: a square that reaches as far meets three of them
+/// along a side at most.
 pub(super) fn node_size(depth: u32) -> usize {
     let reach = reach(depth);
     NODE_CELLS.iter().position(|&cells| cells >= reach).unwrap_or(NODE_CELLS.len() - 1)
@@ -98,7 +104,9 @@ impl Squares {
     fn around(place: [u32; 2], depth: u32) -> Self {
         let size = node_size(depth);
         let (reach, cells) = (reach(depth) as i32, NODE_CELLS[size] as i32);
-        let along = |at: u32| [(at as i32 - reach).div_euclid(cells), (at as i32 + reach + cells - 1).div_euclid(cells) - 1];
+        let along = |at: u32| {
+            [(at as i32 - reach).div_euclid(cells), (at as i32 + reach + cells - 1).div_euclid(cells) - 1]
+        };
         Self { size, columns: along(place[0]), rows: along(place[1]) }
     }
 
@@ -133,14 +141,17 @@ impl Lattice {
             })
         };
         let of_vertex = |vertex| depth_of(vertex).map(|depth| Squares::around(place(vertex), depth));
-        let set_of_vertex = (0..VERTICES as u32).map(|vertex| of_vertex(vertex).map_or(0, &mut number)).collect();
+        let set_of_vertex =
+            (0..VERTICES as u32).map(|vertex| of_vertex(vertex).map_or(0, &mut number)).collect();
         let cell = |half: u32| {
             let [i, j] = place(2 * half + 1);
             // The last column and row hold no cells.
             Squares::of_cell([i.min(CHUNK_CELLS - 1), j.min(CHUNK_CELLS - 1)])
         };
         let set_of_cell = (0..CELLS as u32).map(|half| number(cell(half))).collect();
-        let at = |depth: usize| (0..VERTICES as u32).filter(move |&vertex| depth_of(vertex) == Some(depth as u32)).collect();
+        let at = |depth: usize| {
+            (0..VERTICES as u32).filter(move |&vertex| depth_of(vertex) == Some(depth as u32)).collect()
+        };
         Self { sets, set_of_vertex, set_of_cell, by_depth: std::array::from_fn(at) }
     }
 }
@@ -179,7 +190,14 @@ mod tests {
                 } else if let Some(cell) = cell_to_turn(triangle) {
                     assert_eq!((area2(turned(triangle, cell)), cell % 2), (-1, 1));
                     assert!(turned(triangle, cell).contains(&triangle[2]));
-                    assert_eq!(turned(triangle, cell).map(|v| v.wrapping_sub(cell)).iter().filter(|&&v| v == 0 || v == 66).count(), 2);
+                    assert_eq!(
+                        turned(triangle, cell)
+                            .map(|v| v.wrapping_sub(cell))
+                            .iter()
+                            .filter(|&&v| v == 0 || v == 66)
+                            .count(),
+                        2
+                    );
                 }
             });
         }
@@ -215,7 +233,10 @@ mod tests {
                 }
                 for set in inner {
                     let [inner_columns, inner_rows] = cells(set);
-                    assert!(columns.start <= inner_columns.start && columns.end >= inner_columns.end, "{triangle:?}");
+                    assert!(
+                        columns.start <= inner_columns.start && columns.end >= inner_columns.end,
+                        "{triangle:?}"
+                    );
                     assert!(rows.start <= inner_rows.start && rows.end >= inner_rows.end, "{triangle:?}");
                     compared += 1;
                 }

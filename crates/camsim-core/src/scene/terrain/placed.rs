@@ -1,4 +1,5 @@
-//! What a device needs of a terrain for one ideal frame: the vertices of the triangles that are drawn, and no others.
+//! What a device needs of a terrain for one ideal frame: the vertices of the triangles that are drawn, and no
+//! others.
 
 use glam::{DVec3, Vec3};
 
@@ -7,8 +8,9 @@ use super::{CHUNK_CELLS, LodSelection, Terrain, TerrainMesh, VERTEX_BITS};
 /// Triangles to draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedMesh {
-    /// North, east, down from a base in whole metres, and texture coordinates, in the order of their first use; one on a chunk's border stands
-    /// there for each chunk. Positions are the correctly rounded sums of two exact numbers, so that these chunks agree in every bit.
+    /// North, east, down from a base in whole metres, and texture coordinates, in the order of their first
+    /// use; one on a chunk's border stands there for each chunk. Positions are the correctly rounded sums of
+    /// two exact numbers, so that these chunks agree in every bit.
     pub vertices: Vec<[f32; 5]>,
     /// Three a triangle.
     pub indices: Vec<u32>,
@@ -27,11 +29,16 @@ impl PlacedMesh {
 }
 
 impl TerrainMesh {
-    /// With the vertices themselves, seen from a base near the camera. The base is in whole metres, as chunk centres are.
+    /// With the vertices themselves, seen from a base near the camera. The base is in whole metres, as chunk
+    /// centres are.
     #[must_use]
     pub fn placed(&self, terrain: &Terrain, base_ned_m: DVec3) -> PlacedMesh {
         const NONE: u32 = u32::MAX;
-        let mut placed = PlacedMesh { indices: Vec::with_capacity(self.indices.len()), lod: self.lod, ..PlacedMesh::default() };
+        let mut placed = PlacedMesh {
+            indices: Vec::with_capacity(self.indices.len()),
+            lod: self.lod,
+            ..PlacedMesh::default()
+        };
         // A vertex of this chunk, if it was used before, by its number.
         let mut known = vec![NONE; ((CHUNK_CELLS + 1) * (CHUNK_CELLS + 1)) as usize];
         for of_chunk in self.indices.chunk_by(|a, b| a >> VERTEX_BITS == b >> VERTEX_BITS) {
@@ -73,7 +80,11 @@ mod tests {
         let mesh = TerrainDetail::new(&terrain, &camera, [-0.7, 0.7, -0.5, 0.5], 300.0, 0.25).mesh_to_draw();
         let base_ned_m = camera.position_ned_m.round();
         let placed = mesh.placed(&terrain, base_ned_m);
-        assert!(placed.indices.len() > 3000 && placed.indices.len() == mesh.indices.len() && placed.lod == mesh.lod);
+        assert!(
+            placed.indices.len() > 3000
+                && placed.indices.len() == mesh.indices.len()
+                && placed.lod == mesh.lod
+        );
         for (place, index) in placed.indices.iter().zip(&mesh.indices) {
             let chunk = &terrain.chunks[mesh.chunks[(index >> VERTEX_BITS) as usize] as usize];
             let vertex = terrain.vertices[(chunk.first_vertex + (index & ((1 << VERTEX_BITS) - 1))) as usize];
@@ -88,7 +99,11 @@ mod tests {
         used.dedup();
         assert_eq!(used.len(), placed.vertices.len());
         let inner = placed.vertices.len() - mesh.chunks.len() * 4 * 64;
-        let mut places: Vec<[u32; 3]> = placed.vertices.iter().map(|vertex| [vertex[0], vertex[1], vertex[2]].map(f32::to_bits)).collect();
+        let mut places: Vec<[u32; 3]> = placed
+            .vertices
+            .iter()
+            .map(|vertex| [vertex[0], vertex[1], vertex[2]].map(f32::to_bits))
+            .collect();
         places.sort_unstable();
         places.dedup();
         assert!(places.len() >= inner);

@@ -24,8 +24,8 @@ pub struct TerrainHit {
 }
 
 impl Terrain {
-    /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The direction need not have unit
-    /// length. Rays cannot slip through between triangles.
+    /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The
+    /// direction need not have unit length. Rays cannot slip through between triangles.
     pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
         let mut best: Option<TerrainHit> = None;
         let beside = direction_ned.normalize().any_orthonormal_pair();
@@ -37,14 +37,17 @@ impl Terrain {
         best
     }
 
-    /// The full surface at a place of the tangent plane: the down coordinate of the topmost point, `None` off the terrain.
+    /// The full surface at a place of the tangent plane: the down coordinate of the topmost point, `None` off
+    /// the terrain.
     pub fn down_at(&self, north_m: f64, east_m: f64) -> Option<f64> {
         let top = self.bounds.min.z - 1.0;
-        let hit = self.intersect(DVec3::new(north_m, east_m, top), DVec3::Z, self.bounds.max.z - top + 1.0)?;
+        let hit =
+            self.intersect(DVec3::new(north_m, east_m, top), DVec3::Z, self.bounds.max.z - top + 1.0)?;
         Some(top + hit.t)
     }
 
-    /// A lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such a box.
+    /// A lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such
+    /// a box.
     pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
         self.nearest_box_m(position_ned_m, &|_| true)
     }
@@ -54,8 +57,8 @@ impl Terrain {
         self.bounds.farthest_m(position_ned_m)
     }
 
-    /// As [`Terrain::min_distance_m`], among what the camera sees within `tangents` = [u_min, u_max, v_min, v_max] (u = x/z, v = y/z in
-    /// the optical frame); infinite if the terrain is out of sight.
+    /// As [`Terrain::min_distance_m`], among what the camera sees within `tangents` = [u_min, u_max, v_min,
+    /// v_max] (u = x/z, v = y/z in the optical frame); infinite if the terrain is out of sight.
     pub fn min_distance_in_view_m(&self, camera: &CameraPose, tangents: [f64; 4]) -> f64 {
         let frustum = Frustum::new(camera, tangents);
         self.nearest_box_m(camera.position_ned_m, &|bounds| frustum.may_see(bounds))
@@ -82,8 +85,9 @@ impl Terrain {
         nearest
     }
 
-    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point of a plane, whose axes are `right` and `up`, and a
-    /// cell all of whose vertices lie to one side of the ray there is missed.
+    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point
+    /// of a plane, whose axes are `right` and `up`, and a cell all of whose vertices lie to one side of the
+    /// ray there is missed.
     fn intersect_block(
         &self,
         block: [u32; 2],
@@ -94,7 +98,8 @@ impl Terrain {
     ) -> Option<TerrainHit> {
         let (chunk_index, [i0, j0]) = self.chunk_of_cell(block.map(|n| n * BLOCK_CELLS));
         let chunk = &self.chunks[chunk_index as usize];
-        let [columns, rows] = [(i0, chunk.cells[0]), (j0, chunk.cells[1])].map(|(first, cells)| BLOCK_CELLS.min(cells - first) as usize);
+        let [columns, rows] = [(i0, chunk.cells[0]), (j0, chunk.cells[1])]
+            .map(|(first, cells)| BLOCK_CELLS.min(cells - first) as usize);
         let centre_m = chunk.centre_ned_m - origin;
         let mut beside = [[DVec2::NAN; SIDE]; SIDE];
         for (j, row) in (j0..).zip(beside.iter_mut().take(rows + 1)) {
@@ -109,14 +114,23 @@ impl Terrain {
             for i in 0..columns {
                 if passes([beside[j][i], beside[j][i + 1], beside[j + 1][i], beside[j + 1][i + 1]]) {
                     let limit = best.map_or(t_max, |hit| hit.t);
-                    best = self.intersect_cell(chunk_index, [i0 + i as u32, j0 + j as u32], origin, direction, limit).or(best);
+                    best = self
+                        .intersect_cell(chunk_index, [i0 + i as u32, j0 + j as u32], origin, direction, limit)
+                        .or(best);
                 }
             }
         }
         best
     }
 
-    fn intersect_cell(&self, chunk_index: u32, cell: [u32; 2], origin: DVec3, direction: DVec3, t_max: f64) -> Option<TerrainHit> {
+    fn intersect_cell(
+        &self,
+        chunk_index: u32,
+        cell: [u32; 2],
+        origin: DVec3,
+        direction: DVec3,
+        t_max: f64,
+    ) -> Option<TerrainHit> {
         let chunk = &self.chunks[chunk_index as usize];
         let mut best = None;
         let mut limit = t_max;
@@ -125,7 +139,8 @@ impl Terrain {
             let points = [point(0), point(1), point(2)];
             let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
             limit = t;
-            let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
+            let uvs = corners
+                .map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
             let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
             let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
             let normal_ned = if normal.z > 0.0 { -normal } else { normal };
@@ -138,8 +153,8 @@ impl Terrain {
 /// Vertices along a side of a block.
 const SIDE: usize = BLOCK_CELLS as usize + 1;
 
-/// Whether a ray may pass a cell whose corners it sees at these places around it. The margin is far above what rounding moves them by;
-/// places that are no numbers count as passed, and are left to the triangles.
+/// Whether a ray may pass a cell whose corners it sees at these places around it. The margin is far above
+/// what rounding moves them by; places that are no numbers count as passed, and are left to the triangles.
 fn passes(corners: [DVec2; 4]) -> bool {
     const MARGIN: f64 = 0.01;
     let [a, b, c, d] = corners;
@@ -149,13 +164,19 @@ fn passes(corners: [DVec2; 4]) -> bool {
     !(missed && (a + b + c + d).is_finite())
 }
 
-/// Ray parameter in 0..=`t_max` and barycentric weights where a ray meets a triangle, from either side. Corners that are not finite are
-/// never met.
+/// Ray parameter in 0..=`t_max` and barycentric weights where a ray meets a triangle, from either side.
+/// Corners that are not finite are never met.
 ///
-/// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates its volume in floating point,
-/// so two triangles agree on which side of their common edge a ray passes. Where several edges meet, rounding could still open a gap:
-/// triangles are larger by the rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
-pub fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+/// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates
+/// its volume in floating point, so two triangles agree on which side of their common edge a ray passes.
+/// Where several edges meet, rounding could still open a gap: triangles are larger by the rounding error of
+/// the volumes (1e-8 m for a cell of 10 m seen from 5 km).
+pub fn intersect_triangle(
+    points: [DVec3; 3],
+    origin: DVec3,
+    direction: DVec3,
+    t_max: f64,
+) -> Option<(f64, [f64; 3])> {
     /// 18 products and sums at most, of eps / 2 each, and some reserve.
     const ROUNDING: f64 = 4e-15;
     let (a, b, c) = (points[0] - origin, points[1] - origin, points[2] - origin);

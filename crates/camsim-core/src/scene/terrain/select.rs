@@ -10,7 +10,8 @@ use super::{
     lattice::{self, BLOCK_DEPTH, DEPTHS, LATTICE, Lattice, NODE_CELLS, ROOTS, SIDE, VERTICES},
 };
 
-/// Bits of an index that are a vertex's number in its chunk; those above are the place of the chunk in [`TerrainMesh::chunks`].
+/// Bits of an index that are a vertex's number in its chunk; those above are the place of the chunk in
+/// [`TerrainMesh::chunks`].
 pub const VERTEX_BITS: u32 = 13;
 
 /// What was drawn.
@@ -31,7 +32,8 @@ pub struct LodSelection {
 pub struct TerrainMesh {
     /// Chunks in sight, by number.
     pub chunks: Vec<u32>,
-    /// Three corners a triangle: `place in chunks << VERTEX_BITS | vertex`, vertices counted from the chunk's first.
+    /// Three corners a triangle: `place in chunks << VERTEX_BITS | vertex`, vertices counted from the chunk's
+    /// first.
     pub indices: Vec<u32>,
     /// What that comes to.
     pub lod: LodSelection,
@@ -74,21 +76,27 @@ impl TerrainDetail<'_> {
         TerrainMesh { chunks: self.in_sight.clone(), indices, lod }
     }
 
-    /// Bound on the displacement by errors that are `steps` below their tolerances. A step is 1/128 of an octave along each octave's chord,
-    /// which is off by a factor of 1.0615 at most; and displacement grows at least in proportion to the error.
+    /// Bound on the displacement by errors that are `steps` below their tolerances. A step is 1/128 of an
+    /// octave along each octave's chord, which is off by a factor of 1.0615 at most; and displacement grows
+    /// at least in proportion to the error.
     fn error_px(&self, steps: i32) -> f64 {
         let share = 1.0615 * (f64::from(steps) / 128.0).exp2();
         (share * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
 
     fn chunk_part(&self, known: &Tolerances, place: u32, chunk: u32, from_above: bool) -> ChunkPart {
-        let mut walk = Walk { judged: Judged::new(self, known, chunk), emit: Emit::new(self, place, chunk, from_above), nearest: None };
+        let mut walk = Walk {
+            judged: Judged::new(self, known, chunk),
+            emit: Emit::new(self, place, chunk, from_above),
+            nearest: None,
+        };
         ROOTS.into_iter().for_each(|root| walk.triangle(root, 0));
         let distance_m = self.terrain.chunks[chunk as usize].bounds.distance_m(self.seen_from().0);
         ChunkPart { indices: walk.emit.indices, away: walk.emit.away, nearest: walk.nearest, distance_m }
     }
 
-    /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn there instead: see [`DrawnCell::t`].
+    /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn
+    /// there instead: see [`DrawnCell::t`].
     pub fn drawn_t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
         self.drawn_at(hit).t(hit, origin_ned_m, direction_ned)
     }
@@ -113,7 +121,8 @@ impl TerrainDetail<'_> {
             let mut corners = places(triangle);
             let beside = |axis: usize| {
                 let along = corners.map(|corner| corner[axis]);
-                cell[axis] >= along.into_iter().fold(0, u32::max) || cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
+                cell[axis] >= along.into_iter().fold(0, u32::max)
+                    || cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
             };
             if beside(0) || beside(1) {
                 continue;
@@ -154,15 +163,17 @@ impl DrawnCell {
         (self.chunk, self.cell) == (hit.chunk, hit.cell)
     }
 
-    /// Ray parameter at which a ray that meets the full surface at `hit`, in this cell, meets the triangle that is drawn there instead: the plane of that which the
-    /// ray passes deepest inside. Where the ray leaves the triangles before it meets them, their planes are continued.
+    /// Ray parameter at which a ray that meets the full surface at `hit`, in this cell, meets the triangle
+    /// that is drawn there instead: the plane of that which the ray passes deepest inside. Where the ray
+    /// leaves the triangles before it meets them, their planes are continued.
     pub fn t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
         let mut best = (f64::NEG_INFINITY, hit.t);
         for points in &self.triangles {
             let [a, b, c] = points.map(|point| point - origin_ned_m);
             let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
             let normal = (b - a).cross(c - a);
-            // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which never is the best.
+            // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which
+            // never is the best.
             let inside = wa.min(wb).min(wc).max(-wa.max(wb).max(wc)) / (wa + wb + wc).abs();
             let t = a.dot(normal) / direction_ned.dot(normal);
             if inside > best.0 && t > 0.0 {
@@ -213,7 +224,13 @@ impl Judgement {
 
 impl<'a> Judged<'a> {
     fn new(detail: &'a TerrainDetail<'_>, known: &'a Tolerances, chunk: u32) -> Self {
-        Self { detail, known, errors: detail.errors(chunk), strictest: detail.of_root(known), lattice: &LATTICE }
+        Self {
+            detail,
+            known,
+            errors: detail.errors(chunk),
+            strictest: detail.of_root(known),
+            lattice: &LATTICE,
+        }
     }
 
     #[inline]
@@ -228,7 +245,8 @@ impl<'a> Judged<'a> {
 
     #[inline]
     fn judge(&self, error: u16, set: u16) -> Judgement {
-        let tolerance = if error <= self.strictest { self.strictest } else { self.detail.of_set(self.known, set) };
+        let tolerance =
+            if error <= self.strictest { self.strictest } else { self.detail.of_set(self.known, set) };
         Judgement { error, tolerance }
     }
 }
@@ -243,7 +261,8 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn triangle(&mut self, triangle: [u32; 3], depth: u32) {
-        if depth == BLOCK_DEPTH && !self.judged.detail.block_in_sight(self.judged.known, north_west(triangle)) {
+        if depth == BLOCK_DEPTH && !self.judged.detail.block_in_sight(self.judged.known, north_west(triangle))
+        {
             return;
         }
         if depth == DEPTHS {
@@ -307,7 +326,8 @@ impl<'a> Emit<'a> {
         let terrain = detail.terrain;
         let of = &terrain.chunks[chunk as usize];
         let is_odd = of.cells != [SIDE - 1; 2] || of.has_voids;
-        let odd = is_odd.then(|| OddChunk { cells: of.cells, vertices: &terrain.vertices[of.first_vertex as usize..] });
+        let odd = is_odd
+            .then(|| OddChunk { cells: of.cells, vertices: &terrain.vertices[of.first_vertex as usize..] });
         let facing = from_above.then(|| Facing::new(detail, chunk));
         Self { indices: Vec::new(), base: place << VERTEX_BITS, facing, away: 0, odd }
     }

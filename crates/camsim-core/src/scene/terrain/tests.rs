@@ -44,7 +44,10 @@ pub(super) fn nadir(position_ned_m: DVec3) -> CameraPose {
 pub(super) fn forward(position_ned_m: DVec3, pitch: f64) -> CameraPose {
     let z = DVec3::new(pitch.cos(), 0.0, pitch.sin());
     let x = DVec3::Y;
-    CameraPose { position_ned_m, ned_from_camera: DQuat::from_mat3(&glam::DMat3::from_cols(x, z.cross(x), z)) }
+    CameraPose {
+        position_ned_m,
+        ned_from_camera: DQuat::from_mat3(&glam::DMat3::from_cols(x, z.cross(x), z)),
+    }
 }
 
 #[test]
@@ -52,7 +55,12 @@ fn shared_vertices_have_the_same_bits_at_any_distance() {
     let terrain = hills(150, 131, 37.3, 400.0);
     let [cols, rows] = terrain.chunk_grid;
     assert_eq!([cols, rows], [3, 3]);
-    let cameras = [DVec3::ZERO, DVec3::new(1.0, -7.0, 3.0), DVec3::new(91_234.0, -77_777.0, -3000.0), DVec3::new(3e6, 2e6, -1e5)];
+    let cameras = [
+        DVec3::ZERO,
+        DVec3::new(1.0, -7.0, 3.0),
+        DVec3::new(91_234.0, -77_777.0, -3000.0),
+        DVec3::new(3e6, 2e6, -1e5),
+    ];
     let relative = |chunk: u32, i: u32, j: u32, camera: DVec3| {
         let chunk = &terrain.chunks[chunk as usize];
         let offset = terrain.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].offset_m;
@@ -85,9 +93,14 @@ fn positions_are_kept_within_half_a_quantum() {
     for (row, column) in [(0u32, 0u32), (65, 69), (64, 64), (13, 40)] {
         let (chunk, [i, j]) = terrain.chunk_of_cell([column.min(68), row.min(64)]);
         let (i, j) = (i + column - column.min(68), j + row - row.min(64));
-        let expected =
-            DVec3::new((32.5 - f64::from(row)) * 90.0, (f64::from(column) - 34.5) * 90.0, -heights[(row * 70 + column) as usize]);
-        assert!((terrain.position_ned_m(chunk, i, j) - expected).abs().max_element() <= 0.5 * terrain.quantum_m);
+        let expected = DVec3::new(
+            (32.5 - f64::from(row)) * 90.0,
+            (f64::from(column) - 34.5) * 90.0,
+            -heights[(row * 70 + column) as usize],
+        );
+        assert!(
+            (terrain.position_ned_m(chunk, i, j) - expected).abs().max_element() <= 0.5 * terrain.quantum_m
+        );
     }
 }
 
@@ -97,11 +110,17 @@ fn rays_meet_what_a_search_through_all_triangles_meets() {
     let mut random = Random(11);
     let mut hits = 0;
     for _ in 0..300 {
-        let origin = DVec3::new(random.within(-500.0, 500.0), random.within(-800.0, 800.0), random.within(-300.0, 100.0));
-        let direction = DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-0.3, 1.0));
+        let origin = DVec3::new(
+            random.within(-500.0, 500.0),
+            random.within(-800.0, 800.0),
+            random.within(-300.0, 100.0),
+        );
+        let direction =
+            DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-0.3, 1.0));
         let mut expected: Option<f64> = None;
         for (index, chunk) in terrain.chunks.iter().enumerate() {
-            for cell in (0..chunk.cells[0] * chunk.cells[1]).map(|n| [n % chunk.cells[0], n / chunk.cells[0]]) {
+            for cell in (0..chunk.cells[0] * chunk.cells[1]).map(|n| [n % chunk.cells[0], n / chunk.cells[0]])
+            {
                 for t in cell_triangles(cell) {
                     let points = t.map(|[i, j]| terrain.position_ned_m(index as u32, i, j));
                     if let Some((t, _)) = intersect_triangle(points, origin, direction, 2000.0) {
@@ -117,7 +136,11 @@ fn rays_meet_what_a_search_through_all_triangles_meets() {
             let point = origin + hit.t * direction;
             // Texture coordinates are affine in the plane here.
             let expected_uv = [(point.y / 10.0 + 69.5 + 0.5) / 140.0, (37.0 - point.x / 10.0 + 0.5) / 75.0];
-            assert!((0..2).all(|k| (hit.uv[k] - expected_uv[k]).abs() < 1e-5), "{:?} {expected_uv:?}", hit.uv);
+            assert!(
+                (0..2).all(|k| (hit.uv[k] - expected_uv[k]).abs() < 1e-5),
+                "{:?} {expected_uv:?}",
+                hit.uv
+            );
             assert!(hit.normal_ned.z < 0.0);
             let distance = (point - origin).length();
             assert!(terrain.min_distance_m(origin) <= distance && terrain.max_distance_m(origin) >= distance);
@@ -133,7 +156,9 @@ fn no_ray_slips_through_between_triangles() {
     for j in -65..=65 {
         for i in -65..=65 {
             let target = DVec3::new(f64::from(j), f64::from(i), 0.0);
-            for origin in [target - DVec3::Z * 10.0, DVec3::new(0.0, 0.0, -16.0), DVec3::new(3.0, -1.0, -0.125)] {
+            for origin in
+                [target - DVec3::Z * 10.0, DVec3::new(0.0, 0.0, -16.0), DVec3::new(3.0, -1.0, -0.125)]
+            {
                 let hit = terrain.intersect(origin, target - origin, 2.0).unwrap();
                 assert!((hit.t - 1.0).abs() < 1e-9, "{target} {origin} {}", hit.t);
             }
@@ -149,7 +174,15 @@ fn no_ray_slips_through_between_triangles() {
             }
             let target = rough.position_ned_m(index as u32, i, j);
             if index == 0 && i > 0 && j > 0 {
-                assert!(rough.intersect(DVec3::new(11.3, -17.7, -5000.0), target - DVec3::new(11.3, -17.7, -5000.0), 1.1).is_some());
+                assert!(
+                    rough
+                        .intersect(
+                            DVec3::new(11.3, -17.7, -5000.0),
+                            target - DVec3::new(11.3, -17.7, -5000.0),
+                            1.1
+                        )
+                        .is_some()
+                );
                 assert!((rough.down_at(target.x, target.y).unwrap() - target.z).abs() < 1e-6);
             }
         }
@@ -166,17 +199,29 @@ fn distance_in_view_is_that_of_what_the_camera_sees() {
     let ahead = terrain.min_distance_in_view_m(&forward(position, 0.0), tangents);
     let anywhere = terrain.min_distance_m(position);
     let vertices = |i: usize| (0..65).flat_map(move |a| (0..65).map(move |b| (i as u32, a, b)));
-    let inside = |&(i, a, b): &(u32, u32, u32)| a <= terrain.chunks[i as usize].cells[0] && b <= terrain.chunks[i as usize].cells[1];
+    let inside = |&(i, a, b): &(u32, u32, u32)| {
+        a <= terrain.chunks[i as usize].cells[0] && b <= terrain.chunks[i as usize].cells[1]
+    };
     let distance = |(i, a, b)| terrain.position_ned_m(i, a, b).distance(position);
-    let nearest = (0..terrain.chunks.len()).flat_map(vertices).filter(inside).map(distance).fold(f64::INFINITY, f64::min);
-    assert!(anywhere <= nearest && anywhere > nearest - 2.0 && ahead > nearest && ahead < 90.0, "{anywhere} {nearest} {ahead}");
+    let nearest = (0..terrain.chunks.len())
+        .flat_map(vertices)
+        .filter(inside)
+        .map(distance)
+        .fold(f64::INFINITY, f64::min);
+    assert!(
+        anywhere <= nearest && anywhere > nearest - 2.0 && ahead > nearest && ahead < 90.0,
+        "{anywhere} {nearest} {ahead}"
+    );
 }
 
 #[test]
 fn grids_that_are_no_terrain_are_refused() {
     assert!(matches!(Terrain::from_heights(0, 0, 1.0, &[], None), Err(TerrainError::TooSmall { .. })));
     assert!(matches!(Terrain::from_heights(1, 1, 1.0, &[0.0], None), Err(TerrainError::TooSmall { .. })));
-    assert!(matches!(Terrain::from_heights(2, 2, 1.0, &[0.0; 3], None), Err(TerrainError::Length { got: 3, .. })));
+    assert!(matches!(
+        Terrain::from_heights(2, 2, 1.0, &[0.0; 3], None),
+        Err(TerrainError::Length { got: 3, .. })
+    ));
     assert_eq!(Terrain::from_heights(2, 2, 1.0, &[f64::NAN; 4], None).unwrap_err(), TerrainError::AllVoid);
     assert!(matches!(Terrain::from_heights(2, 2, 1e9, &[0.0; 4], None), Err(TerrainError::TooFar { .. })));
     assert!(matches!(Terrain::from_heights(2, 2, f64::NAN, &[0.0; 4], None), Err(TerrainError::AllVoid)));
@@ -194,7 +239,14 @@ fn hostile_queries_answer_without_panic() {
             let _ = (terrain.min_distance_m(p), terrain.max_distance_m(p), terrain.down_at(x, y));
             let camera = CameraPose { position_ned_m: p, ned_from_camera: DQuat::from_xyzw(x, y, x, y) };
             let _ = TerrainDetail::new(&terrain, &camera, [x, y, y, x], y, x).mesh();
-            let _ = TerrainDetail::new(&terrain, &nadir(DVec3::new(0.0, 0.0, -100.0)), [-1.0, 1.0, -1.0, 1.0], x, y).mesh();
+            let _ = TerrainDetail::new(
+                &terrain,
+                &nadir(DVec3::new(0.0, 0.0, -100.0)),
+                [-1.0, 1.0, -1.0, 1.0],
+                x,
+                y,
+            )
+            .mesh();
         }
     }
     assert_eq!(terrain.intersect(DVec3::new(0.0, 0.0, -100.0), DVec3::ZERO, 1e9), None);
@@ -202,7 +254,8 @@ fn hostile_queries_answer_without_panic() {
 
 #[test]
 fn one_large_chunk_rounds_all_positions() {
-    // 40 x 40 chunks, one of them with a peak higher than any other chunk is wide: not among those that are looked at first.
+    // 40 x 40 chunks, one of them with a peak higher than any other chunk is wide: not among those that are
+    // looked at first.
     let side = 64 * 40 + 1;
     let mut heights = vec![0.0; (side * side) as usize];
     let peak = [64 * 17 + 30, 64 * 23 + 11];
@@ -211,9 +264,17 @@ fn one_large_chunk_rounds_all_positions() {
     // Half of 9000 m needs 13 bits, of 24.
     assert_eq!(terrain.quantum_m, 2f64.powi(13 - 23));
     let (chunk, [i, j]) = terrain.chunk_of_cell(peak);
-    let at = DVec3::new((32.0 * 40.0 - f64::from(peak[1])) * 3.0, (f64::from(peak[0]) - 32.0 * 40.0) * 3.0, -9000.0);
+    let at = DVec3::new(
+        (32.0 * 40.0 - f64::from(peak[1])) * 3.0,
+        (f64::from(peak[0]) - 32.0 * 40.0) * 3.0,
+        -9000.0,
+    );
     assert_eq!(terrain.position_ned_m(chunk, i, j), at);
-    assert!((25.0..27.0).contains(&(terrain.host_bytes() as f64 / f64::from(side * side))), "{}", terrain.host_bytes());
+    assert!(
+        (25.0..27.0).contains(&(terrain.host_bytes() as f64 / f64::from(side * side))),
+        "{}",
+        terrain.host_bytes()
+    );
 }
 
 #[test]
@@ -226,7 +287,8 @@ fn parts_of_the_border_tell_what_all_its_sides_do() {
         let uvs = vec![[0.0; 2]; (cols * rows) as usize];
         let points: Vec<DVec3> = (0..cols * rows)
             .map(|k| {
-                let [i, j] = [f64::from(k % cols) / f64::from(cols - 1), f64::from(k / cols) / f64::from(rows - 1)];
+                let [i, j] =
+                    [f64::from(k % cols) / f64::from(cols - 1), f64::from(k / cols) / f64::from(rows - 1)];
                 let bulge = |t: f64| bend_m * (std::f64::consts::PI * t).sin();
                 DVec3::new((0.5 - j) * (1300.0 + 2.0 * bulge(i)), (i - 0.5) * (2100.0 + 2.0 * bulge(j)), 0.0)
             })
@@ -235,7 +297,8 @@ fn parts_of_the_border_tell_what_all_its_sides_do() {
         let terrain = Terrain::new(cols, rows, &points, &uvs, texture).unwrap();
         for _ in 0..400 {
             let place = glam::DVec2::new(random.within(-700.0, 700.0), random.within(-1150.0, 1150.0));
-            let turns: Vec<f64> = (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
+            let turns: Vec<f64> =
+                (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
             let all = turns.iter().all(|&turn| turn > 0.0) || turns.iter().all(|&turn| turn < 0.0);
             assert_eq!(terrain.border_faces_away_from(place.extend(-500.0)), all, "{place} {bend_m}");
             found[usize::from(all)] += 1;

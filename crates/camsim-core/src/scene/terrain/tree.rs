@@ -1,6 +1,7 @@
 //! A quadtree of boxes over the grid.
 //!
-//! The four boxes below one are [tested against a ray at once](super::super::quad): they lie together in memory, relative to the middle of the whole.
+//! The four boxes below one are [tested against a ray at once](super::super::quad): they lie together in
+//! memory, relative to the middle of the whole.
 
 use glam::DVec3;
 
@@ -12,7 +13,8 @@ pub(super) const BLOCK_CELLS: u32 = 4;
 /// Nodes that wait at most: the root, and three on each level of the largest grid that there can be.
 const MOST_WAITING: usize = 3 * 32 + 1;
 
-/// An implicit quadtree: level 0 holds one box for each 4x4 cells, each level above one for 2x2 of the level below, the last one box.
+/// An implicit quadtree: level 0 holds one box for each 4x4 cells, each level above one for 2x2 of the level
+/// below, the last one box.
 #[derive(Clone, Debug)]
 pub(super) struct BlockTree {
     /// All coordinates are relative to it.
@@ -75,7 +77,8 @@ impl BlockTree {
         (cells / BLOCK_CELLS).trailing_zeros()
     }
 
-    /// The box around a square of so many cells, by column and row; `None` beyond the grid. The last one is around everything.
+    /// The box around a square of so many cells, by column and row; `None` beyond the grid. The last one is
+    /// around everything.
     pub fn square(&self, cells: u32, at: [i64; 2]) -> Option<Aabb> {
         let level = Self::level_of(cells).min(self.root().level);
         let size = self.levels[level as usize].size;
@@ -99,9 +102,16 @@ impl BlockTree {
         }
     }
 
-    /// Leads a ray to the blocks that it may meet, the nearest first as far as their boxes tell. `block` gets the ray parameter up to which
-    /// anything matters, and returns the one from then on: that of a hit, if it has found one.
-    pub fn walk(&self, origin: DVec3, direction: DVec3, t_max: f64, block: &mut dyn FnMut([u32; 2], f64) -> f64) {
+    /// Leads a ray to the blocks that it may meet, the nearest first as far as their boxes tell. `block` gets
+    /// the ray parameter up to which anything matters, and returns the one from then on: that of a hit, if it
+    /// has found one.
+    pub fn walk(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_max: f64,
+        block: &mut dyn FnMut([u32; 2], f64) -> f64,
+    ) {
         let length = direction.length();
         let ray = BoxRay::new(origin - self.middle, direction / length, self.extent_m);
         // Up to the next number above.
@@ -132,7 +142,10 @@ impl BlockTree {
                     waiting[place] = waiting[place - 1];
                     place -= 1;
                 }
-                waiting[place] = (enter[lane as usize], Node { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] });
+                waiting[place] = (
+                    enter[lane as usize],
+                    Node { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] },
+                );
                 count += 1;
             }
         }
@@ -140,8 +153,9 @@ impl BlockTree {
 
     /// A box, as large as its rounding makes it.
     pub fn bounds(&self, node: Node) -> Aabb {
-        let Aabb { min, max } =
-            self.levels[node.level as usize].quad(node.at.map(|n| n / 2)).get((node.at[0] % 2 + 2 * (node.at[1] % 2)) as usize);
+        let Aabb { min, max } = self.levels[node.level as usize]
+            .quad(node.at.map(|n| n / 2))
+            .get((node.at[0] % 2 + 2 * (node.at[1] % 2)) as usize);
         Aabb { min: min + self.middle, max: max + self.middle }
     }
 
@@ -152,7 +166,9 @@ impl BlockTree {
             let size = self.levels[level as usize].size;
             let [x, y] = node.at.map(|n| 2 * n);
             let all = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]];
-            all.into_iter().filter(move |c| c[0] < size[0] && c[1] < size[1]).map(move |at| Node { level, at })
+            all.into_iter()
+                .filter(move |c| c[0] < size[0] && c[1] < size[1])
+                .map(move |at| Node { level, at })
         })
     }
 }
@@ -201,7 +217,9 @@ mod tests {
 
     #[test]
     fn a_ray_is_led_to_every_box_that_it_meets() {
-        for (size, away) in [([1, 1], 0.0), ([5, 3], 10.0), ([37, 22], 1000.0), ([64, 64], -4e5), ([9, 70], 6.4e6)] {
+        for (size, away) in
+            [([1, 1], 0.0), ([5, 3], 10.0), ([37, 22], 1000.0), ([64, 64], -4e5), ([9, 70], 6.4e6)]
+        {
             let away = away * DVec3::new(1.0, 0.3, -0.1);
             let boxes = boxes(size, away);
             let tree = BlockTree::new(size, &boxes);
@@ -221,7 +239,8 @@ mod tests {
                     limit
                 });
                 for (block, each) in places(size).zip(&boxes) {
-                    let t = each.enter(origin, crate::scene::terrain::bounds::inverse(direction), f64::INFINITY);
+                    let t =
+                        each.enter(origin, crate::scene::terrain::bounds::inverse(direction), f64::INFINITY);
                     met += u32::from(t.is_some());
                     assert!(t.is_none() || found.contains(&block), "{size:?} {i}: {block:?} at {t:?}");
                 }
@@ -241,11 +260,16 @@ mod tests {
                 assert_eq!(found.is_empty(), each.is_empty());
                 if !each.is_empty() {
                     let (low, high) = (each.min - found.min, found.max - each.max);
-                    assert!(low.min(high).min_element() >= 0.0 && low.max(high).max_element() < 1e-3, "{at:?}: {low} {high}");
+                    assert!(
+                        low.min(high).min_element() >= 0.0 && low.max(high).max_element() < 1e-3,
+                        "{at:?}: {low} {high}"
+                    );
                 }
             }
             assert_eq!(tree.square(4, [37, 0]), None);
-            assert!(tree.square(BLOCK_CELLS << 9, [0, 0]).is_some_and(|whole| whole == tree.bounds(tree.root())));
+            assert!(
+                tree.square(BLOCK_CELLS << 9, [0, 0]).is_some_and(|whole| whole == tree.bounds(tree.root()))
+            );
         }
     }
 

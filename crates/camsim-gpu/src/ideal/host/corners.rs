@@ -1,11 +1,13 @@
-//! Corners of triangles in the key camera and in its picture; what is behind the camera or far beside the picture is cut off.
+//! Corners of triangles in the key camera and in its picture; what is behind the camera or far beside the
+//! picture is cut off.
 
 use crate::layout::IdealCamera;
 
 /// Of a pixel, as on the devices: corners stand on a grid this fine.
 pub(super) const SUBPIXELS: i32 = 1 << SUBPIXEL_BITS;
 pub(super) const SUBPIXEL_BITS: u32 = 8;
-/// How far from the first pixel a corner may be in the picture, pixels: so far products of two differences are exact in 64 bits.
+/// How far from the first pixel a corner may be in the picture, pixels: so far products of two differences
+/// are exact in 64 bits.
 const FARTHEST_PX: f32 = 32_768.0;
 /// Where triangles are cut, so that rounding leaves what is cut within.
 pub(super) const CUT_PX: f32 = 0.99 * FARTHEST_PX;
@@ -38,7 +40,14 @@ pub(super) struct Corner<const N: usize> {
 
 impl<const N: usize> Corner<N> {
     /// One that has not been projected.
-    pub const NOWHERE: Self = Self { in_camera_m: [0.0; 3], on_it: [0.0; N], at_px: [0.0; 2], at: [0; 2], inverse: 0.0, is_within: false };
+    pub const NOWHERE: Self = Self {
+        in_camera_m: [0.0; 3],
+        on_it: [0.0; N],
+        at_px: [0.0; 2],
+        at: [0; 2],
+        inverse: 0.0,
+        is_within: false,
+    };
 }
 
 impl Camera {
@@ -60,21 +69,36 @@ impl Camera {
     }
 
     #[inline(always)]
-    fn corner_within<const N: usize>(&self, most_px: f32, in_camera_m: [f32; 3], on_it: [f32; N]) -> Corner<N> {
+    fn corner_within<const N: usize>(
+        &self,
+        most_px: f32,
+        in_camera_m: [f32; 3],
+        on_it: [f32; N],
+    ) -> Corner<N> {
         let [x, y, z] = in_camera_m;
         let inverse_z = 1.0 / z;
         let x_px = (x * inverse_z).mul_add(self.focal_px[0], self.principal_px[0]);
         let y_px = (y * inverse_z).mul_add(self.focal_px[1], self.principal_px[1]);
         let is_within = z >= self.uniforms.near_m && x_px.abs() <= most_px && y_px.abs() <= most_px;
-        let on_grid = |px: f32| (if is_within { px * SUBPIXELS as f32 } else { 0.0 }).round_ties_even() as i32;
+        let on_grid =
+            |px: f32| (if is_within { px * SUBPIXELS as f32 } else { 0.0 }).round_ties_even() as i32;
         let at = [on_grid(x_px), on_grid(y_px)];
-        Corner { in_camera_m, on_it, at_px: [x_px, y_px], at, inverse: self.uniforms.near_m * inverse_z, is_within }
+        Corner {
+            in_camera_m,
+            on_it,
+            at_px: [x_px, y_px],
+            at,
+            inverse: self.uniforms.near_m * inverse_z,
+            is_within,
+        }
     }
 
-    /// Where a corner is in the picture, pixels, with all digits: far beside it few are left of [`Corner::at_px`].
+    /// Where a corner is in the picture, pixels, with all digits: far beside it few are left of
+    /// [`Corner::at_px`].
     pub fn place_px<const N: usize>(&self, corner: &Corner<N>) -> [f64; 2] {
         let [x, y, z] = corner.in_camera_m.map(f64::from);
-        let along = |side: f64, k: usize| side / z * f64::from(self.focal_px[k]) + f64::from(self.principal_px[k]);
+        let along =
+            |side: f64, k: usize| side / z * f64::from(self.focal_px[k]) + f64::from(self.principal_px[k]);
         [along(x, 0), along(y, 1)]
     }
 
@@ -91,7 +115,13 @@ impl Camera {
     /// Signed distances from the planes that corners are within.
     fn distances(&self, [x, y, z]: [f32; 3]) -> [f32; 5] {
         let side = |sign: f32, k: usize| (CUT_PX + sign * self.principal_px[k]) / self.focal_px[k];
-        [z - self.uniforms.near_m, side(-1.0, 0) * z - x, side(1.0, 0) * z + x, side(-1.0, 1) * z - y, side(1.0, 1) * z + y]
+        [
+            z - self.uniforms.near_m,
+            side(-1.0, 0) * z - x,
+            side(1.0, 0) * z + x,
+            side(-1.0, 1) * z - y,
+            side(1.0, 1) * z + y,
+        ]
     }
 
     /// What is left of a triangle: a polygon with up to eight corners, in their order.
@@ -106,7 +136,8 @@ impl Camera {
                 if here >= 0.0 {
                     left.push(*corner);
                 }
-                // From inside outwards, whoever asks: two triangles that share the border find the same place.
+                // From inside outwards, whoever asks: two triangles that share the border find the same
+                // place.
                 match (here >= 0.0, there >= 0.0) {
                     (true, false) => left.push(self.between(corner, next, here / (here - there))),
                     (false, true) => left.push(self.between(next, corner, there / (there - here))),

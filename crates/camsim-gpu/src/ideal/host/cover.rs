@@ -12,7 +12,8 @@ use crate::host::vectors::{Inside, Numbers, SIDE_BY_SIDE, Shown, Vectors, Wholes
 pub(super) const SKY: u32 = u32::MAX;
 /// Room beyond the last pixel of a row.
 pub(super) const BEYOND: usize = SIDE_BY_SIDE;
-/// Up to this size of a triangle, pixels, products of differences are exact in 32 bits, eight pixels beyond its end too.
+/// Up to this size of a triangle, pixels, products of differences are exact in 32 bits, eight pixels beyond
+/// its end too.
 pub(super) const SMALL_PX: i32 = 60;
 /// Bits of a triangle's number within its chunk.
 pub(super) const CHUNK_BITS: u32 = 16;
@@ -36,13 +37,16 @@ pub(super) trait Places: Copy + Send + Sync {
     /// Columns after which places are as high again.
     const ALIKE: usize;
 
-    /// Quarters of a pixel from a pixel's middle to the right, in even rows and odd ones, and down, in even columns and odd ones; of pixels that are further apart, from the first one's.
+    /// Quarters of a pixel from a pixel's middle to the right, in even rows and odd ones, and down, in even
+    /// columns and odd ones; of pixels that are further apart, from the first one's.
     const RIGHT: [i32; 2];
     const DOWN: [i32; 2];
 
-    /// Quarters of a pixel from the first of places side by side to each, to the right; and from the middle of its pixel down, where the first one is in an even column and in an odd one.
+    /// Quarters of a pixel from the first of places side by side to each, to the right; and from the middle
+    /// of its pixel down, where the first one is in an even column and in an odd one.
     const STEPS: Wholes = steps(Self::STEP);
-    const DOWNS: [Wholes; 2] = [alternating(Self::DOWN[0], Self::DOWN[1]), alternating(Self::DOWN[1], Self::DOWN[0])];
+    const DOWNS: [Wholes; 2] =
+        [alternating(Self::DOWN[0], Self::DOWN[1]), alternating(Self::DOWN[1], Self::DOWN[0])];
 
     fn beside(column: usize, row: usize) -> [i32; 2] {
         [Self::RIGHT[row % 2], Self::DOWN[column % 2]]
@@ -66,8 +70,9 @@ pub(super) struct Pixels;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fours;
 
-/// A quarter beside the middle of each: to the right in even rows and to the left in odd ones, up in even columns and down in odd ones, so that two by two of them are the places of a
-/// device's four samples a pixel.
+/// A quarter beside the middle of each: to the right in even rows and to the left in odd ones, up in even
+/// columns and down in odd ones, so that two by two of them are the places of a device's four samples a
+/// pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples;
 
@@ -100,9 +105,13 @@ struct Side<T> {
     from: T,
 }
 
-/// A side from a corner to the next, by quarters from the triangle's first pixel; what is exactly on it is within if it is an upper or a left one.
+/// A side from a corner to the next, by quarters from the triangle's first pixel; what is exactly on it is
+/// within if it is an upper or a left one.
 #[inline(always)]
-fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output = T>>(a: [i32; 2], b: [i32; 2]) -> Side<T> {
+fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output = T>>(
+    a: [i32; 2],
+    b: [i32; 2],
+) -> Side<T> {
     let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
     let is_kept = dy < 0 || (dy == 0 && dx > 0);
     let t = T::from;
@@ -110,9 +119,15 @@ fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output =
     Side { across: t(0) - t(dy) * t(SUBPIXELS / 4), down: t(dx) * t(SUBPIXELS / 4), from }
 }
 
-/// Whether any place shows a triangle that nothing hides, of not more columns than there are side by side: its corners from its first pixel on, and its first and last pixels.
+/// Whether any place shows a triangle that nothing hides, of not more columns than there are side by side:
+/// its corners from its first pixel on, and its first and last pixels.
 #[inline(always)]
-pub(super) fn is_anywhere<P: Places>(vectors: impl Vectors, [a, b, c]: [[i32; 2]; 3], first: [i32; 2], last: [i32; 2]) -> bool {
+pub(super) fn is_anywhere<P: Places>(
+    vectors: impl Vectors,
+    [a, b, c]: [[i32; 2]; 3],
+    first: [i32; 2],
+    last: [i32; 2],
+) -> bool {
     let sides: [Side<i32>; 3] = [side(a, b), side(b, c), side(c, a)];
     let (steps, downs) = (&P::STEPS, &P::DOWNS[first[0] as usize % 2]);
     let of_side = |k: usize| vectors.mixed([sides[k].across, sides[k].down], [steps, downs]);
@@ -139,7 +154,14 @@ struct Within {
 impl Band<'_> {
     /// Draws a chunk's triangles that are wanted.
     #[inline(always)]
-    pub fn draw<P: Places>(&mut self, vectors: impl Vectors, _: P, chunk: &Chunk, number: u32, mut is_wanted: impl FnMut(&Cover) -> bool) {
+    pub fn draw<P: Places>(
+        &mut self,
+        vectors: impl Vectors,
+        _: P,
+        chunk: &Chunk,
+        number: u32,
+        mut is_wanted: impl FnMut(&Cover) -> bool,
+    ) {
         for &triangle in chunk.of_band(self.number) {
             let cover = &chunk.covers[triangle as usize];
             if !is_wanted(cover) {
@@ -148,7 +170,9 @@ impl Band<'_> {
             let name = number << CHUNK_BITS | triangle;
             match chunk.large.get(cover.large as usize) {
                 None => self.small::<P>(vectors, cover, name),
-                Some([inverse, ..]) => (0..P::ALIKE).for_each(|first| self.large::<P>(cover, inverse, name, first)),
+                Some([inverse, ..]) => {
+                    (0..P::ALIKE).for_each(|first| self.large::<P>(cover, inverse, name, first))
+                }
             }
         }
     }
@@ -163,7 +187,11 @@ impl Band<'_> {
         let (first, last) = (place(cover.first), place(cover.last));
         let first_row = self.first_row::<P>();
         let right = 4 * ((P::STEP * first[0]) as i32 - i32::from(cover.first[0]));
-        Within { rows: first[1].max(first_row)..(last[1] + 1).min(first_row + BAND_ROWS / P::STEP), columns: [first[0], last[0]], right }
+        Within {
+            rows: first[1].max(first_row)..(last[1] + 1).min(first_row + BAND_ROWS / P::STEP),
+            columns: [first[0], last[0]],
+            right,
+        }
     }
 
     #[inline(always)]
@@ -179,7 +207,8 @@ impl Band<'_> {
         // Written out, here and below: what `map` calls may be compiled without these vectors.
         let of_side = |k: usize| vectors.mixed([sides[k].across, sides[k].down], [steps, downs]);
         let adds = [of_side(0), of_side(1), of_side(2)];
-        let adds_inverse = vectors.mixed_numbers([inverse[1], inverse[2]], [&numbers(steps), &numbers(downs)]);
+        let adds_inverse =
+            vectors.mixed_numbers([inverse[1], inverse[2]], [&numbers(steps), &numbers(downs)]);
         let first_row = self.first_row::<P>();
         for y in rows {
             let right = right + P::RIGHT[y % 2];
@@ -195,7 +224,9 @@ impl Band<'_> {
                 let far = step * x;
                 let place = row + x as usize;
                 // Rows have more numbers than pixels, so that there are enough.
-                let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else { return };
+                let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else {
+                    return;
+                };
                 let side = |k: usize| (begins[k] + sides[k].across * far, &adds[k]);
                 let inside = Inside { sides: [side(0), side(1), side(2)], last: last - x };
                 let near = (inverse[1].mul_add(far as f32, begin_inverse), &adds_inverse);
@@ -205,7 +236,8 @@ impl Band<'_> {
         }
     }
 
-    /// By spans, whose ends are exact in 64 bits: of columns that are alike, from the triangle's first one or one beside it on.
+    /// By spans, whose ends are exact in 64 bits: of columns that are alike, from the triangle's first one or
+    /// one beside it on.
     #[inline(always)]
     fn large<P: Places>(&mut self, cover: &Cover, inverse: &[f64; 3], name: u32, begin: usize) {
         let [a, b, c] = cover.at;
@@ -224,7 +256,10 @@ impl Band<'_> {
                 match step * side.across {
                     0 if from < 0 => last = -1,
                     0 => {}
-                    across @ 1.. => first = first.max((-from).div_euclid(across) + i64::from((-from).rem_euclid(across) != 0)),
+                    across @ 1.. => {
+                        first =
+                            first.max((-from).div_euclid(across) + i64::from((-from).rem_euclid(across) != 0))
+                    }
                     across => last = last.min(from.div_euclid(-across)),
                 }
             }
@@ -233,7 +268,8 @@ impl Band<'_> {
                 continue;
             }
             let across = step as f64 * inverse[1];
-            let at_first = inverse[0] + inverse[2] * down as f64 + inverse[1] * right as f64 + across * first as f64;
+            let at_first =
+                inverse[0] + inverse[2] * down as f64 + inverse[1] * right as f64 + across * first as f64;
             let row = (y - first_row) * self.stride + first_column;
             let span = row + first as usize..row + last as usize + 1;
             let pixels = self.depth[span.clone()].iter_mut().zip(&mut self.shown[span]);

@@ -1,5 +1,6 @@
-//! Which parts of an ideal frame are drawn with several samples a pixel: tiles with a step of depth between their pixels or beside them, and those with any triangle of a model, which
-//! may be thinner than a pixel. Everywhere else samples would show what the pixel's middle shows.
+//! Which parts of an ideal frame are drawn with several samples a pixel: tiles with a step of depth between
+//! their pixels or beside them, and those with any triangle of a model, which may be thinner than a pixel.
+//! Everywhere else samples would show what the pixel's middle shows.
 
 use std::{
     ops::RangeInclusive,
@@ -21,7 +22,8 @@ use crate::host::{
 pub(super) const TILE_PX: usize = 8;
 /// Rows of tiles in a band.
 const TILE_ROWS: usize = PIXEL_ROWS / TILE_PX;
-/// Second difference of inverse depth from pixel to pixel, of the nearest of the three, that is taken for a step: what [`camsim_core::temporal::marks`] takes for one, and smaller ones.
+/// Second difference of inverse depth from pixel to pixel, of the nearest of the three, that is taken for a
+/// step: what [`camsim_core::temporal::marks`] takes for one, and smaller ones.
 const STEP: f32 = 0.005;
 const BITS: usize = u64::BITS as usize;
 
@@ -61,7 +63,9 @@ impl Marks {
     pub fn add_triangles(&self, covers: &[Cover]) {
         for cover in covers {
             let [columns, rows] = tiles(cover);
-            for (row, column) in (rows[0]..=rows[1]).flat_map(|row| (columns[0]..=columns[1]).map(move |column| (row, column))) {
+            for (row, column) in
+                (rows[0]..=rows[1]).flat_map(|row| (columns[0]..=columns[1]).map(move |column| (row, column)))
+            {
                 let (bits, bit) = (&self.bits[row * self.words + column / BITS], 1 << (column % BITS));
                 // Most are there: another thread need not be told again.
                 if bits.load(Ordering::Relaxed) & bit == 0 {
@@ -77,14 +81,20 @@ impl Marks {
         let rows = self.bits.par_chunks_mut(self.words).take(height.div_ceil(TILE_PX)).enumerate();
         rows.for_each(|(tile_row, marks)| {
             // What is beside a step may show it too.
-            let (first, last) = ((TILE_PX * tile_row).saturating_sub(1), (TILE_PX * (tile_row + 1)).min(height - 1));
+            let (first, last) =
+                ((TILE_PX * tile_row).saturating_sub(1), (TILE_PX * (tile_row + 1)).min(height - 1));
             add_tiles(&steps_of_rows(first..=last, depth, stride, self.size_px), marks);
         });
     }
 }
 
 /// Bits of pixels in rows, any of which have a step.
-fn steps_of_rows(rows: RangeInclusive<usize>, depth: &[f32], stride: usize, [width, height]: [usize; 2]) -> Vec<u32> {
+fn steps_of_rows(
+    rows: RangeInclusive<usize>,
+    depth: &[f32],
+    stride: usize,
+    [width, height]: [usize; 2],
+) -> Vec<u32> {
     let row = |y: usize| &depth[y * stride..][..width];
     let mut steps = vec![0; width.div_ceil(LANES)];
     widest!(_vectors => {
@@ -126,7 +136,10 @@ fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
             // Beyond the frame is what is at its border.
             let at = |row: &[f32], x: usize| row[x.min(width - 1)];
             across = std::array::from_fn(|i| at(here, (first + i).saturating_sub(1)));
-            down = [std::array::from_fn(|i| at(above, first + i)), std::array::from_fn(|i| at(below, first + i))];
+            down = [
+                std::array::from_fn(|i| at(above, first + i)),
+                std::array::from_fn(|i| at(below, first + i)),
+            ];
         }
         let mut found = 0;
         for i in 0..LANES {
@@ -142,7 +155,9 @@ fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
 #[inline(always)]
 fn tiles(cover: &Cover) -> [[usize; 2]; 2] {
     // Written out: what `map` calls may be compiled without the vectors that this is.
-    let of = |k: usize| [usize::from(cover.first[k]) / (TILE_PX * ALONG), usize::from(cover.last[k]) / (TILE_PX * ALONG)];
+    let of = |k: usize| {
+        [usize::from(cover.first[k]) / (TILE_PX * ALONG), usize::from(cover.last[k]) / (TILE_PX * ALONG)]
+    };
     [of(0), of(1)]
 }
 
@@ -156,8 +171,9 @@ impl OfBand<'_> {
     pub fn has(&self, cover: &Cover) -> bool {
         let [columns, rows] = tiles(cover);
         let last_row = self.first_row + TILE_ROWS - 1;
-        (rows[0].max(self.first_row)..=rows[1].min(last_row))
-            .any(|row| (columns[0]..=columns[1]).any(|column| self.is_marked_at(column, row - self.first_row)))
+        (rows[0].max(self.first_row)..=rows[1].min(last_row)).any(|row| {
+            (columns[0]..=columns[1]).any(|column| self.is_marked_at(column, row - self.first_row))
+        })
     }
 
     /// By the tile's column and its row within the band.
@@ -178,11 +194,15 @@ mod tests {
 
     /// Pixels with a step beside them, as they are by the definition.
     fn marked(depth: &[f32], stride: usize, [width, height]: [usize; 2]) -> Vec<[usize; 2]> {
-        let at = |x: isize, y: isize| depth[y.clamp(0, height as isize - 1) as usize * stride + x.clamp(0, width as isize - 1) as usize];
+        let at = |x: isize, y: isize| {
+            depth[y.clamp(0, height as isize - 1) as usize * stride + x.clamp(0, width as isize - 1) as usize]
+        };
         let bends = |a: f32, b: f32, c: f32| (a - 2.0 * b + c).abs() > STEP * a.max(b).max(c);
         let is_step = |x: isize, y: isize| {
             let within = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
-            within && (bends(at(x - 1, y), at(x, y), at(x + 1, y)) || bends(at(x, y - 1), at(x, y), at(x, y + 1)))
+            within
+                && (bends(at(x - 1, y), at(x, y), at(x + 1, y))
+                    || bends(at(x, y - 1), at(x, y), at(x, y + 1)))
         };
         let mut tiles: Vec<[usize; 2]> = Vec::new();
         for (x, y) in (0..height as isize).flat_map(|y| (0..width as isize).map(move |x| (x, y))) {
@@ -197,7 +217,9 @@ mod tests {
 
     #[test]
     fn tiles_with_steps_in_them_or_beside_them_are_marked() {
-        for (size_px, step) in [([100, 70], 7919), ([513, 40], 12_289), ([64, 9], 31), ([1105, 33], 24_593), ([2, 2], 1)] {
+        for (size_px, step) in
+            [([100, 70], 7919), ([513, 40], 12_289), ([64, 9], 31), ([1105, 33], 24_593), ([2, 2], 1)]
+        {
             let [width, height] = size_px;
             let stride = width + 9;
             let mut depth: Large<f32> = Large::zeros(stride * height);

@@ -1,4 +1,5 @@
-//! Models as the host draws them: each level of detail in pieces of a few thousand triangles, with the corners that these have.
+//! Models as the host draws them: each level of detail in pieces of a few thousand triangles, with the
+//! corners that these have.
 
 use camsim_core::{
     pose::CameraPose,
@@ -17,7 +18,8 @@ pub(super) const TRIANGLES_A_CHUNK: usize = 4096;
 
 /// Part of the numbers that tell from which side a triangle is seen that rounding may be, and more.
 const ROUNDING: f32 = 1e-5;
-/// A triangle's area may change by three halves of its longest side times what its corners move by, and a little more where all of them do: the height that it loses is up to this many times that.
+/// A triangle's area may change by three halves of its longest side times what its corners move by, and a
+/// little more where all of them do: the height that it loses is up to this many times that.
 const HEIGHT_LOST: f32 = 4.0;
 
 /// Some of a level's triangles.
@@ -31,7 +33,8 @@ pub(super) struct Piece {
     planes: Planes,
 }
 
-/// Planes of triangles: unit normals to the side from which they turn anticlockwise, and how far along these they are, metres in the shape's axes.
+/// Planes of triangles: unit normals to the side from which they turn anticlockwise, and how far along these
+/// they are, metres in the shape's axes.
 #[derive(Debug, Default)]
 struct Planes {
     normal: [Vec<f32>; 3],
@@ -56,7 +59,9 @@ impl Piece {
     /// Those of a shape, by level of detail.
     pub fn of_levels(shape: &Shape, levels: &ShapeLevels) -> Vec<Vec<Self>> {
         let first = shape.first_equals();
-        let pieces = |indices: &[u32]| indices.chunks(3 * TRIANGLES_A_CHUNK).map(|some| Self::new(shape, &first, some)).collect();
+        let pieces = |indices: &[u32]| {
+            indices.chunks(3 * TRIANGLES_A_CHUNK).map(|some| Self::new(shape, &first, some)).collect()
+        };
         levels.levels().iter().map(|level| pieces(&level.indices)).collect()
     }
 
@@ -66,7 +71,11 @@ impl Piece {
         used.sort_unstable();
         used.dedup();
         let place = |&corner: &u32| used.partition_point(|&used| used < first[corner as usize]) as u32;
-        let normals = if shape.has_normals() { used.iter().map(|&corner| shape.normals[corner as usize]).collect() } else { Vec::new() };
+        let normals = if shape.has_normals() {
+            used.iter().map(|&corner| shape.normals[corner as usize]).collect()
+        } else {
+            Vec::new()
+        };
         let corners: Vec<MeshVertex> = used.iter().map(|&corner| shape.vertices[corner as usize]).collect();
         let indices: Vec<u32> = indices.iter().map(place).collect();
         let planes = Planes::new(&corners, &indices);
@@ -124,7 +133,8 @@ impl Piece {
         for (k, corner) in self.corners.iter().enumerate() {
             if bench.is_asked[k] {
                 let ([u, v], [r, g, b, _], [sun, down]) = (corner.uv, corner.tint, more(k));
-                bench.corners[k] = camera.corner(place.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down]);
+                bench.corners[k] =
+                    camera.corner(place.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down]);
             }
         }
         self.add(vectors, camera, bench, kind, chunk);
@@ -149,7 +159,14 @@ impl Piece {
     }
 
     #[inline(always)]
-    fn add<const N: usize>(&self, vectors: impl Vectors, camera: &Camera, bench: &Bench<N>, kind: Kind, chunk: &mut Chunk) {
+    fn add<const N: usize>(
+        &self,
+        vectors: impl Vectors,
+        camera: &Camera,
+        bench: &Bench<N>,
+        kind: Kind,
+        chunk: &mut Chunk,
+    ) {
         for (triangle, is_seen) in self.indices.as_chunks::<3>().0.iter().zip(&bench.is_seen) {
             if *is_seen {
                 let corner = |k: usize| &bench.corners[triangle[k] as usize];
@@ -179,16 +196,21 @@ impl Planes {
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());
             planes.per_height.push((longest / (b - a).cross(c - a).length()) as f32);
         }
-        planes.reach_m = corners.iter().map(|corner| Vec3::from(corner.position_m).length()).fold(0.0, f32::max);
+        planes.reach_m =
+            corners.iter().map(|corner| Vec3::from(corner.position_m).length()).fold(0.0, f32::max);
         planes
     }
 
-    /// Leaves those of the triangles that may be seen from in front. The picture tells which side of one is seen where its corners are on the grid; those that are left out here would turn there
-    /// whatever their corners are moved by.
+    /// Leaves those of the triangles that may be seen from in front. The picture tells which side of one is
+    /// seen where its corners are on the grid; those that are left out here would turn there whatever their
+    /// corners are moved by.
     ///
-    /// A triangle of area `A` whose plane is `d` in front of the eye, in the shape's axes, has the area `f^2 det A d / z_far^3` in the picture or more, where `det` is of the way to the camera's axes, and sides of up to
-    /// `f most L s / z_near`: lengths grow `most` times, and beside the axis a picture stretches by up to `s`. Corners that move by `e` change that area by up to half of the sides' sum times
-    /// `e`. So the side that is seen is sure from `d = 3 e s most z_far^3 / (f det h z_near)` on ([`HEIGHT_LOST`] for 3), `h` the height.
+    /// A triangle of area `A` whose plane is `d` in front of the eye, in the shape's axes, has the area `f^2
+    /// det A d / z_far^3` in the picture or more, where `det` is of the way to the camera's axes, and sides
+    /// of up to `f most L s / z_near`: lengths grow `most` times, and beside the axis a picture stretches by
+    /// up to `s`. Corners that move by `e` change that area by up to half of the sides' sum times `e`. So the
+    /// side that is seen is sure from `d = 3 e s most z_far^3 / (f det h z_near)` on ([`HEIGHT_LOST`] for 3),
+    /// `h` the height.
     #[inline(always)]
     fn seen_from(&self, camera: &Camera, place: &Place, is_seen: &mut [bool]) {
         let [x, y, z] = place.eye_m;
@@ -215,7 +237,8 @@ struct Place {
     from_camera_m: [f32; 3],
     /// The camera in the shape's axes.
     eye_m: [f32; 3],
-    /// How much longer lengths are at most, of those in the shape's axes, and how many times larger volumes; less than 0 where it is mirrored.
+    /// How much longer lengths are at most, of those in the shape's axes, and how many times larger volumes;
+    /// less than 0 where it is mirrored.
     most: f32,
     volume: f32,
 }
@@ -238,15 +261,17 @@ impl Place {
         }
     }
 
-    /// Of a shape of which nothing is farther than `reach_m` from its origin: what a triangle's plane must be before or behind the eye at least to be sure of its side, times its height; in the shape's
-    /// axes. Infinite where some of it may be behind the camera or cut off, and of what is pressed flat.
+    /// Of a shape of which nothing is farther than `reach_m` from its origin: what a triangle's plane must be
+    /// before or behind the eye at least to be sure of its side, times its height; in the shape's axes.
+    /// Infinite where some of it may be behind the camera or cut off, and of what is pressed flat.
     fn turned_m2(&self, camera: &Camera, reach_m: f32) -> f32 {
         let [x, y, z] = self.from_camera_m;
         let reach_m = self.most * reach_m;
         let (near_m, far_m) = (z - reach_m, z + reach_m);
         let beside = ((x * x + y * y).sqrt() + reach_m) / near_m;
         let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.principal_px);
-        // Corners stand half a step of the grid beside where they are at most, and what single precision leaves of metres and of pixels.
+        // Corners stand half a step of the grid beside where they are at most, and what single precision
+        // leaves of metres and of pixels.
         let most_px = fx.max(fy) * (beside + far_m / near_m) + cx.abs().max(cy.abs());
         // Corners farther out are cut off, and what is left has heights of its own.
         let is_whole = near_m >= camera.uniforms.near_m && most_px < CUT_PX && self.volume != 0.0;
@@ -255,7 +280,8 @@ impl Place {
         }
         let moved_px = std::f32::consts::SQRT_2 * (0.5 / SUBPIXELS as f32 + 2.0 * f32::EPSILON * most_px);
         let stretch = (1.0 + beside * beside).sqrt();
-        HEIGHT_LOST * moved_px * stretch * self.most * far_m * far_m * (far_m / near_m) / (fx.min(fy) * self.volume.abs())
+        HEIGHT_LOST * moved_px * stretch * self.most * far_m * far_m * (far_m / near_m)
+            / (fx.min(fy) * self.volume.abs())
     }
 
     #[inline(always)]
@@ -281,12 +307,28 @@ mod tests {
     /// A camera that looks down, and where it is.
     fn camera(height_m: f64, focal_px: f32) -> (Camera, CameraPose) {
         let uniforms = IdealCamera { near_m: 0.05, ..IdealCamera::default() };
-        let camera = Camera { uniforms, focal_px: [focal_px; 2], principal_px: [500.0, 400.0], size_px: [1000, 800], beside: 0 };
-        (camera, CameraPose { position_ned_m: DVec3::new(0.0, 0.0, -height_m), ned_from_camera: DQuat::IDENTITY })
+        let camera = Camera {
+            uniforms,
+            focal_px: [focal_px; 2],
+            principal_px: [500.0, 400.0],
+            size_px: [1000, 800],
+            beside: 0,
+        };
+        (
+            camera,
+            CameraPose { position_ned_m: DVec3::new(0.0, 0.0, -height_m), ned_from_camera: DQuat::IDENTITY },
+        )
     }
 
-    /// What is drawn of triangles of about a size, and how many of them are left out by their planes; all of them where `all` is asked for.
-    fn drawn(seed: u32, camera: &Camera, pose: &CameraPose, size_m: f64, all: bool) -> (Vec<[[i32; 2]; 3]>, usize) {
+    /// What is drawn of triangles of about a size, and how many of them are left out by their planes; all of
+    /// them where `all` is asked for.
+    fn drawn(
+        seed: u32,
+        camera: &Camera,
+        pose: &CameraPose,
+        size_m: f64,
+        all: bool,
+    ) -> (Vec<[[i32; 2]; 3]>, usize) {
         let mut shape = Shape::default();
         for k in 0..600 {
             let [x, y, z, turn] = random(seed, 10 * k);
@@ -294,7 +336,8 @@ mod tests {
             let flat = if turn > 0.0 { 1.0 } else { 0.02 };
             for corner in 1..4 {
                 let [dx, dy, dz, _] = random(seed, 10 * k + corner);
-                let at = [20.0 * x + size_m * flat * dx, 20.0 * y + size_m * flat * dy, 20.0 * z + size_m * dz];
+                let at =
+                    [20.0 * x + size_m * flat * dx, 20.0 * y + size_m * flat * dy, 20.0 * z + size_m * dz];
                 shape.indices.push(shape.vertices.len() as u32);
                 shape.vertices.push(MeshVertex::new(at.map(|at| at as f32), [0.0; 2]));
             }
@@ -302,9 +345,14 @@ mod tests {
         let indices = shape.indices.clone();
         let piece = Piece::new(&shape, &shape.first_equals(), &indices);
         // Stretched all over, hardly, much, and pressed flat.
-        let sides =
-            [DVec3::splat(2.0), DVec3::new(1.0, 1.3, 0.8), DVec3::new(1.0, 5.0, 0.3), DVec3::new(1.0, 1.0, 0.0)][seed as usize / 3 % 4];
-        let ned_from_shape = DMat3::from_rotation_x(0.2) * DMat3::from_diagonal(sides) * DMat3::from_rotation_z(0.3);
+        let sides = [
+            DVec3::splat(2.0),
+            DVec3::new(1.0, 1.3, 0.8),
+            DVec3::new(1.0, 5.0, 0.3),
+            DVec3::new(1.0, 1.0, 0.0),
+        ][seed as usize / 3 % 4];
+        let ned_from_shape =
+            DMat3::from_rotation_x(0.2) * DMat3::from_diagonal(sides) * DMat3::from_rotation_z(0.3);
         let stands = PlacedShape { origin_ned_m: DVec3::new(3.0, -2.0, 1.0), ned_from_shape, stretch: 1.3 };
         let (mut bench, mut chunk) = (Bench::new(), Chunk::default());
         let kind = Kind { paint: 0, one_sided: true, sky: None };
@@ -333,7 +381,8 @@ mod tests {
             assert_eq!(found, drawn(seed, &camera, &pose, size_m, true).0, "{seed}");
             left_out_of_all += left_out;
         }
-        // Half of them show their backs, but many are near edge-on, too small to be sure of, behind the camera or pressed flat.
+        // Half of them show their backs, but many are near edge-on, too small to be sure of, behind the
+        // camera or pressed flat.
         assert!(left_out_of_all > 120 * 600 / 16, "{left_out_of_all}");
     }
 }

@@ -22,7 +22,8 @@ pub(super) enum Picture {
     Texels(Box<Texels>),
 }
 
-/// A picture and its smaller versions, the largest first: texels row after row, and after the last column and the last row what follows them.
+/// A picture and its smaller versions, the largest first: texels row after row, and after the last column and
+/// the last row what follows them.
 #[derive(Debug)]
 pub(super) struct Texels {
     halves: Large<u16>,
@@ -101,7 +102,8 @@ impl Texels {
         [self.widths[0], self.heights[0]]
     }
 
-    /// Adds reads of the pixels that are asked for, times a weight of each: bilinear, between the two versions that a level lies between.
+    /// Adds reads of the pixels that are asked for, times a weight of each: bilinear, between the two
+    /// versions that a level lies between.
     #[inline(always)]
     pub fn add_reads(
         &self,
@@ -161,7 +163,9 @@ impl Texels {
                 continue;
             }
             let (first, span) = (first[i] as usize, stride[i] as usize + 2 * CHANNELS);
-            let of = halves.get(first..first + span).and_then(|halves| Some((*halves.first_chunk()?, *halves.last_chunk()?)));
+            let of = halves
+                .get(first..first + span)
+                .and_then(|halves| Some((*halves.first_chunk()?, *halves.last_chunk()?)));
             let Some((top, bottom)) = of else { continue };
             let (top, bottom) = (vectors.numbers(top), vectors.numbers(bottom));
             for k in 0..2 * CHANNELS {

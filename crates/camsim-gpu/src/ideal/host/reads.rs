@@ -1,4 +1,5 @@
-//! Reads of a surface's picture, as many as the plan says: twin of shaders/ideal/surface.wgsl and shaders/ideal/reads.
+//! Reads of a surface's picture, as many as the plan says: twin of shaders/ideal/surface.wgsl and
+//! shaders/ideal/reads.
 
 use camsim_plan::SurfaceReads;
 
@@ -17,7 +18,8 @@ const CLOSE_TEXELS: f32 = 0.8;
 const CELL_VARIANCE: f32 = 1.5;
 /// Four reads: longer by this than wide (at least a texel), and one read across is enough.
 const IN_A_ROW: f32 = 1.6;
-/// A grid: most reads along the longer axis, those along a shorter one, and the side from which on it has them, texels.
+/// A grid: most reads along the longer axis, those along a shorter one, and the side from which on it has
+/// them, texels.
 const MAX_TAPS: f32 = 32.0;
 const SHORT_TAPS: f32 = 2.0;
 const ONE_TAP: f32 = 0.5;
@@ -31,7 +33,8 @@ pub(super) struct Places {
     pub down: [Lanes; 2],
 }
 
-/// The ellipse that stands for a pixel on the picture: its axes in texels, and the direction of the longer one.
+/// The ellipse that stands for a pixel on the picture: its axes in texels, and the direction of the longer
+/// one.
 struct Pixels {
     longer: Lanes,
     shorter: Lanes,
@@ -50,7 +53,8 @@ impl Pixels {
         let mean = each(|i| 0.5 * (a[i] + c[i]));
         let half = each(|i| 0.5 * (a[i] - c[i]));
         let spread = each(|i| half[i].mul_add(half[i], b[i] * b[i]).sqrt());
-        // Of the two expressions of the eigenvector, the one without cancellation; a circle has no longer axis, any will do.
+        // Of the two expressions of the eigenvector, the one without cancellation; a circle has no longer
+        // axis, any will do.
         let x = each(|i| if half[i] >= 0.0 { half[i] + spread[i] } else { b[i] });
         let y = each(|i| if half[i] >= 0.0 { b[i] } else { spread[i] - half[i] });
         let per_length = each(|i| 1.0 / higher(x[i].mul_add(x[i], y[i] * y[i]).sqrt(), 1e-20));
@@ -58,25 +62,37 @@ impl Pixels {
             each(|i| if spread[i] > 1e-6 * mean[i] { x[i] * per_length[i] } else { 1.0 }),
             each(|i| if spread[i] > 1e-6 * mean[i] { y[i] * per_length[i] } else { 0.0 }),
         ];
-        Self { longer: each(|i| (mean[i] + spread[i]).sqrt()), shorter: each(|i| higher(mean[i] - spread[i], 0.0).sqrt()), along }
+        Self {
+            longer: each(|i| (mean[i] + spread[i]).sqrt()),
+            shorter: each(|i| higher(mean[i] - spread[i], 0.0).sqrt()),
+            along,
+        }
     }
 }
 
-/// Variance (times 12) of the version for reads `cell` texels apart, beyond what the picture has between its texels, and its level.
+/// Variance (times 12) of the version for reads `cell` texels apart, beyond what the picture has between its
+/// texels, and its level.
 #[inline(always)]
 fn version_for(cell: f32) -> [f32; 2] {
     let variance = CELL_VARIANCE * cell * cell;
     let texels2 = variance * (1.0 / 3.0) + 1.0;
     // Half of its exponent, rounded down, and 4 to the minus that.
     let below = ((texels2.to_bits() >> 23) as i32 - 127) >> 1;
-    let level = below as f32 + (texels2 * f32::from_bits(((127 - 2 * below) as u32) << 23) - 1.0) * (1.0 / 3.0);
+    let level =
+        below as f32 + (texels2 * f32::from_bits(((127 - 2 * below) as u32) << 23) - 1.0) * (1.0 / 3.0);
     // Exactly 0 needs one version instead of two.
     if cell <= CLOSE_TEXELS { [0.0; 2] } else { [variance, level] }
 }
 
 /// Mean colours of the pixels that are asked for.
 #[inline(always)]
-pub(super) fn colors(vectors: impl Vectors, picture: &Texels, reads: SurfaceReads, places: &Places, is_asked: &[bool; LANES]) -> Colors {
+pub(super) fn colors(
+    vectors: impl Vectors,
+    picture: &Texels,
+    reads: SurfaceReads,
+    places: &Places,
+    is_asked: &[bool; LANES],
+) -> Colors {
     let pixels = Pixels::new(places, picture.size());
     let [u, v] = &places.uv;
     let mut sums = NO_SUMS;
@@ -126,12 +142,20 @@ fn add_both(
 
 /// Two by two where a pixel is about as wide as long, four in a row where it is longer.
 #[inline(always)]
-fn add_four(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &Pixels, is_asked: &[bool; LANES], sums: &mut Sums) {
+fn add_four(
+    vectors: impl Vectors,
+    picture: &Texels,
+    places: &Places,
+    pixels: &Pixels,
+    is_asked: &[bool; LANES],
+    sums: &mut Sums,
+) {
     let (mut level, mut first, mut second) = (ZERO, [ZERO; 2], [ZERO; 2]);
     for i in 0..LANES {
         let (longer, shorter) = (pixels.longer[i], pixels.shorter[i]);
         let is_square = longer < IN_A_ROW * higher(shorter, 1.0);
-        let [variance, of] = version_for(if is_square { 0.5 * longer } else { higher(0.25 * longer, shorter) });
+        let [variance, of] =
+            version_for(if is_square { 0.5 * longer } else { higher(0.25 * longer, shorter) });
         level[i] = of;
         // +-x has the variance x^2, and +-x with +-3 x has 5 x^2; a mean over the length l has l^2 / 12.
         let long2 = higher(longer * longer - variance, 0.0) * (1.0 / 12.0);
@@ -157,10 +181,18 @@ fn version_variance(level: f32) -> f32 {
 
 /// One or two reads across and as many along the longer axis as keep them square.
 #[inline(always)]
-fn add_grid(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &Pixels, is_asked: &[bool; LANES], sums: &mut Sums) {
+fn add_grid(
+    vectors: impl Vectors,
+    picture: &Texels,
+    places: &Places,
+    pixels: &Pixels,
+    is_asked: &[bool; LANES],
+    sums: &mut Sums,
+) {
     let (mut level, mut taps, mut lengths) = (ZERO, [ZERO; 2], [ZERO; 2]);
-    let tap_length =
-        |side: f32, taps: f32, version: f32| (higher(side * side - version, 0.0) / higher(1.0 - 1.0 / (taps * taps), 0.5)).sqrt();
+    let tap_length = |side: f32, taps: f32, version: f32| {
+        (higher(side * side - version, 0.0) / higher(1.0 - 1.0 / (taps * taps), 0.5)).sqrt()
+    };
     for i in (0..LANES).filter(|&i| is_asked[i]) {
         let (longer, shorter) = (pixels.longer[i], pixels.shorter[i]);
         let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };
@@ -170,13 +202,16 @@ fn add_grid(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &P
         level[i] = if side > 1.0 { lower(side.log2(), MAX_LEVEL) } else { 0.0 };
         let version = version_variance(level[i]);
         (taps[0][i], taps[1][i]) = (long_taps, short_taps);
-        (lengths[0][i], lengths[1][i]) = (tap_length(longer, long_taps, version), tap_length(shorter, short_taps, version));
+        (lengths[0][i], lengths[1][i]) =
+            (tap_length(longer, long_taps, version), tap_length(shorter, short_taps, version));
     }
     let per_texel = picture.size().map(f32::recip);
     let ([x, y], [u, v]) = (&pixels.along, &places.uv);
     let most = |of: &Lanes| of.iter().fold(0.0, |most, &taps| higher(most, taps)) as u32;
     let weight = each(|i| 1.0 / higher(taps[0][i] * taps[1][i], 1.0));
-    for (along, across) in (0..most(&taps[0])).flat_map(|along| (0..most(&taps[1])).map(move |across| (along as f32, across as f32))) {
+    for (along, across) in (0..most(&taps[0]))
+        .flat_map(|along| (0..most(&taps[1])).map(move |across| (along as f32, across as f32)))
+    {
         let mut is_taken = [false; LANES];
         for i in 0..LANES {
             is_taken[i] = is_asked[i] & (along < taps[0][i]) & (across < taps[1][i]);
@@ -193,7 +228,15 @@ fn add_grid(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &P
 #[inline(always)]
 pub(super) fn let_through(density: f32, length: &Lanes) -> Lanes {
     /// ln(2)^k / k!.
-    const TERMS: [f32; 7] = [1.0, std::f32::consts::LN_2, 0.240_226_5, 0.055_504_11, 0.009_618_129, 0.001_333_356, 0.000_154_035_3];
+    const TERMS: [f32; 7] = [
+        1.0,
+        std::f32::consts::LN_2,
+        0.240_226_5,
+        0.055_504_11,
+        0.009_618_129,
+        0.001_333_356,
+        0.000_154_035_3,
+    ];
     each(|i| {
         let power = higher(-density * std::f32::consts::LOG2_E * length[i], -126.0);
         let whole = (power + 0.5).floor();

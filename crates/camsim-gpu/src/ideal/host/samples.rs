@@ -1,6 +1,8 @@
-//! Ideal frames of four samples a pixel. Where the middles of pixels tell all that there is, in most of most frames, they are all that is looked at. In tiles that are [marked](super::marks) it
-//! is asked of each sample which triangle it shows: pixels that show one surface are shaded once, at the pixel's middle, and where they show several each of these is, in the middle of its own
-//! samples, and counts for as much as it has of them.
+//! Ideal frames of four samples a pixel. Where the middles of pixels tell all that there is, in most of most
+//! frames, they are all that is looked at. In tiles that are [marked](super::marks) it is asked of each
+//! sample which triangle it shows: pixels that show one surface are shaded once, at the pixel's middle, and
+//! where they show several each of these is, in the middle of its own samples, and counts for as much as it
+//! has of them.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -26,7 +28,8 @@ pub(super) const ALONG: usize = 2;
 const SAMPLES: usize = ALONG * ALONG;
 /// Rows of pixels in a band.
 pub(super) const PIXEL_ROWS: usize = BAND_ROWS / ALONG;
-/// Ground that is nearer than ground beside it by more than this part of its distance may hide some: each has a colour of its own.
+/// Ground that is nearer than ground beside it by more than this part of its distance may hide some: each has
+/// a colour of its own.
 const STEP: f32 = 0.005;
 
 /// What frames of several samples a pixel need.
@@ -90,11 +93,18 @@ impl Sampled {
         self.marks.add_steps(&into.depth, stride);
         self.bands.resize_with(rayon::current_num_threads(), Mutex::default);
         let Self { marks, bands: of_threads } = self;
-        let rows = into.depth.par_chunks_mut(of_band).zip(shown.par_chunks(of_band)).zip(into.color.par_chunks_mut(CHANNELS * of_band));
+        let rows = into
+            .depth
+            .par_chunks_mut(of_band)
+            .zip(shown.par_chunks(of_band))
+            .zip(into.color.par_chunks_mut(CHANNELS * of_band));
         rows.enumerate().for_each(|(number, ((depth, shown), color))| {
             // Tasks of this loop are the pool's own, one at a time in each of its threads.
             let of_thread = of_threads.get(rayon::current_thread_index().unwrap_or_default());
-            let Some(mut samples) = of_thread.map(|of| of.lock().unwrap_or_else(PoisonError::into_inner)) else { return };
+            let Some(mut samples) = of_thread.map(|of| of.lock().unwrap_or_else(PoisonError::into_inner))
+            else {
+                return;
+            };
             let marks = marks.of_band(number);
             widest!(vectors => samples.fill(vectors, shader, number, marks, stride, depth, shown, color))
         });
@@ -126,20 +136,31 @@ impl Samples {
         let width = shader.camera.size_px[0] as usize / ALONG;
         self.draw(vectors, shader, number, marks, width);
         let mut planes = Planes::new();
-        let rows = depth.chunks_exact_mut(stride).zip(shown.chunks_exact(stride)).zip(color.chunks_exact_mut(CHANNELS * stride));
+        let rows = depth
+            .chunks_exact_mut(stride)
+            .zip(shown.chunks_exact(stride))
+            .zip(color.chunks_exact_mut(CHANNELS * stride));
         for (row, ((depth, shown), color)) in rows.enumerate() {
-            let blocks = depth.as_chunks_mut().0.iter_mut().zip(shown.as_chunks().0).zip(color.chunks_exact_mut(CHANNELS * LANES));
+            let blocks = depth
+                .as_chunks_mut()
+                .0
+                .iter_mut()
+                .zip(shown.as_chunks().0)
+                .zip(color.chunks_exact_mut(CHANNELS * LANES));
             for (block, ((depth, shown), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
                 let column = block * LANES;
                 let y = ((number * PIXEL_ROWS + row) * ALONG) as f32 + 0.5;
                 let places = Lanes2 { x: each(|i| (ALONG * (column + i)) as f32 + 0.5), y: [y; LANES] };
                 let mut block = Block { shown: *shown, places };
-                for tile in (0..LANES / TILE_PX).filter(|tile| marks.is_marked_at(column / TILE_PX + tile, row / TILE_PX)) {
+                for tile in (0..LANES / TILE_PX)
+                    .filter(|tile| marks.is_marked_at(column / TILE_PX + tile, row / TILE_PX))
+                {
                     let pixels = tile * TILE_PX..(tile + 1) * TILE_PX;
                     self.look(shader, [column, row], pixels, &mut block, depth);
                 }
                 let colors = shader.colors(vectors, &block, &mut planes);
-                let pairs = color.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
+                let pairs =
+                    color.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
                 pairs.for_each(|(out, pixels)| *out = vectors.halves(*pixels));
             }
             self.finish_row(vectors, shader, &mut planes, color);
@@ -148,7 +169,14 @@ impl Samples {
 
     /// Which triangles the samples of marked tiles show.
     #[inline(always)]
-    fn draw(&mut self, vectors: impl Vectors, shader: &Shader<'_>, number: usize, marks: OfBand<'_>, width: usize) {
+    fn draw(
+        &mut self,
+        vectors: impl Vectors,
+        shader: &Shader<'_>,
+        number: usize,
+        marks: OfBand<'_>,
+        width: usize,
+    ) {
         if marks.is_empty() {
             return;
         }
@@ -158,7 +186,9 @@ impl Samples {
         let of_tile = TILE_PX * ALONG;
         // Up to where blocks end: tiles beside a step at the frame's border are marked there too.
         let columns = width.next_multiple_of(LANES) / TILE_PX;
-        for (row, column) in (0..PIXEL_ROWS / TILE_PX).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        for (row, column) in
+            (0..PIXEL_ROWS / TILE_PX).flat_map(|row| (0..columns).map(move |column| (row, column)))
+        {
             if marks.is_marked_at(column, row) {
                 for row in row * of_tile..(row + 1) * of_tile {
                     let first = row * self.stride + column * of_tile;
@@ -170,11 +200,14 @@ impl Samples {
         let mut band = Band { number, stride: self.stride, depth: &mut self.depth, shown: &mut self.shown };
         for (number, chunk) in (0..).zip(shader.chunks) {
             // Where triangles of models are is marked.
-            band.draw(vectors, cover::Samples, chunk, number, |cover| !chunk.is_of_ground || marks.has(cover));
+            band.draw(vectors, cover::Samples, chunk, number, |cover| {
+                !chunk.is_of_ground || marks.has(cover)
+            });
         }
     }
 
-    /// What some pixels of a row show by their samples: those that show one surface have it in the block, the others' parts are kept.
+    /// What some pixels of a row show by their samples: those that show one surface have it in the block, the
+    /// others' parts are kept.
     #[inline(always)]
     fn look(
         &mut self,
@@ -187,8 +220,10 @@ impl Samples {
         for i in pixels {
             let first = ALONG * row * self.stride + ALONG * (column + i);
             let second = first + self.stride;
-            let shown = [self.shown[first], self.shown[first + 1], self.shown[second], self.shown[second + 1]];
-            let depths = [self.depth[first], self.depth[first + 1], self.depth[second], self.depth[second + 1]];
+            let shown =
+                [self.shown[first], self.shown[first + 1], self.shown[second], self.shown[second + 1]];
+            let depths =
+                [self.depth[first], self.depth[first + 1], self.depth[second], self.depth[second + 1]];
             if shown[1..].iter().all(|&other| other == shown[0]) {
                 block.shown[i] = shown[0];
                 depth[i] = 0.25 * ((depths[0] + depths[3]) + (depths[1] + depths[2]));
@@ -231,7 +266,13 @@ impl Samples {
 
     /// Colours of the row's pixels that show several surfaces.
     #[inline(always)]
-    fn finish_row(&mut self, vectors: impl Vectors, shader: &Shader<'_>, planes: &mut Planes, color: &mut [u16]) {
+    fn finish_row(
+        &mut self,
+        vectors: impl Vectors,
+        shader: &Shader<'_>,
+        planes: &mut Planes,
+        color: &mut [u16],
+    ) {
         for parts in self.parts.chunks(LANES) {
             let mut block = Block { shown: [SKY; LANES], places: Lanes2 { x: ZERO, y: ZERO } };
             for (i, part) in parts.iter().enumerate() {
@@ -265,14 +306,16 @@ impl Samples {
 pub(super) fn mix(samples: &DrawnFrame, size_px: [u32; 2], into: &mut DrawnFrame) {
     let [width, height] = size_px.map(|side| side as usize);
     let stride = into.stride;
-    let rows = into.depth.par_chunks_mut(stride).zip(into.color.par_chunks_mut(CHANNELS * stride)).take(height);
+    let rows =
+        into.depth.par_chunks_mut(stride).zip(into.color.par_chunks_mut(CHANNELS * stride)).take(height);
     rows.enumerate().for_each(|(row, (depth, color))| {
         for column in 0..width {
             let at = |k: usize| (ALONG * row + k / ALONG) * samples.stride + ALONG * column + k % ALONG;
             depth[column] = middle_depth([0, 1, 2, 3].map(|k| samples.depth[at(k)]), [0.0; 2]);
             for channel in 0..CHANNELS {
                 let of = |k: usize| f16::from_bits(samples.color[CHANNELS * at(k) + channel]).to_f32();
-                color[CHANNELS * column + channel] = f16::from_f32(0.25 * ((of(0) + of(3)) + (of(1) + of(2)))).to_bits();
+                color[CHANNELS * column + channel] =
+                    f16::from_f32(0.25 * ((of(0) + of(3)) + (of(1) + of(2)))).to_bits();
             }
         }
     });
@@ -281,7 +324,8 @@ pub(super) fn mix(samples: &DrawnFrame, size_px: [u32; 2], into: &mut DrawnFrame
 /// Whether samples all show the ground, without a step between them.
 #[inline(always)]
 fn is_ground(shader: &Shader<'_>, shown: &Four<u32>, depths: &Four<f32>) -> bool {
-    let [least, most] = depths.iter().fold([f32::INFINITY, 0.0_f32], |[least, most], &of| [least.min(of), most.max(of)]);
+    let [least, most] =
+        depths.iter().fold([f32::INFINITY, 0.0_f32], |[least, most], &of| [least.min(of), most.max(of)]);
     least >= (1.0 - STEP) * most && shown.iter().all(|&of| shader.surface(of).paint == GROUND)
 }
 

@@ -41,7 +41,15 @@ pub(super) struct Shader<'a> {
     pub is_over: bool,
 }
 
-const NO_SURFACE: Surface = Surface { first: [0.0; 2], paint: SKY, u: [0.0; 3], v: [0.0; 3], inverse: [0.0; 3], more: 0, large: SMALL };
+const NO_SURFACE: Surface = Surface {
+    first: [0.0; 2],
+    paint: SKY,
+    u: [0.0; 3],
+    v: [0.0; 3],
+    inverse: [0.0; 3],
+    more: 0,
+    large: SMALL,
+};
 
 /// Pixels of one triangle that are written together.
 const AT_ONCE: usize = 8;
@@ -66,12 +74,17 @@ impl Planes {
         Self { paint: [SKY; LANES + AT_ONCE], inverse: zero, uv: [zero; 2], changes: [[zero; 2]; 3] }
     }
 
-    /// Writes those of pixels that show a triangle, the first of them at a place and each so far beside the one before; of some beyond them too.
+    /// Writes those of pixels that show a triangle, the first of them at a place and each so far beside the
+    /// one before; of some beyond them too.
     #[inline(always)]
     fn write(&mut self, surface: &Surface, [x, y]: [f32; 2], step: f32, pixels: Range<usize>) {
         let Surface { first: [left, top], u, v, inverse, .. } = surface;
         let down_px = y - top;
-        let begins = [u[2].mul_add(down_px, u[0]), v[2].mul_add(down_px, v[0]), inverse[2].mul_add(down_px, inverse[0])];
+        let begins = [
+            u[2].mul_add(down_px, u[0]),
+            v[2].mul_add(down_px, v[0]),
+            inverse[2].mul_add(down_px, inverse[0]),
+        ];
         let mut first = pixels.start;
         while first < pixels.end {
             let from_px = step.mul_add((first - pixels.start) as f32, x - left);
@@ -91,9 +104,16 @@ impl Planes {
 
     /// Texture coordinates of a large triangle, at the places of pixels.
     #[inline(always)]
-    fn write_large(&mut self, [inverse, u, v]: &[[f64; 3]; 3], first_px: [f32; 2], places: &Lanes2, pixels: Range<usize>) {
+    fn write_large(
+        &mut self,
+        [inverse, u, v]: &[[f64; 3]; 3],
+        first_px: [f32; 2],
+        places: &Lanes2,
+        pixels: Range<usize>,
+    ) {
         for i in pixels {
-            let [across_px, down_px] = [f64::from(places.x[i] - first_px[0]), f64::from(places.y[i] - first_px[1])];
+            let [across_px, down_px] =
+                [f64::from(places.x[i] - first_px[0]), f64::from(places.y[i] - first_px[1])];
             let at = |plane: &[f64; 3]| plane[0] + plane[1] * across_px + plane[2] * down_px;
             self.inverse[i] = at(inverse) as f32;
             let times = f64::from(self.inverse[i]) / at(inverse);
@@ -133,7 +153,14 @@ impl Shader<'_> {
 
     /// Half floats of linear R G B A of pixels of a row, from `x` on.
     #[inline(always)]
-    pub fn block(&self, vectors: impl Vectors, [x, y]: [usize; 2], shown: &[u32; LANES], planes: &mut Planes, out: &mut [u16]) {
+    pub fn block(
+        &self,
+        vectors: impl Vectors,
+        [x, y]: [usize; 2],
+        shown: &[u32; LANES],
+        planes: &mut Planes,
+        out: &mut [u16],
+    ) {
         let is_empty = shown.iter().all(|&shown| shown == SKY);
         if is_empty && self.is_over {
             return;
@@ -183,7 +210,9 @@ impl Shader<'_> {
         let step = self.a_pixel;
         let mut begins = 0_u32;
         for i in 1..LANES {
-            let goes_on = (shown[i] == shown[i - 1]) & (places.x[i] - places.x[i - 1] == step) & (places.y[i] == places.y[i - 1]);
+            let goes_on = (shown[i] == shown[i - 1])
+                & (places.x[i] - places.x[i - 1] == step)
+                & (places.y[i] == places.y[i - 1]);
             begins |= u32::from(!goes_on) << i;
         }
         let mut begin = 0;
@@ -198,21 +227,35 @@ impl Shader<'_> {
             }
             begin = end;
         }
-        let Planes { paint: all, inverse, uv: [u, v], changes: [[u_across, u_down], [v_across, v_down], [inverse_across, inverse_down]] } =
-            planes;
+        let Planes {
+            paint: all,
+            inverse,
+            uv: [u, v],
+            changes: [[u_across, u_down], [v_across, v_down], [inverse_across, inverse_down]],
+        } = planes;
         let mut paint = [SKY; LANES];
         paint.copy_from_slice(&all[..LANES]);
         // Where there is no surface it does not matter.
         let z = each(|i| 1.0 / if inverse[i] > 0.0 { inverse[i] } else { 1.0 });
         let (u, v) = (each(|i| u[i] * z[i]), each(|i| v[i] * z[i]));
-        let change = |place: &Lanes, of: &Room<f32>, inverse: &Room<f32>| each(|i| step * (of[i] - place[i] * inverse[i]) * z[i]);
+        let change = |place: &Lanes, of: &Room<f32>, inverse: &Room<f32>| {
+            each(|i| step * (of[i] - place[i] * inverse[i]) * z[i])
+        };
         let across = [change(&u, u_across, inverse_across), change(&v, v_across, inverse_across)];
         let down = [change(&u, u_down, inverse_down), change(&v, v_down, inverse_down)];
         Seen { paint, coordinates: Places { uv: [u, v], across, down }, z }
     }
 
     #[inline(always)]
-    fn paint(&self, vectors: impl Vectors, paint: &Paint, block: &Block, seen: &Seen, is_asked: &[bool; LANES], into: &mut Colors) {
+    fn paint(
+        &self,
+        vectors: impl Vectors,
+        paint: &Paint,
+        block: &Block,
+        seen: &Seen,
+        is_asked: &[bool; LANES],
+        into: &mut Colors,
+    ) {
         let read = match &*paint.picture {
             Picture::Uniform(color) => [*color; LANES],
             Picture::Texels(texels) => colors(vectors, texels, self.reads, &seen.coordinates, is_asked),

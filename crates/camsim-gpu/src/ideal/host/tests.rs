@@ -51,7 +51,12 @@ fn covered(triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
 }
 
 /// The same at other places.
-fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
+fn covered_by<P: Places>(
+    places: P,
+    camera: &Camera,
+    triangles: &[[Corner<2>; 3]],
+    kind: Kind,
+) -> (Vec<u32>, [usize; 2]) {
     let [width, height] = SIZE_PX.map(|side| side as usize / P::STEP);
     let (stride, rows) = (width + BEYOND, BAND_ROWS / P::STEP);
     let mut counts = vec![0; width * height];
@@ -69,7 +74,8 @@ fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]
                 assert!(shown[width..].iter().all(|&shown| shown == SKY), "nothing beyond the picture");
                 let is_row = first_row + row < height;
                 assert!(is_row || shown.iter().all(|&shown| shown == SKY), "nothing below it");
-                let counts = counts.iter_mut().skip(width * (first_row + row)).take(if is_row { width } else { 0 });
+                let counts =
+                    counts.iter_mut().skip(width * (first_row + row)).take(if is_row { width } else { 0 });
                 counts.zip(shown).for_each(|(count, &shown)| *count += u32::from(shown != SKY));
             }
         }
@@ -77,7 +83,8 @@ fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]
     (counts, kinds)
 }
 
-/// A plane of so many cells, each a pair of triangles, whose inner corners are shaken by a fifth of a cell, seen through `place` from places in it, 0..=1.
+/// A plane of so many cells, each a pair of triangles, whose inner corners are shaken by a fifth of a cell,
+/// seen through `place` from places in it, 0..=1.
 fn sheet(cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Corner<2>; 3]> {
     sheet_by(&camera(), cells, place)
 }
@@ -122,14 +129,23 @@ fn assert_covered_once(name: &str, counts: &[u32]) {
 #[test]
 fn small_triangles_of_models_are_left_out_where_nothing_shows_them() {
     let model = Kind { paint: 1, ..KIND };
-    let of_samples = Camera { size_px: SIZE_PX, ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.of_samples() };
+    let of_samples = Camera {
+        size_px: SIZE_PX,
+        ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.of_samples()
+    };
     for (name, triangles, _) in walls() {
-        let (on_ground, on_model, kinds) = (covered(&triangles, KIND), covered(&triangles, model), [KIND, model]);
+        let (on_ground, on_model, kinds) =
+            (covered(&triangles, KIND), covered(&triangles, model), [KIND, model]);
         assert_eq!(on_ground.0, on_model.0, "{name}");
         let [all, left] = kinds.map(|kind| covered_by(Samples, &of_samples, &triangles, kind));
         assert_eq!(all.0, left.0, "{name}, by samples");
         if name == "tiny" {
-            assert!(4 * on_model.1[0] < 3 * on_ground.1[0] && 4 * left.1[0] < 3 * all.1[0], "{:?} {:?}", on_model.1, on_ground.1);
+            assert!(
+                4 * on_model.1[0] < 3 * on_ground.1[0] && 4 * left.1[0] < 3 * all.1[0],
+                "{:?} {:?}",
+                on_model.1,
+                on_ground.1
+            );
         }
     }
 }
@@ -208,7 +224,9 @@ fn covered_exactly<P: Places>(places: P, beside: i32, reach_m: f32) -> u32 {
         for (i, &count) in counts.iter().enumerate() {
             let [column, row] = [i % columns, i / columns];
             let [right, down] = P::beside(column, row);
-            let at = |place: usize, quarters: i32| (P::STEP * place) as i64 * i64::from(SUBPIXELS) + i64::from(quarters * SUBPIXELS / 4);
+            let at = |place: usize, quarters: i32| {
+                (P::STEP * place) as i64 * i64::from(SUBPIXELS) + i64::from(quarters * SUBPIXELS / 4)
+            };
             let (is_inside, is_on_border) = inside(at(column, right), at(row, down));
             assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, place {i}");
             all += count;
@@ -225,7 +243,9 @@ fn triangles_cover_what_64_bits_say() {
         let samples = covered_exactly(Samples, SUBPIXELS / 2, reach_m);
         let fours = covered_exactly(Fours, SUBPIXELS / 2, reach_m);
         assert!(
-            pixels > 10_000 && pixels.abs_diff(samples) < pixels / 20 && pixels.abs_diff(4 * fours) < pixels / 20,
+            pixels > 10_000
+                && pixels.abs_diff(samples) < pixels / 20
+                && pixels.abs_diff(4 * fours) < pixels / 20,
             "{pixels} {samples} {fours}"
         );
     }
@@ -243,7 +263,10 @@ fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
         let (long, wide) = (0.1 + 15.0 * side, 0.1 * turn.powi(4));
         let (sin, cos) = (40.0 * turn).sin_cos();
         let corner = |along: f32, across: f32, z: f32| {
-            let at = [20.0 * (x - 0.5) + along * cos - across * sin, 15.0 * (y - 0.5) + along * sin + across * cos];
+            let at = [
+                20.0 * (x - 0.5) + along * cos - across * sin,
+                15.0 * (y - 0.5) + along * sin + across * cos,
+            ];
             camera.corner([at[0] * z / 10.0, at[1] * z / 10.0, z], [0.0; 2])
         };
         let [a, b, c] = [corner(0.0, 0.0, 10.0), corner(long, 0.0, 14.0), corner(0.5 * long, wide, 11.0)];
@@ -252,12 +275,15 @@ fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
         chunk.sort(height.div_ceil(BAND_ROWS));
         large += chunk.large.len();
         let (nearest, farthest) = (0.05 / 10.0, 0.05 / 14.0);
-        // A pixel is at most a step of the grid beyond where the corners are, of eight that the triangle is wide at least.
+        // A pixel is at most a step of the grid beyond where the corners are, of eight that the triangle is
+        // wide at least.
         let allowed = 0.25 * (nearest - farthest);
         for number in 0..height.div_ceil(BAND_ROWS) {
             let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
             draw(Pixels, &chunk, &mut Band { number, stride, depth: &mut depth, shown: &mut shown });
-            for inverse in depth.into_iter().zip(shown).filter(|&(_, shown)| shown != SKY).map(|(inverse, _)| inverse) {
+            for inverse in
+                depth.into_iter().zip(shown).filter(|&(_, shown)| shown != SKY).map(|(inverse, _)| inverse)
+            {
                 pixels += 1;
                 assert!((farthest - allowed..=nearest + allowed).contains(&inverse), "{k}: {inverse}");
             }
@@ -274,20 +300,31 @@ fn numbers_that_are_none_draw_nothing() {
         for axis in 0..3 {
             let mut at = [0.5, 0.25, 8.0];
             at[axis] = number;
-            let corners =
-                [camera.corner(at, [0.0; 2]), camera.corner([1.0, 2.0, 9.0], [1.0; 2]), camera.corner([-2.0, 1.0, 9.0], [1.0; 2])];
+            let corners = [
+                camera.corner(at, [0.0; 2]),
+                camera.corner([1.0, 2.0, 9.0], [1.0; 2]),
+                camera.corner([-2.0, 1.0, 9.0], [1.0; 2]),
+            ];
             // Whatever is drawn: no panic, and no pixel twice.
             let (counts, _) = covered(&[corners], KIND);
             assert!(counts.iter().all(|&count| count <= 1), "{k} {axis}");
-            assert!(number.is_finite() || axis == 2 || counts.iter().all(|&count| count == 0), "{number} {axis}");
+            assert!(
+                number.is_finite() || axis == 2 || counts.iter().all(|&count| count == 0),
+                "{number} {axis}"
+            );
         }
     }
 }
 
 #[test]
 fn products_of_small_triangles_fit_32_bits() {
-    // The largest number of `small`: three sums of products of differences of corners with places up to the last one side by side, which may be two pixels apart.
+    // The largest number of `small`: three sums of products of differences of corners with places up to the
+    // last one side by side, which may be two pixels apart.
     let corner = i64::from(SMALL_PX * SUBPIXELS);
     let farthest = corner + i64::from((2 * (BEYOND as i32 - 1) + 1) * SUBPIXELS);
-    assert!(2 * (2 * corner) * (farthest + corner) <= i64::from(i32::MAX), "{}", 2 * (2 * corner) * (farthest + corner));
+    assert!(
+        2 * (2 * corner) * (farthest + corner) <= i64::from(i32::MAX),
+        "{}",
+        2 * (2 * corner) * (farthest + corner)
+    );
 }

@@ -12,14 +12,17 @@ use crate::host::{
 
 /// Triangles less wide than this, steps of the grid, have planes by their corners on the grid.
 const THIN_STEPS: i64 = 8;
-/// Models' triangles of a smaller area, twice that in steps of the grid, are left out where no place shows them: a pixel's, as many of them are smaller.
+/// Models' triangles of a smaller area, twice that in steps of the grid, are left out where no place shows
+/// them: a pixel's, as many of them are smaller.
 const SMALLER_STEPS2: i64 = 2 * (SUBPIXELS * SUBPIXELS) as i64;
 /// Rows of the picture that are drawn together.
 pub(super) const BAND_ROWS: usize = 32;
-/// Numbers on a triangle besides texture coordinates, where it has any: a tint, and what light needs of the normal (towards the sun, down).
+/// Numbers on a triangle besides texture coordinates, where it has any: a tint, and what light needs of the
+/// normal (towards the sun, down).
 pub(super) const MORE: usize = 5;
 
-/// A number over the picture: at the triangle's first pixel, and how it changes from pixel to pixel across and down.
+/// A number over the picture: at the triangle's first pixel, and how it changes from pixel to pixel across
+/// and down.
 pub(super) type Plane = [f32; 3];
 
 /// What decides which pixels a triangle covers.
@@ -53,8 +56,8 @@ pub(super) struct Surface {
     pub large: u32,
 }
 
-/// Place of what is not in [`Chunk::large`]: triangles whose corners are all so near their first pixel that products of differences fit 32 bits, and that planes need no more digits than
-/// floats have.
+/// Place of what is not in [`Chunk::large`]: triangles whose corners are all so near their first pixel that
+/// products of differences fit 32 bits, and that planes need no more digits than floats have.
 pub(super) const SMALL: u32 = u32::MAX;
 
 /// Says that all of a triangle has one tint and one light.
@@ -86,7 +89,8 @@ pub(super) struct Chunk {
     pub is_of_ground: bool,
     pub covers: Vec<Cover>,
     pub surfaces: Vec<Surface>,
-    /// Planes of large ones once more, near / z and texture coordinates: towards a horizon little is left of what they have at the other end.
+    /// Planes of large ones once more, near / z and texture coordinates: towards a horizon little is left of
+    /// what they have at the other end.
     pub large: Vec<[[f64; 3]; 3]>,
     /// Planes of what some have besides.
     pub more: Vec<[Plane; MORE]>,
@@ -117,7 +121,9 @@ impl Chunk {
 
     /// Sorts triangles into bands, those of one in their order.
     pub fn sort(&mut self, bands: usize) {
-        let of = |cover: &Cover| usize::from(cover.first[1]) / BAND_ROWS..usize::from(cover.last[1]) / BAND_ROWS + 1;
+        let of = |cover: &Cover| {
+            usize::from(cover.first[1]) / BAND_ROWS..usize::from(cover.last[1]) / BAND_ROWS + 1
+        };
         self.band_starts.clear();
         self.band_starts.resize(bands + 2, 0);
         for cover in &self.covers {
@@ -140,7 +146,13 @@ impl Chunk {
 
     /// Adds a triangle, or what of it is within.
     #[inline(always)]
-    pub fn add<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    pub fn add<const N: usize>(
+        &mut self,
+        vectors: impl Vectors,
+        camera: &Camera,
+        corners: [&Corner<N>; 3],
+        kind: Kind,
+    ) {
         if corners.iter().all(|corner| corner.is_within) {
             return self.add_within(vectors, camera, corners, kind);
         }
@@ -148,7 +160,13 @@ impl Chunk {
     }
 
     #[cold]
-    fn add_cut<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    fn add_cut<const N: usize>(
+        &mut self,
+        vectors: impl Vectors,
+        camera: &Camera,
+        corners: [&Corner<N>; 3],
+        kind: Kind,
+    ) {
         if corners.iter().all(|corner| corner.in_camera_m[2] < camera.uniforms.near_m) {
             return;
         }
@@ -159,7 +177,13 @@ impl Chunk {
     }
 
     #[inline(always)]
-    fn add_within<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    fn add_within<const N: usize>(
+        &mut self,
+        vectors: impl Vectors,
+        camera: &Camera,
+        corners: [&Corner<N>; 3],
+        kind: Kind,
+    ) {
         let [a, b, c] = corners;
         let [ax, ay, bx, by, cx, cy] = [a.at[0], a.at[1], b.at[0], b.at[1], c.at[0], c.at[1]];
         let (left, right) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
@@ -167,7 +191,8 @@ impl Chunk {
         // Pixels that are asked within the box.
         let beside = camera.beside;
         let first = [left, top].map(|least| ((least + SUBPIXELS - 1 - beside) >> SUBPIXEL_BITS).max(0));
-        let last = [(right, 0), (bottom, 1)].map(|(most, k)| ((most + beside) >> SUBPIXEL_BITS).min(camera.size_px[k] as i32 - 1));
+        let last = [(right, 0), (bottom, 1)]
+            .map(|(most, k)| ((most + beside) >> SUBPIXEL_BITS).min(camera.size_px[k] as i32 - 1));
         if first[0] > last[0] || first[1] > last[1] {
             return;
         }
@@ -181,11 +206,16 @@ impl Chunk {
         let at = [place(a), place(b), place(c)];
         let is_near = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
         let is_small = is_near(at[0]) & is_near(at[1]) & is_near(at[2]);
-        if kind.paint != GROUND && is_small && area2.abs() < SMALLER_STEPS2 && !is_anywhere(vectors, camera, at, first, last) {
+        if kind.paint != GROUND
+            && is_small
+            && area2.abs() < SMALLER_STEPS2
+            && !is_anywhere(vectors, camera, at, first, last)
+        {
             return;
         }
-        // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step of the grid is much towards a horizon. Not where it is next to as much as the
-        // triangle is wide: what is on that would go far beyond what its corners have.
+        // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step
+        // of the grid is much towards a horizon. Not where it is next to as much as the triangle is wide:
+        // what is on that would go far beyond what its corners have.
         let reach = |to: &Corner<N>| i64::from((to.at[0] - a.at[0]).abs() + (to.at[1] - a.at[1]).abs());
         let is_thin = area2.abs() < THIN_STEPS * (reach(b) + reach(c));
         const PX: f32 = 1.0 / SUBPIXELS as f32;
@@ -194,7 +224,11 @@ impl Chunk {
             true => at.map(|[x, y]| [x as f32 * PX, y as f32 * PX]),
             false => [a, b, c].map(|corner| [corner.at_px[0] - first_px[0], corner.at_px[1] - first_px[1]]),
         };
-        let large = if is_small { SMALL } else { self.add_large(camera, [a, b, c], is_thin.then_some(&at), first_px) };
+        let large = if is_small {
+            SMALL
+        } else {
+            self.add_large(camera, [a, b, c], is_thin.then_some(&at), first_px)
+        };
         let (to_b, to_c) = ([b_px[0] - px[0], b_px[1] - px[1]], [c_px[0] - px[0], c_px[1] - px[1]]);
         let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
         let plane = |of_a: f32, of_b: f32, of_c: f32| -> Plane {
@@ -203,10 +237,12 @@ impl Chunk {
             let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
             [of_a - across * px[0] - down * px[1], across, down]
         };
-        let times_inverse = |k: usize| plane(a.on_it[k] * a.inverse, b.on_it[k] * b.inverse, c.on_it[k] * c.inverse);
+        let times_inverse =
+            |k: usize| plane(a.on_it[k] * a.inverse, b.on_it[k] * b.inverse, c.on_it[k] * c.inverse);
         let inverse = plane(a.inverse, b.inverse, c.inverse);
         let [first, last] = [[first[0] as u16, first[1] as u16], [last[0] as u16, last[1] as u16]];
-        let more = if N == 2 + MORE { self.add_more([a, b, c], kind.sky, is_front, times_inverse) } else { 0 };
+        let more =
+            if N == 2 + MORE { self.add_more([a, b, c], kind.sky, is_front, times_inverse) } else { 0 };
         self.covers.push(Cover { first, last, at, inverse, large });
         self.surfaces.push(Surface {
             first: [f32::from(first[0]), f32::from(first[1])],
@@ -244,7 +280,8 @@ impl Chunk {
         self.more.len() as u32 - 1
     }
 
-    /// Keeps the planes of a large triangle, by its corners' places on the grid if those are given; gives their place.
+    /// Keeps the planes of a large triangle, by its corners' places on the grid if those are given; gives
+    /// their place.
     #[cold]
     fn add_large<const N: usize>(
         &mut self,
@@ -268,16 +305,26 @@ impl Chunk {
             let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
             [of[0] - across * px[0] - down * px[1], across, down]
         };
-        let inverse = corners.map(|corner| f64::from(camera.uniforms.near_m) / f64::from(corner.in_camera_m[2]));
-        let times_inverse = |k: usize| plane([0, 1, 2].map(|corner: usize| f64::from(corners[corner].on_it[k]) * inverse[corner]));
+        let inverse =
+            corners.map(|corner| f64::from(camera.uniforms.near_m) / f64::from(corner.in_camera_m[2]));
+        let times_inverse = |k: usize| {
+            plane([0, 1, 2].map(|corner: usize| f64::from(corners[corner].on_it[k]) * inverse[corner]))
+        };
         self.large.push([plane(inverse), times_inverse(0), times_inverse(1)]);
         self.large.len() as u32 - 1
     }
 }
 
-/// Whether any place that a camera's pictures have may show a small model's triangle: its pixels, or four samples a pixel.
+/// Whether any place that a camera's pictures have may show a small model's triangle: its pixels, or four
+/// samples a pixel.
 #[inline(always)]
-fn is_anywhere(vectors: impl Vectors, camera: &Camera, at: [[i32; 2]; 3], first: [i32; 2], last: [i32; 2]) -> bool {
+fn is_anywhere(
+    vectors: impl Vectors,
+    camera: &Camera,
+    at: [[i32; 2]; 3],
+    first: [i32; 2],
+    last: [i32; 2],
+) -> bool {
     let is_wide = last[0] - first[0] >= SIDE_BY_SIDE as i32;
     is_wide
         || match camera.beside {

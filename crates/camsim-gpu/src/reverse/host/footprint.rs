@@ -1,4 +1,5 @@
-//! Area of a pixel in the ideal frame and what reads it: twin of shaders/reverse/gather/footprint.wgsl and its taps.
+//! Area of a pixel in the ideal frame and what reads it: twin of shaders/reverse/gather/footprint.wgsl and
+//! its taps.
 
 use camsim_core::temporal::{WIDEST_AREA_PX, tap_shares};
 
@@ -62,8 +63,16 @@ impl<'a> Footprint<'a> {
         }
         let sides = sides();
         // Written out: what `then` calls may be compiled without the vectors that this is.
-        let softness = if matches!(tap, TapKind::Spline | TapKind::Area | TapKind::SplineOrGrid) { Some(softness(&sides)) } else { None };
-        let grid = if matches!(tap, TapKind::Grid | TapKind::SplineOrGrid) { Some(Grid::new(cells, &sides, most)) } else { None };
+        let softness = if matches!(tap, TapKind::Spline | TapKind::Area | TapKind::SplineOrGrid) {
+            Some(softness(&sides))
+        } else {
+            None
+        };
+        let grid = if matches!(tap, TapKind::Grid | TapKind::SplineOrGrid) {
+            Some(Grid::new(cells, &sides, most))
+        } else {
+            None
+        };
         let area = if tap == TapKind::Area { Some(area(&sides)) } else { None };
         Self { grid, softness, area }
     }
@@ -71,7 +80,10 @@ impl<'a> Footprint<'a> {
     /// Whether something else than the spline reads a pixel.
     #[inline(always)]
     pub fn is_wide(&self, i: usize) -> bool {
-        self.area.as_ref().map_or_else(|| self.reads(i) > 1.0, |sides| (sides.x[i] > NARROW_AREA_PX) | (sides.y[i] > NARROW_AREA_PX))
+        self.area.as_ref().map_or_else(
+            || self.reads(i) > 1.0,
+            |sides| (sides.x[i] > NARROW_AREA_PX) | (sides.y[i] > NARROW_AREA_PX),
+        )
     }
 
     /// Reads of a pixel that see all of it.
@@ -101,7 +113,8 @@ impl<'a> Grid<'a> {
         let (dy, down) = spread(&sides[1], most);
         let mut begin = [0; LANES];
         for i in 0..LANES {
-            begin[i] = cells.begins[(whole(down[i]) * MOST_TAPS + whole(across[i]) - MOST_TAPS - 1) as usize % cells.begins.len()];
+            begin[i] = cells.begins[(whole(down[i]) * MOST_TAPS + whole(across[i]) - MOST_TAPS - 1) as usize
+                % cells.begins.len()];
         }
         let is_common = begin.iter().all(|&of| of == begin[0]);
         Self { dx, dy, shares: &cells.shares, begin, count: each(|i| across[i] * down[i]), is_common }
@@ -112,7 +125,9 @@ impl<'a> Grid<'a> {
     fn shares_of(&self, tap: &Lanes) -> Lanes2 {
         // Half a read further the quotient is never so near a whole number that rounding could pass it.
         let turn = each(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
-        let share = |i: usize| self.shares.get((self.begin[i] + whole(turn[i])) as usize).copied().unwrap_or_default();
+        let share = |i: usize| {
+            self.shares.get((self.begin[i] + whole(turn[i])) as usize).copied().unwrap_or_default()
+        };
         if self.is_common && turn.iter().all(|&of| of == turn[0]) {
             let [across, down] = share(0);
             return Lanes2 { x: [across; LANES], y: [down; LANES] };
@@ -129,10 +144,13 @@ impl<'a> Grid<'a> {
 #[inline(always)]
 fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
     let stretch = side.length();
-    let taps = each(|i| if stretch[i] > WIDEST_SPLINE_PX { lower(higher((stretch[i] - 0.1).ceil(), 1.0), most) } else { 1.0 });
+    let taps = each(|i| {
+        if stretch[i] > WIDEST_SPLINE_PX { lower(higher((stretch[i] - 0.1).ceil(), 1.0), most) } else { 1.0 }
+    });
     // What the reads have themselves the grid need not have.
     let factor = each(|i| {
-        let wide = (higher(stretch[i] * stretch[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i]))).sqrt() / stretch[i];
+        let wide = (higher(stretch[i] * stretch[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i]))).sqrt()
+            / stretch[i];
         if taps[i] > 1.0 { wide } else { 0.0 }
     });
     (Lanes2 { x: each(|i| side.x[i] * factor[i]), y: each(|i| side.y[i] * factor[i]) }, taps)
@@ -141,7 +159,8 @@ fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
 /// A pixel's variance beyond the ideal pixel's own, as the spline has it.
 #[inline(always)]
 fn softness(sides: &[Lanes2; 2]) -> Lanes2 {
-    let along = |side: &Lanes2| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0));
+    let along =
+        |side: &Lanes2| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0));
     Lanes2 { x: along(&sides[0]), y: along(&sides[1]) }
 }
 
@@ -151,7 +170,9 @@ fn area(sides: &[Lanes2; 2]) -> Lanes2 {
     const WIDEST: f32 = WIDEST_AREA_PX as f32;
     let [across, down] = sides;
     let along = |of: &Lanes, other: &Lanes| {
-        each(|i| lower(higher(of[i].mul_add(of[i], other[i].mul_add(other[i], -1.0)), 1.0), WIDEST * WIDEST).sqrt())
+        each(|i| {
+            lower(higher(of[i].mul_add(of[i], other[i].mul_add(other[i], -1.0)), 1.0), WIDEST * WIDEST).sqrt()
+        })
     };
     Lanes2 { x: along(&across.x, &down.x), y: along(&across.y, &down.y) }
 }
@@ -165,7 +186,8 @@ pub(super) struct Spline {
     pub rows: [Lanes; 4],
 }
 
-/// A spline as five bilinear reads, axis by axis: the one between, those above and below it, those left and right of it.
+/// A spline as five bilinear reads, axis by axis: the one between, those above and below it, those left and
+/// right of it.
 pub(super) const SPLINE_READS: [[usize; 2]; 5] = [[1, 1], [1, 0], [1, 2], [0, 1], [2, 1]];
 
 impl Spline {
@@ -192,7 +214,8 @@ impl Spline {
     /// Place of one of its [reads](SPLINE_READS) and its weight.
     #[inline(always)]
     pub fn read(&self, [x, y]: [usize; 2]) -> (Lanes2, Lanes) {
-        let ([x_px, x], [y_px, y]) = (of_read(&self.base.x, &self.columns, x), of_read(&self.base.y, &self.rows, y));
+        let ([x_px, x], [y_px, y]) =
+            (of_read(&self.base.x, &self.columns, x), of_read(&self.base.y, &self.rows, y));
         (Lanes2 { x: x_px, y: y_px }, each(|i| x[i] * y[i]))
     }
 }
@@ -268,12 +291,20 @@ mod tests {
         let cells = Cells::new();
         let (mut splines, mut areas) = (0, 0);
         for block in 0..100 {
-            // Narrow and wide ones in a block, on both sides of the width that tells them apart, turned and mirrored.
-            let width =
-                |i: usize| 0.2 + 1.25 * (((block * LANES + i) as f32 * 0.618_034).fract() * if i.is_multiple_of(3) { 5.0 } else { 1.3 });
+            // Narrow and wide ones in a block, on both sides of the width that tells them apart, turned and
+            // mirrored.
+            let width = |i: usize| {
+                0.2 + 1.25
+                    * (((block * LANES + i) as f32 * 0.618_034).fract()
+                        * if i.is_multiple_of(3) { 5.0 } else { 1.3 })
+            };
             let turn = |i: usize| (block * LANES + i) as f32 * 0.754_878;
-            let across = Lanes2 { x: each(|i| width(i) * turn(i).cos()), y: each(|i| width(i) * turn(i).sin()) };
-            let down = Lanes2 { x: each(|i| 0.9 * width(i) * turn(i).sin()), y: each(|i| -0.9 * width(i) * turn(i).cos()) };
+            let across =
+                Lanes2 { x: each(|i| width(i) * turn(i).cos()), y: each(|i| width(i) * turn(i).sin()) };
+            let down = Lanes2 {
+                x: each(|i| 0.9 * width(i) * turn(i).sin()),
+                y: each(|i| -0.9 * width(i) * turn(i).cos()),
+            };
             let found = Footprint::new(&cells, TapKind::Area, || [across, down], 1);
             let [sides, softness] = [found.area, found.softness].map(|of| of.expect("both are known"));
             for i in 0..LANES {
@@ -282,11 +313,19 @@ mod tests {
                 match Twin::new(at(&across), at(&down), TapStage::Area).kernel {
                     Kernel::Area(exact) => {
                         areas += 1;
-                        assert!(found.is_wide(i) && at(&sides).distance(exact) < 1e-5, "{block} {i}: {} {exact}", at(&sides));
+                        assert!(
+                            found.is_wide(i) && at(&sides).distance(exact) < 1e-5,
+                            "{block} {i}: {} {exact}",
+                            at(&sides)
+                        );
                     }
                     Kernel::Spline(exact) => {
                         splines += 1;
-                        assert!(!found.is_wide(i) && at(&softness).distance(exact) < 1e-5, "{block} {i}: {} {exact}", at(&softness));
+                        assert!(
+                            !found.is_wide(i) && at(&softness).distance(exact) < 1e-5,
+                            "{block} {i}: {} {exact}",
+                            at(&softness)
+                        );
                     }
                     Kernel::Bilinear => panic!("neither"),
                 }

@@ -34,7 +34,14 @@ struct Curve {
 impl Curve {
     /// From a node on, so many steps after the first.
     #[inline(always)]
-    fn new(path: PathStage, nodes: &mut Nodes<'_>, begin: &Source, step: usize, stride: usize, poses: &[Pose]) -> Self {
+    fn new(
+        path: PathStage,
+        nodes: &mut Nodes<'_>,
+        begin: &Source,
+        step: usize,
+        stride: usize,
+        poses: &[Pose],
+    ) -> Self {
         let mut differences = [Lanes2::ZERO; 4];
         let mut length_px = ZERO;
         let mut inside = begin.inside;
@@ -86,7 +93,9 @@ impl Curve {
 fn along(path: PathStage, steps: &Lanes, begin: &Lanes, [d1, d2, d3, d4]: [&Lanes; 4]) -> Lanes {
     match path {
         PathStage::Straight => each(|i| steps[i].mul_add(d1[i], begin[i])),
-        PathStage::Parabola => each(|i| steps[i].mul_add((0.5 * (steps[i] - 1.0)).mul_add(d2[i], d1[i]), begin[i])),
+        PathStage::Parabola => {
+            each(|i| steps[i].mul_add((0.5 * (steps[i] - 1.0)).mul_add(d2[i], d1[i]), begin[i]))
+        }
         PathStage::Quartic => each(|i| {
             let third = (0.25 * (steps[i] - 3.0)).mul_add(d4[i], d3[i]);
             let second = ((steps[i] - 2.0) * (1.0 / 3.0)).mul_add(third, d2[i]);
@@ -96,7 +105,8 @@ fn along(path: PathStage, steps: &Lanes, begin: &Lanes, [d1, d2, d3, d4]: [&Lane
 }
 
 impl Reads<'_> {
-    /// Gathers pixels of a line with these poses: at the nodes, then at mid-exposure. Colours only of those that are `wanted` (1, else 0).
+    /// Gathers pixels of a line with these poses: at the nodes, then at mid-exposure. Colours only of those
+    /// that are `wanted` (1, else 0).
     #[inline(always)]
     pub(super) fn gather(
         &self,
@@ -125,7 +135,14 @@ impl Reads<'_> {
         let gone = (self.frame.coords_phase + 0.5).clamp(0.0, 1.0) * stretches as f32;
         for stretch in 0..stretches {
             let steps = blur.path.steps() as usize;
-            let curve = Curve::new(blur.path, &mut nodes, &source, stretch as usize * steps, blur.stride as usize, poses);
+            let curve = Curve::new(
+                blur.path,
+                &mut nodes,
+                &source,
+                stretch as usize * steps,
+                blur.stride as usize,
+                poses,
+            );
             inside = each(|i| inside[i] * curve.inside[i]);
             let samples = self.samples(&curve.length_px, &at_least);
             let count = each(|i| samples[i] * inside[i] * wanted[i]);
@@ -197,14 +214,23 @@ impl Reads<'_> {
         sum: &mut [Halves; LANES],
     ) {
         let Some(softness) = &area.softness else {
-            return self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum);
+            return self.ideal.add_color(
+                vectors,
+                self.frame,
+                &area.moved(at_px, tap),
+                is_taken,
+                |_| 1.0,
+                sum,
+            );
         };
         let wide = whether(|i| area.is_wide(i));
         if wide.contains(&1.0) {
             let is_taken = |i: usize| is_taken(i) && wide[i] > 0.0;
             match &area.area {
                 Some(sides_px) => self.ideal.add_area(vectors, self.frame, at_px, sides_px, is_taken, sum),
-                None => self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum),
+                None => {
+                    self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum)
+                }
             }
         }
         if wide.contains(&0.0) {

@@ -8,13 +8,23 @@ use crate::layout::FrameUniforms;
 /// Where surfaces beside the sky are looked for.
 const DIRECTIONS: [[f32; 2]; 8] = {
     const SIDE: f32 = std::f32::consts::FRAC_1_SQRT_2;
-    [[1.0, 0.0], [SIDE, SIDE], [0.0, 1.0], [-SIDE, SIDE], [-1.0, 0.0], [-SIDE, -SIDE], [0.0, -1.0], [SIDE, -SIDE]]
+    [
+        [1.0, 0.0],
+        [SIDE, SIDE],
+        [0.0, 1.0],
+        [-SIDE, SIDE],
+        [-1.0, 0.0],
+        [-SIDE, -SIDE],
+        [0.0, -1.0],
+        [SIDE, -SIDE],
+    ]
 };
 
 /// Half floats of a texel.
 pub(super) const CHANNELS: usize = 4;
 
-/// Colours of the left and of the right texels that a pixel's reads lie between, to be added in the end: R G B A each.
+/// Colours of the left and of the right texels that a pixel's reads lie between, to be added in the end: R G
+/// B A each.
 pub(super) type Halves = [f32; 2 * CHANNELS];
 
 /// An ideal frame in the host's memory, as the device has copied it.
@@ -51,7 +61,8 @@ fn around(frame: &FrameUniforms, at_px: &Lanes2, stride: u32) -> Around {
 }
 
 impl IdealOnHost<'_> {
-    /// Inverse planar depth, 1/m: bilinear, which is exact on planes; the nearest texel where the four belong to different surfaces.
+    /// Inverse planar depth, 1/m: bilinear, which is exact on planes; the nearest texel where the four belong
+    /// to different surfaces.
     #[inline(always)]
     pub(super) fn inverse_depth(&self, frame: &FrameUniforms, at_px: &Lanes2) -> Lanes {
         let Around { first, t } = around(frame, at_px, self.depth_stride);
@@ -74,7 +85,8 @@ impl IdealOnHost<'_> {
         })
     }
 
-    /// The same, and where it finds the sky that of the nearest surface of those within reach: twin of `surface_at` in shaders/reverse/temporal_inverse/reproject.wgsl.
+    /// The same, and where it finds the sky that of the nearest surface of those within reach: twin of
+    /// `surface_at` in shaders/reverse/temporal_inverse/reproject.wgsl.
     #[inline(always)]
     pub(super) fn surface_at(&self, frame: &FrameUniforms, at_px: &Lanes2) -> Lanes {
         let mut found = self.inverse_depth(frame, at_px);
@@ -106,7 +118,8 @@ impl IdealOnHost<'_> {
         found
     }
 
-    /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one: what its left texels give and what its right ones do.
+    /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one: what its left
+    /// texels give and what its right ones do.
     #[inline(always)]
     pub(super) fn add_color(
         &self,
@@ -145,7 +158,8 @@ impl IdealOnHost<'_> {
         is_taken: impl Fn(usize) -> bool,
         sum: &mut [Halves; LANES],
     ) {
-        let texels = |sides: &Lanes| whole(sides.iter().fold(0.0, |most: f32, &side| higher(most, side + 1.0)).ceil());
+        let texels =
+            |sides: &Lanes| whole(sides.iter().fold(0.0, |most: f32, &side| higher(most, side + 1.0)).ceil());
         match [texels(&sides_px.x), texels(&sides_px.y)] {
             [0..=2, 0..=2] => self.add_areas::<2, 2>(vectors, frame, at_px, sides_px, is_taken, sum),
             [0..=4, 0..=3] => self.add_areas::<4, 3>(vectors, frame, at_px, sides_px, is_taken, sum),
@@ -166,12 +180,17 @@ impl IdealOnHost<'_> {
         is_taken: impl Fn(usize) -> bool,
         sum: &mut [Halves; LANES],
     ) {
-        let (columns, rows) = (Span::<COLUMNS>::new(&at_px.x, &sides_px.x), Span::<ROWS>::new(&at_px.y, &sides_px.y));
+        let (columns, rows) =
+            (Span::<COLUMNS>::new(&at_px.x, &sides_px.x), Span::<ROWS>::new(&at_px.y, &sides_px.y));
         let share = each(|i| 1.0 / (sides_px.x[i] * sides_px.y[i]));
-        let [right, bottom] = [(0, COLUMNS), (1, ROWS)].map(|(k, texels)| frame.ideal_size_px[k] as f32 - texels as f32);
+        let [right, bottom] =
+            [(0, COLUMNS), (1, ROWS)].map(|(k, texels)| frame.ideal_size_px[k] as f32 - texels as f32);
         let mut is_within = true;
         for i in 0..LANES {
-            let is_inside = (columns.first[i] >= 0.0) & (columns.first[i] <= right) & (rows.first[i] >= 0.0) & (rows.first[i] <= bottom);
+            let is_inside = (columns.first[i] >= 0.0)
+                & (columns.first[i] <= right)
+                & (rows.first[i] >= 0.0)
+                & (rows.first[i] <= bottom);
             is_within &= !is_taken(i) | is_inside;
         }
         if !is_within {
@@ -183,7 +202,9 @@ impl IdealOnHost<'_> {
                 continue;
             }
             let first = whole(rows.first[i]) as usize * stride + CHANNELS * whole(columns.first[i]) as usize;
-            let Some(texels) = self.color.get(first..first + (ROWS - 1) * stride + COLUMNS * CHANNELS) else { continue };
+            let Some(texels) = self.color.get(first..first + (ROWS - 1) * stride + COLUMNS * CHANNELS) else {
+                continue;
+            };
             for pair in 0..COLUMNS / 2 {
                 let mut of_pair = [0.0; 2 * CHANNELS];
                 for row in 0..ROWS {
@@ -194,14 +215,20 @@ impl IdealOnHost<'_> {
                 }
                 for k in 0..2 * CHANNELS {
                     // Left texels come first.
-                    let weight = share[i] * if k < CHANNELS { columns.weights[2 * pair][i] } else { columns.weights[2 * pair + 1][i] };
+                    let weight = share[i]
+                        * if k < CHANNELS {
+                            columns.weights[2 * pair][i]
+                        } else {
+                            columns.weights[2 * pair + 1][i]
+                        };
                     sum[i][k] = weight.mul_add(of_pair[k], sum[i][k]);
                 }
             }
         }
     }
 
-    /// The same where some lie beyond the frame, whose texels there are those of its border: by reads between two by two, which see to that.
+    /// The same where some lie beyond the frame, whose texels there are those of its border: by reads between
+    /// two by two, which see to that.
     #[inline(never)]
     fn add_pairs<const COLUMNS: usize, const ROWS: usize>(
         &self,
@@ -217,7 +244,14 @@ impl IdealOnHost<'_> {
             let [y, of_row] = rows.between(row);
             for column in (0..COLUMNS).step_by(2) {
                 let [x, of_column] = columns.between(column);
-                self.add_color(vectors, frame, &Lanes2 { x, y }, &is_taken, |i| share[i] * of_row[i] * of_column[i], sum);
+                self.add_color(
+                    vectors,
+                    frame,
+                    &Lanes2 { x, y },
+                    &is_taken,
+                    |i| share[i] * of_row[i] * of_column[i],
+                    sum,
+                );
             }
         }
     }
@@ -236,7 +270,8 @@ impl IdealOnHost<'_> {
         let [right, bottom] = frame.ideal_size_px.map(|size| size as f32 - 3.0);
         let mut is_within = true;
         for i in 0..LANES {
-            is_within &= !is_taken(i) | ((base.x[i] >= 1.0) & (base.x[i] <= right) & (base.y[i] >= 1.0) & (base.y[i] <= bottom));
+            is_within &= !is_taken(i)
+                | ((base.x[i] >= 1.0) & (base.x[i] <= right) & (base.y[i] >= 1.0) & (base.y[i] <= bottom));
         }
         if !is_within {
             // Texels beyond the frame are those of its border: reads see to that.
@@ -253,13 +288,16 @@ impl IdealOnHost<'_> {
             }
             let first = (whole(base.y[i]) - 1) as usize * stride + CHANNELS * (whole(base.x[i]) - 1) as usize;
             let Some(texels) = self.color.get(first..first + 3 * stride + 4 * CHANNELS) else { continue };
-            let pair = |row: usize, column: usize| vectors.numbers(pair_at(texels, row * stride + CHANNELS * column));
+            let pair = |row: usize, column: usize| {
+                vectors.numbers(pair_at(texels, row * stride + CHANNELS * column))
+            };
             let middle = [pair(0, 1), pair(3, 1)];
             let (left, right) = ([pair(1, 0), pair(2, 0)], [pair(1, 2), pair(2, 2)]);
             let [w0, w1, w2, w3] = [rows[0][i], rows[1][i], rows[2][i], rows[3][i]];
             for k in 0..2 * CHANNELS {
                 // Left ones of pairs come first.
-                let of = |column: usize| if k < CHANNELS { columns[column][i] } else { columns[column + 1][i] };
+                let of =
+                    |column: usize| if k < CHANNELS { columns[column][i] } else { columns[column + 1][i] };
                 let outer = w3.mul_add(middle[1][k], w0 * middle[0][k]);
                 let of_left = w2.mul_add(left[1][k], w1 * left[0][k]);
                 let of_right = w2.mul_add(right[1][k], w1 * right[0][k]);
@@ -279,7 +317,8 @@ impl<const TEXELS: usize> Span<TEXELS> {
     #[inline(always)]
     fn new(at_px: &Lanes, side_px: &Lanes) -> Self {
         let reach = each(|i| 0.5 * (side_px[i] + 1.0));
-        // From the place within its texel on, which is known to the last bit however far from the first one that is.
+        // From the place within its texel on, which is known to the last bit however far from the first one
+        // that is.
         let base = each(|i| at_px[i].floor());
         let begin = each(|i| (at_px[i] - base[i] - reach[i]).floor() + 1.0);
         let mut weights = [ZERO; TEXELS];
@@ -305,10 +344,12 @@ fn pair_at(values: &[u16], at: usize) -> [u16; 2 * CHANNELS] {
     values.get(at..).and_then(|values| values.first_chunk()).copied().unwrap_or_default()
 }
 
-/// The first and the last values of so many from a place on; zeros beyond the end, where no place within the frame leads.
+/// The first and the last values of so many from a place on; zeros beyond the end, where no place within the
+/// frame leads.
 #[inline(always)]
 fn ends<T: Copy + Default, const N: usize>(values: &[T], at: usize, span: usize) -> [[T; N]; 2] {
-    let of = values.get(at..at + span).and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
+    let of =
+        values.get(at..at + span).and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
     of.unwrap_or([[T::default(); N]; 2])
 }
 
@@ -335,13 +376,22 @@ mod tests {
             let place = |i: usize| block * LANES + i;
             let at_px = Lanes2 {
                 x: each(|i| {
-                    if block.is_multiple_of(2) { 1.0 + 66.9 * part(place(i), 0.754_878) } else { -4.0 + 78.0 * part(place(i), 0.754_878) }
+                    if block.is_multiple_of(2) {
+                        1.0 + 66.9 * part(place(i), 0.754_878)
+                    } else {
+                        -4.0 + 78.0 * part(place(i), 0.754_878)
+                    }
                 }),
                 y: each(|i| {
-                    if block.is_multiple_of(2) { 1.0 + 41.9 * part(place(i), 0.569_84) } else { -4.0 + 53.0 * part(place(i), 0.569_84) }
+                    if block.is_multiple_of(2) {
+                        1.0 + 41.9 * part(place(i), 0.569_84)
+                    } else {
+                        -4.0 + 53.0 * part(place(i), 0.569_84)
+                    }
                 }),
             };
-            let softness = Lanes2 { x: each(|i| part(place(i), 0.324_718)), y: each(|i| part(place(i), 0.220_744)) };
+            let softness =
+                Lanes2 { x: each(|i| part(place(i), 0.324_718)), y: each(|i| part(place(i), 0.220_744)) };
             let spline = Spline::around(&at_px, &softness);
             let is_taken = |i: usize| !(block + i).is_multiple_of(7);
             let (mut found, mut exact) = ([[0.0; 8]; LANES], [[0.0; 8]; LANES]);
@@ -360,7 +410,8 @@ mod tests {
                     assert_eq!(found == 0.0, !is_taken(i));
                 }
             }
-            let is_within = (0..LANES).all(|i| at_px.x[i] >= 1.0 && at_px.x[i] < 68.0 && at_px.y[i] >= 1.0 && at_px.y[i] < 43.0);
+            let is_within = (0..LANES)
+                .all(|i| at_px.x[i] >= 1.0 && at_px.x[i] < 68.0 && at_px.y[i] >= 1.0 && at_px.y[i] < 43.0);
             (within, beside) = if is_within { (within + 1, beside) } else { (within, beside + 1) };
         }
         assert!(within >= 200 && beside >= 100, "{within} {beside}");
@@ -373,7 +424,9 @@ mod tests {
         let color: Vec<u16> = (0..CHANNELS * stride * height).map(|i| number(i).to_bits()).collect();
         let ideal = IdealOnHost { color: &color, color_stride: stride as u32, depth: &[], depth_stride: 0 };
         let frame = FrameUniforms { ideal_size_px: [width, height as u32], ..Zeroable::zeroed() };
-        let of_row = |y: usize| (CHANNELS * stride * y..CHANNELS * (stride * y + width as usize)).map(|i| number(i).to_f32());
+        let of_row = |y: usize| {
+            (CHANNELS * stride * y..CHANNELS * (stride * y + width as usize)).map(|i| number(i).to_f32())
+        };
         let rgba: Vec<f32> = (0..height).flat_map(of_row).collect();
         let twin = ColorImage { size_px: frame.ideal_size_px, rgba: &rgba };
         let part = |i: usize, step: f32| (i as f32 * step).fract();
@@ -382,19 +435,28 @@ mod tests {
             let place = |i: usize| block * LANES + i;
             let is_within = !block.is_multiple_of(3);
             let at = |i: usize, step: f32, size: f32| {
-                if is_within { 4.0 + (size - 9.0) * part(place(i), step) } else { -6.0 + (size + 12.0) * part(place(i), step) }
+                if is_within {
+                    4.0 + (size - 9.0) * part(place(i), step)
+                } else {
+                    -6.0 + (size + 12.0) * part(place(i), step)
+                }
             };
             let at_px = Lanes2 { x: each(|i| at(i, 0.754_878, 70.0)), y: each(|i| at(i, 0.569_84, 45.0)) };
-            let side =
-                |i: usize, step: f32| 1.0 + (most - 1.0) * if block.is_multiple_of(2) { part(block, step) } else { part(place(i), step) };
+            let side = |i: usize, step: f32| {
+                1.0 + (most - 1.0)
+                    * if block.is_multiple_of(2) { part(block, step) } else { part(place(i), step) }
+            };
             let sides_px = Lanes2 { x: each(|i| side(i, 0.324_718)), y: each(|i| side(i, 0.220_744)) };
             let is_taken = |i: usize| !(block + i).is_multiple_of(7);
             let mut found = [[0.0; 8]; LANES];
             widest!(vectors => ideal.add_area(vectors, &frame, &at_px, &sides_px, is_taken, &mut found));
             for i in 0..LANES {
-                let [at, sides] = [&at_px, &sides_px].map(|of| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i])));
+                let [at, sides] =
+                    [&at_px, &sides_px].map(|of| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i])));
                 let exact = if is_taken(i) { twin.over_area(at, sides) } else { DVec3::ZERO };
-                let found = DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(found[i][k] + found[i][k + CHANNELS])));
+                let found = DVec3::from_array(
+                    [0, 1, 2].map(|k: usize| f64::from(found[i][k] + found[i][k + CHANNELS])),
+                );
                 // Places are known to the last bit of 70, and weights by as much.
                 assert!(found.distance(exact) < 2e-5, "{block} {i}, {at}, {sides}: {found} {exact}");
             }

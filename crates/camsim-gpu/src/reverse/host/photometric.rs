@@ -1,4 +1,5 @@
-//! Vignette, light, noise and saturation: twin of shaders/reverse/photometric.wgsl and shaders/common/noise.wgsl.
+//! Vignette, light, noise and saturation: twin of shaders/reverse/photometric.wgsl and
+//! shaders/common/noise.wgsl.
 
 use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
 
@@ -41,7 +42,12 @@ fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channel
     let mut bits = [[0_u32; LANES]; 3];
     for i in 0..LANES {
         let place = (x + i as u32) | (y << 16);
-        let words = pcg4d([place, frame.frame_number, frame.seed[0], frame.seed[1] ^ NOISE_STREAM.wrapping_mul(0x9e37_79b9)]);
+        let words = pcg4d([
+            place,
+            frame.frame_number,
+            frame.seed[0],
+            frame.seed[1] ^ NOISE_STREAM.wrapping_mul(0x9e37_79b9),
+        ]);
         for channel in 0..3 {
             bits[channel][i] = words[channel];
         }
@@ -53,7 +59,8 @@ fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channel
     normals
 }
 
-/// As `camsim_core::noise::normal_from_bits`; the octave is the exponent of the bits as a number, the place in it the fraction.
+/// As `camsim_core::noise::normal_from_bits`; the octave is the exponent of the bits as a number, the place
+/// in it the fraction.
 #[inline(always)]
 fn of_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
     let mut place = [0_u32; LANES];

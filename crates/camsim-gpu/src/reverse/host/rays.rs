@@ -78,9 +78,15 @@ pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMapOnHost>, x: u32, 
     [scaled(&sides[0], frame.ideal_focal_px), scaled(&sides[1], frame.ideal_focal_px)]
 }
 
-/// Central differences of a whole block; false where one of its pixels, or of those around them, has no ray or is beyond the map.
+/// Central differences of a whole block; false where one of its pixels, or of those around them, has no ray
+/// or is beyond the map.
 #[inline(always)]
-fn central_differences(size_px: [u32; 2], map: &LensMapOnHost, [x, y]: [u32; 2], sides: &mut [Lanes2; 2]) -> bool {
+fn central_differences(
+    size_px: [u32; 2],
+    map: &LensMapOnHost,
+    [x, y]: [u32; 2],
+    sides: &mut [Lanes2; 2],
+) -> bool {
     let [width, height] = size_px.map(|side| side as usize);
     let (x, y) = (x as usize, y as usize);
     if x == 0 || x + LANES >= width || y == 0 || y + 1 >= height {
@@ -98,7 +104,8 @@ fn central_differences(size_px: [u32; 2], map: &LensMapOnHost, [x, y]: [u32; 2],
     for i in 0..LANES {
         for k in 0..2 {
             let [across, down] = &mut *sides;
-            let (across, down) = if k == 0 { (&mut across.x, &mut down.x) } else { (&mut across.y, &mut down.y) };
+            let (across, down) =
+                if k == 0 { (&mut across.x, &mut down.x) } else { (&mut across.y, &mut down.y) };
             across[i] = 0.5 * (after[i][k] - before[i][k]);
             down[i] = 0.5 * (below[i][k] - above[i][k]);
         }
@@ -157,7 +164,8 @@ mod tests {
                 }
             }
         }
-        // Of three blocks within the picture in each of 38 rows, all but those with a ray missing above, below or within, or beside.
+        // Of three blocks within the picture in each of 38 rows, all but those with a ray missing above,
+        // below or within, or beside.
         assert_eq!(whole, 3 * 38 - 3 - (3 + 1) - 1);
     }
 }

@@ -1,4 +1,5 @@
-//! Where rays look in the ideal frame: twins of shaders/reverse/temporal_inverse and shaders/reverse/gather/nodes.
+//! Where rays look in the ideal frame: twins of shaders/reverse/temporal_inverse and
+//! shaders/reverse/gather/nodes.
 
 use super::Reads;
 use crate::host::lanes::{LANES, Lanes, Lanes2, Lanes3, ZERO, each, whether};
@@ -51,16 +52,26 @@ impl Reads<'_> {
     pub(super) fn ideal_px(&self, x: &Lanes, y: &Lanes, scale: impl Fn(usize) -> f32) -> Lanes2 {
         let ([fx, fy], [cx, cy]) = (self.frame.ideal_focal_px, self.frame.ideal_principal_px);
         let scale = each(scale);
-        Lanes2 { x: each(|i| (x[i] * scale[i]).mul_add(fx, cx)), y: each(|i| (y[i] * scale[i]).mul_add(fy, cy)) }
+        Lanes2 {
+            x: each(|i| (x[i] * scale[i]).mul_add(fx, cx)),
+            y: each(|i| (y[i] * scale[i]).mul_add(fy, cy)),
+        }
     }
 
     #[inline(always)]
     fn inside(&self, at_px: &Lanes2, z: &Lanes) -> Lanes {
         let [right, bottom] = self.frame.ideal_size_px.map(|size| size as f32 - 0.5);
-        whether(|i| (z[i] > 0.0) & (at_px.x[i] >= -0.5) & (at_px.x[i] <= right) & (at_px.y[i] >= -0.5) & (at_px.y[i] <= bottom))
+        whether(|i| {
+            (z[i] > 0.0)
+                & (at_px.x[i] >= -0.5)
+                & (at_px.x[i] <= right)
+                & (at_px.y[i] >= -0.5)
+                & (at_px.y[i] <= bottom)
+        })
     }
 
-    /// The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or behind the line's own image plane the last guess is kept.
+    /// The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or
+    /// behind the line's own image plane the last guess is kept.
     #[inline(always)]
     fn depth_on_line(direction: &Lanes3, shift: [f32; 3], found: &Lanes, guess: &Lanes) -> Lanes {
         each(|i| {
@@ -69,7 +80,8 @@ impl Reads<'_> {
         })
     }
 
-    /// Look-ups from a guess on the line on, the last of them beside the sky too: the key frame's inverse depth that the last one finds, and what that is on the line.
+    /// Look-ups from a guess on the line on, the last of them beside the sky too: the key frame's inverse
+    /// depth that the last one finds, and what that is on the line.
     #[inline(always)]
     fn looks(&self, direction: &Lanes3, shift: [f32; 3], guess: &Lanes, count: u32) -> (Lanes, Lanes) {
         let (mut in_key, mut on_line) = (ZERO, *guess);
@@ -77,7 +89,11 @@ impl Reads<'_> {
             let x = each(|i| on_line[i].mul_add(shift[0], direction.x[i]));
             let y = each(|i| on_line[i].mul_add(shift[1], direction.y[i]));
             let at_px = self.ideal_px(&x, &y, |i| 1.0 / on_line[i].mul_add(shift[2], direction.z[i]));
-            in_key = if look < count { self.ideal.inverse_depth(self.frame, &at_px) } else { self.ideal.surface_at(self.frame, &at_px) };
+            in_key = if look < count {
+                self.ideal.inverse_depth(self.frame, &at_px)
+            } else {
+                self.ideal.surface_at(self.frame, &at_px)
+            };
             on_line = Self::depth_on_line(direction, shift, &in_key, &on_line);
         }
         (in_key, on_line)
@@ -89,7 +105,9 @@ impl Reads<'_> {
         let [a, b, c, _] = self.frame.planes[0];
         let before = 1.0 - (a * shift[0] + b * shift[1] + c * shift[2]);
         let guess = match before > 1e-3 {
-            true => each(|i| (a * direction.x[i] + b * direction.y[i] + c * direction.z[i]).max(0.0) / before),
+            true => {
+                each(|i| (a * direction.x[i] + b * direction.y[i] + c * direction.z[i]).max(0.0) / before)
+            }
             false => ZERO,
         };
         self.looks(direction, shift, &guess, self.frame.iterations)
@@ -115,7 +133,8 @@ impl Reads<'_> {
         let found = each(found);
         let scale = each(|i| found[i].mul_add(-shift[2], 1.0));
         let per_z = each(|i| 1.0 / direction.z[i]);
-        let place = |far: f32, scale: f32, moved: f32| if scale > 1e-3 { scale.mul_add(far, moved) } else { far };
+        let place =
+            |far: f32, scale: f32, moved: f32| if scale > 1e-3 { scale.mul_add(far, moved) } else { far };
         let at_px = Lanes2 {
             x: each(|i| place(direction.x[i] * per_z[i], scale[i], found[i] * shift[0]).mul_add(fx, cx)),
             y: each(|i| place(direction.y[i] * per_z[i], scale[i], found[i] * shift[1]).mul_add(fy, cy)),
@@ -192,7 +211,9 @@ impl<'a> Nodes<'a> {
             }
             Depths::Curve { begin, slope, bend } => {
                 let share = node as f32 * self.node_share;
-                self.reads.source_of_depth(self.uv, pose, |i| bend[i].mul_add(share, slope[i]).mul_add(share, begin[i]))
+                self.reads.source_of_depth(self.uv, pose, |i| {
+                    bend[i].mul_add(share, slope[i]).mul_add(share, begin[i])
+                })
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Depth and coordinates beside the picture: twin of shaders/reverse/edges/seen.wgsl and shaders/reverse/keys.
+//! Depth and coordinates beside the picture: twin of shaders/reverse/edges/seen.wgsl and
+//! shaders/reverse/keys.
 
 use super::{
     Reads,
@@ -14,9 +15,17 @@ struct Reference {
 }
 
 impl Reads<'_> {
-    /// Truth about pixels whose line has this pose at mid-exposure. `at_phase_px`: where they look at the phase that is asked for.
+    /// Truth about pixels whose line has this pose at mid-exposure. `at_phase_px`: where they look at the
+    /// phase that is asked for.
     #[inline(always)]
-    pub(super) fn truth(&self, uv: &Lanes2, mid: &Pose, at_phase_px: &Lanes2, inside: &Lanes, truth: &mut [Truth]) {
+    pub(super) fn truth(
+        &self,
+        uv: &Lanes2,
+        mid: &Pose,
+        at_phase_px: &Lanes2,
+        inside: &Lanes,
+        truth: &mut [Truth],
+    ) {
         let source = self.reference_px(at_phase_px);
         let at_px = self.solve(uv, mid).at_px;
         let in_key = self.ideal.inverse_depth(self.frame, &at_px);
@@ -24,10 +33,14 @@ impl Reads<'_> {
         let point = self.reference(&at_px, &in_key);
         let along = |axis: usize| {
             let frame = self.frame;
-            let [x, y, z] = [frame.ned_from_key_x[axis], frame.ned_from_key_y[axis], frame.ned_from_key_z[axis]];
+            let [x, y, z] =
+                [frame.ned_from_key_x[axis], frame.ned_from_key_y[axis], frame.ned_from_key_z[axis]];
             each(|i| {
                 let far = 1.0 / point.inverse_depth[i];
-                frame.key_position_ned_m[axis] + point.ray.x[i] * far * x + point.ray.y[i] * far * y + point.ray.z[i] * far * z
+                frame.key_position_ned_m[axis]
+                    + point.ray.x[i] * far * x
+                    + point.ray.y[i] * far * y
+                    + point.ray.z[i] * far * z
             })
         };
         let (north, east, down) = (along(0), along(1), along(2));
@@ -36,10 +49,12 @@ impl Reads<'_> {
                 *truth = Truth::default();
                 continue;
             }
-            *truth = Truth { uv: [uv.x[i], uv.y[i]], source_px: [source.x[i], source.y[i]], ..Truth::default() };
+            *truth =
+                Truth { uv: [uv.x[i], uv.y[i]], source_px: [source.x[i], source.y[i]], ..Truth::default() };
             if in_line[i] > 0.0 && point.inverse_depth[i] > 0.0 {
                 truth.depth_m = 1.0 / in_line[i];
-                // On the key ray of the source, at the depth found there: no absolute pose is differenced in single precision.
+                // On the key ray of the source, at the depth found there: no absolute pose is differenced in
+                // single precision.
                 truth.point_ned_m = [north[i], east[i], down[i]];
             }
         }
@@ -65,7 +80,11 @@ impl Reads<'_> {
         let (ray, shift) = (rotate(&pose, &uv), translation(&pose));
         let moved = |axis: &Lanes, shift: f32| each(|i| in_key[i].mul_add(shift, axis[i]));
         Reference {
-            ray: Lanes3 { x: moved(&ray.x, shift[0]), y: moved(&ray.y, shift[1]), z: moved(&ray.z, shift[2]) },
+            ray: Lanes3 {
+                x: moved(&ray.x, shift[0]),
+                y: moved(&ray.y, shift[1]),
+                z: moved(&ray.z, shift[2]),
+            },
             inverse_depth: *in_key,
         }
     }

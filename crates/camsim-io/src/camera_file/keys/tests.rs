@@ -53,8 +53,16 @@ fn neutral_values() {
 
 #[test]
 fn coefficients_by_name() {
-    for (name, is) in [("k4", true), ("p3", true), ("tauX", true), ("k", false), ("K1", false), ("kp1", false), ("s", false), ("p", false)]
-    {
+    for (name, is) in [
+        ("k4", true),
+        ("p3", true),
+        ("tauX", true),
+        ("k", false),
+        ("K1", false),
+        ("kp1", false),
+        ("s", false),
+        ("p", false),
+    ] {
         assert_eq!(is_coefficient(name), is, "{name}");
     }
 }

@@ -11,16 +11,34 @@ fn tables() {
     assert_flies("tabs", &usual.replace(',', "\t"), &auto(), "");
     assert_flies(
         "tabs and blanks in names",
-        &log("Time [s]\tLatitude\tLongitude\tAlt MSL (m)\tRoll Angle\tPitch Angle\tTrue Heading", &row.replace(',', "\t")),
+        &log(
+            "Time [s]\tLatitude\tLongitude\tAlt MSL (m)\tRoll Angle\tPitch Angle\tTrue Heading",
+            &row.replace(',', "\t"),
+        ),
         &auto(),
         "msl",
     );
     assert_flies("bars of blanks", &usual.replace(',', "   "), &auto(), "");
-    assert_flies("names with units between blanks", &log("# t [s] lat [deg] lon [deg] alt [m]", "T LAT LON H"), &track(), "");
+    assert_flies(
+        "names with units between blanks",
+        &log("# t [s] lat [deg] lon [deg] alt [m]", "T LAT LON H"),
+        &track(),
+        "",
+    );
     assert_flies("old line ends", &usual.replace('\n', "\r"), &auto(), "");
     assert_flies("a comma at every end", &usual.replace('\n', ",\n"), &auto(), "");
-    assert_flies("text with commas in quotes", &log("t,note,lat,lon,alt", "T,\"a, \"\"b\"\", c\",LAT,LON,H"), &track(), "");
-    assert_flies("columns that nobody uses", &log("name,t,lat,lon,alt,state", "Drone 1,T,LAT,LON,H,OK"), &track(), "");
+    assert_flies(
+        "text with commas in quotes",
+        &log("t,note,lat,lon,alt", "T,\"a, \"\"b\"\", c\",LAT,LON,H"),
+        &track(),
+        "",
+    );
+    assert_flies(
+        "columns that nobody uses",
+        &log("name,t,lat,lon,alt,state", "Drone 1,T,LAT,LON,H,OK"),
+        &track(),
+        "",
+    );
     assert_flies("attitudes that nobody uses", &log(lla, "T,LAT,LON,H,?,?,?"), &track(), "");
     assert_flies("an index without a name", &log(",t,lat,lon,alt", "7,T,LAT,LON,H"), &track(), "");
     assert_refused(
@@ -43,8 +61,18 @@ fn tables() {
     );
     assert_refused("a shifted row", usual.replace("507,0,0", "507,x,0,0").as_bytes(), &auto(), &["line 9"]);
     assert_flies("decimal commas", &usual.replace('.', "#").replace(',', ";").replace('#', ","), &auto(), "");
-    assert_flies("decimal commas between tabs", &usual.replace('.', "#").replace(',', "\t").replace('#', ","), &auto(), "");
-    assert_refused("decimal commas between commas", usual.replace('.', ",").as_bytes(), &auto(), &["decimal commas need semicolons"]);
+    assert_flies(
+        "decimal commas between tabs",
+        &usual.replace('.', "#").replace(',', "\t").replace('#', ","),
+        &auto(),
+        "",
+    );
+    assert_refused(
+        "decimal commas between commas",
+        usual.replace('.', ",").as_bytes(),
+        &auto(),
+        &["decimal commas need semicolons"],
+    );
     assert_refused(
         "commas and points",
         usual.replace(',', ";").replace(";507;", ";1.507,5;").as_bytes(),
@@ -64,11 +92,24 @@ fn tables() {
         &["line 9, column 1 (`t`): `t`", "second header"],
     );
     assert_refused("no closing quote", usual.replace("\n7,", "\n\"7,").as_bytes(), &auto(), &["line 9"]);
-    let missing = usual.replace("\n7,", "\nNULL,").replace(",508,", ",-,").replace(",509,0,0,30", ",509,n/a,None,");
+    let missing =
+        usual.replace("\n7,", "\nNULL,").replace(",508,", ",-,").replace(",509,0,0,30", ",509,n/a,None,");
     let log_of_gaps = read_with(missing.as_bytes(), &auto()).unwrap();
-    assert_eq!((log_of_gaps.report.unusable.count, log_of_gaps.rows.len()), (2, 19), "{}", log_of_gaps.report);
+    assert_eq!(
+        (log_of_gaps.report.unusable.count, log_of_gaps.rows.len()),
+        (2, 19),
+        "{}",
+        log_of_gaps.report
+    );
     // An attitude that is missing altogether is interpolated; half of one is a fault.
-    assert_eq!(read_with(usual.replace(",509,0,0,30", ",509,0,None,").as_bytes(), &auto()).unwrap().report.attitude_missing.count, 1);
+    assert_eq!(
+        read_with(usual.replace(",509,0,0,30", ",509,0,None,").as_bytes(), &auto())
+            .unwrap()
+            .report
+            .attitude_missing
+            .count,
+        1
+    );
     assert_refused(
         "missing by a number",
         usual.replace(",508,", ",-9999,").as_bytes(),
@@ -87,23 +128,63 @@ fn several_columns_and_axes() {
         &track(),
         &["2 (`lat`) and 3 (`latitude`)"],
     );
-    assert_refused("two heights", of("t,lat,lon,alt,elevation", "T,LAT,LON,0,H").as_bytes(), &track(), &["`alt`", "`elevation`"]);
-    assert_flies("two datums", &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,0,H"), &track(), "`alt_hae` counts");
+    assert_refused(
+        "two heights",
+        of("t,lat,lon,alt,elevation", "T,LAT,LON,0,H").as_bytes(),
+        &track(),
+        &["`alt`", "`elevation`"],
+    );
+    assert_flies(
+        "two datums",
+        &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,0,H"),
+        &track(),
+        "`alt_hae` counts",
+    );
     let msl = FlightSpec { height: HeightReference::Msl, ..track() };
-    assert_flies("two datums, the other one", &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,H,0"), &msl, "`alt_msl` counts");
-    assert_refused("two of one datum", of("t,lat,lon,alt_msl,amsl", "T,LAT,LON,H,0").as_bytes(), &msl, &["one quantity"]);
+    assert_flies(
+        "two datums, the other one",
+        &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,H,0"),
+        &msl,
+        "`alt_msl` counts",
+    );
+    assert_refused(
+        "two of one datum",
+        of("t,lat,lon,alt_msl,amsl", "T,LAT,LON,H,0").as_bytes(),
+        &msl,
+        &["one quantity"],
+    );
     assert_flies("by air pressure too", &of("t,lat,lon,baro_alt,alt", "T,LAT,LON,0,H"), &track(), "");
     assert_flies("by air pressure only", &of("t,lat,lon,baro_alt", "T,LAT,LON,H"), &track(), "air pressure");
-    assert_refused("two rolls", of("t,lat,lon,alt,roll,roll,pitch,yaw", "T,LAT,LON,H,1,2,3,30").as_bytes(), &auto(), &["`roll`"]);
+    assert_refused(
+        "two rolls",
+        of("t,lat,lon,alt,roll,roll,pitch,yaw", "T,LAT,LON,H,1,2,3,30").as_bytes(),
+        &auto(),
+        &["`roll`"],
+    );
     assert_flies(
         "angles and a quaternion",
         &of("t,lat,lon,alt,roll,pitch,yaw,qw,qx,qy,qz", "T,LAT,LON,H,9,9,30,1,0,0,0"),
         &auto(),
         "quaternion counts",
     );
-    assert_flies("a gimbal", &of("t,lat,lon,alt,roll,pitch,yaw,gimbal_pitch", "T,LAT,LON,H,9,9,30,-90"), &auto(), "camera.mount");
-    assert_flies("magnetic", &of("t,lat,lon,alt,roll,pitch,heading [deg magnetic]", "T,LAT,LON,H,9,9,30"), &auto(), "declination");
-    assert_refused("half of an attitude", of("t,lat,lon,alt,heading", "T,LAT,LON,H,30").as_bytes(), &auto(), &["flight.attitude"]);
+    assert_flies(
+        "a gimbal",
+        &of("t,lat,lon,alt,roll,pitch,yaw,gimbal_pitch", "T,LAT,LON,H,9,9,30,-90"),
+        &auto(),
+        "camera.mount",
+    );
+    assert_flies(
+        "magnetic",
+        &of("t,lat,lon,alt,roll,pitch,heading [deg magnetic]", "T,LAT,LON,H,9,9,30"),
+        &auto(),
+        "declination",
+    );
+    assert_refused(
+        "half of an attitude",
+        of("t,lat,lon,alt,heading", "T,LAT,LON,H,30").as_bytes(),
+        &auto(),
+        &["flight.attitude"],
+    );
     assert_refused(
         "course for heading",
         of("t,lat,lon,alt,roll,pitch,course", "T,LAT,LON,H,1,2,30").as_bytes(),
@@ -111,19 +192,56 @@ fn several_columns_and_axes() {
         &["flight.attitude"],
     );
     // Axes.
-    for (header, format) in [("t,tx,ty,tz,roll,pitch,yaw", LogFormat::Auto), ("t,x,y,z,roll,pitch,yaw", LogFormat::Tum)] {
-        assert_refused(header, of(header, "T,0,N,H,9,9,30").as_bytes(), &spec(format), &["quaternion", "csv-xya"]);
+    for (header, format) in
+        [("t,tx,ty,tz,roll,pitch,yaw", LogFormat::Auto), ("t,x,y,z,roll,pitch,yaw", LogFormat::Tum)]
+    {
+        assert_refused(
+            header,
+            of(header, "T,0,N,H,9,9,30").as_bytes(),
+            &spec(format),
+            &["quaternion", "csv-xya"],
+        );
     }
-    assert_flies("angles by the key", &of("t,x,y,z,roll,pitch,yaw", "T,N,0,H,9,9,30"), &spec(LogFormat::CsvXya), "");
-    assert_flies("a quaternion in a world of heights", &of("t,north,east,alt,qw,qx,qy,qz", "T,N,0,H,1,0,0,0"), &auto(), "PX4");
+    assert_flies(
+        "angles by the key",
+        &of("t,x,y,z,roll,pitch,yaw", "T,N,0,H,9,9,30"),
+        &spec(LogFormat::CsvXya),
+        "",
+    );
+    assert_flies(
+        "a quaternion in a world of heights",
+        &of("t,north,east,alt,qw,qx,qy,qz", "T,N,0,H,1,0,0,0"),
+        &auto(),
+        "PX4",
+    );
     let own = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
     let row = "T,N,0,-H,0,0,0,0,0,0,1,0,0,0,0,0,0,0,0,0";
     assert_flies("what `camsim track` writes", &of(own, row), &auto(), "");
-    for header in ["t,x,y,z,qx,qy,qz,qw", "t,x,y,z,qw,qx,qy,qz", "t,pos_x,pos_y,pos_z,q_w,q_x,q_y,q_z", "t,x,y,alt,qw,qx,qy,qz"] {
-        assert_refused(header, of(header, "T,N,0,H,0,0,0,1").as_bytes(), &auto(), &["flight.format", "csv-ned", "tum"]);
+    for header in [
+        "t,x,y,z,qx,qy,qz,qw",
+        "t,x,y,z,qw,qx,qy,qz",
+        "t,pos_x,pos_y,pos_z,q_w,q_x,q_y,q_z",
+        "t,x,y,alt,qw,qx,qy,qz",
+    ] {
+        assert_refused(
+            header,
+            of(header, "T,N,0,H,0,0,0,1").as_bytes(),
+            &auto(),
+            &["flight.format", "csv-ned", "tum"],
+        );
     }
-    assert_refused("UTM under other names", of("t,x,y,alt", "T,N,0,H").as_bytes(), &track(), &["csv-xya", "north, east"]);
-    assert_flies("north is x by the key", &of("t,x,y,alt", "T,N,0,H"), &FlightSpec { format: LogFormat::CsvXya, ..track() }, "");
+    assert_refused(
+        "UTM under other names",
+        of("t,x,y,alt", "T,N,0,H").as_bytes(),
+        &track(),
+        &["csv-xya", "north, east"],
+    );
+    assert_flies(
+        "north is x by the key",
+        &of("t,x,y,alt", "T,N,0,H"),
+        &FlightSpec { format: LogFormat::CsvXya, ..track() },
+        "",
+    );
     assert_flies(
         "ROS by the key",
         &of(
@@ -141,7 +259,12 @@ fn several_columns_and_axes() {
         "",
     );
     let ned = FlightSpec { format: LogFormat::CsvNed, ..track() };
-    assert_refused("up and down", of("t,north,east,alt", "T,N,0,H").as_bytes(), &ned, &["csv-ned", "named otherwise"]);
+    assert_refused(
+        "up and down",
+        of("t,north,east,alt", "T,N,0,H").as_bytes(),
+        &ned,
+        &["csv-ned", "named otherwise"],
+    );
     // Prose before the names.
     for header in [
         "# columns: t tx ty tz qx qy qz qw",
@@ -202,14 +325,21 @@ fn other_files() {
         &["no XML"],
     );
     let gpx = |points: &str| {
-        format!("<?xml version=\"1.0\"?>\n<gpx xmlns=\"http://www.topografix.com/GPX/1/1\"><trk><trkseg>{points}</trkseg></trk></gpx>")
+        format!(
+            "<?xml version=\"1.0\"?>\n<gpx xmlns=\"http://www.topografix.com/GPX/1/1\"><trk><trkseg>{points}</trkseg></trk></gpx>"
+        )
     };
     let points: String = (0..21)
         .map(|i| format!("<trkpt lat=\"{:.9}\" lon=\"8\"><ele>{}</ele><time>2023-05-01T10:00:{i:02}Z</time><extensions><course>30</course></extensions></trkpt>\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
         .collect();
     let msl = FlightSpec { height: HeightReference::Msl, ..track() };
     assert_flies("GPX", &gpx(&points), &msl, "not used: course");
-    assert_flies("GPX above the ellipsoid", &gpx(&points.replace("course", "hr")), &track(), "mean sea level");
+    assert_flies(
+        "GPX above the ellipsoid",
+        &gpx(&points.replace("course", "hr")),
+        &track(),
+        "mean sea level",
+    );
     let two = gpx(&points.replace("course", "hr").replacen("\n<trkpt", "\n</trkseg><trkseg><trkpt", 3));
     assert_flies("GPX in segments", &two, &msl, "");
 }

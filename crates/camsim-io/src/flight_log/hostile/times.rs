@@ -6,30 +6,56 @@ use super::*;
 fn clocks_and_dates() {
     let _all = AllFaults;
     let at = |time: &dyn Fn(u32) -> String| {
-        let rows: String = (0..21).map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i)).collect();
+        let rows: String = (0..21)
+            .map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
+            .collect();
         format!("time,lat,lon,alt\n{rows}")
     };
     assert_flies("clock", &at(&|i| format!("10:00:{i:02}.5")), &track(), "");
     assert_flies(
         "clock past midnight",
-        &at(&|i| format!("{:02}:{:02}:{:02}", if i < 5 { 23 } else { 0 }, if i < 5 { 59 } else { 0 }, (55 + i) % 60)),
+        &at(&|i| {
+            format!(
+                "{:02}:{:02}:{:02}",
+                if i < 5 { 23 } else { 0 },
+                if i < 5 { 59 } else { 0 },
+                (55 + i) % 60
+            )
+        }),
         &track(),
         "midnight",
     );
     assert_flies("half a clock", &at(&|i| format!("9:59:{i:02} AM")), &track(), "");
-    assert_flies("noon", &at(&|i| if i < 5 { format!("11:59:{} AM", 55 + i) } else { format!("12:00:{:02} PM", i - 5) }), &track(), "");
+    assert_flies(
+        "noon",
+        &at(&|i| if i < 5 { format!("11:59:{} AM", 55 + i) } else { format!("12:00:{:02} PM", i - 5) }),
+        &track(),
+        "",
+    );
     assert_flies("offset", &at(&|i| format!("2023-05-01T10:00:{i:02}+02:00")), &track(), "");
-    assert_flies("blank, quotes, slashes", &at(&|i| format!("\"2023/05/01 10:00:{i:02}.250\"")), &track(), "");
+    assert_flies(
+        "blank, quotes, slashes",
+        &at(&|i| format!("\"2023/05/01 10:00:{i:02}.250\"")),
+        &track(),
+        "",
+    );
     assert_flies(
         "over a leap day",
-        &at(&|i| if i < 10 { format!("2024-02-28T23:59:{}Z", 50 + i) } else { format!("2024-02-29T00:00:{:02}Z", i - 10) }),
+        &at(&|i| {
+            if i < 10 {
+                format!("2024-02-28T23:59:{}Z", 50 + i)
+            } else {
+                format!("2024-02-29T00:00:{:02}Z", i - 10)
+            }
+        }),
         &track(),
         "",
     );
     assert_flies("seconds of the week", &at(&|i| format!("{}", (604_790 + i) % 604_800)), &track(), "GPS");
     assert_flies(
         "a full counter",
-        &at(&|i| format!("{}", (4_294_960_000_u64 + u64::from(i) * 1_000_000) % 4_294_967_296)).replace("time", "time_us"),
+        &at(&|i| format!("{}", (4_294_960_000_u64 + u64::from(i) * 1_000_000) % 4_294_967_296))
+            .replace("time", "time_us"),
         &track(),
         "counter",
     );
@@ -39,7 +65,12 @@ fn clocks_and_dates() {
         &track(),
         &["line 2, column 1 (`time`)", "year-month-day"],
     );
-    assert_refused("minutes and seconds", at(&|i| format!("0:{i:02}")).as_bytes(), &track(), &["hours:minutes:seconds"]);
+    assert_refused(
+        "minutes and seconds",
+        at(&|i| format!("0:{i:02}")).as_bytes(),
+        &track(),
+        &["hours:minutes:seconds"],
+    );
     assert_refused(
         "a number among times",
         at(&|i| if i == 7 { "7".into() } else { format!("10:00:{i:02}") }).as_bytes(),
@@ -71,8 +102,9 @@ fn clocks_and_dates() {
     )
     .unwrap();
     assert_eq!((log.report.out_of_order.count, log.duration_s()), (2, 20.0));
-    let two =
-        (0..21).map(|i| format!("2023-05-01,10:00:{i:02},47.0 8.0,{}\n", 500 + i)).fold("Date,Time,GPS,Alt(m)\n".to_owned(), |a, b| a + &b);
+    let two = (0..21)
+        .map(|i| format!("2023-05-01,10:00:{i:02},47.0 8.0,{}\n", 500 + i))
+        .fold("Date,Time,GPS,Alt(m)\n".to_owned(), |a, b| a + &b);
     assert_eq!(read_with(two.as_bytes(), &track()).unwrap().duration_s(), 20.0);
     assert_refused(
         "three numbers of two",
@@ -88,10 +120,13 @@ fn clocks_and_dates() {
 fn parts_digits_and_others() {
     let _all = AllFaults;
     let at = |header: &str, time: &dyn Fn(u32) -> String| {
-        let rows: String = (0..21).map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i)).collect();
+        let rows: String = (0..21)
+            .map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
+            .collect();
         format!("{header},lat,lon,alt\n{rows}")
     };
-    let digits = at("time", &|i| if i < 10 { format!("1541{}", 50 + i) } else { format!("1542{:02}", i - 10) });
+    let digits =
+        at("time", &|i| if i < 10 { format!("1541{}", 50 + i) } else { format!("1542{:02}", i - 10) });
     assert_refused("digits of a clock", digits.as_bytes(), &track(), &["hhmmss", "flight.time_unit"]);
     assert_refused(
         "hours, minutes, seconds",
@@ -99,9 +134,19 @@ fn parts_digits_and_others() {
         &track(),
         &["several columns", "`sec`"],
     );
-    assert_refused("seconds and milliseconds", at("time,ms", &|i| format!("10:00:{:02},500", i)).as_bytes(), &track(), &["`time`", "`ms`"]);
+    assert_refused(
+        "seconds and milliseconds",
+        at("time,ms", &|i| format!("10:00:{:02},500", i)).as_bytes(),
+        &track(),
+        &["`time`", "`ms`"],
+    );
     assert_flies("an hour beside a time", &at("time_s,hour", &|i| format!("{i},10")), &track(), "");
-    assert_flies("a date that never changes", &at("date,time", &|i| format!("1.5.23,10:00:{i:02}")), &track(), "");
+    assert_flies(
+        "a date that never changes",
+        &at("date,time", &|i| format!("1.5.23,10:00:{i:02}")),
+        &track(),
+        "",
+    );
     assert_refused(
         "dates day first",
         at("date,time", &|i| format!("{}.5.2023,10:00:{i:02}", 1 + i / 10)).as_bytes(),
@@ -116,10 +161,18 @@ fn parts_digits_and_others() {
         &["line 3", "`B`", "one vehicle"],
     );
     assert_flies("one vehicle", &at("Vehicle Name,t", &|i| format!("A,{i}")), &track(), "");
-    assert_refused("two flights", at("t", &|i| format!("{}", i % 11)).as_bytes(), &track(), &["line 13", "several flights"]);
+    assert_refused(
+        "two flights",
+        at("t", &|i| format!("{}", i % 11)).as_bytes(),
+        &track(),
+        &["line 13", "several flights"],
+    );
     let named = at("timestamp [ns]", &|i| format!("{i}"));
     let notes = read_with(named.as_bytes(), &track()).unwrap().notes;
-    assert!(notes.iter().any(|note| note.is_warning && note.text.contains("the header's unit of time")), "{notes:?}");
+    assert!(
+        notes.iter().any(|note| note.is_warning && note.text.contains("the header's unit of time")),
+        "{notes:?}"
+    );
     assert_refused(
         "DJI's two heights",
         at("t,OSD.height [ft]", &|i| format!("{i},9")).replace("alt", "rel_alt").as_bytes(),
@@ -130,12 +183,18 @@ fn parts_digits_and_others() {
         format!("{},{}", 112_574_307 + i * 1_000_000, 1_700_000_000_000_000_u64 + u64::from(i) * 1_000_000)
     });
     assert_flies("PX4's two times", &px4, &track(), "");
-    let ground_station =
-        at("Timestamp,altitudeRelative", &|i| format!("2023-05-01 10:00:{i:02}.123,9")).replace(",alt\n", ",altitudeAMSL\n");
-    assert_flies("a ground station", &ground_station, &FlightSpec { height: HeightReference::Msl, ..track() }, "");
+    let ground_station = at("Timestamp,altitudeRelative", &|i| format!("2023-05-01 10:00:{i:02}.123,9"))
+        .replace(",alt\n", ",altitudeAMSL\n");
+    assert_flies(
+        "a ground station",
+        &ground_station,
+        &FlightSpec { height: HeightReference::Msl, ..track() },
+        "",
+    );
     // One stream after the other is one flight.
     let mut streams = "t,lat,lon,alt,roll,pitch,yaw\n".to_owned();
-    streams.extend((0..21).map(|i| format!("{i},{:.9},8.0,{},,,\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i)));
+    streams
+        .extend((0..21).map(|i| format!("{i},{:.9},8.0,{},,,\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i)));
     streams.extend((0..40).map(|i| format!("{},,,,0,0,30\n", f64::from(i) * 0.5 + 0.25)));
     assert_flies("streams one after the other", &streams, &auto(), "positions are interpolated");
 }
@@ -148,7 +207,9 @@ fn fixes_gaps_and_jumps() {
     let nulls = usual
         .lines()
         .enumerate()
-        .map(|(i, line)| if (1..4).contains(&i) { format!("{},0,0,0,0,0,30", i - 1) } else { line.to_owned() })
+        .map(
+            |(i, line)| if (1..4).contains(&i) { format!("{},0,0,0,0,0,30", i - 1) } else { line.to_owned() },
+        )
         .collect::<Vec<_>>()
         .join("\n");
     let report = read_with(nulls.as_bytes(), &auto()).unwrap().report;
@@ -175,5 +236,9 @@ fn fixes_gaps_and_jumps() {
     let moved = log.rows.last().unwrap().position_ned_m - log.rows[0].position_ned_m;
     let speed = moved / log.duration_s();
     assert!((speed.x - 10.0).abs() < 1e-2 && (speed.z + 1.0).abs() < 1e-2, "{speed}");
-    assert!(log.notes.iter().any(|note| note.is_warning && note.text.contains("heights and positions")), "{:?}", log.notes);
+    assert!(
+        log.notes.iter().any(|note| note.is_warning && note.text.contains("heights and positions")),
+        "{:?}",
+        log.notes
+    );
 }

@@ -3,8 +3,8 @@
 use std::fs;
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, SmallVec, Vec2,
-    WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, SmallVec, Vec2, WritableImage,
 };
 
 use crate::frame_file::{FrameFile, read_frame};
@@ -16,15 +16,19 @@ type Part<'a> = (&'a str, i32, &'a [(&'a str, f32)]);
 fn read(parts: &[Part<'_>], text: &str) -> Result<FrameFile, String> {
     let folder = tempfile::tempdir().unwrap();
     let layer = |(name, at, channels): &Part<'_>| {
-        let list: SmallVec<[AnyChannel<FlatSamples>; 4]> =
-            channels.iter().map(|(name, value)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; 2]))).collect();
-        let mut attributes = if name.is_empty() { LayerAttributes::default() } else { LayerAttributes::named(*name) };
+        let list: SmallVec<[AnyChannel<FlatSamples>; 4]> = channels
+            .iter()
+            .map(|(name, value)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; 2])))
+            .collect();
+        let mut attributes =
+            if name.is_empty() { LayerAttributes::default() } else { LayerAttributes::named(*name) };
         attributes.layer_position = Vec2(*at, 0);
         Layer::new(Vec2(2_usize, 1), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(list))
     };
     let layers: Vec<_> = parts.iter().map(layer).collect();
     let window = IntegerBounds::new(Vec2(0, 0), Vec2(2_usize, 1));
-    let image = Image::from_layers(ImageAttributes::new(window), layers.into_iter().collect::<SmallVec<[_; 2]>>());
+    let image =
+        Image::from_layers(ImageAttributes::new(window), layers.into_iter().collect::<SmallVec<[_; 2]>>());
     image.write().to_file(folder.path().join("a.exr")).unwrap();
     let path = folder.path().join("FRAME.toml");
     fs::write(&path, format!("color = \"a.exr\"\nfocal_px = [2, 2]\n{text}")).unwrap();
@@ -64,12 +68,16 @@ const BLENDER: &[(&str, f32)] = &[
 fn blenders_multilayer_files_need_no_names() {
     assert_eq!(first(&read(&[("", 0, BLENDER)], DEPTH).unwrap()), [0.25, 0.5, 0.75, 8.0]);
     let chosen = "color_layer = \"ViewLayer.DiffCol\"\ndepth_channel = \"Denoising Depth.Z\"\n";
-    assert_eq!(first(&read(&[("", 0, BLENDER)], &format!("{DEPTH}{chosen}")).unwrap()), [0.1, 0.1, 0.1, 99.0]);
+    assert_eq!(
+        first(&read(&[("", 0, BLENDER)], &format!("{DEPTH}{chosen}")).unwrap()),
+        [0.1, 0.1, 0.1, 99.0]
+    );
 }
 
 #[test]
 fn mist_is_no_depth() {
-    let without_depth: Vec<(&str, f32)> = BLENDER.iter().copied().filter(|(name, _)| !name.contains("Depth")).collect();
+    let without_depth: Vec<(&str, f32)> =
+        BLENDER.iter().copied().filter(|(name, _)| !name.contains("Depth")).collect();
     let error = read(&[("", 0, &without_depth)], DEPTH).unwrap_err();
     assert!(error.contains("has no channel Z, but ViewLayer.Combined.A"), "{error}");
     let asked = read(&[("", 0, &without_depth)], &format!("{DEPTH}depth_channel = \"Mist.Z\"\n"));
@@ -79,7 +87,9 @@ fn mist_is_no_depth() {
 #[test]
 fn the_optical_axis_is_in_the_middle_of_the_display() {
     let axis_px = |at: i32, text: &str| {
-        let file = read(&[("", at, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}")).unwrap();
+        let file =
+            read(&[("", at, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}"))
+                .unwrap();
         file.frame.geometry.principal_px.to_array()
     };
     // The display is pixels 0 and 1. Of it a crop that begins at 1, and more of it than is shown from -1 on.
@@ -95,11 +105,20 @@ fn every_part_is_read() {
         ("eye", 0, &[("eye.B", 0.3), ("eye.G", 0.2), ("eye.R", 0.1), ("eye.Z", 5.0)]),
     ];
     let chosen = |text: &str| read(&parts, &format!("{DEPTH}{text}"));
-    assert_eq!(first(&chosen("color_layer = \"rgba\"\ndepth_layer = \"depth\"\n").unwrap()), [0.25, 0.5, 0.75, 4.0]);
-    assert_eq!(first(&chosen("color_layer = \"eye\"\ndepth_channel = \"eye.Z\"\n").unwrap()), [0.1, 0.2, 0.3, 5.0]);
+    assert_eq!(
+        first(&chosen("color_layer = \"rgba\"\ndepth_layer = \"depth\"\n").unwrap()),
+        [0.25, 0.5, 0.75, 4.0]
+    );
+    assert_eq!(
+        first(&chosen("color_layer = \"eye\"\ndepth_channel = \"eye.Z\"\n").unwrap()),
+        [0.1, 0.2, 0.3, 5.0]
+    );
     let mixed = "color_channels = [\"rgba.B\", \"eye.G\", \"rgba.R\"]\ndepth_channel = \"Z\"\ndepth_layer = \"eye\"\n";
     assert_eq!(first(&chosen(mixed).unwrap()), [0.75, 0.2, 0.25, 5.0]);
-    assert_eq!(first(&chosen("color_channels = [\"depth.Z\"]\ndepth_layer = \"depth\"\n").unwrap()), [4.0; 4]);
+    assert_eq!(
+        first(&chosen("color_channels = [\"depth.Z\"]\ndepth_layer = \"depth\"\n").unwrap()),
+        [4.0; 4]
+    );
 }
 
 #[test]
@@ -108,12 +127,17 @@ fn what_cannot_be_told_apart_is_listed() {
         ("left", 0, &[("left.B", 0.0), ("left.G", 0.0), ("left.R", 0.0), ("left.Z", 1.0)]),
         ("right", 0, &[("right.B", 0.0), ("right.G", 0.0), ("right.R", 0.0), ("right.Z", 1.0)]),
     ];
-    let plain: [Part<'_>; 1] = [("", 0, &[("B", 0.0), ("G", 0.0), ("Normal.X", 0.0), ("Normal.Z", 0.0), ("R", 0.0), ("dist", 2.0)])];
+    let plain: [Part<'_>; 1] =
+        [("", 0, &[("B", 0.0), ("G", 0.0), ("Normal.X", 0.0), ("Normal.Z", 0.0), ("R", 0.0), ("dist", 2.0)])];
     let chroma: [Part<'_>; 1] = [("", 0, &[("BY", 0.0), ("RY", 0.0), ("Y", 0.5)])];
     let shifted: [Part<'_>; 2] = [("a", 0, &[("B", 0.0), ("G", 0.0), ("R", 0.0)]), ("b", 5, &[("Z", 1.0)])];
     for (parts, text, expected) in [
         (&two[..], "", "several layers with colour: left, right; choose one with color_layer"),
-        (&two, "color_layer = \"left\"\n", "several channels that may be depth: left.Z right.Z; choose one with depth_channel"),
+        (
+            &two,
+            "color_layer = \"left\"\n",
+            "several channels that may be depth: left.Z right.Z; choose one with depth_channel",
+        ),
         (&two, "color_layer = \"middle\"\n", "has no channel middle.R, but left.B"),
         (&two, "color_channels = [\"R\"]\n", "several channels R: left.R right.R; give the whole name"),
         (&two, "color_channels = [\"R\", \"G\"]\n", "color_channels: must be one name (grey) or three"),
@@ -134,7 +158,12 @@ fn files_that_are_none_are_told_from_files_that_are_not_there() {
     let path = folder.path().join("FRAME.toml");
     fs::write(&path, "color = \"a.exr\"\nfocal_px = [2, 2]\n").unwrap();
     let error = || read_frame(&path).unwrap_err().to_string();
-    assert!(error().contains("a.exr: cannot be read as EXR: ") && error().ends_with("paths are relative to FRAME.toml"), "{}", error());
+    assert!(
+        error().contains("a.exr: cannot be read as EXR: ")
+            && error().ends_with("paths are relative to FRAME.toml"),
+        "{}",
+        error()
+    );
     fs::write(folder.path().join("a.exr"), "no picture").unwrap();
     assert!(error().ends_with("it is cut off, or no EXR"), "{}", error());
 }

@@ -40,7 +40,10 @@ fn rows_of_a_pfm_come_in_the_order_that_is_said() {
     assert_eq!(inverse("d.dat", &bottom_up, "depth_rows = \"bottom-up\"\n"), INVERSE);
     let mut tenth = top_down.clone();
     tenth[17..21].copy_from_slice(&[b'\n', 0, 0, 0x40]);
-    assert_eq!(inverse("d.pfm", &tenth, "depth_rows = \"top-down\"\n")[0], 1.0 / f32::from_le_bytes([b'\n', 0, 0, 0x40]));
+    assert_eq!(
+        inverse("d.pfm", &tenth, "depth_rows = \"top-down\"\n")[0],
+        1.0 / f32::from_le_bytes([b'\n', 0, 0, 0x40])
+    );
 }
 
 #[test]
@@ -49,7 +52,10 @@ fn what_stands_for_the_sky_is_said() {
         let text = format!("depth_rows = \"top-down\"\n{text}");
         read("d.pfm", &pfm("Pf\n3 2\n-1\n", &DEPTH_M, f32::to_le_bytes), &text).unwrap()
     };
-    assert_eq!(file("depth_max_m = 65504\nholes = \"mark\"\n").frame.holes, [false, false, true, false, true, true]);
+    assert_eq!(
+        file("depth_max_m = 65504\nholes = \"mark\"\n").frame.holes,
+        [false, false, true, false, true, true]
+    );
     assert!(!file("depth_max_m = 65504.5\nholes = \"mark\"\n").frame.holes[5]);
     assert_eq!(file("depth_max_m = 4\n").frame.inverse_depth, [1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
     // Blender's background, whatever is said.
@@ -72,7 +78,11 @@ where
 fn tiffs_are_metres_or_whole_numbers() {
     assert_eq!(inverse("d.tiff", &tiff::<colortype::Gray32Float>(&DEPTH_M), ""), INVERSE);
     let millimetres = [1000, 2000, 0, 4000, 0, 65_535];
-    let found = inverse("d.tif", &tiff::<colortype::Gray16>(&millimetres), "depth_per_metre = 1000\ndepth_max_m = 65\n");
+    let found = inverse(
+        "d.tif",
+        &tiff::<colortype::Gray16>(&millimetres),
+        "depth_per_metre = 1000\ndepth_max_m = 65\n",
+    );
     assert_eq!(found, [1.0, 0.5, 0.0, 0.25, 0.0, 0.0]);
 }
 
@@ -88,20 +98,45 @@ fn what_is_wrong_with_a_depth_is_said() {
         ("d.pfm", good[..8].to_vec(), rows, "d.pfm: is a PFM that ends within its header"),
         ("d.pfm", of("PF\n1 2\n-1\n"), rows, "three channels"),
         ("d.pfm", of("Pf\n3 -2\n-1\n"), rows, "`3` by `-2` pixels"),
-        ("d.pfm", of("Pf\n4294967295 4294967295\n-1\n"), rows, "4294967295x4294967295 pixels and holds 24 bytes"),
+        (
+            "d.pfm",
+            of("Pf\n4294967295 4294967295\n-1\n"),
+            rows,
+            "4294967295x4294967295 pixels and holds 24 bytes",
+        ),
         ("d.pfm", of("Pf\n3 2\n0\n"), rows, "scale `0`"),
         ("d.pfm", of("Pf\n2 3\n-1\n"), rows, "is 2x3, but the colour is 3x2"),
         ("d.pfm", good.clone(), "depth_rows = \"down\"\n", "top-down"),
-        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_per_metre = 1e7\n", "depth_per_metre: must be 0.001 to 1e6"),
+        (
+            "d.pfm",
+            good.clone(),
+            "depth_rows = \"top-down\"\ndepth_per_metre = 1e7\n",
+            "depth_per_metre: must be 0.001 to 1e6",
+        ),
         (
             "d.pfm",
             good.clone(),
             "depth_rows = \"top-down\"\ndepth_encoding = \"packed24\"\n",
             "depth_encoding: \"packed24\" is of 8-bit RGB",
         ),
-        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_channel = \"Z\"\n", "depth_channel: is for EXR"),
-        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_max_m = 0\n", "depth_max_m: must be above 0"),
-        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_max_m = nan\n", "depth_max_m: must be above 0"),
+        (
+            "d.pfm",
+            good.clone(),
+            "depth_rows = \"top-down\"\ndepth_channel = \"Z\"\n",
+            "depth_channel: is for EXR",
+        ),
+        (
+            "d.pfm",
+            good.clone(),
+            "depth_rows = \"top-down\"\ndepth_max_m = 0\n",
+            "depth_max_m: must be above 0",
+        ),
+        (
+            "d.pfm",
+            good.clone(),
+            "depth_rows = \"top-down\"\ndepth_max_m = nan\n",
+            "depth_max_m: must be above 0",
+        ),
         ("d.tif", floats.clone(), rows, "depth_rows: is for PFM, and depth is none"),
         ("d.tif", floats[..40].to_vec(), "", "d.tif: cannot be decoded"),
         ("d.tif", tiff::<colortype::Gray16>(&[1; 6]), "", "depth_per_metre: is missing"),
@@ -148,7 +183,11 @@ fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
         (px, "", "UNITTYPE `px`"),
         (feet, "depth_kind = \"inverse\"\ndepth_per_metre = 1\n", "depth_kind: is \"inverse\", but"),
         // One distance throughout is as unsure as many.
-        ("", "", "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole numbers from 2000"),
+        (
+            "",
+            "",
+            "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole numbers from 2000",
+        ),
     ] {
         let error = read("d.tif", &with_items(2000.0, items), text).unwrap_err();
         assert!(error.contains(wanted), "{error}\n  not {wanted}");
@@ -160,7 +199,8 @@ fn what_a_mask_beside_a_tiff_leaves_out_is_no_depth() {
     let folder = tempfile::tempdir().unwrap();
     image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(folder.path().join("c.png")).unwrap();
     fs::write(folder.path().join("d.tif"), tiff::<colortype::Gray32Float>(&[2.0; 6])).unwrap();
-    fs::write(folder.path().join("d.tif.msk"), tiff::<colortype::Gray8>(&[255, 0, 255, 255, 255, 0])).unwrap();
+    fs::write(folder.path().join("d.tif.msk"), tiff::<colortype::Gray8>(&[255, 0, 255, 255, 255, 0]))
+        .unwrap();
     let path = folder.path().join("FRAME.toml");
     fs::write(&path, "color = \"c.png\"\ndepth = \"d.tif\"\nfocal_px = [2, 2]\n").unwrap();
     assert_eq!(read_frame(&path).unwrap().frame.inverse_depth, [0.5, 0.0, 0.5, 0.5, 0.5, 0.0]);
@@ -171,7 +211,10 @@ fn chunks_of_a_png_are_named_or_asked_about() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(at("c.png")).unwrap();
-    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, vec![2000_u16; 6]).unwrap().save(at("d.png")).unwrap();
+    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, vec![2000_u16; 6])
+        .unwrap()
+        .save(at("d.png"))
+        .unwrap();
     let [color, depth] = ["c.png", "d.png"].map(|name| fs::read(at(name)).unwrap());
     let with = |png: &[u8], kind: &[u8], data: &[u8]| {
         let chunk = [kind, data].concat();
@@ -182,15 +225,26 @@ fn chunks_of_a_png_are_named_or_asked_about() {
     let read = |color: &[u8], depth: &[u8], text: &str| {
         fs::write(at("c.png"), color).unwrap();
         fs::write(at("d.png"), depth).unwrap();
-        fs::write(&path, format!("color = \"c.png\"\ndepth = \"d.png\"\ndepth_per_metre = 1000\nfocal_px = [2, 2]\n{text}")).unwrap();
+        fs::write(
+            &path,
+            format!(
+                "color = \"c.png\"\ndepth = \"d.png\"\ndepth_per_metre = 1000\nfocal_px = [2, 2]\n{text}"
+            ),
+        )
+        .unwrap();
         read_frame(&path).map(|file| file.notes).map_err(|error| error.to_string())
     };
     let pq = with(&color, b"cICP", &[9, 16, 0, 1]);
     assert!(read(&pq, &depth, "").unwrap_err().contains("color_space: is missing"));
     assert!(read(&pq, &depth, "color_space = \"srgb\"\n").unwrap()[0].contains("cICP [9, 16, 0, 1]"));
-    assert!(read(&with(&color, b"cICP", &[12, 13, 0, 1]), &depth, "").unwrap()[0].contains("cICP [12, 13, 0, 1]"));
+    assert!(
+        read(&with(&color, b"cICP", &[12, 13, 0, 1]), &depth, "").unwrap()[0].contains("cICP [12, 13, 0, 1]")
+    );
     assert!(read(&with(&color, b"cICP", &[1, 13, 0, 1]), &depth, "").unwrap().is_empty());
-    let wide: Vec<u8> = [31_270_u32, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600].iter().flat_map(|v| v.to_be_bytes()).collect();
+    let wide: Vec<u8> = [31_270_u32, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600]
+        .iter()
+        .flat_map(|v| v.to_be_bytes())
+        .collect();
     assert!(read(&with(&color, b"cHRM", &wide), &depth, "").unwrap()[0].contains("cHRM"));
     assert!(read(&color, &with(&depth, b"sBIT", &[12]), "").unwrap()[0].contains("its sBIT is not applied"));
     let twelve = image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(3, 2, image::Rgb([4095_u16, 9, 9]));

@@ -26,8 +26,12 @@ pub(super) fn pattern_of(path: &Path) -> Result<(PathBuf, [String; 2]), String> 
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     match name.split('*').collect::<Vec<_>>()[..] {
-        [before, after] if !folder.to_string_lossy().contains('*') => Ok((folder, [before.to_owned(), after.to_owned()])),
-        _ => Err(format!("`{}` must have one * in the file's name, and none in the folder's", path.display())),
+        [before, after] if !folder.to_string_lossy().contains('*') => {
+            Ok((folder, [before.to_owned(), after.to_owned()]))
+        }
+        _ => {
+            Err(format!("`{}` must have one * in the file's name, and none in the folder's", path.display()))
+        }
     }
 }
 
@@ -49,13 +53,15 @@ pub(super) fn read_pattern(
         let star = file.strip_prefix(&before).and_then(|rest| rest.strip_suffix(&after));
         // What begins with a dot is hidden, and may be a file that is just being written.
         let Some(star) = star.filter(|star| !star.is_empty() && !file.starts_with('.')) else { continue };
-        let stamp_ns =
-            match unit {
-                None => None,
-                Some(unit) => Some(nanoseconds(star, unit).ok_or_else(|| {
-                    fail(format!("{}: `{star}` is no time, which name_unit says that it is", folder.join(&file).display()))
-                })?),
-            };
+        let stamp_ns = match unit {
+            None => None,
+            Some(unit) => Some(nanoseconds(star, unit).ok_or_else(|| {
+                fail(format!(
+                    "{}: `{star}` is no time, which name_unit says that it is",
+                    folder.join(&file).display()
+                ))
+            })?),
+        };
         items.push(Item { path: folder.join(&file), star: star.to_owned(), stamp_ns });
     }
     if items.is_empty() {
@@ -64,9 +70,13 @@ pub(super) fn read_pattern(
     items.sort_by(|a, b| a.star.cmp(&b.star));
     if items.iter().all(|item| nanoseconds(&item.star, NameUnit::Ns).is_some()) {
         // Large counts overflow as seconds; their whole part then decides.
-        items.sort_by_key(|item| (nanoseconds(&item.star, NameUnit::S), nanoseconds(&item.star, NameUnit::Ns)));
+        items.sort_by_key(|item| {
+            (nanoseconds(&item.star, NameUnit::S), nanoseconds(&item.star, NameUnit::Ns))
+        });
     }
-    if let Some([a, b]) = items.array_windows().find(|[a, b]| a.stamp_ns.is_some() && a.stamp_ns == b.stamp_ns) {
+    if let Some([a, b]) =
+        items.array_windows().find(|[a, b]| a.stamp_ns.is_some() && a.stamp_ns == b.stamp_ns)
+    {
         return Err(fail(format!("{} and {} are of one time", a.path.display(), b.path.display())));
     }
     Ok(items)
@@ -98,7 +108,13 @@ fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
         let (time, color, depth) = match &words[..] {
             [time, color] => (time, color, None),
             [time, color, _, depth] => (time, color, Some(depth)),
-            _ => return Err(row(path, Some(line), "is neither `time color` nor `time color time depth`: correct it or leave it out")),
+            _ => {
+                return Err(row(
+                    path,
+                    Some(line),
+                    "is neither `time color` nor `time color time depth`: correct it or leave it out",
+                ));
+            }
         };
         let stamp_ns = stamp(path, line, time, entries.last().and_then(|entry| entry.stamp_ns))?;
         let depth = depth.map(|depth| picture(path, line, depth)).transpose()?;
@@ -110,7 +126,9 @@ fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
 /// Where the time is in a row of `frames.csv`, and its unit.
 fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, String> {
     // camsim's own tables say it as exactly as they can, whatever else they say.
-    if let Some(at) = header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case("stamp_ns")) {
+    if let Some(at) =
+        header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case("stamp_ns"))
+    {
         return Ok(Some((at, NameUnit::Ns)));
     }
     let is_time = |name: &str| name.trim_start_matches('\u{feff}').to_lowercase().starts_with('t');
@@ -124,25 +142,33 @@ fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, Stri
         [] => Ok(None),
         [(at, cell)] => match column(cell) {
             Column::Time(Some(unit)) => {
-                let known = [(1.0, NameUnit::S), (1e-3, NameUnit::Ms), (1e-6, NameUnit::Us), (1e-9, NameUnit::Ns)];
+                let known =
+                    [(1.0, NameUnit::S), (1e-3, NameUnit::Ms), (1e-6, NameUnit::Us), (1e-9, NameUnit::Ns)];
                 let known = known.into_iter().find(|(factor, _)| *factor == unit.factor);
-                known.map(|(_, unit)| Some((at, unit))).ok_or_else(|| format!("the column `{cell}` is in minutes: give t_s"))
+                known
+                    .map(|(_, unit)| Some((at, unit)))
+                    .ok_or_else(|| format!("the column `{cell}` is in minutes: give t_s"))
             }
-            _ => Err(format!("the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, t_us or t_ns")),
+            _ => Err(format!(
+                "the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, t_us or t_ns"
+            )),
         },
-        [(_, a), (_, b), ..] => Err(format!("the header names two columns of time, `{a}` and `{b}`: leave one out")),
+        [(_, a), (_, b), ..] => {
+            Err(format!("the header names two columns of time, `{a}` and `{b}`: leave one out"))
+        }
     }
 }
 
 fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| row(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(
+            |error| row(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml")),
+        )?;
     let header = reader.headers().map_err(|error| row(path, Some(1), error.to_string()))?.clone();
     let place = |names: &[&str]| {
-        names.iter().find_map(|name| header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)))
+        names.iter().find_map(|name| {
+            header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
+        })
     };
     let Some(color_at) = place(&["color", "color_exr", "color_png"]) else {
         return Err(row(
@@ -153,22 +179,36 @@ fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
     };
     let depth_at = place(&["depth"]);
     let time_at = time_of(&header).map_err(|message| row(path, Some(1), message))?;
-    let twice = |name: &str| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)).count() > 1;
-    if let Some(name) = ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| twice(name)) {
+    let twice = |name: &str| {
+        header.iter().filter(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)).count()
+            > 1
+    };
+    if let Some(name) =
+        ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| twice(name))
+    {
         return Err(row(path, Some(1), format!("the header names two columns {name}: leave one out")));
     }
     // camsim's own tables tell more than is needed here.
     let is_own = place(&["frame"]).is_some() && place(&["stamp_ns"]).is_some();
     let read = [Some(color_at), depth_at, time_at.map(|(at, _)| at), place(&["frame"])];
-    let unread: Vec<&str> =
-        header.iter().enumerate().filter(|(at, _)| !is_own && !read.contains(&Some(*at))).map(|(_, cell)| cell).collect();
+    let unread: Vec<&str> = header
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| !is_own && !read.contains(&Some(*at)))
+        .map(|(_, cell)| cell)
+        .collect();
     let notes = match unread[..] {
         [] => Vec::new(),
-        _ => vec![format!("{}: the columns {} are not read: frames are of t_s, color and depth", path.display(), unread.join(", "))],
+        _ => vec![format!(
+            "{}: the columns {} are not read: frames are of t_s, color and depth",
+            path.display(),
+            unread.join(", ")
+        )],
     };
     let mut entries: Vec<Entry> = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|error| row(path, error.position().map(csv::Position::line), error.to_string()))?;
+        let record = record
+            .map_err(|error| row(path, error.position().map(csv::Position::line), error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
         let cell = |at: usize| record.get(at).unwrap_or_default();
         let before = entries.last().and_then(|entry| entry.stamp_ns);
@@ -181,8 +221,9 @@ fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
 
 /// Words of the lines that are no comments, with the line's number.
 fn lines(path: &Path) -> Result<Vec<(u64, Vec<String>)>, FrameFileError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| row(path, None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml")))?;
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        row(path, None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml"))
+    })?;
     let words = |line| words_of(line).map(|words| words.into_iter().map(str::to_owned).collect());
     Ok((1..).zip(text.lines()).filter_map(|(number, line)| Some((number, words(line)?))).collect())
 }
@@ -192,11 +233,26 @@ fn stamp(path: &Path, line: u64, text: &str, before: Option<i64>) -> Result<i64,
 }
 
 /// Later than the row before.
-fn stamp_in(path: &Path, line: u64, text: &str, unit: NameUnit, before: Option<i64>) -> Result<i64, FrameFileError> {
-    let in_seconds = if unit == NameUnit::S { " in seconds; of another unit give a .csv with the column t_ms, t_us or t_ns" } else { "" };
-    let stamp_ns = nanoseconds(text, unit).ok_or_else(|| row(path, Some(line), format!("`{text}` is no time{in_seconds}")))?;
+fn stamp_in(
+    path: &Path,
+    line: u64,
+    text: &str,
+    unit: NameUnit,
+    before: Option<i64>,
+) -> Result<i64, FrameFileError> {
+    let in_seconds = if unit == NameUnit::S {
+        " in seconds; of another unit give a .csv with the column t_ms, t_us or t_ns"
+    } else {
+        ""
+    };
+    let stamp_ns = nanoseconds(text, unit)
+        .ok_or_else(|| row(path, Some(line), format!("`{text}` is no time{in_seconds}")))?;
     if before.is_some_and(|before| stamp_ns <= before) {
-        return Err(row(path, Some(line), "is not later than the row before; sort by time and leave doubles out"));
+        return Err(row(
+            path,
+            Some(line),
+            "is not later than the row before; sort by time and leave doubles out",
+        ));
     }
     Ok(stamp_ns)
 }
@@ -205,7 +261,11 @@ fn stamp_in(path: &Path, line: u64, text: &str, unit: NameUnit, before: Option<i
 fn picture(path: &Path, line: u64, name: &str) -> Result<PathBuf, FrameFileError> {
     let file = path.parent().unwrap_or(Path::new("")).join(name);
     if name.is_empty() || !file.is_file() {
-        return Err(row(path, Some(line), format!("there is no picture `{}`; paths are relative to this table", file.display())));
+        return Err(row(
+            path,
+            Some(line),
+            format!("there is no picture `{}`; paths are relative to this table", file.display()),
+        ));
     }
     Ok(file)
 }

@@ -8,7 +8,9 @@ use crate::frame_file::{FrameSet, read_frame_set};
 fn set(text: &str) -> Result<Vec<(String, String, Option<i64>)>, String> {
     whole_set(text).map(|(_folder, set)| {
         let name = |path: &std::path::Path| path.file_name().unwrap().to_string_lossy().into_owned();
-        let entry = |entry: &super::Entry| (name(&entry.color), entry.depth.as_deref().map(name).unwrap_or_default(), entry.stamp_ns);
+        let entry = |entry: &super::Entry| {
+            (name(&entry.color), entry.depth.as_deref().map(name).unwrap_or_default(), entry.stamp_ns)
+        };
         assert!(set.is_several());
         set.entries().iter().map(entry).collect()
     })
@@ -57,17 +59,23 @@ fn folders_are_paired_by_name_or_by_time() {
         entry("10.03.png", "10.035.png", 10_030_000_000),
     ];
     assert_eq!(timed.unwrap(), expected, "10.50 has no depth within 20 ms");
-    let (_folder, set_of_all) = whole_set("color = \"rgb/*.png\"\ndepth = \"depth/*.png\"\nname_unit = \"s\"\n").unwrap();
+    let (_folder, set_of_all) =
+        whole_set("color = \"rgb/*.png\"\ndepth = \"depth/*.png\"\nname_unit = \"s\"\n").unwrap();
     assert_eq!(set_of_all.left_out(), 1);
-    let wide = set("color = \"rgb/*.png\"\ndepth = \"depth/*.png\"\nname_unit = \"s\"\nmax_gap_ms = 1000\n").unwrap();
+    let wide = set("color = \"rgb/*.png\"\ndepth = \"depth/*.png\"\nname_unit = \"s\"\nmax_gap_ms = 1000\n")
+        .unwrap();
     assert_eq!(wide[3], entry("10.50.png", "10.09.png", 10_500_000_000));
     let at_25 = set("color = \"rgb/*.png\"\nfps = 25\n[motion]\nstamp_s = 7\n").unwrap();
-    assert_eq!(at_25.iter().map(|entry| entry.2.unwrap()).collect::<Vec<_>>(), [0, 40, 80, 120].map(|ms| (7000 + ms) * 1_000_000));
+    assert_eq!(
+        at_25.iter().map(|entry| entry.2.unwrap()).collect::<Vec<_>>(),
+        [0, 40, 80, 120].map(|ms| (7000 + ms) * 1_000_000)
+    );
 }
 
 #[test]
 fn lists_and_tables_are_read() {
-    let expected = [entry("9.97.png", "9.96.png", 9_970_000_000), entry("10.00.png", "10.01.png", 10_000_000_000)];
+    let expected =
+        [entry("9.97.png", "9.96.png", 9_970_000_000), entry("10.00.png", "10.01.png", 10_000_000_000)];
     assert_eq!(set("color = \"rgb.txt\"\ndepth = \"depth.txt\"\n").unwrap(), expected);
     assert_eq!(set("frames = \"pairs.txt\"\n").unwrap(), expected);
     assert_eq!(set("frames = \"frames.csv\"\n").unwrap(), expected[..1]);
@@ -83,7 +91,10 @@ fn each_frame_moves_about_its_own_stamp() {
         let motion = set.motion(index).unwrap();
         // 1 m/s along x, from 9 to 11.
         assert!((motion.twist_at(0.0).velocity_m_s.x - 1.0).abs() < 1e-12);
-        assert!(motion.covers(9.0 - stamp_s, 11.0 - stamp_s).is_ok() && motion.covers(8.99 - stamp_s, 0.0).is_err());
+        assert!(
+            motion.covers(9.0 - stamp_s, 11.0 - stamp_s).is_ok()
+                && motion.covers(8.99 - stamp_s, 0.0).is_err()
+        );
         assert!((motion.key_from(0.5, -0.25).1.x - 0.75).abs() < 1e-12);
     }
     assert!(set.read(2).unwrap_err().to_string().contains("has 2 frames"));

@@ -33,7 +33,11 @@ fn every_kind_and_order_of_bytes_is_the_same_array() {
         (">i8", bytes(&whole, |v| i64::from(v).to_be_bytes()), true),
     ] {
         let array = parse(&npy(descr, false, "(2, 3)", &data)).unwrap();
-        assert_eq!((array.values, array.whole, &array.shape[..]), (values.to_vec(), is_whole, &[2, 3][..]), "{descr}");
+        assert_eq!(
+            (array.values, array.whole, &array.shape[..]),
+            (values.to_vec(), is_whole, &[2, 3][..]),
+            "{descr}"
+        );
     }
     // By columns: 1 4, 2 5, 3 6.
     let by_columns = bytes(&[1.0, 4.0, 2.0, 5.0, 3.0, 6.0], f64::to_le_bytes);
@@ -71,8 +75,11 @@ fn what_is_no_picture_is_named() {
         let message = parse(&file).unwrap_err();
         assert!(message.contains(wanted), "{message}\n  not {wanted}");
     }
-    let structured =
-        [b"\x93NUMPY\x01\x00\x3a\x00".as_slice(), b"{'descr': [('z', '<f4')], 'fortran_order': False, 'shape': (2,)}"].concat();
+    let structured = [
+        b"\x93NUMPY\x01\x00\x3a\x00".as_slice(),
+        b"{'descr': [('z', '<f4')], 'fortran_order': False, 'shape': (2,)}",
+    ]
+    .concat();
     assert!(parse(&structured).unwrap_err().contains("has no descr"));
     let plane = |shape: &[usize]| Array { shape: shape.to_vec(), values: Vec::new(), whole: false }.plane();
     assert_eq!([plane(&[4, 5]), plane(&[4, 5, 1]), plane(&[1, 4, 5])], [Ok([5, 4]), Ok([5, 4]), Ok([5, 4])]);

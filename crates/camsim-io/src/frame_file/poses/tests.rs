@@ -30,7 +30,11 @@ fn units_and_order_go_by_the_names_of_columns() {
         "qz,qy,qx,qw,z_cm,y_m,x_km,t_ns\n0.5,0.5,-0.5,0.5,300,-2,0.001,2500000000\n",
         "timestamp [us],tx [m],ty [m],tz [m],q_x,q_y,q_z,q_w\n2.5e6,1,-2,3,-0.5,0.5,0.5,0.5\n",
     ] {
-        assert!(close(first(text, TrajectoryFormat::Csv)), "{text}: {:?}", first(text, TrajectoryFormat::Csv));
+        assert!(
+            close(first(text, TrajectoryFormat::Csv)),
+            "{text}: {:?}",
+            first(text, TrajectoryFormat::Csv)
+        );
     }
     for text in [
         "2.5 1 -2 3 -0.5 0.5 0.5 0.5\n",
@@ -39,7 +43,11 @@ fn units_and_order_go_by_the_names_of_columns() {
         "# timestamp tx ty tz qw qx qy qz\n2.5 1 -2 3 0.5 -0.5 0.5 0.5\n",
         "#t_ms, x_mm, y_mm, z_mm, qw, qx, qy, qz\n2500 1000 -2000 3000 0.5 -0.5 0.5 0.5\n",
     ] {
-        assert!(close(first(text, TrajectoryFormat::Tum)), "{text}: {:?}", first(text, TrajectoryFormat::Tum));
+        assert!(
+            close(first(text, TrajectoryFormat::Tum)),
+            "{text}: {:?}",
+            first(text, TrajectoryFormat::Tum)
+        );
     }
 }
 
@@ -55,7 +63,10 @@ fn what_a_table_does_not_say_is_asked_for() {
         ("t_s,x,x_mm,y,z,qw,qx,qy,qz\n".into(), "two columns for x, `x` and `x_mm`"),
         ("t_s,x,y,z,qw,qx,qy,qy\n".into(), "two columns for qy"),
         ("t_s,x,y,z,roll,pitch,yaw\n".into(), "names no column qw"),
-        ("t_s,x,y,z,qw,qx,qy,qz\n1.7e18,0,0,0,1,0,0,0\n".into(), "p.csv:2: its time is 1.7e18 s, which no clock has"),
+        (
+            "t_s,x,y,z,qw,qx,qy,qz\n1.7e18,0,0,0,1,0,0,0\n".into(),
+            "p.csv:2: its time is 1.7e18 s, which no clock has",
+        ),
         ("t_s,x_mm,y,z,qw,qx,qy,qz\n1,one,0,0,1,0,0,0\n".into(), "p.csv:2: x_mm is `one`"),
     ] {
         let error = read(&text, TrajectoryFormat::Csv, 0.0).unwrap_err();
@@ -63,6 +74,7 @@ fn what_a_table_does_not_say_is_asked_for() {
     }
     let error = read("1403715282262142976 0 0 0 0 0 0 1\n", TrajectoryFormat::Tum, 0.0).unwrap_err();
     assert!(error.contains("p.csv:1: its time is") && error.contains("t_ns"), "{error}");
-    let (_, notes) = read("t_s,x,y,z,qw,qx,qy,qz,vx,roll_deg\n1,0,0,0,1,0,0,0,9,9\n", TrajectoryFormat::Csv, 0.0).unwrap();
+    let (_, notes) =
+        read("t_s,x,y,z,qw,qx,qy,qz,vx,roll_deg\n1,0,0,0,1,0,0,0,9,9\n", TrajectoryFormat::Csv, 0.0).unwrap();
     assert!(notes.len() == 1 && notes[0].contains("the columns vx, roll_deg are not read"), "{notes:?}");
 }

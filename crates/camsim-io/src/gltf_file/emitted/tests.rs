@@ -23,20 +23,33 @@ fn light_adds_in_linear_values() {
     let base = layer([2, 1], vec![255, 128, 0, 7, 0, 0, 0, 9], Encoding::Linear, Wrap::Clamp);
     let emitted = layer([2, 1], vec![255, 128, 188, 0, 10, 0, 0, 0], Encoding::Srgb, Wrap::Clamp);
     let both = on_top(&base, [0.5, 0.25, 1.0], &emitted, [0.75, 1.0, 0.5]);
-    let expected = [1.25_f32.min(1.0), 0.25 * 128.0 / 255.0 + linear_from_srgb(128.0 / 255.0), 0.5 * linear_from_srgb(188.0 / 255.0)];
+    let expected = [
+        1.25_f32.min(1.0),
+        0.25 * 128.0 / 255.0 + linear_from_srgb(128.0 / 255.0),
+        0.5 * linear_from_srgb(188.0 / 255.0),
+    ];
     for (channel, light) in expected.into_iter().enumerate() {
-        assert!((f32::from(both.rgba8[channel]) - 255.0 * srgb_from_linear(light)).abs() <= 0.5, "{channel}: {:?}", both.rgba8);
+        assert!(
+            (f32::from(both.rgba8[channel]) - 255.0 * srgb_from_linear(light)).abs() <= 0.5,
+            "{channel}: {:?}",
+            both.rgba8
+        );
     }
     assert_eq!([both.rgba8[3], both.rgba8[7]], [7, 9]);
-    let white = Layer::new(Arc::new(Texture::uniform([255; 4], Encoding::Linear)), base.wrap, false, base.rule);
+    let white =
+        Layer::new(Arc::new(Texture::uniform([255; 4], Encoding::Linear)), base.wrap, false, base.rule);
     assert_eq!(on_top(&white, [0.0; 3], &emitted, [1.0; 3]).rgba8[..3], [255, 128, 188]);
 }
 
 #[test]
 fn of_two_sizes_the_finer_counts() {
     let base = layer([1, 2], vec![0, 0, 0, 255, 255, 255, 255, 255], Encoding::Linear, Wrap::Clamp);
-    let emitted =
-        layer([4, 1], [[0, 0, 0, 255], [80, 0, 0, 255], [160, 0, 0, 255], [240, 0, 0, 255]].concat(), Encoding::Linear, Wrap::Clamp);
+    let emitted = layer(
+        [4, 1],
+        [[0, 0, 0, 255], [80, 0, 0, 255], [160, 0, 0, 255], [240, 0, 0, 255]].concat(),
+        Encoding::Linear,
+        Wrap::Clamp,
+    );
     let both = on_top(&base, [0.0; 3], &emitted, [1.0; 3]);
     assert_eq!(both.size_px, [4, 2]);
     for (pixel, red) in both.rgba8.chunks_exact(4).zip([0.0, 80.0, 160.0, 240.0].repeat(2)) {
@@ -54,7 +67,9 @@ fn square(uv: f32) -> (Shape, Vec<[f32; 2]>) {
 
 /// A smooth picture in linear values.
 fn waves(size: u32, channel: usize, turns: f64) -> Layer {
-    let value = |x: u32| 127.5 + 100.0 * (std::f64::consts::TAU * turns * (f64::from(x) + 0.5) / f64::from(size)).sin();
+    let value = |x: u32| {
+        127.5 + 100.0 * (std::f64::consts::TAU * turns * (f64::from(x) + 0.5) / f64::from(size)).sin()
+    };
     let pixel = |i: u32| {
         let mut rgba = [0, 0, 0, 255];
         rgba[channel] = value(i % size).round() as u8;
@@ -87,7 +102,10 @@ fn light_in_a_layout_of_its_own_is_added_where_it_lies() {
         let light = 0.5 * of.light.at([x, y])[0];
         // Its vertex colour fades the base alone.
         let base = of.base.at([4.0 * x, 4.0 * y])[1] * (1.0 - x as f32);
-        assert!((found[0] - light).abs() < 0.01 && (found[1] - base).abs() < 0.02, "{x}: {found:?} is not {light}, {base}");
+        assert!(
+            (found[0] - light).abs() < 0.01 && (found[1] - base).abs() < 0.02,
+            "{x}: {found:?} is not {light}, {base}"
+        );
     }
 }
 
@@ -121,10 +139,12 @@ fn what_lies_on_itself_in_both_layouts_is_not_baked() {
     // What would be too large is coarser, and at last not there.
     let (shape, light_uvs) = square(4.0);
     let of = Bake { base: waves(64, 1, 1.0), light: waves(16, 0, 1.0), emitted: [1.0; 3] };
-    let sizes = [1 << 20, 18 * 18 * 16, 10]
-        .map(|most| bake(&shape, &light_uvs, &of, most).map(|baked| (baked.texture.size_px, baked.coarser.round())));
+    let sizes = [1 << 20, 18 * 18 * 16, 10].map(|most| {
+        bake(&shape, &light_uvs, &of, most).map(|baked| (baked.texture.size_px, baked.coarser.round()))
+    });
     assert_eq!(sizes, [Some(([144, 144], 2.0)), Some(([72, 72], 4.0)), None]);
-    // A layout without area shows one texel all over: there is nothing to lay the other by, but the other has a place for everything.
+    // A layout without area shows one texel all over: there is nothing to lay the other by, but the other has
+    // a place for everything.
     let (shape, _) = square(1.0);
     let baked = bake(&shape, &[[0.25, 0.5]; 4], &of, MOST_TEXELS).unwrap();
     assert!((shown(&baked, 0.9, 0.4)[0] - of.light.at([0.25, 0.5])[0]).abs() < 0.01);

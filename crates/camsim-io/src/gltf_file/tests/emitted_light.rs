@@ -6,7 +6,10 @@ use super::*;
 fn light_on_a_second_set_of_coordinates_is_shown_where_it_lies() {
     let png = |pixels: [[u8; 3]; 2]| {
         let mut bytes = std::io::Cursor::new(Vec::new());
-        image::RgbImage::from_raw(2, 1, pixels.concat()).unwrap().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        image::RgbImage::from_raw(2, 1, pixels.concat())
+            .unwrap()
+            .write_to(&mut bytes, image::ImageFormat::Png)
+            .unwrap();
         bytes.into_inner()
     };
     // The base colour is black, then blue, from left to right; the light red, then none, from bottom to top.
@@ -47,9 +50,16 @@ fn light_on_a_second_set_of_coordinates_is_shown_where_it_lies() {
         let at = 4 * (pixel[1] * w as usize + pixel[0]);
         mesh.material.texture.rgba8[at..at + 3].to_vec()
     };
-    assert_eq!([at(0.25, 0.25), at(0.75, 0.25), at(0.25, 0.75), at(0.75, 0.75)], [[255, 0, 0], [255, 0, 255], [0, 0, 0], [0, 0, 255]]);
-    // What cannot be told apart is left out, with its name: both triangles lie on each other in both sets, in different ways.
-    let strength = read(&second, r#", "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 0.5 } }"#);
+    assert_eq!(
+        [at(0.25, 0.25), at(0.75, 0.25), at(0.25, 0.75), at(0.75, 0.75)],
+        [[255, 0, 0], [255, 0, 255], [0, 0, 0], [0, 0, 255]]
+    );
+    // What cannot be told apart is left out, with its name: both triangles lie on each other in both sets, in
+    // different ways.
+    let strength = read(
+        &second,
+        r#", "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 0.5 } }"#,
+    );
     let mesh = strength.place(DVec3::ZERO, 0.0, 1.0).next().unwrap();
     let reddest = mesh.material.texture.rgba8.chunks_exact(4).map(|pixel| pixel[0]).max();
     assert_eq!(reddest, Some(188), "half of the light in sRGB");

@@ -52,7 +52,8 @@ impl Good {
         std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
         let path = folder.path().join("model.gltf");
         std::fs::write(&path, self.json.to_string()).unwrap();
-        let options = GltfOptions { time_s: self.json.get("animations").map(|_| 0.5), ..GltfOptions::default() };
+        let options =
+            GltfOptions { time_s: self.json.get("animations").map(|_| 0.5), ..GltfOptions::default() };
         read_gltf(&path, options).map_err(|error| error.to_string())
     }
 }
@@ -97,10 +98,14 @@ fn numbers_that_mean_nothing_are_refused() {
         ("/nodes/0/matrix".into(), json!([1e39].repeat(16)), "nodes.0: with it meshes.0 reaches NaN m"),
     ] {
         let error = with(&[(&pointer, value)]).unwrap_err();
-        assert!(error.contains(wanted) && error.contains("model.gltf"), "{pointer}\n  gives {error}\n  not   {wanted}");
+        assert!(
+            error.contains(wanted) && error.contains("model.gltf"),
+            "{pointer}\n  gives {error}\n  not   {wanted}"
+        );
     }
     let turned = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": 4 } } });
-    let zeros = json!({ "bufferView": 2, "byteOffset": 0, "componentType": 5121, "count": 1, "type": "VEC4" });
+    let zeros =
+        json!({ "bufferView": 2, "byteOffset": 0, "componentType": 5121, "count": 1, "type": "VEC4" });
     let mut good = good(&png(4, 4));
     good.json["nodes"][0]["extensions"] = turned;
     good.json["accessors"].as_array_mut().unwrap().push(zeros);
@@ -111,20 +116,34 @@ fn numbers_that_mean_nothing_are_refused() {
 #[test]
 fn what_is_not_there_is_named_with_its_place() {
     let pictures = json!([{ "uri": "none.png" }]);
-    let channel =
-        json!([{ "channels": [{ "sampler": 0, "target": { "node": 9, "path": "scale" } }], "samplers": [{ "input": 2, "output": 0 }] }]);
+    let channel = json!([{ "channels": [{ "sampler": 0, "target": { "node": 9, "path": "scale" } }], "samplers": [{ "input": 2, "output": 0 }] }]);
     let compressed = json!([{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }]);
     for (changes, wanted) in [
         (vec![("/buffers/0/uri", json!("none.bin"))], "model.gltf: buffers.0: its file"),
         (vec![("/buffers/0/uri", json!("none.bin"))], "none.bin cannot be read"),
         (vec![("/images", pictures)], "model.gltf: images.0: its file"),
         (vec![("/buffers/0/uri", json!(""))], "model.gltf: buffers.0: its uri is no name of a file"),
-        (vec![("/animations", channel)], "model.gltf: animations.0.channels.0: moves node 9, but there are 1"),
-        (vec![("/textures", compressed)], "needs the extension KHR_texture_basisu, which is not supported: write its pictures as PNG"),
-        (vec![("/asset", json!({ "version": "2.0", "minVersion": "2.9" }))], "needs glTF 2.9 (asset.minVersion)"),
+        (
+            vec![("/animations", channel)],
+            "model.gltf: animations.0.channels.0: moves node 9, but there are 1",
+        ),
+        (
+            vec![("/textures", compressed)],
+            "needs the extension KHR_texture_basisu, which is not supported: write its pictures as PNG",
+        ),
+        (
+            vec![("/asset", json!({ "version": "2.0", "minVersion": "2.9" }))],
+            "needs glTF 2.9 (asset.minVersion)",
+        ),
         (vec![("/asset", Value::Null)], "has no asset.version"),
-        (vec![("/nodes/0/mesh", json!(5))], "is not valid: nodes[0].mesh names what is not there; write the file again"),
-        (vec![("/bufferViews/4/byteLength", json!(0))], "images.0: cannot be decoded as PNG, JPEG or WebP: it has no bytes"),
+        (
+            vec![("/nodes/0/mesh", json!(5))],
+            "is not valid: nodes[0].mesh names what is not there; write the file again",
+        ),
+        (
+            vec![("/bufferViews/4/byteLength", json!(0))],
+            "images.0: cannot be decoded as PNG, JPEG or WebP: it has no bytes",
+        ),
     ] {
         let error = with(&changes).unwrap_err();
         assert!(error.contains(wanted), "{changes:?}\n  gives {error}\n  not   {wanted}");
@@ -142,7 +161,10 @@ fn what_is_not_there_is_named_with_its_place() {
 #[test]
 fn a_set_of_coordinates_that_is_not_there_is_noted() {
     let model = with(&[("/materials/0/pbrMetallicRoughness/baseColorTexture/texCoord", json!(5))]).unwrap();
-    assert_eq!(model.notes, ["meshes.0: has no TEXCOORD_5 for its picture to lie by: one texel of it is all over"]);
+    assert_eq!(
+        model.notes,
+        ["meshes.0: has no TEXCOORD_5 for its picture to lie by: one texel of it is all over"]
+    );
 }
 
 #[test]
@@ -150,9 +172,17 @@ fn pictures_of_any_size_are_shown_or_named() {
     let of = |width: u32, height: u32| good(&png(width, height)).read();
     assert!(of(16_384, 1).unwrap().notes.is_empty());
     let notes = of(20_000, 1).unwrap().notes;
-    assert!(notes.len() == 1 && notes[0].contains("images.0: is of 20000x1 px") && notes[0].contains("at most 16384"), "{notes:?}");
+    assert!(
+        notes.len() == 1
+            && notes[0].contains("images.0: is of 20000x1 px")
+            && notes[0].contains("at most 16384"),
+        "{notes:?}"
+    );
     let error = of(40_000, 1).unwrap_err();
-    assert!(error.contains("model.gltf: images.0: is of 40000x1 px, and at most 32768 on a side can be shown"), "{error}");
+    assert!(
+        error.contains("model.gltf: images.0: is of 40000x1 px, and at most 32768 on a side can be shown"),
+        "{error}"
+    );
     let mut claims = png(4, 4);
     claims[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
     assert!(good(&claims).read().unwrap_err().contains("images.0: "));
@@ -169,5 +199,7 @@ fn a_byte_order_mark_is_skipped_and_an_empty_file_is_empty() {
     std::fs::write(&path, b"\xef\xbb\xbf{ \"asset\": { \"version\": \"2.0\" } }").unwrap();
     assert_eq!(read_gltf(&path, GltfOptions::default()).unwrap().triangles(), 0);
     std::fs::write(&path, b"").unwrap();
-    assert!(read_gltf(&path, GltfOptions::default()).unwrap_err().to_string().ends_with("model.gltf: is empty"));
+    assert!(
+        read_gltf(&path, GltfOptions::default()).unwrap_err().to_string().ends_with("model.gltf: is empty")
+    );
 }

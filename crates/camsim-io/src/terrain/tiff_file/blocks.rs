@@ -91,7 +91,17 @@ impl Image {
     /// One band of numbers in the machine's byte order.
     pub fn of_band(size: [u32; 2], sample: Sample, data: Vec<u8>) -> Self {
         let bits = 8 * sample.bytes() as u32;
-        Self { size, bands: 1, is_planar: false, sample, bits, photometric: 1, extra: Vec::new(), data, absent: Vec::new() }
+        Self {
+            size,
+            bands: 1,
+            is_planar: false,
+            sample,
+            bits,
+            photometric: 1,
+            extra: Vec::new(),
+            data,
+            absent: Vec::new(),
+        }
     }
 
     /// A stored number. Whole numbers of more than 53 bits are rounded.
@@ -115,7 +125,11 @@ impl Image {
     /// A stored number of [`Sample::U8`] or [`Sample::U16`].
     pub fn unsigned(&self, pixel: usize, band: usize) -> u32 {
         let index = self.index(pixel, band);
-        if self.sample == Sample::U8 { self.data[index].into() } else { u16::from_ne_bytes(self.at(index)).into() }
+        if self.sample == Sample::U8 {
+            self.data[index].into()
+        } else {
+            u16::from_ne_bytes(self.at(index)).into()
+        }
     }
 
     pub fn pixels(&self) -> usize {
@@ -152,18 +166,26 @@ impl Layout {
         let size = tiff.size(of)?;
         let bands = tiff.integer(of, tag::SAMPLES_PER_PIXEL)?.unwrap_or(1);
         let mut alike = |number: u16, default: u64, what: &str| {
-            let list = tiff.integers(of, number)?.filter(|list| !list.is_empty()).unwrap_or_else(|| vec![default]);
+            let list =
+                tiff.integers(of, number)?.filter(|list| !list.is_empty()).unwrap_or_else(|| vec![default]);
             if list.iter().any(|value| *value != list[0]) {
-                return Err(format!("its bands have different {what} ({list:?}): {}", gdal_translate("-b 1", &tiff.path)));
+                return Err(format!(
+                    "its bands have different {what} ({list:?}): {}",
+                    gdal_translate("-b 1", &tiff.path)
+                ));
             }
             Ok(list[0])
         };
         let bits = alike(tag::BITS_PER_SAMPLE, 1, "bits")?;
         let format = alike(tag::SAMPLE_FORMAT, 1, "sample formats")?;
         let sample = Sample::of(format, bits).ok_or_else(|| {
-            format!("samples of {bits} bits and format {format} are not read: {}", gdal_translate("-ot Float32", &tiff.path))
+            format!(
+                "samples of {bits} bits and format {format} are not read: {}",
+                gdal_translate("-ot Float32", &tiff.path)
+            )
         })?;
-        let mut number = |number: u16, default: u64| Ok::<_, String>(tiff.integer(of, number)?.unwrap_or(default));
+        let mut number =
+            |number: u16, default: u64| Ok::<_, String>(tiff.integer(of, number)?.unwrap_or(default));
         let compression = number(tag::COMPRESSION, NONE)?;
         let predictor = number(tag::PREDICTOR, 1)?;
         let fill_order = number(tag::FILL_ORDER, 1)?;
@@ -171,17 +193,31 @@ impl Layout {
         let photometric = tiff.integer(of, tag::PHOTOMETRIC)?.unwrap_or(if bands >= 3 { 2 } else { 1 });
         let again = || gdal_translate("-co COMPRESS=DEFLATE", &tiff.path);
         if !is_known(compression) {
-            return Err(format!("compression {} is not read; convert it with `{}`", name_of(compression), again()));
+            return Err(format!(
+                "compression {} is not read; convert it with `{}`",
+                name_of(compression),
+                again()
+            ));
         }
-        if !matches!(predictor, 1..=3) || (predictor == 2 && bits % 8 != 0) || (predictor == 3 && format != 3) {
-            return Err(format!("predictor {predictor} for samples of {bits} bits is not read; convert it with `{}`", again()));
+        if !matches!(predictor, 1..=3) || (predictor == 2 && bits % 8 != 0) || (predictor == 3 && format != 3)
+        {
+            return Err(format!(
+                "predictor {predictor} for samples of {bits} bits is not read; convert it with `{}`",
+                again()
+            ));
         }
         if fill_order != 1 && bits < 8 {
-            return Err(format!("bits from the lowest on (FillOrder {fill_order}) are not read; convert it with `{}`", again()));
+            return Err(format!(
+                "bits from the lowest on (FillOrder {fill_order}) are not read; convert it with `{}`",
+                again()
+            ));
         }
         let is_picture = matches!(compression, JPEG | WEBP);
         if is_picture && (bits != 8 || (compression == WEBP && (is_planar || !(3..=4).contains(&bands)))) {
-            return Err(format!("{bands} bands of {bits} bits in JPEG or WebP are not read; convert it with `{}`", again()));
+            return Err(format!(
+                "{bands} bands of {bits} bits in JPEG or WebP are not read; convert it with `{}`",
+                again()
+            ));
         }
         if photometric == 6 && compression != JPEG {
             return Err(format!("YCbCr colours without JPEG are not read; convert it with `{}`", again()));
@@ -231,7 +267,8 @@ impl Layout {
         [at[0], at[1], (self.size[0] - at[0]).min(self.block[0]), (self.size[1] - at[1]).min(self.block[1])]
     }
 
-    /// A block's pixels, row after row, its numbers in the machine's byte order; its rows may be longer than what is wanted of them.
+    /// A block's pixels, row after row, its numbers in the machine's byte order; its rows may be longer than
+    /// what is wanted of them.
     fn decode(&self, block: usize, raw: &[u8]) -> Result<(usize, Vec<u8>), String> {
         let bands = self.block_bands();
         let [_, _, width, rows] = self.place(block);
@@ -255,7 +292,10 @@ impl Layout {
         let row_bytes = (samples as u64 * self.bits).div_ceil(8) as usize;
         let mut data = expand(self.compression, raw, row_bytes * rows)?;
         if !self.bits.is_multiple_of(8) {
-            return Ok((samples, data.chunks_exact(row_bytes).flat_map(|row| spread(row, self.bits as u32, samples)).collect()));
+            return Ok((
+                samples,
+                data.chunks_exact(row_bytes).flat_map(|row| spread(row, self.bits as u32, samples)).collect(),
+            ));
         }
         let bytes = self.sample.bytes();
         for row in data.chunks_exact_mut(row_bytes) {
@@ -296,9 +336,15 @@ fn spread(row: &[u8], bits: u32, samples: usize) -> Vec<u8> {
 fn undo_differences(row: &mut [u8], bytes: usize, bands: usize) {
     match bytes {
         1 => add_left(row, bands, |a: [u8; 1], b| [a[0].wrapping_add(b[0])]),
-        2 => add_left(row, bands, |a, b| u16::from_ne_bytes(a).wrapping_add(u16::from_ne_bytes(b)).to_ne_bytes()),
-        4 => add_left(row, bands, |a, b| u32::from_ne_bytes(a).wrapping_add(u32::from_ne_bytes(b)).to_ne_bytes()),
-        _ => add_left(row, bands, |a, b| u64::from_ne_bytes(a).wrapping_add(u64::from_ne_bytes(b)).to_ne_bytes()),
+        2 => add_left(row, bands, |a, b| {
+            u16::from_ne_bytes(a).wrapping_add(u16::from_ne_bytes(b)).to_ne_bytes()
+        }),
+        4 => add_left(row, bands, |a, b| {
+            u32::from_ne_bytes(a).wrapping_add(u32::from_ne_bytes(b)).to_ne_bytes()
+        }),
+        _ => add_left(row, bands, |a, b| {
+            u64::from_ne_bytes(a).wrapping_add(u64::from_ne_bytes(b)).to_ne_bytes()
+        }),
     }
 }
 
@@ -310,7 +356,8 @@ fn add_left<const N: usize>(row: &mut [u8], bands: usize, add: impl Fn([u8; N], 
     }
 }
 
-/// Predictor 3: all highest bytes of a row first, then the next ones; and each byte less the one `bands` before it.
+/// Predictor 3: all highest bytes of a row first, then the next ones; and each byte less the one `bands`
+/// before it.
 fn undo_float_predictor(row: &mut [u8], bytes: usize, bands: usize) {
     for at in bands..row.len() {
         row[at] = row[at].wrapping_add(row[at - bands]);
@@ -333,23 +380,36 @@ impl TiffFile {
         let impossible = "the stated size is impossible for a file of this length";
         let most = most_decoded(self.bytes);
         let checked = |sides: [u32; 2]| {
-            let all = u64::from(sides[0]).checked_mul(sides[1].into())?.checked_mul((layout.bands * bytes) as u64)?;
+            let all = u64::from(sides[0])
+                .checked_mul(sides[1].into())?
+                .checked_mul((layout.bands * bytes) as u64)?;
             (all <= most).then_some(all as usize)
         };
         let total = checked(layout.size).ok_or(impossible)?;
         checked(layout.block).ok_or(impossible)?;
         let [across, down] = layout.grid().map(u64::from);
         let count = across * down * if layout.is_planar { layout.bands as u64 } else { 1 };
-        let [offsets, counts] =
-            if layout.is_tiled { [tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS] } else { [tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS] };
+        let [offsets, counts] = if layout.is_tiled {
+            [tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS]
+        } else {
+            [tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS]
+        };
         let offsets = self.integers(of, offsets)?.ok_or("it says nothing about where its blocks are")?;
         // Old writers left the lengths of what is not compressed out.
         let counts = match self.integers(of, counts)? {
             Some(counts) => counts,
             None if layout.compression == NONE => {
-                let of_block = (u64::from(layout.block[0]) * layout.block_bands() as u64 * layout.bits).div_ceil(8);
+                let of_block =
+                    (u64::from(layout.block[0]) * layout.block_bands() as u64 * layout.bits).div_ceil(8);
                 (0..offsets.len())
-                    .map(|block| of_block * u64::from(if layout.is_tiled { layout.block[1] } else { layout.place(block)[3] }))
+                    .map(|block| {
+                        of_block
+                            * u64::from(if layout.is_tiled {
+                                layout.block[1]
+                            } else {
+                                layout.place(block)[3]
+                            })
+                    })
                     .collect()
             }
             None => return Err("it says nothing about how long its blocks are".into()),
@@ -378,8 +438,10 @@ impl TiffFile {
                 }
                 raw.push((block, self.read_at(offsets[block], counts[block])?));
             }
-            let decoded: Vec<_> =
-                raw.par_iter().map(|(block, raw)| layout.decode(*block, raw).map(|of_block| (*block, of_block))).collect();
+            let decoded: Vec<_> = raw
+                .par_iter()
+                .map(|(block, raw)| layout.decode(*block, raw).map(|of_block| (*block, of_block)))
+                .collect();
             for block in decoded {
                 let (block, (row_samples, data)) = block?;
                 image.put(&layout, block, row_samples, &data);
@@ -393,7 +455,11 @@ impl Image {
     fn put(&mut self, layout: &Layout, block: usize, row_samples: usize, data: &[u8]) {
         let [column, row, width, height] = layout.place(block).map(|n| n as usize);
         let (bytes, bands) = (self.sample.bytes(), layout.block_bands());
-        let plane = if self.is_planar { block / layout.grid().map(|n| n as usize).iter().product::<usize>() } else { 0 };
+        let plane = if self.is_planar {
+            block / layout.grid().map(|n| n as usize).iter().product::<usize>()
+        } else {
+            0
+        };
         let length = width * bands * bytes;
         for (j, from) in data.chunks_exact(row_samples * bytes).take(height).enumerate() {
             let to = (plane * self.pixels() + (row + j) * self.size[0] as usize + column) * bands * bytes;

@@ -77,7 +77,11 @@ pub(super) fn expand(compression: u64, raw: &[u8], expected: usize) -> Result<Ve
     };
     read.map_err(|error| format!("a block cannot be decompressed: {error}"))?;
     if data.len() < expected {
-        return Err(if compression == NONE { "the file is cut off".into() } else { short(data.len(), expected) });
+        return Err(if compression == NONE {
+            "the file is cut off".into()
+        } else {
+            short(data.len(), expected)
+        });
     }
     Ok(data)
 }
@@ -87,7 +91,9 @@ fn short(found: usize, expected: usize) -> String {
 }
 
 fn expand_lzw(raw: &[u8], expected: usize) -> Result<Vec<u8>, String> {
-    let mut decoder = weezl::decode::Configuration::with_tiff_size_switch(weezl::BitOrder::Msb, 8).with_yield_on_full_buffer(true).build();
+    let mut decoder = weezl::decode::Configuration::with_tiff_size_switch(weezl::BitOrder::Msb, 8)
+        .with_yield_on_full_buffer(true)
+        .build();
     let mut data = vec![0; expected];
     let (mut read, mut written) = (0, 0);
     while written < expected {
@@ -128,7 +134,8 @@ fn unpack_bits(raw: &[u8], expected: usize) -> Vec<u8> {
     data
 }
 
-/// A JPEG, whose tables may be in a tag of their own. `to_rgb`: its colours are YCbCr and become RGB; else its samples stay as they are.
+/// A JPEG, whose tables may be in a tag of their own. `to_rgb`: its colours are YCbCr and become RGB; else
+/// its samples stay as they are.
 pub(super) fn jpeg(tables: Option<&[u8]>, raw: &[u8], to_rgb: bool) -> Result<Picture, String> {
     let stream = match tables {
         // Both are streams from start to end: together they are one.
@@ -159,7 +166,8 @@ pub(super) fn webp(raw: &[u8], samples: usize) -> Result<Picture, String> {
     decoder.read_image(&mut data).map_err(wrong)?;
     if own != samples {
         let channel = |pixel: &[u8], k: usize| pixel.get(k).copied().unwrap_or(255);
-        data = data.chunks_exact(own).flat_map(|pixel| (0..samples).map(move |k| channel(pixel, k))).collect();
+        data =
+            data.chunks_exact(own).flat_map(|pixel| (0..samples).map(move |k| channel(pixel, k))).collect();
     }
     Ok(Picture { size: [width, height], samples, data })
 }

@@ -78,7 +78,10 @@ impl TiffFile {
             return Err(CUT_OFF.into());
         }
         let mut bytes = vec![0; usize::try_from(count).map_err(|_| CUT_OFF)?];
-        self.file.seek(SeekFrom::Start(offset)).and_then(|_| self.file.read_exact(&mut bytes)).map_err(|error| error.to_string())?;
+        self.file
+            .seek(SeekFrom::Start(offset))
+            .and_then(|_| self.file.read_exact(&mut bytes))
+            .map_err(|error| error.to_string())?;
         Ok(bytes)
     }
 
@@ -104,7 +107,8 @@ impl TiffFile {
             let [count_bytes, entry_bytes, room] = if is_big { [8, 20, 8] } else { [2, 12, 4] };
             let count = self.read_at(next, count_bytes)?;
             let count = self.unsigned(&count);
-            let length = count.checked_mul(entry_bytes).and_then(|bytes| bytes.checked_add(room)).ok_or(CUT_OFF)?;
+            let length =
+                count.checked_mul(entry_bytes).and_then(|bytes| bytes.checked_add(room)).ok_or(CUT_OFF)?;
             let table = self.read_at(next + count_bytes, length)?;
             let (entries, link) = table.split_at((length - room) as usize);
             let entries = entries.chunks_exact(entry_bytes as usize).map(|entry| {
@@ -123,7 +127,9 @@ impl TiffFile {
 
     /// The bytes of a value, with the number of its type.
     fn value(&mut self, directory: &Directory, tag: u16) -> Result<Option<(u16, Vec<u8>)>, String> {
-        let Some(entry) = directory.entries.iter().find(|entry| entry.tag == tag).copied() else { return Ok(None) };
+        let Some(entry) = directory.entries.iter().find(|entry| entry.tag == tag).copied() else {
+            return Ok(None);
+        };
         let bytes = (size_of_kind(entry.kind) as u64).checked_mul(entry.count).ok_or(CUT_OFF)?;
         if bytes <= entry.room {
             return Ok(Some((entry.kind, entry.inline[..bytes as usize].to_vec())));

@@ -17,7 +17,16 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 fn wanted(frame: u64) -> Wanted {
     let scenario = Arc::new(read_scenario(&pattern(), &[], None).expect("legal"));
-    Wanted { scenario, reading: 0, frame, stages: vec![Stage::Photometric], size: Size::Preview, truth: false, errors: false, gain: None }
+    Wanted {
+        scenario,
+        reading: 0,
+        frame,
+        stages: vec![Stage::Photometric],
+        size: Size::Preview,
+        truth: false,
+        errors: false,
+        gain: None,
+    }
 }
 
 /// The next picture, with the faults that were told before it.
@@ -33,7 +42,10 @@ fn next(replies: &Receiver<Reply>) -> (FrameReply, Vec<String>) {
 }
 
 /// A worker's thread on `open`, and what a window has of it.
-fn with_worker(open: impl Fn() -> Result<Engine, GpuError> + Sync, test: impl FnOnce(&Mailbox<Wanted>, &Receiver<Reply>)) {
+fn with_worker(
+    open: impl Fn() -> Result<Engine, GpuError> + Sync,
+    test: impl FnOnce(&Mailbox<Wanted>, &Receiver<Reply>),
+) {
     let (sender, replies) = channel();
     let speaker = Speaker { replies: sender, repaint: Arc::new(|| {}) };
     let (mailbox, library) = (Mailbox::default(), Library::default());
@@ -87,7 +99,10 @@ fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
         assert_eq!(devices.lock().expect("one at a time").len(), 2, "opened anew");
         mailbox.put(wanted(0));
         let (after, _) = next(replies);
-        assert_eq!(after.pictures[0].frame.color_rgba, before.pictures[0].frame.color_rgba, "the same picture as before the loss");
+        assert_eq!(
+            after.pictures[0].frame.color_rgba, before.pictures[0].frame.color_rgba,
+            "the same picture as before the loss"
+        );
     });
 }
 

@@ -53,10 +53,14 @@ impl Placement {
         Rect::from_min_size(self.origin, vec2(self.size_px[0] as f32, self.size_px[1] as f32) * self.scale)
     }
 
-    /// Where a picture of `size_px` lies, which may be a preview: its pixels are larger, and the last ones may reach beyond the border.
+    /// Where a picture of `size_px` lies, which may be a preview: its pixels are larger, and the last ones
+    /// may reach beyond the border.
     pub fn picture_rect(&self, size_px: [u32; 2]) -> Rect {
         let factor = if size_px == self.size_px { 1 } else { preview_factor(self.size_px) };
-        Rect::from_min_size(self.origin, vec2((size_px[0] * factor) as f32, (size_px[1] * factor) as f32) * self.scale)
+        Rect::from_min_size(
+            self.origin,
+            vec2((size_px[0] * factor) as f32, (size_px[1] * factor) as f32) * self.scale,
+        )
     }
 
     /// Draws a picture there.
@@ -84,9 +88,18 @@ impl Placement {
 }
 
 /// Zoom at the cursor, pan, pixel under the cursor.
-pub fn interact(ui: &Ui, response: &Response, placements: &[Placement], state: &State, elsewhere: bool, out: &mut Outbox) {
+pub fn interact(
+    ui: &Ui,
+    response: &Response,
+    placements: &[Placement],
+    state: &State,
+    elsewhere: bool,
+    out: &mut Outbox,
+) {
     let pointer = response.hover_pos().filter(|_| !elsewhere);
-    let under = pointer.and_then(|at| placements.iter().find(|placement| placement.pane.contains(at)).map(|placement| (at, placement)));
+    let under = pointer.and_then(|at| {
+        placements.iter().find(|placement| placement.pane.contains(at)).map(|placement| (at, placement))
+    });
     let pixel = under.and_then(|(at, placement)| placement.pixel(at));
     if pixel != state.hovered {
         out.push(Message::Hover(pixel));
@@ -98,7 +111,11 @@ pub fn interact(ui: &Ui, response: &Response, placements: &[Placement], state: &
     if response.double_clicked() {
         view.zoom = None;
     }
-    let Some((at, placement)) = under.or_else(|| placements.first().map(|first| (first.pane.center(), first))) else { return };
+    let Some((at, placement)) =
+        under.or_else(|| placements.first().map(|first| (first.pane.center(), first)))
+    else {
+        return;
+    };
     if response.dragged() && !elsewhere && response.drag_delta() != Vec2::ZERO {
         let centre = placement.share(placement.pane.center() - response.drag_delta());
         (view.zoom, view.centre) = (Some(placement.zoom()), centre.map(|share| share.clamp(-0.5, 1.5)));
@@ -155,9 +172,15 @@ mod tests {
         for pixels_per_point in [1.0, 1.5, 2.0] {
             let placement = middle(1.0, pixels_per_point);
             let on_screen_px = placement.rect().size() * pixels_per_point;
-            assert!((on_screen_px - vec2(64.0, 48.0)).length() < 1e-3, "{on_screen_px} at {pixels_per_point}");
+            assert!(
+                (on_screen_px - vec2(64.0, 48.0)).length() < 1e-3,
+                "{on_screen_px} at {pixels_per_point}"
+            );
             let larger = zoomed(&View::default(), &placement, pane().center(), 2.0);
-            assert!((larger.zoom.expect("zoomed") - 2.0).abs() < 1e-6 && (middle(2.0, pixels_per_point).zoom() - 2.0).abs() < 1e-6);
+            assert!(
+                (larger.zoom.expect("zoomed") - 2.0).abs() < 1e-6
+                    && (middle(2.0, pixels_per_point).zoom() - 2.0).abs() < 1e-6
+            );
             let fitted = Placement::new(pane(), [64, 48], &View::default(), pixels_per_point);
             assert_eq!((fitted.scale, fitted.zoom()), (10.0, 10.0 * pixels_per_point));
         }
@@ -174,7 +197,10 @@ mod tests {
             let share = before.share(at);
             view = zoomed(&view, &before, at, factor);
             let after = Placement::new(pane(), [64, 48], &view, 1e3).share(at);
-            assert!((share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4, "{share:?} {after:?}");
+            assert!(
+                (share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4,
+                "{share:?} {after:?}"
+            );
         }
     }
 

@@ -27,19 +27,34 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     Aside::Below(Rangef::new(top, top + height)).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
         for compare in Compare::ALL {
-            choice(ui, view.compare == compare, compare.label(), compare.label(), "how A and B are held against each other")
-                .clicked()
-                .then(|| view.compare = compare);
+            choice(
+                ui,
+                view.compare == compare,
+                compare.label(),
+                compare.label(),
+                "how A and B are held against each other",
+            )
+            .clicked()
+            .then(|| view.compare = compare);
         }
         if view.compare == Compare::Difference {
-            let field =
-                Field { name: "gain", label: "x", unit: "", range: GAIN, speed: 0.1, decimals: 1, whole: false, tip: "of the difference" };
+            let field = Field {
+                name: "gain",
+                label: "x",
+                unit: "",
+                range: GAIN,
+                speed: 0.1,
+                decimals: 1,
+                whole: false,
+                tip: "of the difference",
+            };
             view.gain = numbers::slider(ui, &field, f64::from(view.gain), out) as f32;
         }
         ui.separator();
         zoom(ui, &mut view);
     });
-    // One below the other, each stage of B below that of A. Overlays have a line of their own, so that the picture stays where it is.
+    // One below the other, each stage of B below that of A. Overlays have a line of their own, so that the
+    // picture stays where it is.
     ui.horizontal_wrapped(|ui| stages(ui, "A", &mut view.a));
     if view.compare != Compare::Single {
         ui.horizontal_wrapped(|ui| stages(ui, "B", &mut view.b));
@@ -71,7 +86,8 @@ fn shown_zoom() -> egui::Id {
     egui::Id::unique("zoom of the picture as it was shown")
 }
 
-/// How large the picture is in this pass, for the line above it in the next one: a fitted picture is as large as its pane has it.
+/// How large the picture is in this pass, for the line above it in the next one: a fitted picture is as large
+/// as its pane has it.
 pub fn remember(ui: &Ui, placement: Option<&Placement>) {
     if let Some(placement) = placement {
         ui.data_mut(|data| data.insert_temp(shown_zoom(), placement.zoom()));
@@ -109,7 +125,8 @@ fn overlays(ui: &mut Ui, view: &mut View) {
     ui.weak("over it").explained("what is drawn over the pictures");
     ui.toggle_value(&mut over.invalid, "invalid")
         .explained("pixels without a ray, or outside of every ideal frame, in the paper's red (I)");
-    ui.toggle_value(&mut over.grid, "grid").explained("lines of equal ideal ray: what the lens does to a square grid (G)");
+    ui.toggle_value(&mut over.grid, "grid")
+        .explained("lines of equal ideal ray: what the lens does to a square grid (G)");
     ui.toggle_value(&mut over.motion, "motion").explained(
         "8 times as large: from where each place would be at the stamp to where it is at its row's time (eq. 16, blue), and its way over the exposure (orange) (M)",
     );

@@ -86,17 +86,24 @@ pub fn chart(ui: &Ui, loaded: &Loaded) -> Chart {
     let stamp_s = |frame: u64| sequence.start_s + frame as f64 / sequence.scenario.camera.fps;
     let last = sequence.frames.saturating_sub(1);
     let count = POINTS.min(last + 1).max(1);
-    let frames = (0..count).map(|k| if count > 1 { (u128::from(k) * u128::from(last) / u128::from(count - 1)) as u64 } else { 0 });
+    let frames = (0..count).map(|k| {
+        if count > 1 { (u128::from(k) * u128::from(last) / u128::from(count - 1)) as u64 } else { 0 }
+    });
     let place = |frame: u64| sequence.path.pose(stamp_s(frame)).position_ned_m;
-    let flown = frames.clone().map(|frame| sequence.path.trajectory.state(stamp_s(frame)).position_ned_m).collect();
+    let flown =
+        frames.clone().map(|frame| sequence.path.trajectory.state(stamp_s(frame)).position_ned_m).collect();
     let track: Vec<(DVec3, f64)> = frames.map(|frame| (place(frame), stamp_s(frame) - stamp_s(0))).collect();
-    let seen = CameraModel::from_spec(&sequence.scenario.camera).map_or_else(|_| Vec::new(), |camera| seen(sequence, &camera));
+    let seen = CameraModel::from_spec(&sequence.scenario.camera)
+        .map_or_else(|_| Vec::new(), |camera| seen(sequence, &camera));
     let (flats, boxes) = things(&sequence.scene);
     let from_above = |corners: &[DVec3; 2]| corners.map(DVec3::truncate);
-    let bounds =
-        bounds(track.iter().map(|(ned, _)| ned.truncate()).chain(seen), flats.iter().map(around).chain(boxes.iter().map(from_above)));
+    let bounds = bounds(
+        track.iter().map(|(ned, _)| ned.truncate()).chain(seen),
+        flats.iter().map(around).chain(boxes.iter().map(from_above)),
+    );
     let terrain = sequence.scene.terrain.as_ref();
-    let relief = terrain.map(|terrain| ui.ctx().load_texture("relief", relief(terrain, bounds), TextureOptions::LINEAR));
+    let relief = terrain
+        .map(|terrain| ui.ctx().load_texture("relief", relief(terrain, bounds), TextureOptions::LINEAR));
     let chart = Chart {
         of,
         track: Arc::new(track),
@@ -115,10 +122,14 @@ pub fn chart(ui: &Ui, loaded: &Loaded) -> Chart {
 fn seen(sequence: &Sequence, camera: &CameraModel) -> Vec<DVec2> {
     let last = sequence.frames.saturating_sub(1);
     let of = |k: u64| {
-        let pose = sequence.path.pose(sequence.start_s + (last * k / 4) as f64 / sequence.scenario.camera.fps);
+        let pose =
+            sequence.path.pose(sequence.start_s + (last * k / 4) as f64 / sequence.scenario.camera.fps);
         let here = pose.position_ned_m.truncate();
         let runs = footprint(&sequence.scene, camera, &pose);
-        runs.into_iter().flatten().map(move |ned| here + (ned.truncate() - here).clamp_length_max(FARTHEST_M)).collect::<Vec<_>>()
+        runs.into_iter()
+            .flatten()
+            .map(move |ned| here + (ned.truncate() - here).clamp_length_max(FARTHEST_M))
+            .collect::<Vec<_>>()
     };
     (0..=4).flat_map(of).collect()
 }
@@ -151,12 +162,16 @@ fn rows(log: &FlightLog, [from_s, to_s]: [f64; 2]) -> Vec<DVec3> {
 
 fn around(corners: &[DVec3; 4]) -> [DVec2; 2] {
     let from_above = corners.map(DVec3::truncate);
-    from_above.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], corner| [low.min(*corner), high.max(*corner)])
+    from_above.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], corner| {
+        [low.min(*corner), high.max(*corner)]
+    })
 }
 
-/// A square around the track and what the camera sees, and around what stands near it; what it stands on may reach beyond.
+/// A square around the track and what the camera sees, and around what stands near it; what it stands on may
+/// reach beyond.
 fn bounds(points: impl Iterator<Item = DVec2>, things: impl Iterator<Item = [DVec2; 2]>) -> [DVec2; 2] {
-    let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), ne| (low.min(ne), high.max(ne)));
+    let (low, high) =
+        points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), ne| (low.min(ne), high.max(ne)));
     if !low.is_finite() || !high.is_finite() {
         return [DVec2::splat(-1.0), DVec2::splat(1.0)];
     }
@@ -164,7 +179,9 @@ fn bounds(points: impl Iterator<Item = DVec2>, things: impl Iterator<Item = [DVe
     let limits = [low - reach, high + reach];
     let near = things.filter(|[from, to]| from.cmple(limits[1]).all() && to.cmpge(limits[0]).all());
     let small = near.filter(|[from, to]| !(from.cmple(low).all() && to.cmpge(high).all()));
-    let (low, high) = small.fold((low, high), |(low, high), [from, to]| (low.min(from.max(limits[0])), high.max(to.min(limits[1]))));
+    let (low, high) = small.fold((low, high), |(low, high), [from, to]| {
+        (low.min(from.max(limits[0])), high.max(to.min(limits[1])))
+    });
     let half = 0.55 * (high - low).max_element().max(SMALLEST_M);
     let middle = 0.5 * (low + high);
     [middle - half, middle + half]
@@ -172,19 +189,26 @@ fn bounds(points: impl Iterator<Item = DVec2>, things: impl Iterator<Item = [DVe
 /// Heights by colour, with light from the north-west.
 fn relief(terrain: &Terrain, [low, high]: [DVec2; 2]) -> ColorImage {
     let at = |x: usize, y: usize| {
-        let share = DVec2::new(1.0 - (y as f64 + 0.5) / RELIEF_PX as f64, (x as f64 + 0.5) / RELIEF_PX as f64);
+        let share =
+            DVec2::new(1.0 - (y as f64 + 0.5) / RELIEF_PX as f64, (x as f64 + 0.5) / RELIEF_PX as f64);
         let ne = low + share * (high - low);
         terrain.down_at(ne.x, ne.y).map(|down_m| -down_m)
     };
-    let heights: Vec<Option<f64>> = (0..RELIEF_PX * RELIEF_PX).map(|i| at(i % RELIEF_PX, i / RELIEF_PX)).collect();
+    let heights: Vec<Option<f64>> =
+        (0..RELIEF_PX * RELIEF_PX).map(|i| at(i % RELIEF_PX, i / RELIEF_PX)).collect();
     let known = || heights.iter().flatten();
-    let (lowest, highest) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| (a.min(*h), b.max(*h)));
+    let (lowest, highest) =
+        known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| (a.min(*h), b.max(*h)));
     let step_m = (high.x - low.x) / RELIEF_PX as f64;
     let pixels = (0..heights.len()).map(|i| {
         let Some(height) = heights[i] else { return Color32::from_gray(40) };
-        let slope =
-            |other: Option<usize>| other.and_then(|i| heights.get(i).copied().flatten()).map_or(0.0, |there| (height - there) / step_m);
-        let light = 0.75 + 0.35 * (slope(i.checked_sub(RELIEF_PX)) + slope(i.checked_sub(1))).clamp(-1.0, 1.0);
+        let slope = |other: Option<usize>| {
+            other
+                .and_then(|i| heights.get(i).copied().flatten())
+                .map_or(0.0, |there| (height - there) / step_m)
+        };
+        let light =
+            0.75 + 0.35 * (slope(i.checked_sub(RELIEF_PX)) + slope(i.checked_sub(1))).clamp(-1.0, 1.0);
         let color = ramp_color(0.15 + 0.6 * (height - lowest) / (highest - lowest).max(1.0));
         Color32::from_rgb(shade(color.r(), light), shade(color.g(), light), shade(color.b(), light))
     });
@@ -205,7 +229,11 @@ mod tests {
         let side = |bounds: [DVec2; 2]| (bounds[1] - bounds[0]).x;
         let alone = bounds(track(), std::iter::empty());
         assert!((side(alone) - 110.0).abs() < 1e-9);
-        assert_eq!(bounds(track(), [[DVec2::splat(-3e3), DVec2::splat(3e3)]].into_iter()), alone, "a pattern below all of it");
+        assert_eq!(
+            bounds(track(), [[DVec2::splat(-3e3), DVec2::splat(3e3)]].into_iter()),
+            alone,
+            "a pattern below all of it"
+        );
         let house = [DVec2::new(150.0, 0.0), DVec2::new(160.0, 10.0)];
         let [low, high] = bounds(track(), [house].into_iter());
         assert!(low.cmple(DVec2::ZERO).all() && high.cmpge(DVec2::new(160.0, 40.0)).all(), "{low} {high}");

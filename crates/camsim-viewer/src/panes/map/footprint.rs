@@ -16,8 +16,9 @@ const HALVINGS: u32 = 9;
 /// Surfaces of more triangles are no ground.
 const FLAT_TRIANGLES: usize = 2;
 
-/// The outermost ground that is seen in directions all around the picture, closed; `None` where there is none in a direction. Where
-/// a lens folds, the picture's corners have no rays, and beyond the horizon or beside the terrain rays meet nothing: then it is what is seen last.
+/// The outermost ground that is seen in directions all around the picture, closed; `None` where there is none
+/// in a direction. Where a lens folds, the picture's corners have no rays, and beyond the horizon or beside
+/// the terrain rays meet nothing: then it is what is seen last.
 pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec3>> {
     let meets = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
     let mut runs: Vec<Vec<DVec3>> = vec![Vec::new()];
@@ -33,7 +34,8 @@ pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<
     runs
 }
 
-/// What `of` says of the ray of the outermost pixel for which it says anything, from the middle of the picture in a direction of it.
+/// What `of` says of the ray of the outermost pixel for which it says anything, from the middle of the
+/// picture in a direction of it.
 pub fn outermost<T>(camera: &CameraModel, direction: DVec2, of: impl Fn(DVec2) -> Option<T>) -> Option<T> {
     let size_px = DVec2::new(f64::from(camera.size_px[0]), f64::from(camera.size_px[1]));
     let half_px = 0.5 * (size_px - 1.0);
@@ -58,9 +60,14 @@ pub fn outermost<T>(camera: &CameraModel, direction: DVec2, of: impl Fn(DVec2) -
 /// The nearest of terrain, pattern and board along a ray.
 pub fn ground(scene: &Scene, pose: &CameraPose, direction_ned: DVec3) -> Option<DVec3> {
     let origin = pose.position_ned_m;
-    let terrain = scene.terrain.as_ref().and_then(|terrain| terrain.intersect(origin, direction_ned, f64::INFINITY)).map(|hit| hit.t);
+    let terrain = scene
+        .terrain
+        .as_ref()
+        .and_then(|terrain| terrain.intersect(origin, direction_ned, f64::INFINITY))
+        .map(|hit| hit.t);
     let flat = scene.meshes.iter().filter(|mesh| is_flat(mesh));
-    let nearest = flat.filter_map(|mesh| mesh.intersect(origin, direction_ned, f64::INFINITY)).map(|(t, _)| t);
+    let nearest =
+        flat.filter_map(|mesh| mesh.intersect(origin, direction_ned, f64::INFINITY)).map(|(t, _)| t);
     let t = nearest.chain(terrain).min_by(f64::total_cmp)?;
     Some(origin + t * direction_ned)
 }
@@ -81,7 +88,8 @@ mod tests {
     fn above() -> (Scene, CameraPose) {
         let texture = camsim_core::scene::Texture::uniform([255; 4], camsim_core::scene::Encoding::Srgb);
         let level = Mesh::level_picture(std::sync::Arc::new(texture), DVec3::ZERO, 1e4);
-        let down = CameraPose { position_ned_m: DVec3::new(10.0, 20.0, -100.0), ned_from_camera: DQuat::IDENTITY };
+        let down =
+            CameraPose { position_ned_m: DVec3::new(10.0, 20.0, -100.0), ned_from_camera: DQuat::IDENTITY };
         (Scene { meshes: vec![level], ..Scene::default() }, down)
     }
 
@@ -121,7 +129,8 @@ mod tests {
     #[test]
     fn beside_the_ground_it_is_what_is_seen_last() {
         let (mut scene, pose) = above();
-        // 60 x 60 m about the origin, the camera above (10, 20): all of it is in the picture, which shows 200 x 100 m.
+        // 60 x 60 m about the origin, the camera above (10, 20): all of it is in the picture, which shows 200
+        // x 100 m.
         let texture = camsim_core::scene::Texture::uniform([255; 4], camsim_core::scene::Encoding::Srgb);
         scene.meshes = vec![Mesh::level_picture(std::sync::Arc::new(texture), DVec3::ZERO, 60.0)];
         let runs = footprint(&scene, &camera(&[]), &pose);

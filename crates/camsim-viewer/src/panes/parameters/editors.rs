@@ -58,7 +58,15 @@ fn as_f64(value: &Value) -> f64 {
 }
 
 /// A value to drag or to type.
-fn drag(ui: &mut Ui, name: &str, label: &str, value: f64, param: &Param, whole: bool, out: &mut Outbox) -> Option<(f64, bool)> {
+fn drag(
+    ui: &mut Ui,
+    name: &str,
+    label: &str,
+    value: f64,
+    param: &Param,
+    whole: bool,
+    out: &mut Outbox,
+) -> Option<(f64, bool)> {
     let Param { unit, range, speed, tip, .. } = *param;
     number_field(ui, &Field { name, label, unit, range, speed, decimals: 7, whole, tip }, value, out)
 }
@@ -67,16 +75,24 @@ fn to_value(number: f64, whole: bool) -> Value {
     if whole { Value::Integer(number.round() as i64) } else { Value::Float(number) }
 }
 
-fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: bool, out: &mut Outbox) -> Option<Edit> {
+fn number(
+    ui: &mut Ui,
+    key: &str,
+    value: Option<&Value>,
+    param: &Param,
+    whole: bool,
+    out: &mut Outbox,
+) -> Option<Edit> {
     let Some(value) = value else {
         let add = ui.button("set").explained(param.tip);
         named(&add, Role::Button, &format!("set {key}"));
         return add.clicked().then(|| to_value(first_value(param), whole)).and_then(once);
     };
-    let edit =
-        drag(ui, key, "", as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
+    let edit = drag(ui, key, "", as_f64(value), param, whole, out)
+        .map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
     let may_be_left_out =
-        matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white") || key.starts_with("scene.light.");
+        matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
+            || key.starts_with("scene.light.");
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, ongoing: false });
     }
@@ -103,14 +119,26 @@ fn remove(ui: &mut Ui, key: &str) -> bool {
     button.clicked()
 }
 
-fn number_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, words: &[&str], whole: bool, out: &mut Outbox) -> Option<Edit> {
+fn number_or(
+    ui: &mut Ui,
+    key: &str,
+    value: Option<&Value>,
+    param: &Param,
+    words: &[&str],
+    whole: bool,
+    out: &mut Outbox,
+) -> Option<Edit> {
     let value = value?;
     for word in words {
         let is_word = value.as_str() == Some(word);
         let response = ui.selectable_label(is_word, *word).explained(param.tip);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
-            return if is_word { once(to_value(first_value(param).max(1.0), whole)) } else { once(Value::String((*word).into())) };
+            return if is_word {
+                once(to_value(first_value(param).max(1.0), whole))
+            } else {
+                once(Value::String((*word).into()))
+            };
         }
     }
     if value.is_str() { None } else { number(ui, key, Some(value), param, whole, out) }
@@ -130,9 +158,15 @@ fn numbers(
     let array = value?.as_array()?;
     let mut edit = None;
     for (at, element) in array.iter().take(count).enumerate() {
-        if let Some((number, ongoing)) =
-            drag(ui, &format!("{key}[{at}]"), labels.get(at).unwrap_or(&""), as_f64(element), param, whole, out)
-        {
+        if let Some((number, ongoing)) = drag(
+            ui,
+            &format!("{key}[{at}]"),
+            labels.get(at).unwrap_or(&""),
+            as_f64(element),
+            param,
+            whole,
+            out,
+        ) {
             let mut changed = array.clone();
             changed[at] = to_value(number, whole);
             edit = Some(Edit { value: Some(Value::Array(changed)), ongoing });
@@ -154,7 +188,11 @@ fn optional(
     let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"));
     if value.is_some() {
         let edit = numbers(ui, document, key, value, param, count, false, out);
-        return if may_be_left_out && remove(ui, key) { Some(Edit { value: None, ongoing: false }) } else { edit };
+        return if may_be_left_out && remove(ui, key) {
+            Some(Edit { value: None, ongoing: false })
+        } else {
+            edit
+        };
     }
     let add = ui.button("set").explained(param.tip);
     named(&add, Role::Button, &format!("set {key}"));
@@ -181,16 +219,28 @@ fn numbers_or(
     let response = ui.selectable_label(is_word, word).explained(param.tip);
     named(&response, Role::Button, &format!("{key}: {word}"));
     if response.clicked() {
-        return once(if is_word { Value::Array(vec![Value::Float(0.0); count]) } else { Value::String(word.into()) });
+        return once(if is_word {
+            Value::Array(vec![Value::Float(0.0); count])
+        } else {
+            Value::String(word.into())
+        });
     }
     if is_word { None } else { numbers(ui, document, key, value, param, count, false, out) }
 }
 
 /// As many numbers as one likes.
-fn list(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>, param: &Param, out: &mut Outbox) -> Option<Edit> {
+fn list(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    value: Option<&Value>,
+    param: &Param,
+    out: &mut Outbox,
+) -> Option<Edit> {
     let array = value?.as_array()?;
     let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
-    let (more, less) = (ui.small_button("+").explained("one more"), ui.small_button("-").explained("one less"));
+    let (more, less) =
+        (ui.small_button("+").explained("one more"), ui.small_button("-").explained("one less"));
     named(&more, Role::Button, &format!("one more of {key}"));
     named(&less, Role::Button, &format!("one less of {key}"));
     let mut changed = array.clone();
@@ -203,14 +253,17 @@ fn list(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>, para
     edit
 }
 
-/// A path is taken when it has been typed to the end: half a path is no file. Files beside the scenario go by their names, as in its file.
+/// A path is taken when it has been typed to the end: half a path is no file. Files beside the scenario go by
+/// their names, as in its file.
 fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> Option<Edit> {
     let present = value.and_then(Value::as_str).unwrap_or_default();
     let id = egui::Id::unique(("path", key));
     let (beside, elsewhere) = (document.beside(present), shortened(present));
     let resting = if beside.len() < present.len() { beside.clone() } else { elsewhere };
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or(resting);
-    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).explained(present);
+    let response = ui
+        .add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none"))
+        .explained(present);
     named(&response, Role::TextInput, key);
     if response.gained_focus() {
         ui.data_mut(|data| data.insert_temp(id, beside));
@@ -233,7 +286,9 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
     let present = value.and_then(Value::as_str).unwrap_or_default();
     let id = egui::Id::unique(("text", key));
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
-    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).explained(param.tip);
+    let response = ui
+        .add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none"))
+        .explained(param.tip);
     named(&response, Role::TextInput, key);
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
@@ -279,7 +334,9 @@ fn several(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Opt
         let response = ui.toggle_value(&mut on, *word);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
-            let kept = words.iter().filter(|other| if *other == word { on } else { array.iter().any(|e| e.as_str() == Some(other)) });
+            let kept = words.iter().filter(|other| {
+                if *other == word { on } else { array.iter().any(|e| e.as_str() == Some(other)) }
+            });
             edit = once(Value::Array(kept.map(|word| Value::String((*word).into())).collect()));
         }
     }

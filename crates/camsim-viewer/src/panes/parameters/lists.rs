@@ -29,7 +29,9 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
         });
         ui.indent((key, at), |ui| {
             for (element, kind) in keys() {
-                let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else { continue };
+                let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else {
+                    continue;
+                };
                 if let Some(param) = params::of(element) {
                     row_at(ui, state, document, &format!("{key}.{at}.{field}"), *kind, param, out);
                 }

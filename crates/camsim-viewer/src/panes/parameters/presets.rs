@@ -73,7 +73,11 @@ impl Preset {
             focal_px: self.focal_px,
             principal_point_px: Some(self.principal_point_px),
             lens: LensSpec { model: self.model, coefficients: self.coefficients.to_vec() },
-            shutter: ShutterSpec { readout_ms: self.readout_ms, exposure_ms: self.exposure_ms, ..ShutterSpec::default() },
+            shutter: ShutterSpec {
+                readout_ms: self.readout_ms,
+                exposure_ms: self.exposure_ms,
+                ..ShutterSpec::default()
+            },
             ..CameraSpec::default()
         }
     }
@@ -81,13 +85,14 @@ impl Preset {
 
 /// The choice; mount, frame rate and phase stay as they are.
 pub fn show(ui: &mut Ui, out: &mut Outbox) {
-    let combo = egui::ComboBox::from_id_salt("camera preset").selected_text("camera preset").show_ui(ui, |ui| {
-        for preset in PRESETS {
-            if ui.selectable_label(false, preset.name).explained(preset.source).clicked() {
-                out.push(Message::Camera(Box::new(preset.camera())));
+    let combo =
+        egui::ComboBox::from_id_salt("camera preset").selected_text("camera preset").show_ui(ui, |ui| {
+            for preset in PRESETS {
+                if ui.selectable_label(false, preset.name).explained(preset.source).clicked() {
+                    out.push(Message::Camera(Box::new(preset.camera())));
+                }
             }
-        }
-    });
+        });
     named(&combo.response, Role::ComboBox, "camera preset");
     combo
         .response

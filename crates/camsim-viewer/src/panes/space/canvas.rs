@@ -1,4 +1,5 @@
-//! Faces and lines in three dimensions by egui's painter: one mesh, whose triangles are drawn from the farthest to the nearest.
+//! Faces and lines in three dimensions by egui's painter: one mesh, whose triangles are drawn from the
+//! farthest to the nearest.
 
 use eframe::egui::{Color32, Mesh, Pos2, Shape, Vec2, vec2};
 use glam::DVec3;
@@ -64,7 +65,8 @@ impl Canvas {
             .map(|corner| {
                 let (ned_m, color) = (*corner)?;
                 let seen = self.eye.seen(ned_m);
-                let index = if seen.z >= near_m { self.corner(self.on_screen(seen), color) } else { u32::MAX };
+                let index =
+                    if seen.z >= near_m { self.corner(self.on_screen(seen), color) } else { u32::MAX };
                 Some((seen, color, index))
             })
             .collect();
@@ -107,7 +109,8 @@ impl Canvas {
             return;
         }
         let depth = kept.iter().map(|corner| corner.z).sum::<f64>() / kept.len() as f64;
-        let indices: Vec<u32> = kept.iter().map(|corner| self.corner(self.on_screen(*corner), color)).collect();
+        let indices: Vec<u32> =
+            kept.iter().map(|corner| self.corner(self.on_screen(*corner), color)).collect();
         for pair in indices[1..].windows(2) {
             self.triangles.push((depth as f32, [indices[0], pair[0], pair[1]]));
         }
@@ -132,8 +135,12 @@ impl Canvas {
         }
         let aside = along.normalized().rot90();
         let inner = 0.5 * (width - FADE).max(0.1);
-        let steps: [(f32, Color32); 4] =
-            [(-inner - FADE, Color32::TRANSPARENT), (-inner, color), (inner, color), (inner + FADE, Color32::TRANSPARENT)];
+        let steps: [(f32, Color32); 4] = [
+            (-inner - FADE, Color32::TRANSPARENT),
+            (-inner, color),
+            (inner, color),
+            (inner + FADE, Color32::TRANSPARENT),
+        ];
         let ends = steps.map(|(by, color)| [from, to].map(|end| self.corner(end + by * aside, color)));
         for pair in ends.windows(2) {
             let [[a, b], [c, d]] = [pair[0], pair[1]];
@@ -149,8 +156,9 @@ impl Canvas {
         }
         let (at, depth) = (self.on_screen(seen), (seen.z - lift_m) as f32);
         let middle = self.corner(at, color);
-        let rim: Vec<u32> =
-            (0..8).map(|k| self.corner(at + radius * Vec2::angled(std::f32::consts::TAU * k as f32 / 8.0), color)).collect();
+        let rim: Vec<u32> = (0..8)
+            .map(|k| self.corner(at + radius * Vec2::angled(std::f32::consts::TAU * k as f32 / 8.0), color))
+            .collect();
         for k in 0..8 {
             self.triangles.push((depth, [middle, rim[k], rim[(k + 1) % 8]]));
         }
@@ -185,19 +193,26 @@ impl Canvas {
         let depth = seen.iter().map(|corner| corner.z).sum::<f64>() / 4.0;
         for k in 0..4 {
             if let [from, to] = self.eye.clipped(&[seen[k], seen[(k + 1) % 4]]).as_slice() {
-                self.stroke([self.on_screen(*from), self.on_screen(*to)], 1.0, Color32::from_black_alpha(140), depth as f32);
+                self.stroke(
+                    [self.on_screen(*from), self.on_screen(*to)],
+                    1.0,
+                    Color32::from_black_alpha(140),
+                    depth as f32,
+                );
             }
         }
     }
 
-    /// What a camera sees from its place as far as a rim: sides that can be looked through, and their edges at the corners.
+    /// What a camera sees from its place as far as a rim: sides that can be looked through, and their edges
+    /// at the corners.
     pub fn pyramid(&mut self, apex_ned_m: DVec3, rim: &[DVec3], color: Color32) {
         let count = rim.len();
         if count < 3 {
             return;
         }
-        let pieces =
-            |from: DVec3, to: DVec3| -> Vec<DVec3> { (0..=PIECES).map(|k| from.lerp(to, f64::from(k) / f64::from(PIECES))).collect() };
+        let pieces = |from: DVec3, to: DVec3| -> Vec<DVec3> {
+            (0..=PIECES).map(|k| from.lerp(to, f64::from(k) / f64::from(PIECES))).collect()
+        };
         for k in 0..count {
             self.face(&[apex_ned_m, rim[k], rim[(k + 1) % count]], color.gamma_multiply(0.10));
         }
@@ -247,9 +262,16 @@ mod tests {
         canvas.surface(&level(-5.0, Color32::RED));
         canvas.surface(&level(5.0, Color32::GREEN));
         canvas.line(&[DVec3::new(0.0, -1.0, 5.0), DVec3::new(0.0, 1.0, 5.0)], 2.0, Color32::BLUE, 0.5);
-        let colors: Vec<Color32> = triangles(canvas).iter().map(|corners| corners.iter().find(|c| c.1.a() > 0).expect("seen").1).collect();
+        let colors: Vec<Color32> = triangles(canvas)
+            .iter()
+            .map(|corners| corners.iter().find(|c| c.1.a() > 0).expect("seen").1)
+            .collect();
         let expected = [Color32::GREEN; 2].into_iter().chain([Color32::BLUE; 6]).chain([Color32::RED; 2]);
-        assert_eq!(colors, expected.collect::<Vec<_>>(), "from above: the green one lies below, with a line on it");
+        assert_eq!(
+            colors,
+            expected.collect::<Vec<_>>(),
+            "from above: the green one lies below, with a line on it"
+        );
     }
 
     #[test]
@@ -259,7 +281,8 @@ mod tests {
         canvas.cuboid([DVec3::splat(-1.0), DVec3::splat(1.0)], Color32::WHITE, false);
         let drawn = triangles(canvas);
         assert_eq!(drawn.len(), 2);
-        // The top is 10 / sin 22.5 deg - 1 = 25.13 m away, and 100 / tan 22.5 deg = 241.4 points are a tangent of 1.
+        // The top is 10 / sin 22.5 deg - 1 = 25.13 m away, and 100 / tan 22.5 deg = 241.4 points are a
+        // tangent of 1.
         for (at, _) in drawn.iter().flatten() {
             let away = *at - pos2(100.0, 100.0);
             assert!((away.x.abs() - 9.606).abs() < 1e-2 && (away.y.abs() - 9.606).abs() < 1e-2, "{away}");
@@ -269,7 +292,9 @@ mod tests {
     #[test]
     fn holes_of_a_surface_stay_open_and_what_is_behind_the_eye_is_not_drawn() {
         let mut canvas = canvas();
-        let mut corners: Vec<_> = (0..9).map(|k| Some((DVec3::new(-f64::from(k / 3), f64::from(k % 3), 0.0), Color32::WHITE))).collect();
+        let mut corners: Vec<_> = (0..9)
+            .map(|k| Some((DVec3::new(-f64::from(k / 3), f64::from(k % 3), 0.0), Color32::WHITE)))
+            .collect();
         corners[8] = None;
         canvas.surface(&Surface { columns: 3, corners });
         canvas.dot(DVec3::new(0.0, 0.0, -1e3), 3.0, Color32::RED, 0.0);

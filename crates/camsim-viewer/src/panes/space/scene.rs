@@ -1,4 +1,5 @@
-//! What of the 3D view is the same from frame to frame: ground, patterns and boards, and how large all of it is.
+//! What of the 3D view is the same from frame to frame: ground, patterns and boards, and how large all of it
+//! is.
 
 use std::sync::Arc;
 
@@ -47,17 +48,27 @@ pub fn id() -> Id {
 
 /// The last one, or another for another sequence.
 pub fn model(ui: &Ui, sequence: &Sequence, chart: &Chart) -> Model {
-    if let Some(model) = ui.data(|data| data.get_temp::<Model>(id())).filter(|model| Arc::ptr_eq(&model.of, &chart.track)) {
+    if let Some(model) =
+        ui.data(|data| data.get_temp::<Model>(id())).filter(|model| Arc::ptr_eq(&model.of, &chart.track))
+    {
         return model;
     }
     let scene = &sequence.scene;
-    let ground = scene.terrain.as_ref().map_or_else(Surface::default, |terrain| ground(terrain, chart.bounds));
+    let ground =
+        scene.terrain.as_ref().map_or_else(Surface::default, |terrain| ground(terrain, chart.bounds));
     let count = chart::flats(scene).count().max(1);
     let cells = ((FLAT_CELLS / count as f64).sqrt() as usize).clamp(1, 64);
     let flats: Vec<Surface> = chart::flats(scene).map(|mesh| flat(mesh, cells)).collect();
     let ball = ball(chart, &ground);
     let step_m = (chart.bounds[1] - chart.bounds[0]).max_element() / GROUND_CELLS as f64;
-    let model = Model { of: chart.track.clone(), ground: Arc::new(ground), flats: Arc::new(flats), ball, step_m, bounds: chart.bounds };
+    let model = Model {
+        of: chart.track.clone(),
+        ground: Arc::new(ground),
+        flats: Arc::new(flats),
+        ball,
+        step_m,
+        bounds: chart.bounds,
+    };
     ui.data_mut(|data| data.insert_temp(id(), model.clone()));
     model
 }
@@ -66,7 +77,9 @@ impl Model {
     /// The corner of the ground that is nearest to what lies below a place.
     pub fn below(&self, ned_m: DVec3) -> Option<DVec3> {
         let share = (ned_m.truncate() - self.bounds[0]) / (self.bounds[1] - self.bounds[0]);
-        let index = |share: f64| ((0.0..=1.0).contains(&share)).then(|| (share * GROUND_CELLS as f64).round() as usize);
+        let index = |share: f64| {
+            ((0.0..=1.0).contains(&share)).then(|| (share * GROUND_CELLS as f64).round() as usize)
+        };
         let (row, column) = (index(1.0 - share.x)?, index(share.y)?);
         let (corner, _) = (*self.ground.corners.get(row * self.ground.columns + column)?)?;
         Some(ned_m.truncate().extend(corner.z))
@@ -79,15 +92,21 @@ fn ground(terrain: &Terrain, [low, high]: [DVec2; 2]) -> Surface {
     let top = terrain.bounds.min.z - 1.0;
     let deep = terrain.bounds.max.z - top + 1.0;
     // Of the picture, which covers all of the terrain: what a cell of the ground has of it.
-    let spread = (high - low) / (terrain.bounds.max - terrain.bounds.min).truncate().max(DVec2::splat(1e-9)) / GROUND_CELLS as f64;
+    let spread = (high - low)
+        / (terrain.bounds.max - terrain.bounds.min).truncate().max(DVec2::splat(1e-9))
+        / GROUND_CELLS as f64;
     let spread = [spread.y.clamp(0.0, 1.0), spread.x.clamp(0.0, 1.0)];
     let corner = |at: usize| {
-        let share = DVec2::new(1.0 - (at / columns) as f64 / GROUND_CELLS as f64, (at % columns) as f64 / GROUND_CELLS as f64);
+        let share = DVec2::new(
+            1.0 - (at / columns) as f64 / GROUND_CELLS as f64,
+            (at % columns) as f64 / GROUND_CELLS as f64,
+        );
         let ne = low + share * (high - low);
         let hit = terrain.intersect(DVec3::new(ne.x, ne.y, top), DVec3::Z, deep)?;
         let color = mean(&terrain.texture, hit.uv, spread);
         // Light from the north-west, at half of a right angle.
-        let light = 0.55 + 0.6 * hit.normal_ned.dot(DVec3::new(0.5, -0.5, -std::f64::consts::FRAC_1_SQRT_2)).max(0.0);
+        let light =
+            0.55 + 0.6 * hit.normal_ned.dot(DVec3::new(0.5, -0.5, -std::f64::consts::FRAC_1_SQRT_2)).max(0.0);
         Some((DVec3::new(ne.x, ne.y, top + hit.t), shaded(color, light)))
     };
     Surface { columns, corners: (0..columns * columns).map(corner).collect() }
@@ -109,7 +128,8 @@ fn flat(mesh: &Mesh, cells: usize) -> Surface {
     Surface { columns, corners: (0..columns * columns).map(at).collect() }
 }
 
-/// Mean of a picture around a place, linear light; `spread` is the part of the picture that counts, across and down.
+/// Mean of a picture around a place, linear light; `spread` is the part of the picture that counts, across
+/// and down.
 fn mean(texture: &Texture, uv: [f64; 2], spread: [f64; 2]) -> [f32; 3] {
     let mut sum = [0.0; 3];
     for k in 0..SAMPLES * SAMPLES {
@@ -125,18 +145,23 @@ fn mean(texture: &Texture, uv: [f64; 2], spread: [f64; 2]) -> [f32; 3] {
 }
 
 fn shaded(linear: [f32; 3], light: f64) -> Color32 {
-    let [r, g, b] = linear.map(|value| (255.0 * srgb_from_linear((value * light as f32).clamp(0.0, 1.0))).round() as u8);
+    let [r, g, b] =
+        linear.map(|value| (255.0 * srgb_from_linear((value * light as f32).clamp(0.0, 1.0))).round() as u8);
     Color32::from_rgb(r, g, b)
 }
 
 /// Around the ground of the map, the flight, and what stands near it.
 fn ball(chart: &Chart, ground: &Surface) -> Ball {
-    let within = |ned: &DVec3| ned.truncate().cmpge(chart.bounds[0]).all() && ned.truncate().cmple(chart.bounds[1]).all();
+    let within = |ned: &DVec3| {
+        ned.truncate().cmpge(chart.bounds[0]).all() && ned.truncate().cmple(chart.bounds[1]).all()
+    };
     let heights = ground.corners.iter().flatten().map(|(ned, _)| *ned);
     let things = chart.flats.iter().flatten().chain(chart.boxes.iter().flatten()).copied().filter(within);
     let flight = chart.track.iter().map(|(ned, _)| *ned).chain(chart.flown.iter().copied());
-    let (low, high) =
-        heights.chain(flight).chain(things).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), ned| (low.min(ned.z), high.max(ned.z)));
+    let (low, high) = heights
+        .chain(flight)
+        .chain(things)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), ned| (low.min(ned.z), high.max(ned.z)));
     let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
     let (from, to) = (chart.bounds[0].extend(low), chart.bounds[1].extend(high));
     Ball { middle_ned_m: 0.5 * (from + to), radius_m: (0.5 * (to - from)).length().max(0.5) }
@@ -150,7 +175,8 @@ mod tests {
 
     /// Four pixels across and two down: the left half black, the right one white.
     fn halves() -> Texture {
-        let row: Vec<u8> = [0_u8, 0, 255, 255].iter().flat_map(|value| [*value, *value, *value, 255]).collect();
+        let row: Vec<u8> =
+            [0_u8, 0, 255, 255].iter().flat_map(|value| [*value, *value, *value, 255]).collect();
         Texture { size_px: [4, 2], rgba8: [row.clone(), row].concat(), encoding: Encoding::Srgb }
     }
 

@@ -14,7 +14,8 @@ use crate::{
 
 /// Rays along each side of the picture.
 const ALONG: u32 = 10;
-/// Length of the pyramid, of the scene's radius: as far as the ground in the middle, but neither less nor more than this.
+/// Length of the pyramid, of the scene's radius: as far as the ground in the middle, but neither less nor
+/// more than this.
 const REACH: [f64; 2] = [0.06, 0.45];
 
 /// Rays of the pyramid, times its height, at most.
@@ -33,7 +34,13 @@ pub struct Sight {
 
 impl Sight {
     /// The last one, or another for another frame; `None` for a camera without rays.
-    pub fn new(ui: &Ui, state: &State, sequence: &Arc<Sequence>, pose: &CameraPose, radius_m: f64) -> Option<Self> {
+    pub fn new(
+        ui: &Ui,
+        state: &State,
+        sequence: &Arc<Sequence>,
+        pose: &CameraPose,
+        radius_m: f64,
+    ) -> Option<Self> {
         type Kept = (Weak<Sequence>, u64, Option<u64>, Option<Sight>);
         let frame = state.timeline.frame;
         // Of a zoom lens, the calibration that the frame on show was made with.
@@ -41,13 +48,19 @@ impl Sight {
         let zoom = picture.and_then(|picture| picture.plan.zoom);
         let id = Id::unique("sight of the camera");
         let kept = ui.data(|data| data.get_temp::<Kept>(id));
-        let is_same =
-            |kept: &Kept| std::ptr::eq(kept.0.as_ptr(), Arc::as_ptr(sequence)) && kept.1 == frame && kept.2 == zoom.map(f64::to_bits);
+        let is_same = |kept: &Kept| {
+            std::ptr::eq(kept.0.as_ptr(), Arc::as_ptr(sequence))
+                && kept.1 == frame
+                && kept.2 == zoom.map(f64::to_bits)
+        };
         if let Some((.., sight)) = kept.filter(is_same) {
             return sight;
         }
         let spec = &sequence.scenario.camera;
-        let camera = zoom.map_or_else(|| motion::camera_of(spec), |zoom| CameraModel::at_zoom(spec, zoom).ok().map(Arc::new));
+        let camera = zoom.map_or_else(
+            || motion::camera_of(spec),
+            |zoom| CameraModel::at_zoom(spec, zoom).ok().map(Arc::new),
+        );
         let sight = camera.map(|camera| {
             let ground = map::footprint(ui, sequence, frame, &camera, pose);
             let middle = outermost(&camera, DVec2::ZERO, Some).unwrap_or_default();
@@ -60,15 +73,22 @@ impl Sight {
             let rim = rim(&camera).into_iter().map(|uv| pose.position_ned_m + pose.ned_from_camera * end(uv));
             Self { rim: rim.collect(), ground, field_deg: field_deg(&camera) }
         });
-        ui.data_mut(|data| data.insert_temp::<Kept>(id, (Arc::downgrade(sequence), frame, zoom.map(f64::to_bits), sight.clone())));
+        ui.data_mut(|data| {
+            data.insert_temp::<Kept>(
+                id,
+                (Arc::downgrade(sequence), frame, zoom.map(f64::to_bits), sight.clone()),
+            )
+        });
         sight
     }
 }
 
-/// Outermost rays towards places along the picture's border, clockwise from the upper left corner; a corner that has no ray is where the lens ends.
+/// Outermost rays towards places along the picture's border, clockwise from the upper left corner; a corner
+/// that has no ray is where the lens ends.
 fn rim(camera: &CameraModel) -> Vec<DVec2> {
     let half = DVec2::new(f64::from(camera.size_px[0].max(2) - 1), f64::from(camera.size_px[1].max(2) - 1));
-    let corners = [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0)];
+    let corners =
+        [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0)];
     let along = (0..4 * ALONG).map(|k| {
         let (side, step) = ((k / ALONG) as usize, f64::from(k % ALONG) / f64::from(ALONG));
         half * corners[side].lerp(corners[(side + 1) % 4], step)
@@ -94,7 +114,14 @@ mod tests {
     use super::*;
 
     fn camera(coefficients: &[f64]) -> CameraModel {
-        CameraModel::new([201, 101], [100.0, 100.0], Some([100.0, 50.0]), LensModel::BrownConrady, coefficients).expect("a camera")
+        CameraModel::new(
+            [201, 101],
+            [100.0, 100.0],
+            Some([100.0, 50.0]),
+            LensModel::BrownConrady,
+            coefficients,
+        )
+        .expect("a camera")
     }
 
     #[test]
