@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use camsim::{
     core::scenario::Channel,
-    gpu::{AdapterChoice, Engine},
+    engine::{AdapterChoice, Engine},
 };
 
 mod flight;
@@ -36,7 +36,7 @@ fn main() -> Outcome<()> {
     let demo = &loaded.sequence;
     let engine = Engine::new(AdapterChoice::Best)?;
     let [width, height] = demo.scenario.camera.size_px;
-    println!("adapter   {}", engine.gpu().describe());
+    println!("adapter   {}", engine);
     println!("frames    {width}x{height} of the built-in flight, read back, nothing encoded");
     let plain = &demo.scenario.output.channels;
     let with_truth = [plain.as_slice(), &[Channel::Depth, Channel::Coords]].concat();

@@ -19,12 +19,12 @@ use camsim::{
         scene::{Terrain, TerrainDetail},
         tracker::track,
     },
-    gpu::{AdapterChoice, Engine},
+    engine::{AdapterChoice, Engine},
     io::{
         load::Loaded,
         write::{FrameFiles, FrameWriter},
     },
-    plan::{Planner, line_poses},
+    plan::{Planner, row_poses},
 };
 use criterion::{BenchmarkId, Criterion, Throughput};
 use glam::{DQuat, DVec3};
@@ -66,8 +66,8 @@ fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
             bencher.iter(plan_anew)
         });
         let plan = planner.plan(60)?;
-        group.bench_function(BenchmarkId::new("line_poses", name), |bencher| {
-            bencher.iter(|| line_poses(black_box(&plan), &sequence.path))
+        group.bench_function(BenchmarkId::new("row_poses", name), |bencher| {
+            bencher.iter(|| row_poses(black_box(&plan), &sequence.path))
         });
     }
     group.finish();
@@ -84,13 +84,13 @@ fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let mut measure = |name: &str, terrain: &Terrain, pose: &CameraPose| {
         let detail =
             || TerrainDetail::new(black_box(terrain), pose, plan.tangents(), focal_px, plan.terrain_error_px);
-        let lod = detail().mesh_to_draw().lod;
+        let lod = detail().visible_mesh().lod;
         println!(
             "{name}: {} triangles of {} chunks, within {:.3} px",
             lod.triangles, lod.chunks, lod.max_error_px
         );
         group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| {
-            bencher.iter(|| detail().mesh_to_draw())
+            bencher.iter(|| detail().visible_mesh())
         });
     };
     if let Some(terrain) = &sequence.scene.terrain {

@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use camsim::{
-    gpu::{AdapterChoice, Engine},
+    engine::{AdapterChoice, Engine},
     lab::bench::{BenchError, Options, Step, run},
 };
 

@@ -15,10 +15,10 @@ use camsim::{
     core::{
         frame::COORDS_CHANNELS,
         scenario::{Auto, Channel, Silhouettes},
-        scene::{ModelDetail, SceneLevels},
+        scene::{ModelLod, SceneLods},
         sequence::Sequence,
     },
-    gpu::{AdapterChoice, Engine},
+    engine::{AdapterChoice, Backend, Engine},
     io::{load::load_sequence, scenario_file::read_scenario},
     lab::{
         cases::cases,
@@ -51,12 +51,13 @@ fn main() -> Outcome<()> {
         std::env::args().skip(1).partition(|argument| argument == "--bench");
     let is_measuring = !measuring.is_empty();
     let engine = Engine::new(AdapterChoice::Best)?;
-    println!("adapter   {}", engine.gpu().describe());
+    println!("adapter   {}", engine);
     println!(
         "frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table"
     );
     let tables = [
-        ("size", size as fn(&Engine, bool) -> Outcome<()>),
+        ("renderers", renderers as fn(&Engine, bool) -> Outcome<()>),
+        ("size", size),
         ("blur", blur),
         ("effects", effects),
         ("alike", alike),
@@ -72,6 +73,46 @@ fn main() -> Outcome<()> {
     drop(engine);
     if wanted.is_empty() || wanted.iter().any(|wanted| wanted == "files") {
         files(is_measuring)?;
+    }
+    Ok(())
+}
+
+/// The same frames by the cpu alone, by the adapter alone, and by the paper's preset on the adapter, in turn.
+fn renderers(_: &Engine, is_measuring: bool) -> Outcome<()> {
+    let cpu = Engine::cpu();
+    let gpu = Engine::open(Backend::Gpu)?;
+    let whole = changed(&[])?;
+    let truth = [Channel::Color, Channel::Depth, Channel::Coords, Channel::Valid];
+    let color = &truth[..1];
+    let rows = [
+        ("all effects", Without::Nothing, color),
+        ("all effects, color, depth, coords, valid", Without::Nothing, &truth),
+        ("- motion blur", Without::Blur, color),
+        ("- lens", Without::Lens, color),
+        ("- all effects: a perfect camera", Without::Anything, color),
+    ];
+    let rows = &rows[..if is_measuring { rows.len() } else { 1 }];
+    let mut variants = Vec::new();
+    for (name, without, channels) in rows {
+        let sequence = without.of(&whole)?;
+        for engine in [&cpu, &gpu] {
+            variants.push(Variant::open(*name, engine, sequence.clone(), channels)?);
+        }
+    }
+    variants.push(Variant::open(PRESET, &gpu, preset()?, color)?);
+    let effort = effort(EFFORT, is_measuring);
+    measure(&mut variants, 96, effort)?;
+    println!("{}", say_rounds(&variants, effort));
+    println!("frames/s; in brackets those of the quartiles. gpu: {gpu}\n");
+    println!("| variant | {cpu} | gpu | gpu, {PRESET} |\n|---|---|---|---|");
+    let rate = |variant: &Variant<'_>| {
+        let [fast_ms, median_ms, slow_ms] = quartiles(&variant.ms);
+        format!("{:.1} ({:.1} .. {:.1})", 1e3 / median_ms, 1e3 / slow_ms, 1e3 / fast_ms)
+    };
+    let (of_preset, pairs) = variants.split_last().ok_or("no variants")?;
+    for (row, pair) in pairs.chunks_exact(2).enumerate() {
+        let last = if row == 0 { rate(of_preset) } else { String::new() };
+        println!("| {} | {} | {} | {last} |", pair[0].name, rate(&pair[0]), rate(&pair[1]));
     }
     Ok(())
 }
@@ -445,8 +486,7 @@ fn predicted_dn(plan: &FramePlan) -> f64 {
 fn in_view(plan: &FramePlan, variant: &Variant<'_>) -> u64 {
     let sequence = variant.session.planner().sequence();
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
-    ModelDetail::new(&sequence.scene, &SceneLevels::new(&sequence.scene), &plan.ideal_pose(), &tolerance)
-        .meshes
+    ModelLod::new(&sequence.scene, &SceneLods::new(&sequence.scene), &plan.ideal_pose(), &tolerance).meshes
 }
 
 /// The program itself, with and without files.

@@ -24,7 +24,7 @@ use camsim_core::{
     sequence::Sequence,
     trajectory::Trajectory,
 };
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_engine::{AdapterChoice, Engine};
 use camsim_io::{
     gltf_file::{GltfOptions, Model, read_gltf},
     write::{WriteError, contact_sheet},

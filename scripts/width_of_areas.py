@@ -1,4 +1,4 @@
-"""How wide the mean over a pixel's area should be (crates/camsim-core/src/temporal/footprint.rs, docs/PERFORMANCE.md, "Means over areas").
+"""How wide the mean over a pixel's area should be (crates/camsim-core/src/temporal/footprint.rs, docs/DECISIONS.md, "Temporal inverse and gather").
 
 Straight borders are drawn at random into ideal frames whose pixels have one sample or four, and a pixel `w` ideal pixels wide is read by grids of bilinear reads and by means over squares
 with the sides sqrt(w^2 - c). Printed is the RMS of what they are off the part of the pixel that the border truly covers, for as many pixel sides of border as pixels.

@@ -58,7 +58,7 @@ pub fn looking_down(demo: &Sequence, side: u32) -> Outcome<Arc<Sequence>> {
     let picture: Arc<Texture> = demo.scene.terrain.as_ref().ok_or("the demo has terrain")?.texture.clone();
     let middle_s = sequence.start_s + 0.5 * sequence.frames as f64 / sequence.scenario.camera.fps;
     let centre_ned_m = sequence.path.pose(middle_s).position_ned_m;
-    let terrain = Terrain::of_grid(side, side, &Hills { side, centre_ned_m }, picture)?;
+    let terrain = Terrain::from_grid(side, side, &Hills { side, centre_ned_m }, picture)?;
     let mount = &mut sequence.scenario.camera.mount;
     mount.angles_deg = [0.0, -90.0, 0.0];
     sequence.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), mount)?);

@@ -14,7 +14,7 @@ use std::{
 
 use camsim::{
     core::{scenario::Channel, sequence::Sequence},
-    gpu::{Engine, engine::Session},
+    engine::{Engine, Session},
     lab::timing::{ms, processor_ms, quartiles},
 };
 

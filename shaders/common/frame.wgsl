@@ -77,5 +77,5 @@ struct Frame {
 @group(0) @binding(0) var<uniform> given_frame: Frame;
 
 // What the kernels read, copied where they begin: llvmpipe reads each number of a uniform buffer lane by lane
-// where a loop or condition stands around it (docs/PERFORMANCE.md, "Numbers read once").
+// where a loop or condition stands around it (docs/DECISIONS.md, "Gpu renderer").
 var<private> frame: Frame;

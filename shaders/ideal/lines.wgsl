@@ -1,6 +1,6 @@
 // The border of two surfaces within a fine pixel, as a straight line. Four samples know where a border is to
 // a tenth of a pixel; all samples along four pixels of a straight one know it to a hundredth or three. Twin:
-// camsim_core::temporal::lines.
+// camsim_core::temporal::edge_lines.
 
 // Half of the length along which samples must agree on a line, fine pixels: tried in this order.
 const LINE_REACH: array<f32, 2> = array<f32, 2>(4.0, 2.0);

@@ -1,5 +1,5 @@
 // Marks the pixels of an ideal frame that, with their neighbours, show more than one surface, and lists the
-// tiles of 8x8 pixels that have any. Twin of `steps`: camsim_core::temporal::edges.
+// tiles of 8x8 pixels that have any. Twin of `steps`: camsim_core::temporal::edge_mask.
 #import common/dispatch.wgsl
 #import ideal/marked_tiles.wgsl
 

@@ -1,5 +1,5 @@
 // The depth of each pixel of an ideal frame that was drawn with four samples a pixel. Twin of
-// camsim-core/src/temporal/samples.rs.
+// camsim-core/src/temporal/multisample.rs.
 
 @group(0) @binding(0) var samples: texture_depth_multisampled_2d;
 

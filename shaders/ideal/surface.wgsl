@@ -19,7 +19,7 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 
 // What reads the picture about a place, of which the middle's neighbours tell how large a pixel is: the
 // `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
-// filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter. Where the
+// filters are each their own approximation. Twin: camsim_core::scene::Prefilter. Where the
 // picture is: the `picture` slot, in one texture or in tiles.
 #import <slot:picture>
 @group(1) @binding(1) var surface_sampler: sampler;

@@ -1,4 +1,4 @@
-//! One file a command: its arguments, its help, and `run`.
+//! One file per command, with its arguments, its help and `run`.
 
 pub mod apply;
 pub mod bench;

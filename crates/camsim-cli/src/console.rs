@@ -1,4 +1,4 @@
-//! Where text goes: answers to standard output, everything about the work to standard error.
+//! Output streams: results go to standard output, messages to standard error.
 
 use std::{
     ffi::{OsStr, OsString},
@@ -11,15 +11,15 @@ use serde::Serialize;
 
 use crate::failure::{DONE, Failure};
 
-/// The two streams, and how much the user wants to hear.
+/// The two streams, and the verbosity.
 pub struct Console<'a> {
     out: io::BufWriter<&'a mut dyn Write>,
     err: &'a mut dyn Write,
     quiet: bool,
     verbose: bool,
-    /// What was typed, the program's name first.
+    /// The command line, with the program's name first.
     typed: Vec<OsString>,
-    /// The scenario, and what of the command line belongs to it.
+    /// The scenario file, and the options of the command line that change it.
     scenario: Option<(PathBuf, Vec<String>)>,
 }
 
@@ -33,7 +33,7 @@ impl fmt::Debug for Console<'_> {
 }
 
 impl<'a> Console<'a> {
-    /// Answers to `out`, the rest to `err`.
+    /// Results go to `out`, messages to `err`.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write) -> Self {
         Self {
             out: io::BufWriter::new(out),
@@ -45,31 +45,31 @@ impl<'a> Console<'a> {
         }
     }
 
-    /// What was typed, for hints that name a command.
+    /// Sets the command line, for hints that repeat it.
     pub fn set_typed(&mut self, typed: Vec<OsString>) {
         self.typed = typed;
     }
 
-    /// The scenario that a command is about, and the options that change it.
+    /// Sets the scenario of the command, and the options that change it.
     pub fn set_scenario(&mut self, scenario: &Path, changes: Vec<String>) {
         self.scenario = Some((scenario.into(), changes));
     }
 
-    /// The command that was typed.
+    /// The command line as typed.
     #[must_use]
     pub fn command(&self) -> String {
         self.typed.iter().map(|word| quoted(word.as_os_str())).collect::<Vec<_>>().join(" ")
     }
 
-    /// The command that was typed, with one more option.
+    /// The command line with one more option.
     #[must_use]
     pub fn command_with(&self, option: &str) -> String {
         let words = self.typed.iter().map(OsString::as_os_str).filter(|word| *word != option);
         words.chain([option.as_ref()]).map(quoted).collect::<Vec<_>>().join(" ")
     }
 
-    /// Text whose commands name the scenario in place of `SCENARIO.toml`, with the options that change it
-    /// where the command takes them.
+    /// Replaces `SCENARIO.toml` in the commands of a text by the scenario, with the options that change it
+    /// where the command accepts them.
     #[must_use]
     pub fn whole(&self, text: &str) -> String {
         let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
@@ -80,83 +80,83 @@ impl<'a> Console<'a> {
             .replace("SCENARIO.toml", &with_changes)
     }
 
-    /// `-q` and `-v`.
+    /// Sets the verbosity, `-q` and `-v`.
     pub fn set_volume(&mut self, quiet: bool, verbose: bool) {
         self.quiet = quiet;
         self.verbose = verbose;
     }
 
-    /// Whether notes and progress are unwanted.
+    /// Whether notes and progress are suppressed.
     #[must_use]
     pub fn is_quiet(&self) -> bool {
         self.quiet
     }
 
-    /// Text as it is, to standard output.
+    /// Prints a text to standard output.
     ///
     /// # Errors
-    /// The stream's.
+    /// Errors of the stream.
     pub fn print(&mut self, text: &str) -> io::Result<()> {
         self.out.write_all(text.as_bytes())
     }
 
-    /// One line to standard output.
+    /// Prints a line to standard output.
     ///
     /// # Errors
-    /// The stream's.
+    /// Errors of the stream.
     pub fn line(&mut self, text: impl fmt::Display) -> io::Result<()> {
         writeln!(self.out, "{text}")
     }
 
-    /// Indented JSON to standard output.
+    /// Prints indented JSON to standard output.
     ///
     /// # Errors
-    /// The stream's.
+    /// Errors of the stream.
     pub fn json(&mut self, value: &impl Serialize) -> io::Result<()> {
         serde_json::to_writer_pretty(&mut self.out, value)?;
         writeln!(self.out)
     }
 
-    /// Standard output, for writers.
+    /// Standard output as a writer.
     pub fn stdout(&mut self) -> &mut dyn Write {
         &mut self.out
     }
 
-    /// Writes out what is buffered.
+    /// Flushes standard output.
     ///
     /// # Errors
-    /// The stream's.
+    /// Errors of the stream.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// A line about the work to standard error, unless `-q`.
+    /// Prints a note to standard error, unless `-q`.
     pub fn note(&mut self, text: impl fmt::Display) {
         if !self.quiet {
             self.complain(&format!("{text}\n"));
         }
     }
 
-    /// The same, only with `-v`.
+    /// Prints a note to standard error with `-v` only.
     pub fn detail(&mut self, text: impl fmt::Display) {
         if self.verbose {
             self.complain(&format!("{text}\n"));
         }
     }
 
-    /// Something the user should look at, unless `-q`.
+    /// Prints a warning to standard error, unless `-q`.
     pub fn warn(&mut self, text: impl fmt::Display) {
         self.note(format_args!("warning: {text}"));
     }
 
-    /// Text to standard error, `-q` or not. If that stream fails there is nobody left to tell.
+    /// Prints a text to standard error, even with `-q`. Errors of that stream are ignored.
     pub fn complain(&mut self, text: &str) {
         let _ = self.err.write_all(text.as_bytes());
     }
 
-    /// Says why a command failed and gives the exit code.
+    /// Prints the reason of a failure and returns the exit code.
     pub fn report(&mut self, failure: &Failure) -> u8 {
-        // What was answered before the fault comes before it.
+        // Results printed before the failure come first.
         let _ = self.out.flush();
         if failure.is_broken_pipe() {
             return DONE;
@@ -166,7 +166,7 @@ impl<'a> Console<'a> {
     }
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a shell.
 #[must_use]
 pub fn quoted(word: &OsStr) -> String {
     let text = word.to_string_lossy();
@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hints_name_commands_whole() {
+    fn hints_contain_complete_commands() {
         let (mut out, mut err) = (Vec::new(), Vec::new());
         let mut console = Console::new(&mut out, &mut err);
         let hint = "see `camsim lens SCENARIO.toml check` and `camsim explain SCENARIO.toml --frame 5`";

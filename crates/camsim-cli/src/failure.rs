@@ -1,19 +1,19 @@
-//! How a command fails: an error and the exit code that goes with it.
+//! Failures of commands: an error with its exit code.
 
 use std::{fmt, io};
 
-use camsim_gpu::{GpuError, RenderError};
+use camsim_engine::{GpuError, RenderError};
 
 /// Exit code of success.
 pub const DONE: u8 = 0;
-/// Exit code of a failure on the way.
+/// Exit code of a failure during the run.
 pub const FAILED: u8 = 1;
 /// Exit code of wrong usage or bad input.
 pub const BAD_INPUT: u8 = 2;
 /// Exit code of a machine without an adapter.
 pub const NO_ADAPTER: u8 = 3;
 
-/// Exit code of a run that the user has stopped, as shells have it.
+/// Exit code of a run that the user stopped (128 + SIGINT, as in shells).
 pub const INTERRUPTED: u8 = 130;
 
 /// An error with its exit code.
@@ -29,12 +29,12 @@ impl Failure {
         Self { code: BAD_INPUT, error: error.into() }
     }
 
-    /// Anything that went wrong with good input.
+    /// A failure with valid input.
     pub fn failed(error: impl Into<anyhow::Error>) -> Self {
         Self { code: FAILED, error: error.into() }
     }
 
-    /// Stopped by the user; the error says what is done.
+    /// Stopped by the user; the error tells what was completed.
     pub fn interrupted(error: impl Into<anyhow::Error>) -> Self {
         Self { code: INTERRUPTED, error: error.into() }
     }
@@ -45,7 +45,7 @@ impl Failure {
         self.code
     }
 
-    /// Whether whoever read the output has left, which is no failure (`camsim ... | head`).
+    /// Whether the reader of the output has closed it, which is no failure (`camsim ... | head`).
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         let of_pipe = |cause: &(dyn std::error::Error + 'static)| {
@@ -56,7 +56,7 @@ impl Failure {
 }
 
 impl fmt::Display for Failure {
-    /// `error: ...`, then a line `caused by: ...` for each cause that the lines before do not state already.
+    /// `error: ...`, then a line `caused by: ...` for each cause that is not part of the lines before.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut said = self.error.to_string();
         let begin = if self.code == INTERRUPTED { "stopped" } else { "error" };
@@ -81,7 +81,7 @@ impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
         let code = match error {
             GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
-            GpuError::TooLarge { .. } | GpuError::Setting { .. } => BAD_INPUT,
+            GpuError::TooLarge { .. } => BAD_INPUT,
             _ => FAILED,
         };
         Self { code, error: error.into() }
@@ -99,11 +99,11 @@ impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Fail
     }
 }
 
-/// Says which exit code an error of a library means here.
+/// Maps library errors to exit codes.
 pub trait OrFail<T> {
-    /// The user's input is at fault.
+    /// The error is caused by the user's input.
     fn or_bad_input(self) -> Result<T, Failure>;
-    /// The work is at fault.
+    /// The error occurred during the run.
     fn or_failed(self) -> Result<T, Failure>;
 }
 
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_left_is_told_from_other_faults() {
+    fn broken_pipes_are_no_failure() {
         let left = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe))
             .context("writing to standard output")
             .unwrap_err();
@@ -146,12 +146,8 @@ mod tests {
     }
 
     #[test]
-    fn adapters_have_their_own_code() {
+    fn missing_adapter_has_its_own_exit_code() {
         assert_eq!(Failure::from(GpuError::NoAdapter(String::new())).code(), NO_ADAPTER);
         assert_eq!(Failure::from(GpuError::Device("lost".into())).code(), FAILED);
-        let setting =
-            GpuError::Setting { name: "CAMSIM_REVERSE", value: "gpu".into(), allowed: "`device` or `host`" };
-        assert_eq!(setting.to_string(), "CAMSIM_REVERSE=gpu: set it to `device` or `host`, or not at all");
-        assert_eq!(Failure::from(setting).code(), BAD_INPUT);
     }
 }

@@ -1,8 +1,8 @@
-//! `--frames`: which frames of a sequence.
+//! `--frames`: a selection of frames.
 
 use std::{fmt, str::FromStr};
 
-/// Ranges as typed; ends that were left out come from the sequence.
+/// Ranges as typed; omitted ends come from the sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameList(Vec<Part>);
 
@@ -18,15 +18,15 @@ struct Part {
 pub enum FrameListError {
     /// Not a list of ranges.
     Syntax(String),
-    /// A range that holds nothing.
+    /// An empty range.
     Empty(String),
-    /// A frame that the window does not have.
+    /// A frame outside of the window.
     Outside {
         /// The option.
         asked_by: &'static str,
         /// The frame.
         frame: u64,
-        /// How many there are.
+        /// Number of frames.
         frames: u64,
     },
 }
@@ -37,15 +37,15 @@ impl fmt::Display for FrameListError {
             Self::Syntax(part) => {
                 write!(
                     f,
-                    "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"
+                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"
                 )
             }
-            Self::Empty(part) => write!(f, "`{part}` holds no frame: the end must be above the start"),
+            Self::Empty(part) => write!(f, "`{part}` is empty: the end must be above the start"),
             Self::Outside { asked_by, frame, frames } => {
                 let last = frames.saturating_sub(1);
                 write!(
                     f,
-                    "{asked_by} asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps"
+                    "{asked_by}: frame {frame} does not exist, the last one is {last}; widen flight.window_s or raise camera.fps"
                 )
             }
         }
@@ -91,7 +91,7 @@ impl Part {
 }
 
 impl FrameList {
-    /// The frames in ascending order, each once, of a sequence that has `frames` of them.
+    /// The selected frames of a sequence of `frames` frames, in ascending order without duplicates.
     ///
     /// # Errors
     /// [`FrameListError::Outside`].
@@ -114,7 +114,7 @@ impl FrameList {
     }
 }
 
-/// `--shard I/N`: every N-th frame, beginning with the I-th (counted from 1).
+/// `--shard I/N`: every N-th frame, starting with the I-th (counted from 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard(
     /// I and N.
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_range_is_refused() {
+    fn invalid_ranges_are_refused() {
         for text in [
             "",
             "a",
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_outside_are_named() {
+    fn frames_outside_are_refused() {
         let outside = |frame: u64| Err(FrameListError::Outside { asked_by: "--frames", frame, frames: 10 });
         assert_eq!(frames("5..12", 10), outside(10));
         assert_eq!(frames("20", 10), outside(20));

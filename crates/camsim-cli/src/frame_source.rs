@@ -8,10 +8,7 @@ use camsim_core::{
     scene::LodSelection,
     sequence::Sequence,
 };
-use camsim_gpu::{
-    Engine,
-    engine::{Finished, FrameTimes, Session},
-};
+use camsim_engine::{Engine, Finished, FrameTimes, Session};
 use camsim_io::write::WriteError;
 use camsim_plan::Planner;
 
@@ -54,7 +51,7 @@ impl<'a> Device<'a> {
 
 impl FrameSource for Device<'_> {
     fn adapter(&self) -> String {
-        self.engine.gpu().describe()
+        self.engine.to_string()
     }
 
     fn planner(&self) -> &Planner {

@@ -1,11 +1,11 @@
-//! What several commands take: a scenario with changes on top, and everything it names, loaded.
+//! Input that several commands share: a scenario with changes, and loading of its files.
 
 use std::path::PathBuf;
 
 use camsim_core::{
     flight_log::FlightLog,
     scenario::{Preset, Scenario},
-    tracker::Tracked,
+    tracker::TrackResult,
 };
 use camsim_io::{
     load::{Loaded, flight_warnings, load_flight, load_sequence},
@@ -17,7 +17,7 @@ use crate::{
     failure::{Failure, OrFail},
 };
 
-/// A scenario file and what the command line changes of it.
+/// A scenario file, and changes of it by the command line.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ScenarioArgs {
     /// Scenario (TOML); `camsim render --print-default` prints one with every key explained
@@ -26,19 +26,19 @@ pub struct ScenarioArgs {
     pub changes: Changes,
 }
 
-/// What the command line changes of a scenario.
+/// Changes of a scenario by the command line.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Changes {
     /// Change a key of the scenario: --set camera.shutter.readout_ms=0 (may be repeated)
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_set)]
     pub sets: Vec<(String, String)>,
-    /// Methods: camsim's own, or the paper's
+    /// Set of methods: camsim's own, or the paper's
     #[arg(long, value_enum)]
     pub preset: Option<PresetArg>,
 }
 
 impl Changes {
-    /// As they are typed.
+    /// The options as typed.
     fn words(&self) -> Vec<String> {
         let sets = self.sets.iter().flat_map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
         let preset = self
@@ -54,7 +54,7 @@ impl Changes {
 pub enum PresetArg {
     /// The cheapest methods that keep the tolerances
     Default,
-    /// The paper's own methods and approximations
+    /// The methods and approximations of the paper
     Paper,
 }
 
@@ -66,7 +66,7 @@ fn parse_set(text: &str) -> Result<(String, String), String> {
 }
 
 impl ScenarioArgs {
-    /// Reads the scenario and applies the changes; hints name it from now on.
+    /// Reads the scenario and applies the changes; hints name it from then on.
     pub fn read(&self, console: &mut Console<'_>) -> Result<Scenario, Failure> {
         console.set_scenario(&self.scenario, self.changes.words());
         let preset = self.changes.preset.map(|preset| match preset {
@@ -77,7 +77,7 @@ impl ScenarioArgs {
     }
 }
 
-/// Loads what the scenario names; warnings are said once.
+/// Loads the files of a scenario, and prints warnings.
 pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Failure> {
     let mut loaded = load_sequence(scenario).or_bad_input()?;
     loaded.warnings.iter_mut().for_each(|warning| *warning = console.whole(warning));
@@ -88,11 +88,11 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
     Ok(loaded)
 }
 
-/// Loads the log and tracks it; no scene is read.
+/// Loads and tracks the log, without the scene.
 pub fn load_flight_only(
     scenario: &Scenario,
     console: &mut Console<'_>,
-) -> Result<(FlightLog, Tracked), Failure> {
+) -> Result<(FlightLog, TrackResult), Failure> {
     let (log, tracked) = load_flight(scenario).or_bad_input()?;
     for warning in flight_warnings(scenario, &log, &tracked) {
         console.warn(warning);
@@ -101,7 +101,7 @@ pub fn load_flight_only(
     Ok((log, tracked))
 }
 
-/// What the reader of the log says that is open to no doubt.
+/// Prints the notes of the log's reader that are no warnings.
 fn say_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>) {
     let file = scenario.flight.log.display();
     console.detail(format_args!("{file}: {}", log.report));
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_split_at_the_first_equals_sign() {
+    fn set_splits_at_the_first_equals_sign() {
         assert_eq!(parse_set("a.b = c=d"), Ok(("a.b".to_owned(), "c=d".to_owned())));
         assert_eq!(parse_set("a="), Ok(("a".to_owned(), String::new())));
         assert!(parse_set("a").is_err());

@@ -1,4 +1,4 @@
-//! Ctrl-C: the first time a run ends after the frames that are under way, the second time at once.
+//! Ctrl-C: the first one ends a run after the current frames, the second one at once.
 
 use std::sync::{
     Once,
@@ -11,11 +11,11 @@ static RUNS: AtomicUsize = AtomicUsize::new(0);
 static ASKED: AtomicBool = AtomicBool::new(false);
 static INSTALL: Once = Once::new();
 
-/// While it lives Ctrl-C asks instead of ending the process.
+/// While it exists, Ctrl-C requests a stop instead of ending the process.
 #[derive(Debug)]
 pub struct Watch(());
 
-/// Begins to listen. Where no handler can be installed Ctrl-C ends the process, as ever.
+/// Starts to handle Ctrl-C. If no handler can be installed, Ctrl-C ends the process.
 #[must_use]
 pub fn watch() -> Watch {
     INSTALL.call_once(|| {

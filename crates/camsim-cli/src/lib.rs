@@ -1,8 +1,8 @@
 //! The camsim command line: arguments -> scenario -> engine -> writers.
 //!
 //! Each command is one file in `commands/` with its arguments and a `run`. Everything else is shared:
-//! [`console`] (where text goes), [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list`
-//! (`--frames`), `frame_source` (what renders), `render_run` (from there to an output folder).
+//! [`console`] (output streams), [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list`
+//! (`--frames`), `frame_source` (renderers), `render_run` (rendering into an output folder).
 
 use std::{
     ffi::OsString,
@@ -12,6 +12,7 @@ use std::{
 
 use clap::{Parser, Subcommand, error::ErrorKind};
 
+mod backend;
 mod commands;
 pub mod console;
 pub mod failure;
@@ -30,32 +31,31 @@ use failure::Failure;
 
 const AFTER_HELP: &str = "\
 Examples:
-  camsim demo                                     the built-in flight, as pictures, in ./camsim-demo
-  camsim render flight.toml -o frames             every frame of a scenario
+  camsim demo                                     renders the built-in flight to ./camsim-demo
+  camsim render flight.toml -o frames             renders every frame of a scenario
   camsim render flight.toml --frames 0..10 --set camera.shutter.readout_ms=0
-  camsim explain flight.toml --frame 7            what a frame takes, and what it doesn't
-  camsim verify flight.toml                       how far off its pixels are, and were said to be
-  camsim camera import calib.yaml -o CAMERA.toml  calibrations of other programs
-  camsim apply CAMERA.toml FRAME.toml -o out.png  an ideal RGB-D picture of any origin, through the camera
+  camsim explain flight.toml --frame 7            shows the plan of a frame, and what it skips
+  camsim verify flight.toml                       compares measured with predicted errors
+  camsim camera import calib.yaml -o CAMERA.toml  converts calibrations of other programs
+  camsim apply CAMERA.toml FRAME.toml -o out.png  applies the camera to an ideal RGB-D image of any origin
 
 Exit codes:
-  0  done
-  1  it failed on the way (disk, device, a check that did not hold)
-  2  wrong usage or bad input: the message says where, and what to do
-  3  no usable graphics adapter
-  130  stopped by Ctrl-C: what is written is whole, and the message says how to go on; a second Ctrl-C ends at once, without it
+  0  success
+  1  failure during the run (disk, GPU, a check that did not pass)
+  2  wrong usage or invalid input; the message names the place and a remedy
+  3  no usable graphics adapter where one is demanded
+  130  stopped by Ctrl-C after the current frames; all files are complete, and the message tells how to resume. A second Ctrl-C ends at once
 
-CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`). CAMSIM_REVERSE=device or host says where output frames are made from
-ideal frames, CAMSIM_IDEAL=device or host where those are drawn (`camsim info --help`).";
+--backend cpu renders without a graphics adapter; CAMSIM_ADAPTER=part-of-a-name picks one (names: `camsim info`).";
 
-/// Pictures of a real, imperfect airborne camera, and the truth about them.
+/// Simulator of imperfect airborne cameras: frames with ground truth.
 #[derive(Debug, Parser)]
 #[command(name = "camsim", version, after_help = AFTER_HELP, arg_required_else_help = true, max_term_width = 110)]
 struct Cli {
-    /// Say only what was asked for: no progress, no notes, no warnings
+    /// Print results only: no progress, notes or warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say more
+    /// Print more details
     #[arg(short, long, global = true)]
     verbose: bool,
     #[command(subcommand)]
@@ -87,7 +87,7 @@ pub fn main() -> ExitCode {
     ExitCode::from(run(std::env::args_os(), &mut io::stdout().lock(), &mut io::stderr()))
 }
 
-/// Runs the program with `args` (the first is the program's name) and gives the exit code.
+/// Runs the program with `args` (the first is the program's name) and returns the exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>, stdout: &mut dyn Write, stderr: &mut dyn Write) -> u8 {
     let mut console = Console::new(stdout, stderr);
     let args: Vec<OsString> = args.into_iter().collect();
@@ -97,7 +97,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stdout: &mut dyn Write, std
             console.set_volume(cli.quiet, cli.verbose);
             dispatch(cli.command, &mut console)
         }
-        Err(error) => return answer_of_clap(&error, &mut console),
+        Err(error) => return report_clap(&error, &mut console),
     };
     match outcome.and_then(|()| Ok(console.flush()?)) {
         Ok(()) => failure::DONE,
@@ -125,8 +125,8 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
     }
 }
 
-/// Help and version are answers; everything else that clap says is wrong usage.
-fn answer_of_clap(error: &clap::Error, console: &mut Console<'_>) -> u8 {
+/// Help and version go to standard output; every other message of clap is wrong usage.
+fn report_clap(error: &clap::Error, console: &mut Console<'_>) -> u8 {
     let text = error.render();
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => match console.print(&text.to_string()) {

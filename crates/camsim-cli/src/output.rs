@@ -1,4 +1,4 @@
-//! One answer to one file, or to standard output.
+//! Output to a file or to standard output.
 
 use std::{
     fs::File,
@@ -13,7 +13,8 @@ use crate::{
     failure::{Failure, OrFail},
 };
 
-/// Lets `fill` write to `path`, or to standard output without one. A file appears whole or not at all.
+/// Calls `fill` to write to `path`, or to standard output without one. A file appears completely or not at
+/// all.
 pub fn write_output(
     path: Option<&Path>,
     console: &mut Console<'_>,
@@ -27,23 +28,23 @@ pub fn write_output(
     }
 }
 
-/// Refuses, before any work is done, a file that could not be written at its end. Nothing of it is made.
+/// Checks, before the run, that a file can be written. It is not created.
 ///
 /// # Errors
-/// As [`write_output`] would fail.
+/// The error that [`write_output`] would return.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
     let tried = part_of(path)
         .and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
     tried.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
 }
 
-/// The same for a folder, which is made.
+/// Checks, before the run, that a folder can be written. It is created.
 ///
 /// # Errors
-/// It cannot be made, or no file can be made in it.
+/// If it cannot be created, or no file can be created in it.
 pub fn check_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .with_context(|| format!("{}: cannot be made; choose another folder with -o", folder.display()))
+        .with_context(|| format!("{}: cannot be created; choose another folder with -o", folder.display()))
         .or_failed()?;
     let tried = part_of(&folder.join("camsim")).and_then(|part| touch(&part));
     tried
@@ -56,7 +57,7 @@ fn touch(part: &Path) -> io::Result<()> {
     std::fs::remove_file(part)
 }
 
-/// The name that a file has while it is written.
+/// Temporary name of a file while it is written.
 fn part_of(path: &Path) -> io::Result<PathBuf> {
     let mut name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_owned();
     name.push(format!(".{}.part", std::process::id()));
@@ -72,7 +73,7 @@ fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
         std::fs::rename(&part, path)
     });
     if written.is_err() {
-        // The fault that matters is the one of writing.
+        // The error of writing is the one to report.
         let _ = std::fs::remove_file(&part);
     }
     written
@@ -85,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_written_is_known_before_the_work() {
+    fn unwritable_output_is_detected_before_the_run() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.csv");
         check_output(&path).unwrap();
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_whole_or_absent() {
+    fn files_are_complete_or_absent() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.csv");
         let failed = write_file(&path, |out| {

@@ -15,8 +15,8 @@ pub fn frames_bar(frames: u64, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// Says what is being done that has no known end, with the seconds that it has taken; invisible with `quiet`
-/// or away from a terminal. Clear it when it is done.
+/// A progress message with the elapsed time, for a task of unknown length; invisible with `quiet` or away
+/// from a terminal. The caller clears it.
 pub fn waiting(what: &'static str, quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let bar = ProgressBar::with_draw_target(None, target).with_message(what);

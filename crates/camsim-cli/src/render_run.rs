@@ -1,4 +1,4 @@
-//! A sequence through a renderer into an output folder.
+//! Renders a sequence into an output folder.
 
 use std::{
     collections::BTreeMap,
@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::anyhow;
 use camsim_core::{frame::RenderedFrame, sequence::Sequence};
-use camsim_gpu::engine::Finished;
+use camsim_engine::Finished;
 use camsim_io::{
     inputs,
     manifest::{RunManifest, in_shard},
@@ -24,7 +24,7 @@ use crate::{
     frame_source::FrameSource,
     interrupt,
     progress::{frames_bar, waiting},
-    tolerances::{Rings, Tolerances},
+    tolerances::{OverlapCycles, Tolerances},
 };
 
 mod folder;
@@ -34,50 +34,50 @@ use folder::Standing;
 pub use folder::{Lock, refuse_others, refuse_unknown};
 pub use tables::{body_at, camera_at, source_frame};
 
-/// What to render and where to.
+/// A rendering job.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// The loaded sequence.
     pub sequence: &'a Arc<Sequence>,
     /// Output folder.
     pub folder: &'a Path,
-    /// Frames of all shards, ascending.
+    /// Frames of all shards, in ascending order.
     pub frames: &'a [u64],
-    /// Which of them are this run's.
+    /// Frames of this run's shard.
     pub shard: Option<Shard>,
-    /// Whether frames that are there already stay.
+    /// Whether existing frames are kept.
     pub resume: bool,
-    /// Said while loading; kept in `run.json`.
+    /// Warnings of loading, stored in `run.json`.
     pub warnings: &'a [String],
-    /// The command that renders what is missing, for whoever stops the run.
+    /// Command that resumes the run, for the message after an interruption.
     pub go_on: &'a str,
 }
 
-/// What a run did.
+/// Result of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     /// Frames rendered.
     pub frames: u64,
-    /// Frames that were there already.
+    /// Frames that existed already.
     pub skipped: u64,
     /// Bytes of frame files.
     pub bytes: u64,
     /// From the first submission until the last file was written.
     pub time: Duration,
-    /// Before that: what it took to plan the first of them.
+    /// Time of planning the first frame, before that.
     pub first_plan: Duration,
 }
 
 impl Outcome {
-    /// Frames a second; 0 if there was nothing to do.
+    /// Frames per second; 0 if there was nothing to do.
     #[must_use]
     pub fn frames_per_s(&self) -> f64 {
         if self.frames == 0 { 0.0 } else { self.frames as f64 / self.time.as_secs_f64().max(1e-9) }
     }
 }
 
-/// Renders; `look` sees each finished frame before it is written, and can stop the run, as Ctrl-C can: frames
-/// that are written then stay, the tables are of them, and `run.json` says that it is not finished.
+/// Renders a job. `look` receives each finished frame before it is written and can stop the run, as Ctrl-C
+/// can. Written frames are kept then, the tables list them, and `run.json` marks the run as unfinished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
@@ -96,7 +96,7 @@ pub fn run(
         .filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0)))
         .collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
-    // What cannot be planned is refused before anything is written.
+    // Planning errors are reported before anything is written.
     let begin = Instant::now();
     if let Some(&first) = todo.first() {
         let waiting = waiting("planning the first frame", console.is_quiet());
@@ -123,7 +123,7 @@ pub fn run(
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files.clone(), threads()));
-    let (mut blind, mut empty, mut rings) = (0_u64, 0_u64, Rings::default());
+    let (mut blind, mut empty, mut cycles) = (0_u64, 0_u64, OverlapCycles::default());
     let mut tolerances = Tolerances::new(&scenario.quality);
     let mut made = BTreeMap::new();
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
@@ -135,7 +135,7 @@ pub fn run(
         }
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
-        rings.add(finished.plan.frame, finished.out_of_order);
+        cycles.add(finished.plan.frame, finished.out_of_order);
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
         made.insert(finished.plan.frame, source_frame(job.sequence, &finished.plan));
         bar.inc(1);
@@ -143,14 +143,14 @@ pub fn run(
         if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
     });
     bar.finish_and_clear();
-    // All that was rendered is on disk before anything is said of it.
+    // All rendered frames are on disk before messages about them.
     let written = writer.map(FrameWriter::finish).transpose().or_failed();
     let is_stopped = rendered.is_err() && watch.is_asked();
     drop(watch);
     let time = begin.elapsed();
     let said: Vec<String> = if rendered.is_ok() {
-        let unseen = unseen_warnings(blind, empty, todo.len()).chain(rings.warning(todo.len()));
-        unseen
+        let warnings = validity_warnings(blind, empty, todo.len()).chain(cycles.warning(todo.len()));
+        warnings
             .chain(tolerances.iter().flat_map(Tolerances::warnings))
             .map(|warning| console.whole(&warning))
             .collect()
@@ -171,7 +171,7 @@ pub fn run(
         };
         let folder = job.folder.display();
         return Err(Failure::interrupted(anyhow!(
-            "{done} of {} frames are in {folder}; to go on: {}",
+            "{done} of {} frames are in {folder}; to resume: {}",
             mine.len(),
             job.go_on
         )));
@@ -182,8 +182,7 @@ pub fn run(
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
 }
 
-/// Writes what there is to say before the first frame; of a folder of another scenario nothing stays that
-/// this one could take for its own.
+/// Writes the files before the first frame. Frames of another scenario are removed from the folder.
 fn prepare(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -193,7 +192,7 @@ fn prepare(
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
     let _lock = Lock::take(job.folder)?;
-    // Again, now that nobody else changes it.
+    // Checked again under the lock.
     let standing = folder::standing(job, files, &manifest.inputs)?;
     if standing == Standing::Replaced {
         files.remove(job.frames).or_failed()?;
@@ -204,7 +203,7 @@ fn prepare(
     tables::begin_frames(job, standing == Standing::Ours)
 }
 
-/// Writes what there is to say after the last.
+/// Writes the files after the last frame.
 fn finish(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -217,26 +216,26 @@ fn finish(
     manifest.write(job.folder).or_failed()
 }
 
-/// Of frames that see only sky, and of those without a valid pixel.
-fn unseen_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
+/// Warns of frames that see only sky, and of frames without a valid pixel.
+fn validity_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
     let blind = (blind > 0).then(|| {
-        format!("{blind} of {frames} frames see no surface, only sky: check camera.mount, flight.height and where the scene lies")
+        format!("{blind} of {frames} frames see only sky: check camera.mount, flight.height and the position of the scene")
     });
     let empty = (empty > 0).then(|| {
         format!(
-            "{empty} of {frames} frames have no valid pixel: no ray of the camera's is in the ideal frame, or the lens has none; check \
+            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, or the lens has none; check \
              camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain SCENARIO.toml`"
         )
     });
     blind.into_iter().chain(empty)
 }
 
-/// Whether nothing of a frame's colour is valid; a frame without colour is not known to be empty.
+/// Whether no pixel of a frame's colour is valid; false for a frame without colour.
 fn is_empty(frame: &RenderedFrame) -> bool {
     !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
 }
 
-/// The command that renders what a folder's own scenario has beyond the frames that are there.
+/// Command that renders the missing frames of a folder's scenario.
 pub fn go_on(folder: &Path) -> String {
     format!(
         "camsim render {} -o {} --resume",

@@ -1,28 +1,28 @@
-//! `camsim render --times`: where the time of the frames went.
+//! `camsim render --times`: time per stage.
 
 use std::time::{Duration, Instant};
 
-use camsim_gpu::engine::FrameTimes;
+use camsim_engine::FrameTimes;
 use camsim_lab::timing::peak_memory_mb;
 
 use crate::progress::waiting;
 
-/// Milliseconds of each part, one entry a frame, in the order in which frames meet the parts.
+/// Milliseconds of each stage, one entry per frame, in the order of execution.
 #[derive(Debug, Default)]
 pub struct TimesTable {
-    /// What was done once, before the first frame.
+    /// Stages before the first frame.
     start: Vec<(&'static str, Duration)>,
     parts: Vec<(String, Vec<f64>)>,
     frames: usize,
 }
 
 impl TimesTable {
-    /// Takes in what was done once, before the first frame.
+    /// Adds a stage before the first frame.
     pub fn begun(&mut self, name: &'static str, time: Duration) {
         self.start.push((name, time));
     }
 
-    /// Does something once, before the first frame, and says so if it takes long.
+    /// Runs and times a stage before the first frame, with a progress message if it takes long.
     pub fn timed<T>(&mut self, name: &'static str, quiet: bool, work: impl FnOnce() -> T) -> T {
         let begin = Instant::now();
         let waiting = waiting(name, quiet);
@@ -32,7 +32,7 @@ impl TimesTable {
         done
     }
 
-    /// Takes in a frame.
+    /// Adds a frame.
     pub fn add(&mut self, times: &FrameTimes) {
         self.frames += 1;
         for (name, ms) in [
@@ -59,11 +59,11 @@ impl TimesTable {
         }
     }
 
-    /// Median and largest of each part, and in how many frames there was one: what is kept from frame to
-    /// frame is not done again.
+    /// Median and largest time of each stage, and the number of frames in which it ran (cached results are
+    /// reused).
     #[must_use]
     pub fn text(&mut self) -> String {
-        let mut text = format!("{:<24}{:>10}{:>10}{:>10}\n", "ms a frame", "median", "largest", "frames");
+        let mut text = format!("{:<24}{:>10}{:>10}{:>10}\n", "ms per frame", "median", "largest", "frames");
         for (name, all) in &mut self.parts {
             all.sort_by(f64::total_cmp);
             let (median, largest) = (all[all.len() / 2], all[all.len() - 1]);

@@ -1,9 +1,9 @@
-//! Which frames of a run do not keep the tolerances, by their plans, or may not for what no plan knows.
+//! Warnings for frames that are predicted to exceed the tolerances, or have errors that are not predicted.
 
 use camsim_core::scenario::{Auto, Preset, QualitySpec, Solver};
 use camsim_plan::FramePlan;
 
-/// Frames so far of which `quality.max_error_px` and `quality.max_error_dn` are predicted to be broken.
+/// Frames that are predicted to exceed `quality.max_error_px` or `quality.max_error_dn`.
 #[derive(Debug)]
 pub struct Tolerances {
     px: Broken,
@@ -17,13 +17,13 @@ struct Broken {
     unit: &'static str,
     tolerance: f64,
     frames: u64,
-    /// The largest prediction, and of which frame.
+    /// Largest predicted error, and its frame.
     worst: Option<(f64, u64)>,
 }
 
 impl Tolerances {
-    /// `None` where the user asks for methods whatever their error: those of the paper; and for the oracle,
-    /// which has no plan.
+    /// `None` for methods that the user chose regardless of their error, those of the paper, and for the
+    /// oracle, which has no plan.
     pub fn new(quality: &QualitySpec) -> Option<Self> {
         let is_asked_for = quality.preset == Preset::Paper
             || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle));
@@ -35,15 +35,15 @@ impl Tolerances {
         })
     }
 
-    /// Takes in a frame.
+    /// Adds a frame.
     pub fn add(&mut self, plan: &FramePlan) {
         let predicted = &plan.predicted;
         self.frames += 1;
-        self.px.add(plan.frame, predicted.kept, predicted.total_px);
-        self.dn.add(plan.frame, predicted.levels_kept, predicted.picture_dn());
+        self.px.add(plan.frame, predicted.source_error_kept, predicted.total_px);
+        self.dn.add(plan.frame, predicted.picture_error_kept, predicted.picture_dn());
     }
 
-    /// What the user should know: a line for each tolerance that is broken.
+    /// A warning for each tolerance that is exceeded.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         [&self.px, &self.dn].into_iter().filter_map(|broken| broken.warning(self.frames))
     }
@@ -63,28 +63,28 @@ impl Broken {
     fn warning(&self, of: u64) -> Option<String> {
         let &Self { key, unit, tolerance, frames, worst } = self;
         let (error, frame) = worst?;
-        // Pixels without a source break the tolerance too, however near the others are.
+        // Pixels without a source exceed the tolerance too, however accurate the others are.
         let expected = if error > tolerance {
             format!("{}{unit} are predicted", two_digits(error))
         } else {
             "too many pixels have no source".to_owned()
         };
         Some(format!(
-            "{frames} of {of} frames do not keep {key} = {tolerance}: in the worst, frame {frame}, {expected}; `camsim explain SCENARIO.toml --frame {frame}` says why"
+            "{frames} of {of} frames exceed {key} = {tolerance}: in the worst, frame {frame}, {expected}; see `camsim explain SCENARIO.toml --frame {frame}`"
         ))
     }
 }
 
-/// Frames whose blended surfaces cover each other in rings: of what that costs no plan knows.
+/// Frames whose blended surfaces overlap in cycles, an error that is not predicted.
 #[derive(Debug, Default)]
-pub struct Rings {
+pub struct OverlapCycles {
     frames: usize,
-    /// Most in a frame, and in which.
+    /// Largest number in a frame, and that frame.
     worst: Option<(u32, u64)>,
 }
 
-impl Rings {
-    /// Takes in a frame.
+impl OverlapCycles {
+    /// Adds a frame.
     pub fn add(&mut self, frame: u64, out_of_order: u32) {
         if out_of_order > 0 {
             self.frames += 1;
@@ -94,18 +94,18 @@ impl Rings {
         }
     }
 
-    /// What the user should know.
+    /// The warning, if any.
     pub fn warning(&self, of: usize) -> Option<String> {
         let (most, frame) = self.worst?;
         let frames = self.frames;
         Some(format!(
-            "in {frames} of {of} frames blended triangles cover each other in rings, so that up to {most}, in frame {frame}, are mixed before what is \
-             behind them, which no prediction counts; `camsim verify SCENARIO.toml --pictures --frames {frame}` measures it, quality.solver = \"oracle\" does without"
+            "in {frames} of {of} frames blended triangles overlap in cycles, so that up to {most} (frame {frame}) are blended in the wrong \
+             order, which is not predicted; `camsim verify SCENARIO.toml --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
         ))
     }
 }
 
-/// Without an exponent where there is no need for one.
+/// Two significant digits, with an exponent only for small numbers.
 fn two_digits(error: f64) -> String {
     if error < 0.01 {
         format!("{error:.1e}")
@@ -131,27 +131,27 @@ mod tests {
             tolerances.px.add(frame, kept, px);
         }
         let said: Vec<String> = tolerances.warnings().collect();
-        let wanted = "3 of 4 frames do not keep quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
-                      `camsim explain SCENARIO.toml --frame 5` says why";
+        let wanted = "3 of 4 frames exceed quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
+                      see `camsim explain SCENARIO.toml --frame 5`";
         assert_eq!(said, [wanted]);
     }
 
     #[test]
-    fn rings_are_told_of_the_frame_with_most() {
-        let mut rings = Rings::default();
-        assert_eq!(rings.warning(0), None);
+    fn cycle_warning_names_the_worst_frame() {
+        let mut cycles = OverlapCycles::default();
+        assert_eq!(cycles.warning(0), None);
         [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)]
             .into_iter()
-            .for_each(|(frame, count)| rings.add(frame, count));
-        let said = rings.warning(5).unwrap();
+            .for_each(|(frame, count)| cycles.add(frame, count));
+        let said = cycles.warning(5).unwrap();
         assert!(
-            said.starts_with("in 4 of 5 frames blended triangles cover each other in rings, so that up to 7, in frame 5, are mixed before"),
+            said.starts_with("in 4 of 5 frames blended triangles overlap in cycles, so that up to 7 (frame 5) are blended in the wrong order"),
             "{said}"
         );
     }
 
     #[test]
-    fn a_frame_without_sources_is_broken_however_small_the_error_of_the_others() {
+    fn frame_with_too_few_sources_exceeds_the_tolerance() {
         let mut tolerances = Tolerances::new(&QualitySpec::default()).unwrap();
         tolerances.frames = 1;
         tolerances.px.add(7, false, 1e-4);
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn methods_asked_for_by_name_are_not_judged() {
+    fn explicit_methods_have_no_tolerance_warnings() {
         let of = |solver| Tolerances::new(&QualitySpec { solver, ..QualitySpec::default() }).is_some();
         assert!(of(Auto::Auto) && of(Auto::Value(Solver::Reproject)));
         assert!(

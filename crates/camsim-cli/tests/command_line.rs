@@ -1,4 +1,4 @@
-//! The command line as a user meets it: what is typed, what is answered, and the exit code.
+//! The command line: arguments, output and exit codes.
 
 #![allow(clippy::unwrap_used)]
 
@@ -72,7 +72,7 @@ fn help_names_every_command_and_every_exit_code() {
 }
 
 #[test]
-fn completions_come_for_every_shell() {
+fn completions_exist_for_every_shell() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let (code, out, _) = camsim(["completions", shell]);
         assert!(code == 0 && out.contains("camsim") && out.contains("render"), "{shell}");
@@ -80,14 +80,14 @@ fn completions_come_for_every_shell() {
 }
 
 #[test]
-fn points_survive_the_lens_and_back() {
+fn distort_and_undistort_are_inverse() {
     let folder = tempfile::tempdir().unwrap();
     let (rays, pixels, back) =
         (folder.path().join("rays.csv"), folder.path().join("pixels.csv"), folder.path().join("back.csv"));
     let points = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [1e-9, 0.1]];
     let rows: String = points.iter().map(|[u, v]| format!("{u},{v}\n")).collect();
     fs::write(&rays, format!("u,v\n{rows}")).unwrap();
-    // The camera file by itself and inside its scenario are one camera.
+    // The camera file alone and within a scenario.
     for camera in ["demo_camera.toml", "demo.toml"] {
         let camera = assets().join(camera);
         let (code, _, err) =
@@ -101,7 +101,7 @@ fn points_survive_the_lens_and_back() {
         assert_eq!(lines.next(), Some("u,v,valid"));
         for ([u, v], line) in points.iter().zip(lines) {
             let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
-            // Newton stops at 1e-13 of the ideal plane or better; the text keeps every bit.
+            // Newton's method stops at 1e-13 of the ideal plane or better; the text keeps every bit.
             assert!(
                 (cells[0] - u).abs() < 1e-11 && (cells[1] - v).abs() < 1e-11 && cells[2] == 1.0,
                 "{line}"
@@ -111,10 +111,10 @@ fn points_survive_the_lens_and_back() {
 }
 
 #[test]
-fn pixels_without_a_ray_have_no_answer_and_rays_beyond_the_fold_are_counted() {
+fn pixels_without_a_ray_are_invalid_and_points_beyond_the_fold_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let camera = folder.path().join("folds.toml");
-    // d_r = 1 - 0.4 r^2 turns round at r = sqrt(1 / 1.2) = 0.913, where the image radius is 0.609.
+    // d_r = 1 - 0.4 r^2 has its maximum at r = sqrt(1 / 1.2) = 0.913, where the image radius is 0.609.
     let lens = "[lens]\nmodel = \"brown-conrady\"\ncoefficients = [-0.4]\n";
     fs::write(&camera, format!("size_px = [640, 480]\nfocal_px = [400.0, 400.0]\n{lens}")).unwrap();
     let points = folder.path().join("points.csv");
@@ -142,7 +142,7 @@ fn pixels_without_a_ray_have_no_answer_and_rays_beyond_the_fold_are_counted() {
 }
 
 #[test]
-fn calibrations_of_other_programs_become_camera_files() {
+fn calibrations_of_other_programs_are_imported() {
     let folder = tempfile::tempdir().unwrap();
     let (kalibr, camera) = (folder.path().join("camchain.yaml"), folder.path().join("CAMERA.toml"));
     let chain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
@@ -157,7 +157,7 @@ fn calibrations_of_other_programs_become_camera_files() {
 }
 
 #[test]
-fn experiments_refuse_what_they_cannot_use() {
+fn reproduce_refuses_invalid_input() {
     let folder = tempfile::tempdir().unwrap();
     let (code, _, err) = camsim(["reproduce", "time", "--width", "12"]);
     assert!(code == 2 && err.contains("--width 12: must be 96 to 4096"), "{err}");
@@ -168,7 +168,7 @@ fn experiments_refuse_what_they_cannot_use() {
 }
 
 #[test]
-fn pictures_are_compared() {
+fn images_are_compared() {
     let assets = assets();
     let one = assets.join("acircles.png");
     let (code, out, err) = camsim(["compare", text(&one), text(&one), "--json"]);
@@ -216,7 +216,7 @@ fn the_built_in_flight_is_tracked_and_explained() {
     assert!(code == 0 && out.contains("skipped") && !out.contains("light:"), "{out}");
     let (code, out, err) = camsim(["explain", text(&scenario), "--set", "scene.light.sun=0.7"]);
     assert!(
-        code == 0 && out.contains("light: sun 0.7 from 180 deg") && !out.contains("ground's picture"),
+        code == 0 && out.contains("light: sun 0.7 from 180 deg") && !out.contains("terrain texture"),
         "{out}"
     );
     assert!(err.contains("scene.light changes nothing"), "{err}");
@@ -261,14 +261,14 @@ fn the_camera_is_tracked_with_its_mount_and_vibration() {
         let quaternion = |row: &[f64]| glam::DQuat::from_xyzw(row[1], row[2], row[3], row[0]);
         let (of_body, of_rigid, of_shaken) =
             (quaternion(&body[10..14]), quaternion(&rigid[7..11]), quaternion(&shaken[7..11]));
-        // Straight down, its top towards the nose, 2 m ahead.
+        // The camera looks straight down with its top towards the nose, 2 m ahead.
         let ahead = of_body * glam::DVec3::new(2.0, 0.0, 0.0);
         let apart = glam::DVec3::new(rigid[1] - body[1], rigid[2] - body[2], rigid[3] - body[3]);
         assert!((apart - ahead).length() < 1e-9, "{apart} {ahead}");
         assert!((of_rigid * glam::DVec3::Z - of_body * glam::DVec3::Z).length() < 1e-9);
         assert!((of_rigid * -glam::DVec3::Y - of_body * glam::DVec3::X).length() < 1e-9);
-        // The window begins 10 s after the first good row, from which the phase counts; about the body's
-        // forward axis, before the mount.
+        // The window begins 10 s after the first good row, where the phase is zero; the rotation is about the
+        // body's forward axis, before the mount.
         let angle_rad = 0.5_f64.to_radians()
             * (std::f64::consts::TAU * 17.0 * (10.0 + 0.01 * i as f64) + 30_f64.to_radians()).sin();
         let expected = of_body * glam::DQuat::from_rotation_x(angle_rad) * of_body.inverse() * of_rigid;
@@ -276,14 +276,14 @@ fn the_camera_is_tracked_with_its_mount_and_vibration() {
     }
     let (_, _, err) = track(&["--of", "camera", "--rate", "30", "--set", "output.stamps=zero"]);
     assert!(
-        err.contains("30 rows a second are too few to show the mount's vibration of 17 Hz: give --rate 136"),
+        err.contains("30 rows per second are too few for the mount's vibration of 17 Hz: use --rate 136"),
         "{err}"
     );
     assert!(fs::read_to_string(&table).unwrap().lines().nth(1).unwrap().starts_with("0.000000000,"));
 }
 
 #[test]
-fn explain_says_what_source_coordinates_are_in() {
+fn explain_prints_the_frame_of_source_coordinates() {
     let scenario = assets().join("pattern.toml");
     let (code, out, err) = camsim(["explain", text(&scenario), "--frame", "3", "--json"]);
     assert_eq!(code, 0, "{err}");
@@ -307,7 +307,7 @@ fn explain_says_what_source_coordinates_are_in() {
 }
 
 #[test]
-fn what_is_given_in_place_of_a_scenario_is_recognised() {
+fn files_that_are_no_scenario_are_recognised() {
     let assets = assets();
     for (file, wanted) in [
         (
@@ -327,7 +327,7 @@ fn what_is_given_in_place_of_a_scenario_is_recognised() {
 }
 
 #[test]
-fn the_predicted_error_is_explained_by_cause() {
+fn predicted_error_is_listed_by_cause() {
     let scenario = assets().join("pattern.toml");
     let explain = |more: &[&str]| {
         let (code, out, err) = camsim([&["explain", text(&scenario)][..], more].concat());
@@ -336,7 +336,7 @@ fn the_predicted_error_is_explained_by_cause() {
     };
     let out = explain(&[]);
     assert!(
-        out.contains("predicted error")
+        out.contains("predicted source error")
             && out.contains("within the tolerance")
             && out.contains("single precision"),
         "{out}"
@@ -348,32 +348,38 @@ fn the_predicted_error_is_explained_by_cause() {
     let predicted = &plan["predicted"];
     let total_px = predicted["total_px"].as_f64().unwrap();
     assert!(
-        total_px > 0.0 && total_px <= 0.05 && predicted["kept"] == true && predicted["in_the_way"].is_null(),
+        total_px > 0.0
+            && total_px <= 0.05
+            && predicted["source_error_kept"] == true
+            && predicted["source_error_obstacle"].is_null(),
         "{predicted}"
     );
-    // The paper's own model of the motion is worse, and single precision has a floor: both are said.
+    // The paper's motion model is less accurate, and single precision has a floor: both are listed.
     let [linear, exact] =
         ["linear", "reproject"].map(|solver| of(&["--set", &format!("quality.solver={solver}")]));
     let temporal_px = |plan: &serde_json::Value| plan["predicted"]["temporal_px"].as_f64().unwrap();
     assert!(temporal_px(&linear) > temporal_px(&exact), "{linear} {exact}");
-    // Grey levels have a tolerance of their own.
-    assert!(predicted["levels_kept"] == true && predicted["levels_in_the_way"].is_null(), "{predicted}");
+    // The picture error has its own tolerance.
+    assert!(
+        predicted["picture_error_kept"] == true && predicted["picture_error_obstacle"].is_null(),
+        "{predicted}"
+    );
     let coarse = of(&["--set", "quality.max_error_dn=1e-3"]);
     assert!(
-        coarse["predicted"]["levels_kept"] == false
-            && coarse["predicted"]["levels_in_the_way"].as_str().unwrap().contains("/255"),
+        coarse["predicted"]["picture_error_kept"] == false
+            && coarse["predicted"]["picture_error_obstacle"].as_str().unwrap().contains("/255"),
         "{coarse}"
     );
     let floor = of(&["--set", "quality.max_error_px=1e-7"]);
     assert!(
-        floor["predicted"]["kept"] == false
-            && floor["predicted"]["in_the_way"].as_str().unwrap().contains("the lens inverse"),
+        floor["predicted"]["source_error_kept"] == false
+            && floor["predicted"]["source_error_obstacle"].as_str().unwrap().contains("the lens inverse"),
         "{floor}"
     );
 }
 
 #[test]
-fn the_printed_scenario_is_a_scenario() {
+fn printed_default_scenario_is_valid() {
     let (code, out, _) = camsim(["render", "--print-default"]);
     assert_eq!(code, 0);
     for key in ["[flight]", "[tracker]", "[camera", "[scene", "[quality]", "[output]"] {
@@ -382,7 +388,7 @@ fn the_printed_scenario_is_a_scenario() {
 }
 
 #[test]
-fn bad_input_is_refused_with_its_place_and_a_way_out() {
+fn invalid_input_is_refused_with_place_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, content: &str| {
         let path = folder.path().join(name);
@@ -424,29 +430,26 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
             vec!["explain", &scenario, "--set", "camera.photometric.vignette=none.png"],
             "; check camera.photometric.vignette",
         ),
-        (vec!["render", &scenario, "--frames", "5..2"], "holds no frame"),
-        (vec!["render", &scenario, "--frames", "58..99"], "ends with frame 59"),
+        (vec!["render", &scenario, "--frames", "5..2"], "`5..2` is empty"),
+        (vec!["render", &scenario, "--frames", "58..99"], "the last one is 59"),
         (vec!["render", &scenario, "--shard", "5/4"], "I from 1 to N"),
         (vec!["render", &scenario, "--outputs", "colour"], "coords"),
-        (vec!["render", &scenario, "--format", "none,png"], "stands alone"),
+        (vec!["render", &scenario, "--format", "none,png"], "cannot be combined with other formats"),
         (vec!["render", &scenario, "--preset", "paper", "--set", "quality.solver=linear"], "quality.solver"),
         (
             vec!["render", &scenario, "--backend", "gpu", "--set", "quality.solver=oracle"],
             "leave --backend out",
         ),
-        (vec!["verify", &scenario, "--set", "quality.solver=oracle"], "verified against"),
+        (vec!["verify", &scenario, "--set", "quality.solver=oracle"], "the reference of this command"),
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),
-        (
-            vec!["explain", &scenario, "--frame", "60"],
-            "--frame asks for frame 60, but the sequence ends with frame 59",
-        ),
+        (vec!["explain", &scenario, "--frame", "60"], "--frame: frame 60 does not exist, the last one is 59"),
         (
             vec!["explain", &scenario, "--set", "flight.window_s=[1.0, 1.001]", "--set", "camera.phase=0.9"],
             "window_s",
         ),
-        (vec!["verify", &scenario, "--frames", "58..99"], "ends with frame 59"),
+        (vec!["verify", &scenario, "--frames", "58..99"], "the last one is 59"),
         (vec!["verify", "nowhere.toml"], "nowhere.toml"),
         (vec!["track", &scenario, "--rate", "0"], "--rate"),
         (vec!["track", &scenario, "--rate", "NaN"], "--rate"),
@@ -480,7 +483,7 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
+fn unwritable_folders_are_failures_of_the_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
@@ -488,7 +491,7 @@ fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
     let (code, _, err) =
         camsim(["track", text(&assets().join("pattern.toml")), "--rate", "1", "-o", text(&below)]);
     assert!(code == 1 && err.contains("traj.csv"), "{err}");
-    // Long work is refused before it begins.
+    // Long runs are refused before they begin.
     for (args, name) in [
         (vec!["bench", "--csv", text(&below)], "traj.csv"),
         (vec!["bench", "--plot", text(&below.with_extension("svg"))], "traj.svg"),
@@ -506,7 +509,7 @@ fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn one_experiment_without_circles_does_not_stop_the_others() {
+fn failed_experiment_does_not_stop_the_others() {
     let folder = tempfile::tempdir().unwrap();
     let (code, out, err) =
         camsim(["reproduce", "lens", "interlace", "--width", "96", "-o", text(folder.path())]);
@@ -515,12 +518,12 @@ fn one_experiment_without_circles_does_not_stop_the_others() {
         err.contains("lens: error: no circle of the target was found") && err.contains("96 px wide"),
         "{err}"
     );
-    assert!(err.contains("1 of 2 experiments were not done: lens"), "{err}");
+    assert!(err.contains("1 of 2 experiments failed: lens"), "{err}");
     assert!(out.contains("8.7, fig. 20") && folder.path().join("interlace/report.md").is_file(), "{out}");
 }
 
 #[test]
-fn somebody_elses_picture_goes_through_the_camera() {
+fn apply_renders_an_image_of_another_program() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name);
     fs::copy(assets().join("acircles.png"), file("ideal.png")).unwrap();
@@ -536,7 +539,7 @@ fn somebody_elses_picture_goes_through_the_camera() {
         assert_eq!((code, answer.as_str()), (0, ""), "{err}");
         assert!(err.contains("64x48"), "{err}");
     }
-    // The paper's two models of a turn of half a degree differ little, and by something.
+    // The paper's two models differ slightly for a rotation of half a degree.
     let other = file("linear.png");
     assert_eq!(
         camsim(["-q", "apply", text(&camera), text(&frame), "--solver", "linear", "-o", text(&other)]).0,
@@ -579,9 +582,9 @@ fn somebody_elses_picture_goes_through_the_camera() {
         );
     }
 
-    // All sky is a picture; that a velocity then changes nothing is said.
+    // An image of sky only is valid, with a warning that velocity has no effect.
     let png = fs::read(file("ideal.png")).unwrap();
-    // Width and height stand in a PNG's first chunk.
+    // Width and height are in the first chunk of a PNG.
     let [width, height] = [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()));
     let sky: Vec<u8> = format!("P5\n{width} {height}\n65535\n")
         .bytes()
@@ -601,7 +604,7 @@ fn somebody_elses_picture_goes_through_the_camera() {
         (turning.replace("ideal.png", "none.png"), "none.png: cannot be read"),
         (
             format!("{turning}[fog]\nend_m = 10.0\ncolor = [0.0, 0.0, 0.0]\n"),
-            "FRAME.toml: fog is a part of the ideal frame",
+            "FRAME.toml: linear fog after the blur belongs",
         ),
         (
             turning
@@ -630,7 +633,7 @@ fn somebody_elses_picture_goes_through_the_camera() {
 }
 
 #[test]
-fn a_folder_of_pictures_goes_through_the_camera() {
+fn apply_renders_a_folder_of_images() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name);
     fs::create_dir(file("rgb")).unwrap();
@@ -661,11 +664,11 @@ fn a_folder_of_pictures_goes_through_the_camera() {
     }
     assert!(!out.join("color/frame_000000.png").exists() && !out.join("depth").exists());
 
-    // What is there stays as it is, what is missing is the same as in one run, and the table holds both.
+    // Existing frames are kept, missing ones equal those of a single run, and the table lists both.
     let kept = fs::read(out.join("color/frame_000001.exr")).unwrap();
     fs::remove_file(out.join("color/frame_000002.exr")).unwrap();
     let (code, _, err) = apply(&["--resume", "--format", "png,exr"]);
-    assert!(code == 0 && err.contains("3 frames (1 were there)"), "{err}");
+    assert!(code == 0 && err.contains("3 frames (1 existed)"), "{err}");
     assert_eq!(fs::read(out.join("color/frame_000001.exr")).unwrap(), kept);
     assert_eq!(fs::read_to_string(out.join("frames.csv")).unwrap().lines().count(), 5);
     let alone = file("alone");
@@ -681,7 +684,7 @@ fn a_folder_of_pictures_goes_through_the_camera() {
     let noise = |frame: u32| fs::read(out.join(format!("color/frame_00000{frame}.exr"))).unwrap();
     assert_ne!(noise(1), noise(2), "noise is of the frame");
 
-    // Its own table is a table of frames.
+    // The table that it writes is accepted as a table of frames.
     let again = file("AGAIN.toml");
     fs::write(&again, "frames = \"out/frames.csv\"\nfocal_px = [60.0, 60.0]\n").unwrap();
     let (code, _, err) =
@@ -690,7 +693,7 @@ fn a_folder_of_pictures_goes_through_the_camera() {
 
     let (code, _, err) = apply(&["--resume", "--seed", "3"]);
     assert!(code == 2 && err.contains("seed was 0, now 3"), "{err}");
-    // Nor is a picture that has changed since taken for what it was.
+    // A changed input image is detected as well.
     let picture = file("rgb/1.5.png");
     let was = fs::read(&picture).unwrap();
     fs::write(&picture, [&was[..], b"more"].concat()).unwrap();
@@ -705,7 +708,7 @@ fn a_folder_of_pictures_goes_through_the_camera() {
     let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&file("p.png"))]);
     assert!(code == 2 && err.contains("names 4 frames, so it must be a folder"), "{err}");
 
-    // A trajectory that does not reach all frames is told before anything is written.
+    // A trajectory that does not cover all frames is an error before anything is written.
     fs::write(file("poses.csv"), "t_s,x,y,z,qw,qx,qy,qz\n1,0,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n").unwrap();
     fs::write(&frames, twist.replace("angular_rate_rad_s = [0.0, 0.0, 1.0]", "trajectory = \"poses.csv\""))
         .unwrap();
@@ -716,20 +719,20 @@ fn a_folder_of_pictures_goes_through_the_camera() {
         "{err}"
     );
     assert!(!new.exists());
-    // One that has too few rows there is told of.
+    // A trajectory with gaps gives a warning.
     let (_, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new), "--frames", "1..3"]);
     assert!(
         err.contains(
-            "FRAMES.toml: 2 of 2 frames, first frame 1, are taken in gaps of the trajectory of up to 2.0 s"
+            "FRAMES.toml: 2 of 2 frames, first frame 1, are in gaps of the trajectory of up to 2.0 s"
         ),
         "{err}"
     );
 
-    // One frame has no folder.
+    // A single frame has no folder.
     fs::write(&frames, "color = \"rgb/0.5.png\"\nfocal_px = [300.0, 300.0]\n").unwrap();
     let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new)]);
-    assert!(code == 2 && err.contains("one frame is one picture"), "{err}");
+    assert!(code == 2 && err.contains("a single frame is an image"), "{err}");
     let (code, _, err) =
         camsim(["apply", text(&camera), text(&frames), "-o", text(&file("p.png")), "--resume"]);
-    assert!(code == 2 && err.contains("--resume is for many frames"), "{err}");
+    assert!(code == 2 && err.contains("--resume is for several frames"), "{err}");
 }

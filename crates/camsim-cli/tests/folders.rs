@@ -1,4 +1,4 @@
-//! Output folders that are true by themselves: moved, made in parts, stopped half-way.
+//! Output folders: moved, rendered in parts, interrupted.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,11 +11,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Set in the copy of this program that is the command line: its arguments, with this between them.
+/// Environment variable with the arguments of a child process that runs the command line, and their
+/// separator.
 const ARGS: &str = "CAMSIM_TEST_ARGS";
 const BETWEEN: char = '\u{1f}';
 
-/// The command line in a process of its own; of all others it is a test without a body.
+/// Runs the command line in the child process; in the parent it is an empty test.
 #[test]
 fn runs_as_the_program() {
     let Ok(args) = std::env::var(ARGS) else { return };
@@ -57,7 +58,7 @@ fn camsim(folder: &Path, args: &[&str]) -> (i32, String) {
     end(spawn(folder, args))
 }
 
-/// A camera so small that the reference renders it in no time.
+/// A camera so small that the reference renders it quickly.
 const SMALL: [&str; 10] = [
     "--set",
     "camera.size_px=[32, 24]",
@@ -81,7 +82,7 @@ fn pattern() -> String {
         .to_owned()
 }
 
-/// Renders the pattern, small, into a folder.
+/// Renders a small pattern into a folder.
 fn render(base: &Path, out: &str, more: &[&str]) -> (i32, String) {
     let pattern = pattern();
     camsim(
@@ -126,7 +127,7 @@ fn numbers(folder: &Path) -> Vec<u64> {
 }
 
 #[test]
-fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
+fn copied_folder_reproduces_the_same_bytes() {
     let base = tempfile::tempdir().unwrap();
     let at = |name: &str| base.path().join(name);
     camsim_io::builtin::unpack(&at("made/demo/scene")).unwrap();
@@ -147,7 +148,8 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
     let camera = String::from_utf8(made[Path::new("camera.toml")].clone()).unwrap();
     assert!(camera.contains("vignette = \"scene/vignette.png\""), "{camera}");
 
-    // Elsewhere, the first one gone, from another working directory, by the folder's own scenario.
+    // In another place, without the first folder, from another working directory, by the folder's own
+    // scenario.
     fs::create_dir_all(at("far/away")).unwrap();
     fs::create_dir_all(at("work")).unwrap();
     fs::rename(at("made/demo"), at("far/away/copy")).unwrap();
@@ -158,13 +160,13 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
     assert_eq!(code, 0, "{err}");
     let again = files_below(&at("work/again"));
     for (name, bytes) in made.iter().filter(|(name, _)| !name.starts_with("scene")) {
-        // These two say where things are from here, and the vignette has come along.
+        // These two contain relative paths, and the vignette was copied.
         if !["run.json", "camera.toml"].contains(&name.to_str().unwrap()) {
             assert_eq!(Some(bytes), again.get(name), "{}", name.display());
         }
     }
     assert_eq!(again[Path::new("inputs/vignette.png")], made[Path::new("scene/vignette.png")]);
-    // Into itself all is as it was, to the byte; and what is there is taken for done.
+    // Rendering into the same folder changes no byte, and existing frames are skipped.
     let (code, err) =
         camsim(&at("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
     assert_eq!(code, 0, "{err}");
@@ -176,7 +178,7 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
         serde_json::from_slice(&fs::read(at("far/away/copy/run.json")).unwrap()).unwrap();
     assert_eq!((run["written"].as_u64(), run["skipped"].as_u64()), (Some(1), Some(3)));
 
-    // The camera of either folder by itself.
+    // The camera file of either folder.
     for (folder, camera) in [("work", "again/camera.toml"), ("far", "away/copy/camera.toml")] {
         let (code, err) = camsim(&at(folder), &["lens", camera, "check"]);
         assert_eq!(code, 0, "{err}");
@@ -192,7 +194,7 @@ fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
 }
 
 #[test]
-fn parts_make_one_table_and_scenarios_are_not_mixed() {
+fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
     let base = tempfile::tempdir().unwrap();
     let at = |name: &str| base.path().join(name);
     let done = |out: &str, more: &[&str]| {
@@ -205,7 +207,7 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
     assert_eq!(numbers(&at("parts")), [2, 3, 4]);
     done("parts", &["--frames", "4..8"]);
     assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
-    // Two at once.
+    // Two concurrent runs.
     let pattern = pattern();
     let shard = |shard: &str| {
         let args = [
@@ -227,7 +229,7 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
         assert_eq!(code, 0, "{err}");
     }
     assert_eq!(fs::read(at("shards/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
-    // What is gone is not listed, and a table that is gone is made again from what is there.
+    // Deleted frames are not listed, and a deleted table is restored from the existing frames.
     fs::remove_file(at("parts/color/frame_000003.exr")).unwrap();
     done("parts", &["--frames", "7", "--resume"]);
     let rows = frames(&at("parts"));
@@ -240,7 +242,7 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
     fs::remove_file(at("parts/frames.csv")).unwrap();
     done("parts", &["--frames", "2..8", "--resume"]);
     assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
-    // Another channel of the same frames stands beside.
+    // Another channel of the same frames is added.
     let channel = camsim(
         base.path(),
         &[&["render", &pattern, "-o", "parts", "--outputs", "valid", "--frames", "2..4"][..], &SMALL]
@@ -256,17 +258,17 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
     );
     assert!(rows[5]["valid"].is_empty(), "{rows:?}");
 
-    // Another scenario between these frames is refused before anything is touched ...
+    // Another scenario among these frames is refused before anything is changed ...
     let before = files_below(&at("whole"));
     let (code, err) = render(base.path(), "whole", &["--frames", "2..4", "--set", "seed=99"]);
     assert!(
         code == 2
             && err.contains("seed was 12, now 99")
-            && err.contains("20 files of frames, color/frame_000004.exr the first"),
+            && err.contains("20 files of other frames would remain (color/frame_000004.exr is the first)"),
         "{err}"
     );
     assert!(files_below(&at("whole")) == before);
-    // ... and in place of all of them it leaves nothing behind that could be taken for its own.
+    // ... and if it replaces all of them, no old frame remains.
     let err = done("whole", &["--frames", "2..8", "--set", "seed=99"]);
     assert!(err.contains("its frames are replaced"), "{err}");
     assert_eq!(numbers(&at("whole")), [2, 3, 4, 5, 6, 7]);
@@ -274,21 +276,21 @@ fn parts_make_one_table_and_scenarios_are_not_mixed() {
         fs::read(at("whole/color/frame_000002.exr")).unwrap() == before[Path::new("color/frame_000002.exr")],
         "the pattern has no noise"
     );
-    // Frames that nobody knows.
+    // Frames of unknown origin.
     fs::remove_file(at("whole/run.json")).unwrap();
     let (code, err) = render(base.path(), "whole", &["--frames", "2..8", "--resume"]);
-    assert!(code == 2 && err.contains("no run.json that says what made them"), "{err}");
+    assert!(code == 2 && err.contains("no run.json that describes their origin"), "{err}");
     let (code, err) = render(base.path(), "whole", &["--frames", "2..4"]);
-    assert!(code == 2 && err.contains("no run.json that says what made them"), "{err}");
+    assert!(code == 2 && err.contains("no run.json that describes their origin"), "{err}");
 }
 
 #[cfg(unix)]
 #[test]
-fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
+fn interrupted_run_reports_progress_and_resume_command() {
     let base = tempfile::tempdir().unwrap();
     let out = base.path().join("my out");
     let pattern = pattern();
-    // Enough work for a signal to come in between.
+    // A run long enough to be interrupted.
     let args = [
         &["render", &pattern, "-o", "my out", "--outputs", "color,rows"][..],
         &SMALL,
@@ -317,7 +319,7 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
     assert!(
         done < 60
             && told.starts_with(&format!(
-                "stopped: {done} of 60 frames are in my out; to go on: camsim render "
+                "stopped: {done} of 60 frames are in my out; to resume: camsim render "
             )),
         "{told}"
     );
@@ -327,7 +329,7 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
             && told.ends_with(" --resume"),
         "{told}"
     );
-    // What is written is listed, all of it and nothing else.
+    // Exactly the written frames are listed.
     assert_eq!(numbers(&out), (0..done as u64).collect::<Vec<_>>());
     assert!(
         frames(&out)
@@ -344,15 +346,15 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn an_adapter_that_is_not_there_gets_a_list_of_those_that_are() {
+fn unknown_adapter_lists_available_ones() {
     let base = tempfile::tempdir().unwrap();
-    let there = camsim_gpu::context::adapters(camsim_gpu::AdapterChoice::Best);
+    let there = camsim_gpu::context::adapters(camsim_engine::AdapterChoice::Best);
     let (code, err) =
         end(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
     assert!(
         code == 3 && err.contains("no adapter has `no such thing` in its name (CAMSIM_ADAPTER): there is "),
         "{err}"
     );
-    // Of this process's own choice, which may be narrower.
+    // The list of this process, which may be shorter.
     assert!(there.iter().all(|adapter| err.contains(&adapter.to_string())) && !there.is_empty(), "{err}");
 }

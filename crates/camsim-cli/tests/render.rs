@@ -1,4 +1,4 @@
-//! Whole runs: `camsim render` with shards, resumption and timing only.
+//! Runs of `camsim render` with shards, resume and timing, and of `camsim verify`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -22,7 +22,7 @@ fn run_json(folder: &Path) -> serde_json::Value {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn shards_and_resumption_give_the_bytes_of_one_run() {
+fn shards_and_resume_give_the_bytes_of_one_run() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let temporary = tempfile::tempdir().unwrap();
     let (whole, parts) = (temporary.path().join("whole"), temporary.path().join("parts"));
@@ -37,7 +37,7 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
             "--format",
             "exr,png",
         ];
-        // A small camera: the order of frames is what matters here.
+        // A small camera is enough for the order of frames.
         let small = [
             "--set",
             "camera.size_px=[96, 72]",
@@ -56,7 +56,7 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     }
     fs::remove_file(parts.join("color/frame_000004.exr")).unwrap();
     let (code, out, err) = render(&parts, &["--frames", "2..6", "--resume"]);
-    assert!(code == 0 && out.starts_with("1 frames (3 were there already)"), "{out}{err}");
+    assert!(code == 0 && out.starts_with("1 frames (3 existed)"), "{out}{err}");
     for frame in 2..6 {
         for file in [
             format!("color/frame_{frame:06}.exr"),
@@ -74,14 +74,14 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     assert_eq!((resumed["written"].as_u64(), resumed["skipped"].as_u64()), (Some(1), Some(3)));
     assert_eq!(one["scenario"], resumed["scenario"]);
 
-    // Another scenario is never mixed in.
+    // Frames of another scenario are never mixed in.
     let (code, _, err) = render(&parts, &["--frames", "2..6", "--resume", "--set", "seed=99"]);
     assert!(code == 2 && err.contains("seed"), "{err}");
 }
 
-/// Nor is the same scenario with something else in one of its files.
+/// The same scenario with a changed input file is detected.
 #[test]
-fn a_file_that_has_changed_is_told_by_resuming() {
+fn resume_detects_changed_input_files() {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
     let temporary = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(assets.join("pattern.toml")).unwrap();
@@ -114,7 +114,7 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     let (code, _, err) = render(&["--frames", "2"]);
     assert_eq!(code, 0, "{err}");
     let (code, out, err) = render(&["--frames", "2..4", "--resume"]);
-    assert!(code == 0 && out.starts_with("1 frames (1 were there already)"), "{out}{err}");
+    assert!(code == 0 && out.starts_with("1 frames (1 existed)"), "{out}{err}");
 
     let log = temporary.path().join(log);
     let rows = fs::read_to_string(&log).unwrap();
@@ -136,13 +136,13 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     let (code, _, err) = render(&["--frames", "2..5", "--resume"]);
     assert!(code == 0 && !err.contains("another adapter"), "{err}");
 
-    // Frames of another adapter stay, but that is said.
+    // Frames of another adapter are kept, with a warning.
     let manifest = fs::read_to_string(folder.join("run.json")).unwrap();
     let adapter = run_json(&folder)["adapter"].as_str().unwrap().to_owned();
     fs::write(folder.join("run.json"), manifest.replace(&adapter, "a card")).unwrap();
     let (code, _, err) = render(&["--frames", "2..6", "--resume"]);
     assert!(
-        code == 0 && err.contains(&format!("run.json was made by another adapter than {adapter}")),
+        code == 0 && err.contains(&format!("run.json was rendered by another adapter than {adapter}")),
         "{err}"
     );
 }
@@ -165,7 +165,7 @@ fn timing_runs_write_no_frame() {
     ]);
     assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
     assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
-    // What was asked for by name is said in a quiet run too.
+    // Requested output is printed in a quiet run as well.
     let quiet = [
         "render",
         scenario.to_str().unwrap(),
@@ -181,7 +181,7 @@ fn timing_runs_write_no_frame() {
     let (code, out, err) = camsim(&quiet);
     assert!(
         code == 0
-            && out.starts_with("ms a frame")
+            && out.starts_with("ms per frame")
             && out.contains("host: plan")
             && out.contains("plan of the first frame")
             && err.is_empty(),
@@ -189,10 +189,10 @@ fn timing_runs_write_no_frame() {
     );
 }
 
-/// Set in the copy of this test that runs where no adapter can be found.
+/// Environment variable of the child process that runs this test without an adapter.
 const WITHOUT_ADAPTER: &str = "CAMSIM_TEST_WITHOUT_ADAPTER";
 
-/// Also where there is no adapter, and with the bytes of one run whatever the shards.
+/// The reference needs no adapter, and shards give the bytes of one run.
 #[test]
 fn the_reference_renders_without_an_adapter() {
     if std::env::var_os(WITHOUT_ADAPTER).is_none() {
@@ -247,7 +247,7 @@ fn the_reference_renders_without_an_adapter() {
     }
     fs::remove_file(parts.join("depth/frame_000003.exr")).unwrap();
     let (code, out, err) = render(&parts, &["--frames", "2..5", "--resume", "--backend", "reference"]);
-    assert!(code == 0 && out.starts_with("1 frames (2 were there already)"), "{out}{err}");
+    assert!(code == 0 && out.starts_with("1 frames (2 existed)"), "{out}{err}");
     for frame in 2..5 {
         for channel in ["color", "depth", "coords"] {
             let file = format!("{channel}/frame_{frame:06}.exr");
@@ -261,12 +261,12 @@ fn the_reference_renders_without_an_adapter() {
     );
     assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
 
-    // What names methods of its own would get the oracle's picture instead.
+    // Scenarios that name methods are refused, because the oracle would ignore them.
     for (more, wanted) in [
-        (vec!["--preset", "paper"], "quality.preset = \"paper\" does not go with --backend reference"),
-        (vec!["--set", "quality.solver=rk2"], "quality.solver = \"rk2\" does not go"),
-        (vec!["--set", "quality.solver=linear"], "quality.solver = \"linear\" does not go"),
-        (vec!["--set", "quality.solver=reproject"], "quality.solver = \"reproject\" does not go"),
+        (vec!["--preset", "paper"], "quality.preset = \"paper\" cannot be combined with --backend reference"),
+        (vec!["--set", "quality.solver=rk2"], "quality.solver = \"rk2\" cannot be combined"),
+        (vec!["--set", "quality.solver=linear"], "quality.solver = \"linear\" cannot be combined"),
+        (vec!["--set", "quality.solver=reproject"], "quality.solver = \"reproject\" cannot be combined"),
         (vec!["--set", "quality.iterations=3"], "quality.iterations: counts the depth look-ups"),
     ] {
         let refused = folder("refused");
@@ -280,7 +280,7 @@ fn the_reference_renders_without_an_adapter() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_measured_error_stands_beside_the_predicted_one() {
+fn verify_prints_measured_and_predicted_errors() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let verify = |more: &[&str]| {
         let small = [
@@ -307,13 +307,15 @@ fn the_measured_error_stands_beside_the_predicted_one() {
         );
         assert!(frame["measured"]["falsely_valid"] == 0 && frame["measured"]["missing"] == 0, "{frame}");
     }
-    // Straight steps at constant velocity in a turn: beyond the tolerance, and the exit code says so.
+    // Linear steps at constant velocity in a turn exceed the tolerance, with exit code 1.
     let (code, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=0.002"]);
     assert!(
-        code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"),
+        code == 1
+            && out.contains("EXCEEDED")
+            && err.contains("the source error exceeds the tolerance of 0.002 px"),
         "{out}{err}"
     );
-    // More than any adapter holds.
+    // More pixels than any adapter supports.
     let (code, _, err) = verify(&["--set", "camera.size_px=[20000, 20000]"]);
     assert!(
         code == 2 && err.contains("400000000 pixels") && err.contains("make camera.size_px smaller"),
@@ -330,16 +332,16 @@ fn verify_small(more: &[&str]) -> (u8, String, String) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_picture_beyond_its_tolerance_fails_and_what_nobody_foretold_is_named() {
+fn picture_error_above_tolerance_fails_and_unpredicted_causes_are_named() {
     let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]", "--pictures"];
     let verify = |more: &[&str]| verify_small(&[&centre[..], more].concat());
-    // Eight bits alone are more than that.
+    // The quantisation to eight bits alone exceeds the tolerance.
     let strict = ["--set", "quality.max_error_dn=0.01"];
     let (code, out, err) = verify(&strict);
-    assert!(code == 1 && out.contains("quality.max_error_dn = 0.01 is BROKEN as predicted"), "{out}{err}");
+    assert!(code == 1 && out.contains("quality.max_error_dn = 0.01 is EXCEEDED as predicted"), "{out}{err}");
     assert!(
-        err.contains("quality.max_error_dn = 0.01 is broken in frame 3")
-            && !out.contains("not in that prediction"),
+        err.contains("frame 3: the picture error exceeds quality.max_error_dn = 0.01")
+            && !out.contains("not predicted: "),
         "{out}{err}"
     );
     let (code, out, _) = verify(&[&strict[..], &["--json"]].concat());
@@ -349,22 +351,22 @@ fn a_picture_beyond_its_tolerance_fails_and_what_nobody_foretold_is_named() {
         code == 1 && report["kept"] == false && frame["kept"] == true && frame["picture"]["kept"] == false,
         "{out}"
     );
-    // Sources may be anywhere, and the prediction for the picture knows what that costs.
+    // The predicted picture error includes that of wrong sources.
     let (_, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=100"]);
-    assert!(out.contains("is BROKEN as predicted") && !out.contains("not in that prediction"), "{out}{err}");
+    assert!(out.contains("is EXCEEDED as predicted") && !out.contains("not predicted: "), "{out}{err}");
     let (_, out, err) = verify(&["--preset", "paper"]);
-    assert!(out.contains("not in that prediction: vignette, fog and stored colours"), "{out}{err}");
+    assert!(out.contains("not predicted: vignette, fog and stored colours"), "{out}{err}");
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn two_fields_far_apart_do_not_hide_an_error() {
+fn interlaced_fields_do_not_hide_an_error() {
     let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]"];
     let fields = ["--json", "--set", "camera.shutter.interlace_ms=700", "--set", "quality.solver=linear"];
     let (code, out, err) = verify_small(&[&centre[..], &fields].concat());
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     let frame = &report["frames"][0];
-    assert!(code == 1 && report["kept"] == false && err.contains("is broken in frame 3"), "{out}{err}");
+    assert!(code == 1 && report["kept"] == false && err.contains("frame 3: "), "{out}{err}");
     assert!(
         frame["measured"]["smooth"]["pixels"].as_u64().unwrap() > 6000
             && frame["measured"]["judged_by"] == "smooth",
@@ -378,14 +380,14 @@ fn two_fields_far_apart_do_not_hide_an_error() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn an_empty_picture_is_neither_kept_nor_silent() {
-    // The paper's frustum is symmetric about the optical axis, which these pictures lie beside.
+fn empty_frames_exceed_the_tolerance_with_a_warning() {
+    // The paper's frustum is symmetric about the optical axis, which is outside of these frames.
     let pinhole = ["--set", "camera.lens.model=pinhole", "--set", "camera.lens.coefficients=[]"];
     let beside =
         [&pinhole[..], &["--set", "camera.principal_point_px=[200, 150]", "--preset", "paper"]].concat();
     let (code, out, err) = verify_small(&beside);
     assert!(
-        code == 1 && out.contains("6912") && out.contains("BROKEN as predicted: too many pixels"),
+        code == 1 && out.contains("6912") && out.contains("EXCEEDED as predicted: too many pixels"),
         "{out}{err}"
     );
     assert!(err.contains("the ideal frame: 100.0 % of the pixels"), "{err}");
@@ -418,7 +420,7 @@ fn an_empty_picture_is_neither_kept_nor_silent() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn tolerances_that_the_plans_break_are_said_once_and_kept() {
+fn predicted_tolerance_violations_are_reported_once_and_stored() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let render = |more: &[&str]| {
@@ -442,7 +444,7 @@ fn tolerances_that_the_plans_break_are_said_once_and_kept() {
     for said in <[String; 2]>::from(render(&strict)) {
         for key in ["quality.max_error_px = 0.0000001", "quality.max_error_dn = 0.001"] {
             assert_eq!(
-                said.matches(&format!("2 of 2 frames do not keep {key}: in the worst, frame ")).count(),
+                said.matches(&format!("2 of 2 frames exceed {key}: in the worst, frame ")).count(),
                 1,
                 "{said}"
             );
@@ -460,20 +462,20 @@ fn tolerances_that_the_plans_break_are_said_once_and_kept() {
         &[&strict[..], &["--set", "quality.solver=linear"]].concat(),
     ] {
         for said in <[String; 2]>::from(render(more)) {
-            assert!(!said.contains("do not keep"), "{more:?}: {said}");
+            assert!(!said.contains("exceed"), "{more:?}: {said}");
         }
     }
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
+fn verify_prints_the_terrain_level_of_detail() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml");
     let verify = |more: &[&str]| {
         let small = ["--set", "camera.size_px=[80, 60]", "--set", "camera.principal_point_px=[39.5, 29.5]"];
         camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "0"][..], &small, more].concat())
     };
-    // Coarse terrain leaves the source coordinates as they are, and is said beside them.
+    // Coarse terrain does not change the source errors; its bound is listed separately.
     let off_px = |[terrain_px, dn]: [&str; 2]| {
         let asked =
             [format!("quality.max_terrain_error_px={terrain_px}"), format!("quality.max_error_dn={dn}")];
@@ -485,12 +487,12 @@ fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
     };
     let [fine, coarse] = [["0.25", "1"], ["20", "200"]].map(off_px);
     assert!(fine <= 0.25 && coarse > 1.0 && coarse <= 20.0, "{fine} {coarse}");
-    // What the picture may be off by is kept all the same.
+    // The picture error stays within its tolerance.
     let [tight, loose] = [["20", "1"], ["20", "2"]].map(off_px);
     assert!(tight < 0.5 * loose && loose < 0.5 * coarse, "{tight} {loose} {coarse}");
     let (code, out, err) = verify(&[]);
     assert!(
-        code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")),
+        code == 0 && out.contains("terrain LOD") && out.contains(&format!("| {fine:>11.3} | kept")),
         "{out}{err}"
     );
 }

@@ -1,4 +1,4 @@
-//! The viewer beside the program.
+//! The viewer as part of the program.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,7 +6,7 @@ use std::{ffi::OsString, path::Path};
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_window_shows_the_codes_of_the_files_that_render_writes() {
+fn viewer_shows_the_bytes_that_render_writes() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
     let folder = tempfile::tempdir().unwrap();
     let words = [
@@ -36,7 +36,7 @@ fn the_window_shows_the_codes_of_the_files_that_render_writes() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_told_as_the_window_tells_it() {
+fn invalid_scenario_gives_the_error_of_the_viewer() {
     let error = camsim_viewer::still(Path::new("no/such/scenario.toml"), 0).unwrap_err().to_string();
     assert!(error.contains("no/such/scenario.toml"), "{error}");
 }

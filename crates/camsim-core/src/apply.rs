@@ -1,16 +1,16 @@
-//! The reverse pipeline on an ideal RGB-D frame of any origin (Blender, AirSim, Gazebo, a depth camera):
-//! `camsim apply`.
+//! The reverse pipeline on an ideal RGB-D frame of any origin (Blender, AirSim, Gazebo, a depth camera), as
+//! used by `camsim apply`.
 //!
-//! Output pixel -> lens inverse -> line time -> temporal inverse -> gather over exposure and area ->
-//! photometric, the paper's section 2, in f64 on the CPU and on all its cores, by the same twins that define
-//! the shaders. Two sets of methods:
+//! Output pixel -> lens inverse -> row time -> temporal inverse -> gather over exposure and area ->
+//! photometric stage: section 2 of the paper, in f64 on all CPU cores, by the f64 twins that define the
+//! shaders. There are two sets of methods:
 //!
-//! * [`Preset::Default`]: exact relative poses, depth by fixed point and by a search along the ray's path
-//!   where surfaces meet, the true curved path over the exposure, footprint taps, linear light;
-//! * [`Preset::Paper`]: what the paper does ([`paper`]).
+//! * [`Preset::Default`]: exact relative poses; depth by fixed-point iteration, and by a search along the
+//!   epipolar line where surfaces meet; the curved exposure path; footprint taps; averages in linear light.
+//! * [`Preset::Paper`]: the methods of the paper ([`paper`]).
 //!
-//! Instants are seconds from the frame's stamp. The ideal frame shows its scene at [`IdealFrame::instant_s`],
-//! 0 being the stamp itself.
+//! Instants are seconds relative to the stamp of the frame. The ideal frame shows the scene at
+//! [`IdealFrame::instant_s`], where 0 is the stamp itself.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -31,55 +31,57 @@ use crate::{
     },
 };
 
+mod depth_search;
 mod flow;
 mod ideal;
 mod motion;
 pub mod paper;
-mod search;
 
+use depth_search::DepthSearch;
 pub use flow::FlowField;
 use flow::FlowSearch;
-pub use ideal::{ApplyError, IdealFrame, Unseen, UnseenCounts};
+pub use ideal::{ApplyError, IdealFrame, NoSource, NoSourceCounts};
 pub use motion::{Motion, PoseRow, PoseTrack, PoseTrackError};
-use search::DepthEdges;
 
-/// Part of an output pixel by which the polyline over the exposure may miss the curved path.
+/// Largest deviation of the exposure polyline from the curved path, output pixels.
 const CHORD_MISS_PX: f64 = 0.01;
-/// Most exposure nodes.
+/// Largest number of exposure nodes.
 const MAX_NODES: u32 = 65;
-/// Samples a pixel of path: keeps white texture below 1/255 (NUMERICS section 3).
+/// Exposure samples per pixel of path. With 2 the error stays below 1/255 on white texture
+/// (docs/accuracy/stress.md).
 const SAMPLES_PER_PX: f64 = 2.0;
-/// Most samples between two nodes.
+/// Largest number of samples between two nodes.
 const MAX_SAMPLES: u32 = 1024;
-/// Most footprint taps an axis.
+/// Largest number of footprint taps per axis.
 const MAX_TAPS: u32 = 8;
-/// Parallax between the surfaces around a source, over the exposure, beyond which every sample is solved on
-/// its own, pixels.
+/// Parallax over the exposure between the surfaces around a source above which every exposure sample is
+/// solved on its own, pixels.
 const EDGE_PARALLAX_PX: f64 = 0.1;
-/// A difference of inverse depth, relative to the nearer, that is a jump and no slope: as where depth is
-/// read.
+/// Relative difference of inverse depth, to the nearer one, above which there is a jump and no slope: the
+/// threshold of the depth look-up.
 const JUMP: f64 = 0.1;
-/// Exposure nodes of a flow, which is straight but for its slopes: where these bend a path, every sample is
-/// solved on its own.
+/// Exposure nodes of a flow, whose paths are straight except for the slopes of the flow. Where these bend a
+/// path, every sample is solved on its own.
 const FLOW_NODES: u32 = 5;
-/// Miss of the polyline at the exposure's middle beyond which every sample is solved on its own, pixels.
-const BENT_PX: f64 = 0.05;
+/// Deviation of the polyline at mid-exposure above which every sample is solved on its own, pixels.
+const MAX_BEND_PX: f64 = 0.05;
 
-/// How to do it.
+/// Settings of the pipeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Whose methods.
+    /// Set of methods.
     pub preset: Preset,
-    /// Temporal inverse; by default [`Solver::Reproject`]. The paper's preset takes [`Solver::Rk2`]; another
-    /// one beside it leaves its other methods as they are, which tells its causes of error apart.
+    /// Temporal inverse; [`Solver::Reproject`] by default, [`Solver::Rk2`] with the paper's preset. Another
+    /// solver can be combined with the paper's preset to separate its causes of error.
     pub solver: Option<Solver>,
-    /// Samples over the exposure; `None` chooses by the length of the path (100 in the paper's preset).
+    /// Number of exposure samples. `None` derives it from the length of the path (100 with the paper's
+    /// preset).
     pub blur_samples: Option<u32>,
-    /// The paper's fog, only with its preset.
+    /// The paper's fog; only with its preset.
     pub fog: Option<paper::LinearFog>,
-    /// Seed of the noise, with the camera's name ([`camera_seed`]).
+    /// Seed of the noise, combined with the camera's name ([`camera_seed`]).
     pub seed: u64,
-    /// Frame number, for the noise and as the frame's name.
+    /// Frame number, for the noise and the name of the frame.
     pub frame: u64,
 }
 
@@ -89,7 +91,7 @@ impl Default for Settings {
     }
 }
 
-/// Everything prepared for the pixels of one frame.
+/// The pipeline of one frame, with all data that its pixels share.
 #[derive(Debug)]
 pub struct Pipeline<'a> {
     spec: &'a CameraSpec,
@@ -100,19 +102,19 @@ pub struct Pipeline<'a> {
     settings: Settings,
     solver: Solver,
     twist: Twist,
-    edges: DepthEdges,
+    edges: DepthSearch,
     flow: Option<FlowSearch>,
-    /// Stored values, for the paper's preset only.
+    /// Stored (encoded) colours; only for the paper's preset.
     stored_rgba: Vec<f32>,
     nodes: u32,
     noise_seed: u64,
 }
 
 impl<'a> Pipeline<'a> {
-    /// Checks and prepares.
+    /// Checks the inputs and prepares the pipeline.
     ///
     /// # Errors
-    /// A camera, frame or motion that cannot be used; settings that do not go together.
+    /// A camera, frame or motion that cannot be used, or settings that contradict each other.
     pub fn new(
         spec: &'a CameraSpec,
         frame: &'a IdealFrame,
@@ -143,7 +145,7 @@ impl<'a> Pipeline<'a> {
             _ => None,
         };
         let depth = InverseDepthImage { size_px: frame.geometry.size_px, values: &frame.inverse_depth };
-        let edges = DepthEdges::new(&depth);
+        let edges = DepthSearch::new(&depth);
         let stored_rgba = if paper {
             frame.color_rgba.iter().map(|&v| srgb_from_linear(v.clamp(0.0, 1.0))).collect()
         } else {
@@ -171,14 +173,14 @@ impl<'a> Pipeline<'a> {
         Ok(pipeline)
     }
 
-    /// Exposure nodes that are solved one by one; the path between two is taken as straight.
+    /// Number of exposure nodes that are solved exactly; the path between two of them is straight.
     #[must_use]
     pub fn nodes(&self) -> u32 {
         self.nodes
     }
 
-    /// Of a flow: the first and the last instant that is seen, shares of its interval after the ideal frame.
-    /// Beyond 0 to 1 it is gone on with.
+    /// For a flow: the first and last instant that is read, as shares of the interval after the ideal frame.
+    /// Outside of 0 to 1 the flow is extrapolated.
     #[must_use]
     pub fn flow_shares(&self) -> Option<[f64; 2]> {
         let (first_s, last_s) = self.shutter.window_s();
@@ -186,23 +188,23 @@ impl<'a> Pipeline<'a> {
         self.flow.as_ref().map(|_| [shares[0].min(shares[1]), shares[0].max(shares[1])])
     }
 
-    /// Where a pixel looks in the ideal frame at exposure phase `phase` (-0.5 begin, 0.5 end).
+    /// Source of a pixel in the ideal frame at exposure phase `phase` (-0.5 is the begin, 0.5 the end).
     ///
     /// # Errors
-    /// Why it sees nothing.
-    pub fn source(&self, pixel: [u32; 2], phase: f64) -> Result<Source, Unseen> {
+    /// Why the pixel has no source.
+    pub fn source(&self, pixel: [u32; 2], phase: f64) -> Result<Source, NoSource> {
         let uv = self
             .camera
             .unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))
-            .ok_or(Unseen::NoRay)?;
+            .ok_or(NoSource::NoRay)?;
         self.source_of_ray(
             uv,
             self.shutter.dt_pixel_s(pixel[0], pixel[1]) + phase * self.shutter.exposure_s(),
         )
     }
 
-    /// As [`Pipeline::source`], of an ideal ray at an instant.
-    fn source_of_ray(&self, uv: DVec2, dt_s: f64) -> Result<Source, Unseen> {
+    /// As [`Pipeline::source`], for an ideal ray at an instant.
+    fn source_of_ray(&self, uv: DVec2, dt_s: f64) -> Result<Source, NoSource> {
         let ideal = &self.frame.geometry;
         let holes = &self.frame.holes;
         if let Some(flow) = &self.flow {
@@ -218,9 +220,9 @@ impl<'a> Pipeline<'a> {
                 ideal,
             );
         }
-        // These read the depth where the ray would look if nothing moved.
+        // The paper's models read the depth at the position that the ray would have without motion.
         if !holes.is_empty() && holes[self.depth().nearest_index(ideal.px_from_point(uv.extend(1.0)))] {
-            return Err(Unseen::Hole);
+            return Err(NoSource::Hole);
         }
         let inverse_depth = self.inverse_depth_of_ray(uv);
         let shift_s = dt_s - self.frame.instant_s;
@@ -228,27 +230,27 @@ impl<'a> Pipeline<'a> {
             Solver::Linear => displacement::linear(uv, inverse_depth, &self.twist, shift_s),
             _ => displacement::rk2(uv, inverse_depth, &self.twist, shift_s, RK2_STEP_DEG.to_radians()),
         };
-        let at_px = ideal.px_from_point(moved.extend(1.0));
-        if at_px.is_finite() && ideal.contains(at_px) {
-            Ok(Source { at_px, inverse_depth })
+        let position_px = ideal.px_from_point(moved.extend(1.0));
+        if position_px.is_finite() && ideal.contains(position_px) {
+            Ok(Source { position_px, inverse_depth })
         } else {
-            Err(Unseen::Outside)
+            Err(NoSource::Outside)
         }
     }
 
-    /// The share of a flow's interval that a time is; 0 without a flow.
+    /// Share of the flow's interval at a time; 0 without a flow.
     fn flow_share(&self, dt_s: f64) -> f64 {
         if let Motion::Flow(flow) = self.motion { dt_s / flow.interval_s } else { 0.0 }
     }
 
-    /// The paper's models take the depth where the ray would look if nothing moved: the nearest texel in its
-    /// own preset, bilinear else.
+    /// Depth for the paper's models, at the position that the ray would have without motion: the nearest
+    /// texel with the paper's preset, bilinear otherwise.
     fn inverse_depth_of_ray(&self, uv: DVec2) -> f64 {
-        let at_px = self.frame.geometry.px_from_point(uv.extend(1.0));
+        let position_px = self.frame.geometry.px_from_point(uv.extend(1.0));
         if self.settings.preset == Preset::Paper {
-            self.depth().nearest(at_px)
+            self.depth().nearest(position_px)
         } else {
-            self.depth().inverse_depth(at_px)
+            self.depth().inverse_depth(position_px)
         }
     }
 
@@ -264,21 +266,21 @@ impl<'a> Pipeline<'a> {
         ColorImage { size_px: self.frame.geometry.size_px, rgba: &self.stored_rgba }
     }
 
-    /// The finished picture, with depth in each line's own camera. `vignette` is the map of
-    /// `photometric.vignette`, read.
+    /// The finished frame, with depth in the camera of each row. `vignette` is the image named by
+    /// `photometric.vignette`.
     #[must_use]
     pub fn render(&self, vignette: Option<&GrayImage>) -> RenderedFrame {
         self.render_and_count(vignette).0
     }
 
-    /// As [`Pipeline::render`], with the pixels that show nothing.
+    /// As [`Pipeline::render`], with the number of pixels without a source.
     #[must_use]
-    pub fn render_and_count(&self, vignette: Option<&GrayImage>) -> (RenderedFrame, UnseenCounts) {
+    pub fn render_and_count(&self, vignette: Option<&GrayImage>) -> (RenderedFrame, NoSourceCounts) {
         let size_px @ [width, height] = self.camera.size_px;
         let weights =
             vignette.map(|map| vignette_weights(map, size_px, self.spec.photometric.vignette_thresholds));
         let table = tail_table();
-        let pixels: Vec<Result<([f32; 3], f32), Unseen>> = (0..height)
+        let pixels: Vec<Result<([f32; 3], f32), NoSource>> = (0..height)
             .into_par_iter()
             .flat_map_iter(|y| (0..width).map(move |x| [x, y]))
             .map(|pixel| {
@@ -290,7 +292,7 @@ impl<'a> Pipeline<'a> {
         let color_rgba =
             pixels.iter().flat_map(|found| found.map_or([0.0; 4], |([r, g, b], _)| [r, g, b, 1.0])).collect();
         let depth_m = pixels.iter().map(|found| found.map_or(0.0, |(_, depth_m)| depth_m)).collect();
-        let mut counts = UnseenCounts::default();
+        let mut counts = NoSourceCounts::default();
         pixels.iter().filter_map(|found| found.err()).for_each(|why| counts.add(why));
         let frame = RenderedFrame {
             index: self.settings.frame,
@@ -302,12 +304,12 @@ impl<'a> Pipeline<'a> {
         (frame, counts)
     }
 
-    /// Linear colour and depth. What the vignette blackens is not gathered.
-    fn pixel(&self, pixel: [u32; 2], weight: f32, table: &[f32]) -> Result<([f32; 3], f32), Unseen> {
+    /// Linear colour and depth of a pixel. Pixels that the vignette makes black are not gathered.
+    fn pixel(&self, pixel: [u32; 2], weight: f32, table: &[f32]) -> Result<([f32; 3], f32), NoSource> {
         let uv = self
             .camera
             .unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))
-            .ok_or(Unseen::NoRay)?;
+            .ok_or(NoSource::NoRay)?;
         let dt_s = self.shutter.dt_pixel_s(pixel[0], pixel[1]);
         let middle = self.source_of_ray(uv, dt_s);
         let depth_m = middle.map_or(0.0, |source| {
@@ -329,22 +331,22 @@ impl<'a> Pipeline<'a> {
             return Ok((finish(DVec3::ZERO), depth_m));
         }
         if self.settings.preset == Preset::Paper {
-            // Vignette, light and noise act on stored values too; only then is the picture decoded, so that
-            // files are linear or encoded as ever.
+            // In the paper's preset, vignette, light and noise act on stored values. The colour is decoded
+            // only afterwards, so that output files have the usual encodings.
             let stored = finish(self.gather_paper(uv, dt_s)?);
             return Ok((stored.map(linear_from_srgb), depth_m));
         }
         Ok((finish(self.gather_exact(uv, dt_s, middle?)?), depth_m))
     }
 
-    /// Mean over the exposure and the pixel's area, in linear light. A pixel that looks outside of the ideal
-    /// frame, or into a hole of its depth, at any node has none.
-    fn gather_exact(&self, uv: DVec2, dt_s: f64, middle: Source) -> Result<DVec3, Unseen> {
+    /// Mean over the exposure and the pixel's area in linear light. An error if the source at any node is
+    /// outside of the ideal frame or in a hole of its depth.
+    fn gather_exact(&self, uv: DVec2, dt_s: f64, middle: Source) -> Result<DVec3, NoSource> {
         let area = self.footprint(uv, dt_s, &middle);
         let exposure_s = self.shutter.exposure_s();
         if self.nodes < 2 {
             return Ok(gather(
-                &[middle.at_px],
+                &[middle.position_px],
                 PathStage::Straight,
                 &area,
                 &self.color(),
@@ -353,18 +355,18 @@ impl<'a> Pipeline<'a> {
             ));
         }
         let at_node = |k: u32| dt_s + exposure_s * (f64::from(k) / f64::from(self.nodes - 1) - 0.5);
-        let sources: Result<Vec<Source>, Unseen> =
+        let sources: Result<Vec<Source>, NoSource> =
             (0..self.nodes).map(|k| self.source_of_ray(uv, at_node(k))).collect();
         let sources = sources?;
-        let nodes_px: Vec<DVec2> = sources.iter().map(|source| source.at_px).collect();
+        let nodes_px: Vec<DVec2> = sources.iter().map(|source| source.position_px).collect();
         let (per_px, cap) = match self.settings.blur_samples {
             Some(samples) => (f64::from(samples), samples.div_ceil(self.nodes - 1)),
             None => (SAMPLES_PER_PX, MAX_SAMPLES),
         };
-        if !self.meets_edge(uv, dt_s, &sources, middle.at_px) {
+        if !self.sees_parallax(uv, dt_s, &sources, middle.position_px) {
             return Ok(gather(&nodes_px, PathStage::Straight, &area, &self.color(), per_px, cap));
         }
-        // Surfaces that part over the exposure: every sample finds its own.
+        // Surfaces with different parallax over the exposure: every sample is solved on its own.
         let length_px: f64 = nodes_px.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
         let count = samples_for(
             length_px,
@@ -376,25 +378,29 @@ impl<'a> Pipeline<'a> {
         let sample = |i: u32| {
             let phase = (f64::from(i) + 0.5) / f64::from(count) - 0.5;
             let source = self.source_of_ray(uv, dt_s + phase * exposure_s);
-            source.map(|source| area.tap_color(&color, source.at_px, i))
+            source.map(|source| area.tap_color(&color, source.position_px, i))
         };
-        let sum: Result<DVec3, Unseen> = (0..count).map(sample).sum();
+        let sum: Result<DVec3, NoSource> = (0..count).map(sample).sum();
         sum.map(|sum| sum / f64::from(count))
     }
 
-    /// Whether surfaces meet near the sources, and the exposure's travel pulls them apart; or the polyline
-    /// misses the path at its middle.
-    fn meets_edge(&self, uv: DVec2, dt_s: f64, sources: &[Source], middle_px: DVec2) -> bool {
+    /// Whether surfaces meet near the sources and the exposure's motion gives them different parallax, or
+    /// whether the polyline deviates from the path at mid-exposure.
+    fn sees_parallax(&self, uv: DVec2, dt_s: f64, sources: &[Source], middle_px: DVec2) -> bool {
         let half = sources.len() / 2;
-        let chord_px = sources[(sources.len() - 1) / 2].at_px.midpoint(sources[half].at_px);
-        if chord_px.distance(middle_px) > BENT_PX {
+        let chord_px = sources[(sources.len() - 1) / 2].position_px.midpoint(sources[half].position_px);
+        if chord_px.distance(middle_px) > MAX_BEND_PX {
             return true;
         }
         let half_s = 0.5 * self.shutter.exposure_s();
         if let Some(flow) = &self.flow {
             let shares = [-half_s, half_s]
                 .map(|from_middle_s| self.flow_share(dt_s + from_middle_s - self.frame.instant_s));
-            return flow.parts(self.frame.geometry.px_from_point(uv.extend(1.0)), shares, EDGE_PARALLAX_PX);
+            return flow.may_separate(
+                self.frame.geometry.px_from_point(uv.extend(1.0)),
+                shares,
+                EDGE_PARALLAX_PX,
+            );
         }
         let (_, begin) = self.motion.key_from(dt_s - half_s, self.frame.instant_s);
         let (_, end) = self.motion.key_from(dt_s + half_s, self.frame.instant_s);
@@ -408,20 +414,19 @@ impl<'a> Pipeline<'a> {
             apart((a - b).abs(), a.max(b))
         };
         sources.windows(2).any(between)
-            || sources.iter().any(|source| apart(depth.spread(source.at_px), source.inverse_depth))
+            || sources.iter().any(|source| apart(depth.spread(source.position_px), source.inverse_depth))
     }
 
-    /// Change of the source per output pixel: through the lens's inverse Jacobian and the relative pose at
-    /// the ray's own depth.
+    /// Footprint of a pixel: the change of the source per output pixel, from the inverse Jacobian of the lens
+    /// and the relative pose at the depth of the ray.
     fn footprint(&self, uv: DVec2, dt_s: f64, source: &Source) -> Footprint {
         let uv_from_px = self.camera.lens.jacobian(uv).inverse();
         let focal = self.camera.focal_px;
         let pixel = [DVec2::new(1.0 / focal.x, 0.0), DVec2::new(0.0, 1.0 / focal.y)];
         if let Some(flow) = &self.flow {
-            let source_from_look =
-                flow.source_from_look(source.at_px, self.flow_share(dt_s - self.frame.instant_s));
-            let [dx, dy] =
-                pixel.map(|d| source_from_look * (self.frame.geometry.focal_px * (uv_from_px * d)));
+            let source_from_ray =
+                flow.source_from_ray(source.position_px, self.flow_share(dt_s - self.frame.instant_s));
+            let [dx, dy] = pixel.map(|d| source_from_ray * (self.frame.geometry.focal_px * (uv_from_px * d)));
             return Footprint::new(dx, dy, TapStage::SplineOrGrid { most: MAX_TAPS });
         }
         let (rotation, shift) = self.motion.key_from(dt_s, self.frame.instant_s);
@@ -434,8 +439,8 @@ impl<'a> Pipeline<'a> {
         Footprint::new(dx, dy, TapStage::SplineOrGrid { most: MAX_TAPS })
     }
 
-    /// Nodes so that no chord misses the path by more than [`CHORD_MISS_PX`], seen at a grid of pixels. The
-    /// miss falls with the square of the number of segments.
+    /// Number of nodes for which no chord deviates from the path by more than [`CHORD_MISS_PX`], tested on a
+    /// grid of pixels. The deviation falls with the square of the number of segments.
     fn exposure_nodes(&self) -> u32 {
         let exposure_s = self.shutter.exposure_s();
         if exposure_s <= 0.0 {
@@ -453,18 +458,18 @@ impl<'a> Pipeline<'a> {
             let Some(uv) = self.camera.unproject(DVec2::new(f64::from(x), f64::from(y))) else { continue };
             let w = self.inverse_depth_of_ray(uv);
             let mid_s = self.shutter.dt_pixel_s(x, y);
-            let at: Vec<DVec2> = (0..=steps)
+            let path_px: Vec<DVec2> = (0..=steps)
                 .map(|k| {
                     let t_s = mid_s + exposure_s * (f64::from(k) / f64::from(steps) - 0.5);
                     let (rotation, shift) = self.motion.key_from(t_s, self.frame.instant_s);
                     ideal.px_from_point(rotation * uv.extend(1.0) + w * shift)
                 })
-                .filter(|at| at.is_finite())
+                .filter(|path_px| path_px.is_finite())
                 .collect();
-            longest = longest.max(at.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
-            if let (Some(&a), Some(&b)) = (at.first(), at.last()) {
-                let parts = (at.len() - 1).max(1) as f64;
-                miss = at
+            longest = longest.max(path_px.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
+            if let (Some(&a), Some(&b)) = (path_px.first(), path_px.last()) {
+                let parts = (path_px.len() - 1).max(1) as f64;
+                miss = path_px
                     .iter()
                     .enumerate()
                     .map(|(k, p)| p.distance(a.lerp(b, k as f64 / parts)))

@@ -1,7 +1,8 @@
-//! Camera intrinsics: pixel <-> ideal ray, the zoom table, and the check of a calibration.
+//! Camera intrinsics: conversion between pixels and ideal rays, the zoom table, and the check of a
+//! calibration.
 //!
-//! Pixels as in OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the top-left pixel, a
-//! centred principal point is `((W - 1)/2, (H - 1)/2)`.
+//! Pixel coordinates are those of OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the
+//! top-left pixel, and a centred principal point is `((W - 1)/2, (H - 1)/2)`.
 
 use glam::DVec2;
 
@@ -16,14 +17,13 @@ pub use check::LensCheck;
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
-/// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing
-/// error.
+/// Largest width or height. GPUs of the last decade support 16384; twice that is a typing error.
 pub(crate) const MAX_SIZE_PX: u32 = 32_768;
 
-/// What can be wrong with a camera.
+/// Invalid camera parameters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// Zero or absurd size.
+    /// Zero or too large size.
     #[error("camera.size_px is [{0}, {1}]: both must be 1 to {MAX_SIZE_PX}")]
     Size(u32, u32),
     /// Zero, negative or non-finite focal length.
@@ -48,7 +48,7 @@ pub enum CameraError {
         /// cy.
         y: f64,
     },
-    /// The lens.
+    /// Invalid lens coefficients.
     #[error("{key}: {source}")]
     Lens {
         /// Section in the file.
@@ -56,7 +56,7 @@ pub enum CameraError {
         /// What is wrong.
         source: LensError,
     },
-    /// Zoom values that do not ascend.
+    /// Zoom values that are not ascending.
     #[error(
         "camera.zoom[{index}].at is {at}: the zoom table must be finite and strictly ascending in `at`; sort it and merge equal entries"
     )]
@@ -71,7 +71,7 @@ pub enum CameraError {
     ZoomValue(f64),
 }
 
-/// Intrinsics of a camera and its lens, checked. Immutable.
+/// Checked intrinsics of a camera with its lens. Immutable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
     /// Width, height.
@@ -80,12 +80,12 @@ pub struct CameraModel {
     pub focal_px: DVec2,
     /// cx, cy.
     pub principal_point_px: DVec2,
-    /// Distortion.
+    /// Lens model with its distortion.
     pub lens: Lens,
 }
 
 impl CameraModel {
-    /// From plain numbers; `None` for the principal point is the image centre.
+    /// A camera from plain numbers. A principal point of `None` is the image centre.
     pub fn new(
         size_px: [u32; 2],
         focal_px: [f64; 2],
@@ -96,7 +96,7 @@ impl CameraModel {
         Self::with_key("camera", size_px, focal_px, principal_point_px, model, coefficients)
     }
 
-    /// From `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
+    /// A camera from `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
         Self::new(
             spec.size_px,
@@ -107,7 +107,7 @@ impl CameraModel {
         )
     }
 
-    /// From `[camera]` at one zoom value: its zoom table where it has one, else as
+    /// A camera from `[camera]` at one zoom value, by the zoom table if there is one, else as
     /// [`CameraModel::from_spec`].
     pub fn at_zoom(spec: &CameraSpec, zoom: f64) -> Result<Self, CameraError> {
         match ZoomTable::from_spec(spec)? {
@@ -142,7 +142,7 @@ impl CameraModel {
         }
         let focal_px = DVec2::new(fx, fy);
         let principal_point_px = DVec2::new(cx, cy);
-        // The start table of the inverse is spread over just what the image shows.
+        // The start table of the inverse covers just the image.
         let reach = image_corners(size_px)
             .into_iter()
             .map(|corner| ((corner - principal_point_px) / focal_px).length())
@@ -152,19 +152,19 @@ impl CameraModel {
         Ok(Self { size_px, focal_px, principal_point_px, lens })
     }
 
-    /// Where the ideal ray `(u, v, 1)` is imaged, pixels. The bare formula: also beyond the fold, where
-    /// [`Lens::contains`] is false.
+    /// Projection of the ideal ray `(u, v, 1)`, pixels. The formula is evaluated beyond the fold as well,
+    /// where [`Lens::contains`] is false.
     pub fn project(&self, ideal: DVec2) -> DVec2 {
         self.pixel_from_distorted(self.lens.distort(ideal))
     }
 
-    /// The ideal `(u, v)` seen at a pixel coordinate; `None` where the lens has no answer.
+    /// Ideal `(u, v)` at a pixel coordinate; `None` where the lens has no inverse.
     pub fn unproject(&self, pixel: DVec2) -> Option<DVec2> {
         self.lens.undistort(self.distorted_from_pixel(pixel))
     }
 
     /// `f x + c`.
-    pub fn pixel_from_distorted(&self, distorted: DVec2) -> DVec2 {
+    pub(crate) fn pixel_from_distorted(&self, distorted: DVec2) -> DVec2 {
         distorted * self.focal_px + self.principal_point_px
     }
 

@@ -1,19 +1,20 @@
-//! The flight log: rows of time, position and attitude, cleaned and brought to one local north-east-down
+//! The flight log: rows of time, position and attitude, cleaned and converted to one local north-east-down
 //! frame.
 //!
-//! [`RawRow`]s come from a reader (camsim-io) as the file states them; [`FlightLog::from_raw`] cleans them
-//! and counts every repair in a [`CleaningReport`]. Nothing is repaired silently. The steps, in order:
+//! [`RawRow`]s come from a reader (camsim-io) as the file states them. [`FlightLog::from_raw`] cleans them
+//! and counts every repair in a [`CleaningReport`]; nothing is repaired silently. The steps, in order:
 //!
-//! 1. rows without a usable time or position are dropped; unusable attitudes are marked as missing;
-//! 2. rows are sorted stably by time; zeros that stand for a missing fix or height are left out
-//!    (`null_rows`);
-//! 3. heights change datum, positions become local NED, angles become rotations or (where turns count) stay
-//!    angles;
-//! 4. position spikes are dropped, attitude glitches are marked as missing (`outliers`);
-//! 5. rows less than 1 ms apart are averaged into one;
-//! 6. missing attitudes are interpolated between their neighbours, or all are computed from the track
-//!    (`track_attitude`);
-//! 7. time is scaled, gaps are counted, rows with more than 90 degrees of turn between them get rows in
+//! 1. Rows without a usable time or position are dropped; unusable attitudes are marked as missing.
+//! 2. Rows are sorted by time (stable sort); zeros that stand for a missing fix or height are dropped
+//!    (`null_rows`).
+//! 3. Heights change datum, positions become local NED, angles become rotations, or stay angles if they count
+//!    turns.
+//! 4. Position spikes are dropped, attitude glitches are marked as missing (`outliers`).
+//! 5. Rows less than 1 ms apart are averaged into one.
+//! 6. Missing attitudes are interpolated between their neighbours, or all are computed from the track
+//!    (`track_attitude`).
+//! 7. Time is scaled, gaps are counted, and rows are inserted where the angles between two rows change by
+//!    more than 90 degrees.
 //!    between.
 
 use glam::{DQuat, DVec3};
@@ -34,7 +35,7 @@ mod track_attitude;
 pub use attitude::body_from_euler_deg;
 pub use report::{CleaningReport, Finding, Note};
 
-/// Position of a row as its file states it.
+/// Position of a row as the file states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RawPosition {
     /// On WGS-84; the attitude of such a row is relative to the tangent frame at that point.
@@ -50,7 +51,8 @@ pub enum RawAttitude {
     EulerDeg([f64; 3]),
     /// Takes body (FRD) to north-east-down; any norm within 10 % of 1.
     Quaternion(DQuat),
-    /// The row states none. Where other rows do, it is interpolated between them, which is no repair.
+    /// The row states no attitude. Where other rows do, it is interpolated between them; that counts as no
+    /// repair.
     None,
 }
 
@@ -67,7 +69,7 @@ pub struct RawRow {
     pub attitude: RawAttitude,
 }
 
-/// One row of a cleaned log.
+/// A row of a cleaned log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogRow {
     /// Seconds since the first good row, divided by the `speed` factor; strictly increasing.
@@ -78,8 +80,8 @@ pub struct LogRow {
     pub ned_from_body: DQuat,
 }
 
-/// Change of vertical datum while a log is read. If log and terrain share a datum, none is needed: that is
-/// the caller's decision.
+/// Change of vertical datum while a log is read. None is needed if log and terrain share a datum; the caller
+/// decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeightConversion {
     /// Heights stay as they are.
@@ -91,16 +93,16 @@ pub enum HeightConversion {
     EllipsoidToMsl,
 }
 
-/// How raw rows become a log.
+/// Options for turning raw rows into a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogOptions {
     /// Whether angles wrap or count turns.
     pub angles: AngleKind,
-    /// Where attitude comes from.
+    /// Source of the attitude.
     pub attitude: AttitudeSource,
-    /// Origin of the local frame: `None` is the first good row of a geodetic log, after `height`. A given
-    /// origin is in the datum *after* `height`. For a log in local coordinates it says where on earth (0, 0,
-    /// 0) is.
+    /// Origin of the local frame. `None` is the first good row of a geodetic log, after `height`. A given
+    /// origin is in the datum *after* `height`. For a log in local coordinates, it is the geodetic position
+    /// of (0, 0, 0).
     pub origin: Option<Geodetic>,
     /// Change of vertical datum of geodetic rows.
     pub height: HeightConversion,
@@ -133,24 +135,24 @@ impl LogOptions {
     }
 }
 
-/// What makes a log unusable.
+/// Why a log cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LogError {
-    /// No rows at all.
+    /// There are no rows.
     #[error("the log has no rows")]
     Empty,
-    /// Rows, but none usable.
+    /// No row is usable.
     #[error("none of the log's {rows} rows has a finite time and position (first: line {line})")]
     NoGoodRow {
         /// Rows read.
         rows: usize,
-        /// Line of the first.
+        /// Line of the first row.
         line: usize,
     },
-    /// Neither columns nor usable values of attitude.
+    /// There are neither attitude columns nor usable attitudes.
     #[error("the log has no usable attitude; set flight.attitude = \"track\" to derive it from the track")]
     NoAttitude,
-    /// Geodetic and local rows in one log.
+    /// Geodetic and local positions in one log.
     #[error("line {line}: the log mixes geodetic and local positions; keep one kind per file")]
     MixedPositions {
         /// First line of the other kind.
@@ -175,23 +177,23 @@ pub enum LogError {
     TurnTooLarge {
         /// Line of the later row.
         line: usize,
-        /// Sum of the three angles' changes.
+        /// Sum of the changes of the three angles.
         degrees: f64,
     },
 }
 
-/// A cleaned log, ready for the tracker. Has at least one row.
+/// A cleaned log, ready for the tracker, with at least one row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlightLog {
     /// Rows by strictly increasing time.
     pub rows: Vec<LogRow>,
     /// Log clock at `t_s = 0`, nanoseconds.
     pub epoch_ns: i64,
-    /// The local frame on earth; `None` for a log in local coordinates without a geodetic origin.
+    /// Geodetic position of the local frame; `None` for a log in local coordinates without a geodetic origin.
     pub frame: Option<LocalFrame>,
-    /// What was repaired.
+    /// The repairs.
     pub report: CleaningReport,
-    /// What its reader said about the file.
+    /// Notes of the reader about the file.
     pub notes: Vec<Note>,
 }
 

@@ -1,14 +1,14 @@
-//! What one rendered frame gives, as plain data between renderer and writers.
+//! A rendered frame as plain data, passed from renderers to writers.
 
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::pose::CameraPose;
 
-/// Time, pose and velocity of one line of the readout (a row, or a column for sideways readout) at its
-/// mid-exposure.
+/// Time, pose and velocity of one row of the readout at its mid-exposure. With sideways readout it is a
+/// column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowRecord {
-    /// Line number from 0.
+    /// Row number from 0.
     pub row: u32,
     /// Mid-exposure, nanoseconds on the log's clock.
     pub t_mid_ns: i64,
@@ -23,14 +23,14 @@ pub struct RowRecord {
 /// Floats per pixel of [`RenderedFrame::coords`].
 pub const COORDS_CHANNELS: usize = 8;
 
-/// Where a ray (u, v) of a camera goes: what `coords` has in place of a point where the ray meets nothing.
-/// NED, of length 1.
+/// Direction of a ray (u, v) of a camera in NED, of length 1. `coords` has it in place of a point where the
+/// ray shows the sky.
 #[must_use]
 pub fn sky_direction_ned(pose: &CameraPose, uv: DVec2) -> DVec3 {
     pose.ned_from_camera * uv.extend(1.0).normalize()
 }
 
-/// One finished frame. Images are row-major from the top-left pixel.
+/// A finished frame. Images are row-major from the top-left pixel.
 #[derive(Clone, Debug, Default)]
 pub struct RenderedFrame {
     /// Frame number of the sequence.
@@ -39,14 +39,14 @@ pub struct RenderedFrame {
     pub stamp_ns: i64,
     /// Width, height.
     pub size_px: [u32; 2],
-    /// Linear R G B A, four floats a pixel; A is 1 where a ray exists, else 0.
+    /// Linear R G B A, four floats per pixel; A is 1 where a ray exists, else 0.
     pub color_rgba: Vec<f32>,
-    /// Planar depth in the row's own camera, metres, 0 = nothing there.
+    /// Planar depth in the row's own camera, metres; 0 = nothing.
     pub depth_m: Option<Vec<f32>>,
-    /// Per pixel: ideal ray u, v; source x, y in the ideal frame (pixels); Delta t (s); the ray's point n, e,
-    /// d at mid-exposure (m), or of the sky, whose depth is 0, its direction: a vector of length 1. All 0
-    /// where there is no ray.
+    /// Per pixel: ideal ray u, v; source x, y in the ideal frame (pixels); Delta t (s); and n, e, d of the
+    /// ray's point at mid-exposure (m), or, for the sky (depth 0), its direction of length 1. All 0 where
+    /// there is no ray.
     pub coords: Option<Vec<[f32; COORDS_CHANNELS]>>,
-    /// One record a line of the readout.
+    /// One record per row of the readout.
     pub rows: Vec<RowRecord>,
 }

@@ -1,11 +1,10 @@
 //! WGS-84 geodesy: geodetic <-> earth-centred (ECEF) <-> local north-east-down, exact in f64.
 //!
 //! The local frame is the plane tangent to the ellipsoid at the origin's latitude and longitude, through the
-//! origin's height: flat-earth shortcuts would be off by 0.07 m over a 1 km flight and by metres over a long
-//! one.
+//! origin's height. A flat-earth approximation would be off by 0.07 m over a 1 km flight, and by metres over
+//! a long one.
 //!
-//! An ECEF coordinate near the surface has a spacing of 9.3e-10 m in f64; that is the accuracy of everything
-//! here.
+//! The accuracy of all conversions is the spacing of ECEF coordinates near the surface in f64, 9.3e-10 m.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -14,11 +13,11 @@ mod geoid;
 pub use geoid::{GeoidCache, geoid_undulation_m};
 
 /// Semi-major axis of WGS-84, metres (NIMA TR8350.2).
-pub const WGS84_A_M: f64 = 6_378_137.0;
+pub(crate) const WGS84_A_M: f64 = 6_378_137.0;
 /// Flattening of WGS-84 (NIMA TR8350.2).
-pub const WGS84_F: f64 = 1.0 / 298.257_223_563;
+pub(crate) const WGS84_F: f64 = 1.0 / 298.257_223_563;
 /// First eccentricity squared of WGS-84, f (2 - f).
-pub const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
+pub(crate) const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
 
 /// A point on WGS-84.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,7 +59,7 @@ impl Geodetic {
     /// north pole.
     ///
     /// `N = a / sqrt(1 - e2 sin^2 lat)`, `x = (N + h) cos lat cos lon`, `z = (N (1 - e2) + h) sin lat`.
-    pub fn to_ecef(self) -> DVec3 {
+    pub(crate) fn to_ecef(self) -> DVec3 {
         let (sin_lat, cos_lat) = self.lat_rad.sin_cos();
         let (sin_lon, cos_lon) = self.lon_rad.sin_cos();
         let normal_m = WGS84_A_M / (1.0 - WGS84_E2 * sin_lat * sin_lat).sqrt();
@@ -76,16 +75,16 @@ impl Geodetic {
     ///
     /// Bowring's iteration on the reduced latitude beta (Bowring 1976, Survey Review 23:323-327), run to
     /// convergence: `tan lat = (z + e'^2 b sin^3 beta) / (p - e2 a cos^3 beta)`, `tan beta = (1 - f) tan
-    /// lat`. Height is `p cos lat + z sin lat - a sqrt(1 - e2 sin^2 lat)`, which is well conditioned at the
-    /// poles and on the equator alike. Valid further than 43 km from the earth's centre (inside the evolute
-    /// the answer is not unique); finite everywhere.
-    pub fn from_ecef(ecef_m: DVec3) -> Self {
+    /// lat`. The height is `p cos lat + z sin lat - a sqrt(1 - e2 sin^2 lat)`, which is well conditioned at
+    /// the poles and on the equator alike. Valid farther than 43 km from the earth's centre (inside the
+    /// evolute the solution is not unique); finite everywhere.
+    pub(crate) fn from_ecef(ecef_m: DVec3) -> Self {
         let semi_minor_m = WGS84_A_M * (1.0 - WGS84_F);
         let second_e2 = WGS84_E2 / (1.0 - WGS84_E2);
         let from_axis_m = ecef_m.x.hypot(ecef_m.y);
         let mut reduced = ecef_m.z.atan2((1.0 - WGS84_F) * from_axis_m);
         let mut lat_rad = 0.0;
-        // Two rounds reach 1e-12 rad from -10 km to 1000 km; the rest costs nothing because the loop stops.
+        // Two iterations reach 1e-12 rad from -10 km to 1000 km; then the loop ends.
         for _ in 0..10 {
             let (sin_r, cos_r) = reduced.sin_cos();
             let next_lat = (ecef_m.z + second_e2 * semi_minor_m * sin_r.powi(3))
@@ -105,7 +104,7 @@ impl Geodetic {
 
     /// Rotation that takes north-east-down coordinates of the tangent frame here to ECEF axes: Rz(lon)
     /// Ry(-pi/2 - lat).
-    pub fn ecef_from_ned_rotation(self) -> DQuat {
+    pub(crate) fn ecef_from_ned_rotation(self) -> DQuat {
         DQuat::from_rotation_z(self.lon_rad)
             * DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2 - self.lat_rad)
     }
@@ -134,18 +133,18 @@ impl LocalFrame {
         }
     }
 
-    /// Where (0, 0, 0) is.
+    /// Geodetic position of (0, 0, 0).
     pub fn origin(&self) -> Geodetic {
         self.origin
     }
 
     /// Local coordinates of an earth-centred point.
-    pub fn ned_from_ecef(&self, ecef_m: DVec3) -> DVec3 {
+    pub(crate) fn ned_from_ecef(&self, ecef_m: DVec3) -> DVec3 {
         self.ned_from_ecef_axes * (ecef_m - self.origin_ecef_m)
     }
 
     /// Earth-centred coordinates of a local point.
-    pub fn ecef_from_ned(&self, ned_m: DVec3) -> DVec3 {
+    pub(crate) fn ecef_from_ned(&self, ned_m: DVec3) -> DVec3 {
         self.origin_ecef_m + self.ned_from_ecef_axes.transpose() * ned_m
     }
 
@@ -159,11 +158,12 @@ impl LocalFrame {
         Geodetic::from_ecef(self.ecef_from_ned(ned_m))
     }
 
-    /// Rotation that takes the tangent NED frame at `at` to this frame's axes.
+    /// Rotation from the tangent NED frame at `at` to the axes of this frame.
     ///
-    /// An attitude in a log is relative to the tangent frame at the aircraft; this brings it to the origin's.
-    /// It turns by about 0.9 degrees per 100 km, and by the meridian convergence about the vertical.
-    pub fn ned_from_local(&self, at: Geodetic) -> DQuat {
+    /// Attitudes in a log are relative to the tangent frame at the aircraft; this converts them to that of
+    /// the origin. The rotation is about 0.9 degrees per 100 km, plus the meridian convergence about the
+    /// vertical.
+    pub(crate) fn ned_from_local(&self, at: Geodetic) -> DQuat {
         (self.origin.ecef_from_ned_rotation().inverse() * at.ecef_from_ned_rotation()).normalize()
     }
 }

@@ -1,12 +1,12 @@
-//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and back on the principal
-//! branch or not at all.
+//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and the inverse on the
+//! principal branch.
 //!
-//! A lens is regular in a star-shaped domain about its axis, [`Lens::fold_radius`] being the border: there
-//! the Jacobian's determinant, its trace, or the model's denominator reaches zero for the first time along a
-//! ray. Beyond the fold the formula goes on, but what it yields are mirror images that no real lens shows, so
-//! the inverse answers `None` for a point whose only pre-images lie there.
+//! A lens is regular in a star-shaped domain about its axis, bounded by [`Lens::fold_radius`]: there the
+//! Jacobian's determinant or trace, or the model's denominator, reaches zero for the first time along a ray
+//! from the axis. Beyond this fold the formula yields mirror images that no real lens shows, so the inverse
+//! is `None` for points whose only pre-images lie there.
 //!
-//! Adding a model is one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain,
+//! A new model needs one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain,
 //! start table), one WGSL file of the same name, and one line in each `match` below.
 
 use glam::{DMat2, DVec2};
@@ -21,16 +21,16 @@ mod pinhole;
 mod radial_table;
 
 pub use brown_conrady::BrownConrady;
-pub use fold::{FOLD_RAYS, FoldCurve, MAX_FIELD_RAD};
+pub use fold::{FOLD_RAYS, FoldCurve};
 pub use kannala_brandt::KannalaBrandt;
 pub use pinhole::Pinhole;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
 
-/// Distorted radius (units of the focal length) that the start table of [`Lens::new`] covers; see
+/// Default distorted radius covered by the start table of [`Lens::new`], in units of the focal length; see
 /// [`Lens::with_reach`].
 const DEFAULT_REACH: f64 = 2.0;
 
-/// What can be wrong with lens coefficients.
+/// Invalid lens coefficients.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LensError {
     /// More coefficients than the model has.
@@ -40,13 +40,13 @@ pub enum LensError {
     TooManyCoefficients {
         /// The model's name in files.
         model: &'static str,
-        /// How many it takes.
+        /// Number of coefficients of the model.
         max: usize,
         /// Their names, in order.
         names: &'static str,
-        /// How many there were.
+        /// Number of coefficients given.
         got: usize,
-        /// What to do.
+        /// How to correct it.
         fix: &'static str,
     },
     /// NaN or infinite.
@@ -66,7 +66,7 @@ pub enum LensError {
     Reach(f64),
 }
 
-/// A lens with everything prepared that its inverse needs. Immutable.
+/// A lens with the precomputed data of its inverse. Immutable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lens {
     /// No distortion.
@@ -84,8 +84,8 @@ impl Lens {
         Self::with_reach(model, coefficients, DEFAULT_REACH)
     }
 
-    /// As [`Lens::new`], with the start table of the inverse spread over distorted radii `0..=reach` (units
-    /// of the focal length) where the lens does not fold before. Points farther out are still solved, from a
+    /// As [`Lens::new`], with a start table of the inverse that covers distorted radii `0..=reach` (units of
+    /// the focal length), or less if the lens folds before. Points farther out are still solved, from a
     /// poorer start.
     pub fn with_reach(model: LensModel, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
         if !(reach.is_finite() && reach > 0.0) {
@@ -139,7 +139,7 @@ impl Lens {
         }
     }
 
-    /// Whether the lens leaves every point where it is: then neither lens map nor lens inverse is needed.
+    /// Whether the lens maps every point to itself, so that neither lens map nor lens inverse is needed.
     pub fn is_identity(&self) -> bool {
         match self {
             Self::Pinhole(_) => true,
@@ -148,8 +148,8 @@ impl Lens {
         }
     }
 
-    /// Forward: ideal to distorted. The bare formula, also beyond the fold; ask [`Lens::contains`] whether
-    /// the point can be seen.
+    /// Forward: ideal to distorted. The formula is evaluated beyond the fold as well; [`Lens::contains`]
+    /// tells whether the point is visible.
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         match self {
             Self::Pinhole(lens) => lens.distort(ideal),
@@ -167,8 +167,8 @@ impl Lens {
         }
     }
 
-    /// Inverse on the principal branch: the ideal point inside the fold that is imaged at `distorted`, or
-    /// `None` if there is none (also for NaN and infinities).
+    /// Inverse on the principal branch: the ideal point inside the fold with the image `distorted`. `None` if
+    /// there is none, also for NaN and infinities.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         match self {
             Self::Pinhole(lens) => lens.undistort(distorted),
@@ -195,7 +195,7 @@ impl Lens {
         }
     }
 
-    /// A bound on the distorted radius of everything on the principal branch; infinite for a pinhole.
+    /// Bound on the distorted radius of the principal branch; infinite for a pinhole.
     pub fn distorted_max(&self) -> f64 {
         match self {
             Self::Pinhole(_) => f64::INFINITY,
@@ -210,14 +210,13 @@ impl Lens {
         self.fold_curve().map_or(f64::INFINITY, |fold| fold.radius(phi_rad))
     }
 
-    /// Whether an ideal point lies on the principal branch, that is, whether `undistort(distort(ideal))` is
-    /// `ideal`.
+    /// Whether an ideal point lies on the principal branch, so that `undistort(distort(ideal))` is `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
         ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
     }
 }
 
-/// Coefficients filled up with zeros to the model's count.
+/// Coefficients padded with zeros to the model's count.
 fn padded<const N: usize>(
     coefficients: &[f64],
     model: &'static str,

@@ -1,11 +1,42 @@
-//! The mathematics of camsim, in f64, without GPU and without file formats.
+//! The mathematics of camsim: geometry, camera models, motion, scenes and image formation, in f64, without
+//! GPU and without file formats. The functions that the renderers must reproduce (their *twins*) and the
+//! reference renderer that they are tested against are here.
 //!
-//! Modules stand in the order of the data flow: scenario -> log -> tracker -> trajectory -> camera -> shutter
-//! -> frame plan -> ideal frame -> lens inverse -> temporal inverse -> gather -> photometric -> metrics.
+//! ```
+//! use camsim_core::{lens::Lens, scenario::LensModel};
+//! use glam::DVec2;
+//!
+//! # fn main() -> Result<(), camsim_core::lens::LensError> {
+//! // Barrel distortion, k1 = -0.3: from the ideal (u, v) to the distorted image point and back.
+//! let lens = Lens::new(LensModel::BrownConrady, &[-0.3])?;
+//! let distorted = lens.distort(DVec2::new(0.2, 0.1));
+//! assert!(distorted.length() < DVec2::new(0.2, 0.1).length());
+//! let ideal = lens.undistort(distorted).expect("inside the fold");
+//! assert!((ideal - DVec2::new(0.2, 0.1)).length() < 1e-12);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Modules, in the order of the data flow
+//!
+//! | module | content |
+//! |---|---|
+//! | [`scenario`] | the input of a run: all keys, with range checks |
+//! | [`geodesy`], [`flight_log`] | WGS-84 and local frames; a log, cleaned |
+//! | [`tracker`], [`trajectory`], [`mount`], [`pose`] | from a log to the pose of the camera at any instant |
+//! | [`lens`], [`camera`], [`shutter`] | distortion and its inverse, intrinsics with zoom, exposure times of rows |
+//! | [`scene`] | terrain, meshes, textures, light, levels of detail, calibration boards |
+//! | [`sequence`] | a loaded scenario |
+//! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
+//! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`apply`] | the reverse pipeline on ideal frames of any origin |
+//! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
+//! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
+//! | [`transfer`] | transfer functions of means and samples |
 //!
 //! # Conventions
 //!
-//! | thing | convention |
+//! | quantity | convention |
 //! |---|---|
 //! | World | local NED (north, east, down), metres, f64, about a WGS-84 origin |
 //! | Body | FRD (forward, right, down); Euler angles are ZYX and only an input form |
@@ -20,44 +51,24 @@
 
 #![warn(missing_docs)]
 
-pub mod scenario;
-
-pub mod pose;
-
-pub mod geodesy;
-
-pub mod flight_log;
-
-pub mod tracker;
-
-pub mod trajectory;
-
-pub mod mount;
-
-pub mod lens;
-
-pub mod camera;
-
-pub mod shutter;
-
-pub mod scene;
-
-pub mod sequence;
-
-pub mod temporal;
-
-pub mod photometric;
-
-pub mod noise;
-
 pub mod apply;
-
+pub mod camera;
+pub mod flight_log;
 pub mod frame;
-
+pub mod geodesy;
+pub mod lens;
 pub mod metrics;
-
-pub mod silhouette;
-
+pub mod mount;
+pub mod noise;
+pub mod photometric;
+pub mod pose;
 pub mod reference;
-
-pub mod waves;
+pub mod scenario;
+pub mod scene;
+pub mod sequence;
+pub mod shutter;
+pub mod silhouette;
+pub mod temporal;
+pub mod tracker;
+pub mod trajectory;
+pub mod transfer;

@@ -1,9 +1,9 @@
-//! How much two pictures differ.
+//! Metrics of the difference of two images.
 //!
-//! RMSE and the largest difference are over all samples of all colour channels, with values as stored (a peak
-//! of 1 is white). SSIM is that of Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error
-//! visibility to structural similarity", IEEE TIP 13(4), 2004: Gaussian window of 11 x 11 with sigma 1.5, K1
-//! = 0.01, K2 = 0.03, L = 1, windows wholly inside the picture.
+//! RMSE and the largest difference are over all samples of all colour channels, with values as stored (1 is
+//! white). SSIM is that of Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error visibility
+//! to structural similarity", IEEE TIP 13(4), 2004: Gaussian window of 11 x 11 with sigma 1.5, K1 = 0.01, K2
+//! = 0.03, L = 1, over windows entirely inside the image.
 
 use thiserror::Error;
 
@@ -12,74 +12,74 @@ use thiserror::Error;
 pub struct ImageView<'a> {
     /// Width, height.
     pub size_px: [u32; 2],
-    /// Samples a pixel, at least 1.
+    /// Samples per pixel, at least 1.
     pub channels: usize,
-    /// Which of them is alpha or validity: it counts for `differing` only.
+    /// Index of the alpha or validity channel, which counts for `differing` only.
     pub alpha: Option<usize>,
     /// `size_px[0] * size_px[1] * channels` samples.
     pub samples: &'a [f32],
 }
 
-/// Why two pictures cannot be compared.
+/// Why two images cannot be compared.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum MetricError {
     /// Different sizes.
-    #[error("the sizes differ: {}x{} against {}x{}; compare pictures of one size", a[0], a[1], b[0], b[1])]
+    #[error("the sizes differ: {}x{} against {}x{}; compare images of equal size", a[0], a[1], b[0], b[1])]
     Size {
-        /// First picture.
+        /// Size of the first image.
         a: [u32; 2],
-        /// Second picture.
+        /// Size of the second image.
         b: [u32; 2],
     },
     /// Different channel counts.
-    #[error("the channels differ: {a} against {b} a pixel; write both with the same channels")]
+    #[error("the channels differ: {a} against {b} per pixel; write both with the same channels")]
     Channels {
-        /// First picture.
+        /// Channels of the first image.
         a: usize,
-        /// Second picture.
+        /// Channels of the second image.
         b: usize,
     },
-    /// The samples do not fill the picture, or there are none.
-    #[error("a picture of {}x{} with {channels} channels needs {needed} samples (at least one), and has {found}", size_px[0], size_px[1])]
+    /// The samples do not fill the image, or there are none.
+    #[error("an image of {}x{} with {channels} channels needs {needed} samples (at least one), and has {found}", size_px[0], size_px[1])]
     Samples {
         /// Size stated.
         size_px: [u32; 2],
         /// Channels stated.
         channels: usize,
-        /// Samples that this takes.
+        /// Number of samples needed.
         needed: usize,
-        /// Samples there are.
+        /// Number of samples given.
         found: usize,
     },
 }
 
-/// Differences of two pictures.
+/// Differences between two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// Root of the mean square difference over colour samples that are finite in both.
+    /// Root of the mean square difference over colour samples that are finite in both images.
     pub rmse: f64,
-    /// Largest absolute difference over the same.
+    /// Largest absolute difference over the same samples.
     pub max: f64,
     /// Structural similarity of luminance; `None` below 11 pixels of width or height.
     pub ssim: Option<f64>,
-    /// Share of pixels of which any sample differs at all (alpha too), 0..=1.
+    /// Share of pixels in which any sample differs, including alpha, 0..=1.
     pub differing: f64,
-    /// Pixels that hold a NaN or an infinity in either picture; they are left out of `rmse`, `max` and `ssim`
-    /// unless bitwise equal.
+    /// Number of pixels with a NaN or an infinity in either image. They are left out of `rmse`, `max` and
+    /// `ssim` unless bitwise equal.
     pub non_finite: u64,
     /// Pixels compared.
     pub pixels: u64,
-    /// Colour samples behind `rmse`.
+    /// Number of colour samples in `rmse`.
     pub samples: u64,
 }
 
 impl Comparison {
-    /// Peak signal-to-noise ratio in decibels for a peak of 1; infinite for equal pictures.
+    /// Peak signal-to-noise ratio in decibels for a peak of 1; infinite for equal images.
     pub fn psnr_db(&self) -> f64 {
         -20.0 * self.rmse.log10()
     }
 
-    /// All pictures of a set as one: pooled RMSE, share and counts, largest maximum, mean SSIM by picture.
+    /// Pooled comparison of a set of images: RMSE, share and counts over all, largest maximum, mean SSIM.
     /// `None` for an empty set.
     pub fn pooled(set: &[Self]) -> Option<Self> {
         let pixels: u64 = set.iter().map(|c| c.pixels).sum();
@@ -102,10 +102,10 @@ impl Comparison {
     }
 }
 
-/// Compares two pictures of one size and layout.
+/// Compares two images of equal size and layout.
 ///
 /// # Errors
-/// When sizes or channel counts differ, or a picture is empty or not filled.
+/// If sizes or channel counts differ, or an image is empty or incomplete.
 pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricError> {
     if a.size_px != b.size_px {
         return Err(MetricError::Size { a: a.size_px, b: b.size_px });
@@ -158,7 +158,8 @@ pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricE
     })
 }
 
-/// Rec. 709 luminance of three or more channels, else the first one; unusable pixels are 0 in both pictures.
+/// Rec. 709 luminance of three or more channels, else the first channel; unusable pixels are 0 in both
+/// images.
 fn luminance(view: ImageView<'_>, usable: &[bool]) -> Vec<f64> {
     let value = |pixel: &[f32]| match pixel {
         [r, g, b, ..] => 0.2126 * f64::from(*r) + 0.7152 * f64::from(*g) + 0.0722 * f64::from(*b),
@@ -197,7 +198,7 @@ fn ssim(a: &[f64], b: &[f64], size_px: [u32; 2]) -> Option<f64> {
     Some(sum / mean_a.len() as f64)
 }
 
-/// Separable Gaussian over windows wholly inside: the result is `WINDOW - 1` narrower and lower.
+/// Separable Gaussian over windows entirely inside: the result is smaller by `WINDOW - 1`.
 fn blur(values: &[f64], width: usize) -> Vec<f64> {
     let half = (WINDOW / 2) as f64;
     let mut kernel: [f64; WINDOW] =
@@ -246,7 +247,7 @@ mod tests {
         assert!((c.rmse - 0.1).abs() < 1e-7 && (c.max - 0.1).abs() < 1e-7);
         assert!((c.psnr_db() - 20.0).abs() < 1e-5);
         assert_eq!(c.differing, 1.0);
-        // Constants have no variance, so SSIM is its luminance term alone.
+        // Constants have no variance, so SSIM reduces to its luminance term.
         let expected = (2.0 * 0.25 * 0.35 + 1e-4) / (0.25 * 0.25 + 0.35 * 0.35 + 1e-4);
         assert!((c.ssim.unwrap() - expected).abs() < 1e-6);
     }
@@ -303,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_that_do_not_fit_are_refused() {
+    fn mismatched_images_are_refused() {
         let a = vec![0.0_f32; 6];
         assert!(matches!(compare(view([3, 2], 1, &a), view([2, 3], 1, &a)), Err(MetricError::Size { .. })));
         assert!(matches!(

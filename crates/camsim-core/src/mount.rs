@@ -1,5 +1,5 @@
-//! Mount: the camera on the platform, its lever arm and its vibration (paper eqs. 3-5 without their
-//! approximations).
+//! Mount: position and orientation of the camera on the platform, with lever arm and vibration (eqs. 3-5 of
+//! the paper without their approximations).
 //!
 //! With the body at position x and attitude R, body rate w, mount M (constant), vibration rotation V(t) =
 //! Exp(theta(t)) and displacement d(t):
@@ -10,11 +10,12 @@
 //! rate in camera  = (V M)^T (w + J(theta) theta'),  J the left Jacobian of Exp
 //! ```
 //!
-//! M takes optical camera axes to body axes: at angles (0, 0, 0) the camera's z is the nose, its x the right
-//! wing, its y the belly; roll, pitch and yaw then turn it as they turn a body (ZYX). Pitch -90 deg looks
-//! straight down with the top of the image towards the nose. The vibration is composed before the mount, so
-//! its axes are the body's, whichever way the camera looks: theta has the sums of `amplitude sin(2 pi hz t +
-//! phase)` of the roll, pitch and yaw entries as components and turns the camera about its optical centre.
+//! M rotates optical camera axes to body axes: at angles (0, 0, 0) the camera's z is the nose, its x the
+//! right wing, its y the belly; roll, pitch and yaw then rotate it like a body (ZYX). Pitch -90 deg looks
+//! straight down with the top of the image towards the nose. Vibration is applied before the mount, so its
+//! axes are those of the body for any orientation of the camera. The components of theta are the sums of
+//! `amplitude sin(2 pi hz t + phase)` over the roll, pitch and yaw entries; the rotation is about the optical
+//! centre.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -27,7 +28,7 @@ use crate::{
     trajectory::{Trajectory, so3},
 };
 
-/// Why a mount cannot be used.
+/// Invalid mount parameters.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MountError {
     /// NaN or infinity.
@@ -60,7 +61,7 @@ pub enum MountError {
     },
 }
 
-/// One sinusoid on one component of a vector.
+/// A sinusoid in one component of a vector.
 #[derive(Clone, Copy, Debug)]
 struct Sinusoid {
     component: DVec3,
@@ -81,7 +82,7 @@ pub struct CameraPath {
     translations: Vec<Sinusoid>,
 }
 
-/// What the mount adds at one instant.
+/// Contribution of the mount at one instant.
 struct Offset {
     body_from_camera: DQuat,
     lever_body_m: DVec3,
@@ -90,7 +91,7 @@ struct Offset {
 }
 
 impl CameraPath {
-    /// The camera that `spec` mounts on the platform that flies `trajectory`.
+    /// The camera mounted by `spec` on a platform that flies `trajectory`.
     pub fn new(trajectory: impl Into<Arc<Trajectory>>, spec: &MountSpec) -> Result<Self, MountError> {
         for (key, values) in [("angles_deg", spec.angles_deg), ("offset_m", spec.offset_m)] {
             if !values.iter().all(|value| value.is_finite()) {
@@ -117,8 +118,8 @@ impl CameraPath {
         })
     }
 
-    /// First and last instant that the log covers, seconds. Outside, the platform coasts and the mount goes
-    /// on vibrating.
+    /// First and last instant of the log, seconds. Outside, the platform coasts and the mount continues to
+    /// vibrate.
     pub fn span_s(&self) -> (f64, f64) {
         self.trajectory.span_s()
     }
@@ -160,12 +161,7 @@ impl CameraPath {
         peak(&self.rotations)
     }
 
-    /// Bound on the vibration's displacement at any time, metres; 0 for a rigid mount.
-    pub fn peak_vibration_m(&self) -> f64 {
-        peak(&self.translations)
-    }
-
-    /// Inlined, so that poses, which are asked for most, leave out all rates.
+    /// Inlined, so that poses, the most frequent query, skip all rates.
     #[inline(always)]
     fn at(&self, t_s: f64) -> (BodyState, Offset) {
         let body = self.trajectory.state(t_s);
@@ -175,7 +171,7 @@ impl CameraPath {
             lever_rate_body_m_s: DVec3::ZERO,
             rate_body_rad_s: DVec3::ZERO,
         };
-        // A sine has no value at an infinite instant; the trajectory stands still there, and so does the
+        // A sine has no value at an infinite instant. The trajectory stands still there, and so does the
         // mount.
         if t_s.is_finite() {
             if !self.rotations.is_empty() {
@@ -202,7 +198,7 @@ fn body_from_camera([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> DQuat {
     (turned * body_from_forward_camera).normalize()
 }
 
-/// Body axis of a degree of freedom, and whether it turns.
+/// Body axis of a degree of freedom, and whether it is a rotation.
 fn body_axis(axis: Axis) -> (DVec3, bool) {
     match axis {
         Axis::Roll => (DVec3::X, true),
@@ -214,7 +210,7 @@ fn body_axis(axis: Axis) -> (DVec3, bool) {
     }
 }
 
-/// Amplitude of the entry in radians or metres.
+/// Amplitude of an entry in radians or metres.
 fn amplitude(spec: &VibrationSpec, entry: usize, turns: bool) -> Result<f64, MountError> {
     let (own, other, wanted, given) = if turns {
         (spec.amplitude_deg.to_radians(), spec.amplitude_m, "amplitude_deg", "amplitude_m")
@@ -241,7 +237,7 @@ fn sum(sinusoids: &[Sinusoid], t_s: f64) -> (DVec3, DVec3) {
     (value, derivative)
 }
 
-/// Length of the vector of the summed magnitudes of each component.
+/// Bound on the length of the vector: each component with the sum of its amplitudes.
 fn peak(sinusoids: &[Sinusoid]) -> f64 {
     sinusoids.iter().map(|s| s.component.abs()).sum::<DVec3>().length()
 }
@@ -278,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_where_the_conventions_say() {
+    fn mount_angles_follow_the_conventions() {
         let (north, east, down) = (DVec3::X, DVec3::Y, DVec3::Z);
         let h = std::f64::consts::FRAC_1_SQRT_2;
         for (yaw_deg, angles_deg, expected) in [
@@ -356,20 +352,16 @@ mod tests {
     }
 
     #[test]
-    fn tells_the_planner_about_its_vibration() {
+    fn vibration_bounds_for_the_planner() {
         let path = shaken();
         assert!((path.highest_vibration_hz() - 100.0).abs() < 1e-9);
         assert!((path.peak_vibration_rad().to_degrees() - (0.04f64 + 25.0 + 1.0).sqrt()).abs() < 1e-9);
-        assert!((path.peak_vibration_m() - (1e-4f64 + 4e-6).sqrt()).abs() < 1e-12);
         let rigid = CameraPath::new(level(0.0), &MountSpec::default()).unwrap();
-        assert_eq!(
-            (rigid.highest_vibration_hz(), rigid.peak_vibration_rad(), rigid.peak_vibration_m()),
-            (0.0, 0.0, 0.0)
-        );
+        assert_eq!((rigid.highest_vibration_hz(), rigid.peak_vibration_rad()), (0.0, 0.0));
     }
 
     #[test]
-    fn refuses_faults_and_survives_any_time() {
+    fn invalid_mounts_are_refused_and_any_time_is_finite() {
         assert_eq!(
             CameraPath::new(level(0.0), &mount([f64::NAN, 0.0, 0.0])).unwrap_err(),
             MountError::NotFinite { key: "angles_deg" }

@@ -1,20 +1,21 @@
 //! Counter-based noise: a pure function of (seed, frame, pixel, stream), independent of order, machine and
-//! resume.
+//! restarts.
 //!
-//! Twin of `shaders/common/noise.wgsl`; integer hash and multiply-add only, so both agree to rounding.
+//! f64 twin of `shaders/common/noise.wgsl`. It uses integer hashes and multiply-add only, so both agree to
+//! rounding.
 
-/// Octaves of the tail probability that 24 bits can reach.
+/// Octaves of tail probability that 24 bits reach.
 const OCTAVES: usize = 24;
-/// Linear segments in each octave.
+/// Linear segments per octave.
 pub const SEGMENTS: usize = 16;
 /// Stream of the sensor's additive Gaussian noise.
 pub const NOISE_STREAM: u32 = 1;
 
-/// Seed of a camera's noise: `seed` itself without a name; with one, so that cameras of one run do not share
-/// their noise, `splitmix64(seed ^ fnv1a64(name))`: the 64-bit FNV-1a hash of the name's UTF-8 bytes, and the
-/// finaliser of SplitMix64.
+/// Seed of a camera's noise. Without a name it is `seed`; with one it is `splitmix64(seed ^ fnv1a64(name))`,
+/// the 64-bit FNV-1a hash of the name's UTF-8 bytes and the finaliser of SplitMix64, so that the cameras of
+/// one run have different noise.
 #[must_use]
-pub fn camera_seed(seed: u64, name: &str) -> u64 {
+pub(crate) fn camera_seed(seed: u64, name: &str) -> u64 {
     if name.is_empty() {
         return seed;
     }
@@ -29,7 +30,7 @@ pub fn camera_seed(seed: u64, name: &str) -> u64 {
 
 /// Four well-mixed words from four key words (pcg4d: Jarzynski & Olano, JCGT 9(3), 2020).
 ///
-/// The low 8 bits are patterned; use bits 8 and up.
+/// The low 8 bits have a pattern; use bits 8 and up.
 #[must_use]
 #[inline(always)]
 pub fn pcg4d(key: [u32; 4]) -> [u32; 4] {
@@ -55,15 +56,15 @@ pub fn pcg4d(key: [u32; 4]) -> [u32; 4] {
 /// `s = 0..=16`.
 #[must_use]
 pub fn tail_table() -> Vec<f32> {
-    let at = |octave: usize, segment: usize| {
+    let quantile = |octave: usize, segment: usize| {
         let p = (1.0 + segment as f64 / SEGMENTS as f64) * 0.5_f64.powi(octave as i32 + 2);
         upper_quantile(p) as f32
     };
-    (0..OCTAVES).flat_map(|octave| (0..=SEGMENTS).map(move |segment| at(octave, segment))).collect()
+    (0..OCTAVES).flat_map(|octave| (0..=SEGMENTS).map(move |segment| quantile(octave, segment))).collect()
 }
 
-/// [`tail_table`] as a shader reads it: what each segment begins with and what it adds, index `16 k + s`, `s
-/// = 0..16`.
+/// [`tail_table`] as a shader reads it: the value at the begin of each segment and its increment, index `16 k
+/// + s`, `s = 0..16`.
 #[must_use]
 pub fn tail_segments() -> Vec<[f32; 2]> {
     let table = tail_table();
@@ -72,10 +73,10 @@ pub fn tail_segments() -> Vec<[f32; 2]> {
     table.chunks_exact(SEGMENTS + 1).flat_map(of_octave).collect()
 }
 
-/// Standard normal from 32 random bits by interpolating [`tail_table`]; bit 31 is the sign, bits 30..8 the
-/// tail probability.
+/// Standard normal variate from 32 random bits by interpolation in [`tail_table`]. Bit 31 is the sign, bits
+/// 30..8 the tail probability.
 ///
-/// Reaches about 5.5 sigma.
+/// The values reach about 5.5 sigma.
 #[must_use]
 pub fn normal_from_bits(bits: u32, table: &[f32]) -> f32 {
     let m = (bits >> 8) & 0x7f_ffff;
@@ -90,7 +91,7 @@ pub fn normal_from_bits(bits: u32, table: &[f32]) -> f32 {
 
 /// Four independent standard normals of a pixel.
 #[must_use]
-pub fn normal4(pixel: [u32; 2], frame: u32, seed: u64, stream: u32, table: &[f32]) -> [f32; 4] {
+pub(crate) fn normal4(pixel: [u32; 2], frame: u32, seed: u64, stream: u32, table: &[f32]) -> [f32; 4] {
     let key = [
         pixel[0] | (pixel[1] << 16),
         frame,
@@ -106,7 +107,7 @@ fn upper_quantile(p: f64) -> f64 {
     if p >= 0.5 {
         return 0.0;
     }
-    // Abramowitz & Stegun 26.2.23 is good to 4.5e-4; Newton does the rest.
+    // The formula 26.2.23 of Abramowitz & Stegun is accurate to 4.5e-4; Newton does the rest.
     let t = (-2.0 * p.ln()).sqrt();
     let numerator = 2.515_517 + t * (0.802_853 + t * 0.010_328);
     let denominator = 1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308));
@@ -155,26 +156,26 @@ mod tests {
     }
 
     #[test]
-    fn a_name_makes_another_seed() {
+    fn camera_name_changes_the_seed() {
         assert_eq!(camera_seed(12, ""), 12);
         let seeds = ["left", "right", "lefu", "a", "b"].map(|name| camera_seed(12, name));
         for (i, seed) in seeds.iter().enumerate() {
             assert!(*seed != 12 && !seeds[..i].contains(seed), "{seeds:?}");
         }
-        // FNV-1a of "a" is af63dc4c8601ec8c (its authors' table), and SplitMix64 begins with e220a8397b1dcdaf
+        // FNV-1a of "a" is af63dc4c8601ec8c (table of its authors); SplitMix64 begins with e220a8397b1dcdaf
         // from state 0 (Vigna's program).
         assert_eq!(camera_seed(0xaf63_dc4c_8601_ec8c, "a"), 0xe220_a839_7b1d_cdaf);
-        // Unlike seeds stay unlike under one name.
+        // Different seeds stay different with the same name.
         assert_ne!(camera_seed(12, "left"), camera_seed(13, "left"));
     }
 
     #[test]
-    fn segments_are_those_of_the_table() {
+    fn tail_segments_match_the_table() {
         let (table, segments) = (tail_table(), tail_segments());
         assert_eq!(segments.len(), OCTAVES * SEGMENTS);
         for (i, [begin, adds]) in segments.into_iter().enumerate() {
-            let at = i / SEGMENTS * (SEGMENTS + 1) + i % SEGMENTS;
-            assert_eq!((begin, adds), (table[at], table[at + 1] - table[at]), "{i}");
+            let first = i / SEGMENTS * (SEGMENTS + 1) + i % SEGMENTS;
+            assert_eq!((begin, adds), (table[first], table[first + 1] - table[first]), "{i}");
         }
     }
 
@@ -206,18 +207,18 @@ mod tests {
     #[test]
     fn neighbours_frames_and_seeds_are_uncorrelated() {
         let table = tail_table();
-        let at = |x: u32, y: u32, frame: u32, seed: u64| {
+        let noise = |x: u32, y: u32, frame: u32, seed: u64| {
             f64::from(normal4([x, y], frame, seed, NOISE_STREAM, &table)[0])
         };
         let mut sums = [0.0; 4];
         for y in 0..300 {
             for x in 0..300 {
-                let z = at(x, y, 7, 12);
+                let z = noise(x, y, 7, 12);
                 for (sum, other) in sums.iter_mut().zip([
-                    at(x + 1, y, 7, 12),
-                    at(x, y + 1, 7, 12),
-                    at(x, y, 8, 12),
-                    at(x, y, 7, 13),
+                    noise(x + 1, y, 7, 12),
+                    noise(x, y + 1, 7, 12),
+                    noise(x, y, 8, 12),
+                    noise(x, y, 7, 13),
                 ]) {
                     *sum += z * other;
                 }
@@ -252,8 +253,8 @@ mod tests {
         }
     }
 
-    /// Largest power of a plane of bits at any frequency but 0, in its mean power: exponentially distributed
-    /// for true noise.
+    /// Largest power of a bit plane at any frequency but 0, relative to its mean power: exponentially
+    /// distributed for ideal noise.
     fn strongest_wave(bit: impl Fn(u32, u32) -> bool) -> f64 {
         const SIDE: usize = 64;
         let mut rows: Vec<Vec<[f64; 2]>> = (0..SIDE as u32)
@@ -265,8 +266,8 @@ mod tests {
             let mut column: Vec<[f64; 2]> = rows.iter().map(|row| row[x]).collect();
             fourier(&mut column);
             for ([re, im], y) in column.into_iter().zip(0..) {
-                // Where the plane's wave is its own mirror image all its power is in one number: half as much
-                // on average counts the same.
+                // At self-conjugate frequencies all power is in one real number, so half of it counts the
+                // same on average.
                 let real = x % (SIDE / 2) == 0 && y % (SIDE / 2) == 0;
                 let power = (re * re + im * im) / (SIDE * SIDE) as f64;
                 if (x, y) != (0, 0) {
@@ -278,9 +279,9 @@ mod tests {
     }
 
     #[test]
-    fn no_bit_plane_that_is_used_has_a_pattern() {
-        // 96 planes of 4096 frequencies: the strongest of them is above 27 once in a million times (4e5
-        // exp(-27) = 7e-7).
+    fn used_bit_planes_have_no_pattern() {
+        // 96 planes of 4096 frequencies: the strongest exceeds 27 once in a million times (4e5 exp(-27) =
+        // 7e-7).
         const LIMIT: f64 = 27.0;
         let wave = |lane: usize, bit: u32| {
             let key = |x: u32, y: u32| [x | (y << 16), 7, 12, NOISE_STREAM.wrapping_mul(0x9e37_79b9)];
@@ -288,10 +289,10 @@ mod tests {
         };
         for lane in 0..4 {
             for bit in 8..32 {
-                let found = wave(lane, bit);
-                assert!(found < LIMIT, "lane {lane} bit {bit}: {found}");
+                let power = wave(lane, bit);
+                assert!(power < LIMIT, "lane {lane} bit {bit}: {power}");
             }
-            // The low bits, which are not used, do have one.
+            // The low bits, which are not used, do have a pattern.
             assert!(wave(lane, 1) > 2.0 * LIMIT, "lane {lane}: {}", wave(lane, 1));
         }
     }

@@ -1,5 +1,5 @@
-//! Vignette, light, noise, saturation: paper section 7 and fig. 9, on linear values. Twin of
-//! `shaders/reverse/photometric.wgsl`.
+//! Photometric stage: vignette, light, noise and saturation on linear values (section 7 and fig. 9 of the
+//! paper). f64 twin of `shaders/reverse/photometric.wgsl`.
 
 use crate::{
     noise::{NOISE_STREAM, normal4},
@@ -7,7 +7,7 @@ use crate::{
     sequence::GrayImage,
 };
 
-/// Weight of a vignette value: `v < t1` is black, else `min(v / t2, 1)`.
+/// Weight of a vignette value: 0 if `v < t1`, else `min(v / t2, 1)`.
 #[must_use]
 pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
     let [black, full] = thresholds.map(|t| t as f32);
@@ -20,31 +20,31 @@ pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
     }
 }
 
-/// Vignette weights at output size: the map resampled bilinearly (pixel centres, edges held), then the
+/// Vignette weights at output size: the map resampled bilinearly (pixel centres, borders constant), then the
 /// thresholds.
 #[must_use]
 pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]) -> Vec<f32> {
     let axis = |out: u32, out_size: u32, in_size: u32| {
-        let at = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5)
+        let map_px = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5)
             .clamp(0.0, f64::from(in_size - 1));
-        let low = at.floor() as u32;
-        (low, (low + 1).min(in_size - 1), (at - at.floor()) as f32)
+        let low = map_px.floor() as u32;
+        (low, (low + 1).min(in_size - 1), (map_px - map_px.floor()) as f32)
     };
-    let at = |x: u32, y: u32| map.values[(y * map.size_px[0] + x) as usize];
+    let value = |x: u32, y: u32| map.values[(y * map.size_px[0] + x) as usize];
     let mut weights = Vec::with_capacity((size_px[0] * size_px[1]) as usize);
     for y in 0..size_px[1] {
         let (y0, y1, ty) = axis(y, size_px[1], map.size_px[1]);
         for x in 0..size_px[0] {
             let (x0, x1, tx) = axis(x, size_px[0], map.size_px[0]);
-            let top = at(x0, y0) + tx * (at(x1, y0) - at(x0, y0));
-            let bottom = at(x0, y1) + tx * (at(x1, y1) - at(x0, y1));
+            let top = value(x0, y0) + tx * (value(x1, y0) - value(x0, y0));
+            let bottom = value(x0, y1) + tx * (value(x1, y1) - value(x0, y1));
             weights.push(vignette_weight(top + ty * (bottom - top), thresholds));
         }
     }
     weights
 }
 
-/// Whether one luminance value stands for all three channels.
+/// Whether the output is a single luminance channel.
 #[must_use]
 pub fn is_mono(output: OutputEncoding) -> bool {
     matches!(output, OutputEncoding::Luma8 | OutputEncoding::Luma16)

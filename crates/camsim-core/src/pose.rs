@@ -1,5 +1,5 @@
-//! Poses and motion states. World is local NED in metres (f64), body is FRD, camera is optical (x right, y
-//! down, z forward).
+//! Poses and motion states. The world is local NED in metres (f64), the body FRD, the camera optical (x
+//! right, y down, z forward).
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -30,8 +30,8 @@ pub struct CameraPose {
 }
 
 impl CameraPose {
-    /// The rigid motion that takes coordinates of `self` to coordinates of `other`: `x_other = R x_self + t`,
-    /// in f64.
+    /// Relative pose that takes coordinates of `self` to coordinates of `other`: `x_other = R x_self + t`, in
+    /// f64.
     pub fn relative_to(&self, other: &Self) -> (DMat3, DVec3) {
         let other_from_ned = other.ned_from_camera.inverse();
         let rotation = DMat3::from_quat((other_from_ned * self.ned_from_camera).normalize());

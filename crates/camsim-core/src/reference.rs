@@ -1,11 +1,12 @@
-//! The oracle: every ray cast in f64 at its own instant from the trajectory into the scene. Slow, exact, and
-//! independent.
+//! The oracle: a reference renderer that casts every ray in f64, at the instant of its own row, from the
+//! trajectory into the scene. It is slow, exact and independent of the other renderers.
 //!
-//! It shares with the renderer and its twins the scenario, the trajectory (with the mount) and the lens's
-//! forward model, and nothing else: line times ([`clock`]), lens inverse ([`eye`]), zoom, ray casting
-//! ([`ray`], [`ground`], [`meshes`]), colour ([`paint`]) and integration ([`render`]) are its own. The seeded
-//! photometric stage is the renderer's, since a seed has no other meaning than its noise. What its
-//! measurements count apart as a silhouette is defined once, for them and for the plan's prediction.
+//! It shares with them the scenario, the trajectory (with the mount) and the forward model of the lens, and
+//! nothing else. Row times ([`timing`]), lens inverse ([`lens_inverse`]), zoom, ray casting ([`ray`],
+//! [`terrain_pyramid`], [`mesh_bvh`]), colour ([`shading`]) and integration ([`render`]) are implementations
+//! of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
+//! The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these measurements and by the
+//! predictions of the planner.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -20,35 +21,35 @@ use crate::{
     shutter::{Shutter, ShutterError},
 };
 
-mod clock;
-mod eye;
-mod ground;
-mod holes;
+mod disocclusion;
+mod lens_inverse;
 mod measure;
-mod meshes;
-mod paint;
+mod mesh_bvh;
 mod ray;
 mod render;
+mod shading;
+mod terrain_pyramid;
+mod timing;
 mod truth;
 
-use clock::Clock;
-use eye::Eye;
-use ground::Ground;
-pub use holes::{Holes, holes};
+pub use disocclusion::{Disocclusion, disocclusion};
+use lens_inverse::LensInverse;
 pub use measure::{
-    CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, MOST_VOID_SHARE, coord_errors, image_errors,
-    silhouettes,
+    CoordErrors, CoordTruth, ErrorStats, ErrorVerdict, ImageErrors, MAX_VOID_SHARE, coord_errors,
+    image_errors, silhouettes,
 };
-use meshes::Meshes;
-use paint::Paint;
+use mesh_bvh::MeshBvh;
 use ray::Ray;
 pub use render::{Convergence, IdealView, RenderOptions};
+use shading::Shading;
+use terrain_pyramid::TerrainPyramid;
+use timing::FrameTiming;
 pub use truth::{DEPTH_TOLERANCE, TruthErrors, truth_errors};
 
-/// Zoomed lenses that are kept: as many as frames may be looked at in turn.
-const ZOOMED_KEPT: usize = 4;
+/// Number of zoomed lenses that are cached: as many as there may be frames rendered in turn.
+const ZOOM_CACHE_SIZE: usize = 4;
 
-/// Why there is no oracle of a sequence.
+/// Why the oracle cannot be built for a sequence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OracleError {
     /// The camera or an entry of its zoom table.
@@ -63,69 +64,69 @@ pub enum OracleError {
 #[derive(Debug)]
 pub struct Oracle {
     sequence: Arc<Sequence>,
-    clock: Clock,
+    timing: FrameTiming,
     /// `None` for a zoom lens.
-    fixed: Option<Eye>,
-    zoomed: Mutex<Vec<(u64, Arc<Eye>)>>,
-    ground: Option<Ground>,
-    meshes: Meshes,
-    paint: Paint,
-    /// Whether anything is mixed with what is behind it.
+    fixed: Option<LensInverse>,
+    zoomed: Mutex<Vec<(u64, Arc<LensInverse>)>>,
+    terrain_pyramid: Option<TerrainPyramid>,
+    mesh_bvh: MeshBvh,
+    shading: Shading,
+    /// Whether the scene has blended surfaces.
     blends: bool,
 }
 
-/// What a place of the picture sees at one instant.
+/// What one image position sees at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// The instant, path time, seconds.
+pub struct RaySample {
+    /// The instant in path time, seconds.
     pub t_s: f64,
-    /// Pose of the camera then.
+    /// Pose of the camera at that instant.
     pub pose: CameraPose,
     /// Ideal ray (u, v) in the optical frame.
     pub uv: DVec2,
-    /// First surface along the ray; `None` is sky.
+    /// First intersection of the ray; `None` is sky.
     pub hit: Option<Hit>,
 }
 
-/// Where a ray first meets a surface.
+/// Intersection of a ray with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// The point, NED, metres.
+    /// The point in NED, metres.
     pub point_ned_m: DVec3,
-    /// Planar depth in the optical frame of the ray's own camera pose, metres.
+    /// Planar depth in the camera at the instant of the ray, metres.
     pub depth_m: f64,
-    /// Texture coordinates.
+    /// Texture coordinates of the point.
     pub texture_uv: [f64; 2],
-    /// Factor of the texture's colour there.
+    /// Factor on the texture's colour at the point.
     pub tint: [f64; 3],
     /// 0 = terrain, 1 + i = mesh i of the scene.
     pub surface: u32,
 }
 
-/// One frame through the oracle's eye: what all looks into it share.
+/// One frame, with the data that all its samples share.
 #[derive(Debug)]
 pub struct FrameView<'a> {
     oracle: &'a Oracle,
     stamp_s: f64,
-    eye: FrameEye<'a>,
+    lens: FrameLens<'a>,
 }
 
 #[derive(Debug)]
-enum FrameEye<'a> {
-    Fixed(&'a Eye),
-    Zoomed(Arc<Eye>),
-    /// A zoom value without a lens: no pixel has a ray.
-    Blind,
+enum FrameLens<'a> {
+    Fixed(&'a LensInverse),
+    Zoomed(Arc<LensInverse>),
+    /// The zoom value has no valid lens, so no pixel has a ray.
+    Invalid,
 }
 
 impl Oracle {
-    /// Prepares for looks into `sequence`.
+    /// Prepares the oracle of a sequence.
     ///
     /// # Errors
     /// A camera or shutter that cannot be used.
     pub fn new(sequence: Arc<Sequence>) -> Result<Self, OracleError> {
         let camera = &sequence.scenario.camera;
-        // Only for what they refuse; their numbers are not used.
+        // Called for its checks only; the values are not used.
         CameraModel::from_spec(camera)?;
         ZoomTable::from_spec(camera)?;
         Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
@@ -134,24 +135,24 @@ impl Oracle {
         }
         let fixed = if camera.zoom.is_empty() {
             let principal_px = camera.principal_point_px.unwrap_or_else(|| centre_px(camera));
-            Some(eye(camera, camera.focal_px, principal_px, &camera.lens.coefficients)?)
+            Some(lens_inverse(camera, camera.focal_px, principal_px, &camera.lens.coefficients)?)
         } else {
             None
         };
         let scene = &sequence.scene;
         Ok(Self {
-            clock: Clock::new(&sequence),
+            timing: FrameTiming::new(&sequence),
             fixed,
             zoomed: Mutex::default(),
-            ground: scene.terrain.as_ref().map(Ground::new),
-            meshes: Meshes::new(&scene.meshes, scene.light),
-            paint: Paint::new(scene),
+            terrain_pyramid: scene.terrain.as_ref().map(TerrainPyramid::new),
+            mesh_bvh: MeshBvh::new(&scene.meshes, scene.light),
+            shading: Shading::new(scene),
             blends: scene.has_blended(),
             sequence,
         })
     }
 
-    /// What renders, for people, in place of an adapter's name.
+    /// Name of the renderer for display, in place of that of an adapter.
     #[must_use]
     pub fn describe() -> String {
         format!("reference (f64 rays, {} threads)", rayon::current_num_threads())
@@ -166,130 +167,130 @@ impl Oracle {
     /// Stamp of a frame, path time, seconds.
     #[must_use]
     pub fn stamp_s(&self, frame: u64) -> f64 {
-        self.clock.stamp_s(frame)
+        self.timing.stamp_s(frame)
     }
 
-    /// One frame, for many looks.
+    /// One frame, for taking many samples of it.
     #[must_use]
     pub fn view(&self, frame: u64) -> FrameView<'_> {
-        let stamp_s = self.clock.stamp_s(frame);
-        let eye = match &self.fixed {
-            Some(eye) => FrameEye::Fixed(eye),
+        let stamp_s = self.timing.stamp_s(frame);
+        let lens = match &self.fixed {
+            Some(lens) => FrameLens::Fixed(lens),
             None => self
-                .zoomed_eye(zoom_at(&self.sequence.zoom_track, stamp_s))
-                .map_or(FrameEye::Blind, FrameEye::Zoomed),
+                .zoomed_lens(zoom_at(&self.sequence.zoom_track, stamp_s))
+                .map_or(FrameLens::Invalid, FrameLens::Zoomed),
         };
-        FrameView { oracle: self, stamp_s, eye }
+        FrameView { oracle: self, stamp_s, lens }
     }
 
-    /// The place `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase `phase` in
-    /// [-0.5, 0.5]; the whole pixel has the time of its line. `None` where the lens has no ideal ray. For
-    /// many looks into a frame of a zoom lens, [`Oracle::view`] is faster.
+    /// Samples the position `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase
+    /// `phase` in [-0.5, 0.5]. The whole pixel is exposed at the time of its row. `None` where the lens has
+    /// no ideal ray. For many samples of a frame with a zoom lens, [`Oracle::view`] is faster.
     #[must_use]
-    pub fn look(&self, frame: u64, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<Look> {
-        self.view(frame).look(pixel, offset_px, phase)
+    pub fn sample(&self, frame: u64, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
+        self.view(frame).sample(pixel, offset_px, phase)
     }
 
-    /// First surface along `origin + t direction`, t > 0, of what is mixed with what is behind it that from
-    /// its cut-off on; [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in the camera.
-    /// Surfaces are met from both sides. `None` also for numbers that are not finite.
+    /// First intersection of the ray `origin + t direction` with t > 0. Blended surfaces count where their
+    /// alpha reaches the cut-off. [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in
+    /// the camera. Surfaces are hit from both sides. `None` also for numbers that are not finite.
     #[must_use]
     pub fn cast(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
         let ray = Ray::new(origin_ned_m, direction_ned)?;
-        let on_ground = self.on_ground(&ray);
-        let limit = on_ground.map_or(f64::INFINITY, |hit| hit.depth_m);
-        self.meshes.first(&ray, limit).or(on_ground)
+        let terrain_hit = self.cast_terrain(&ray);
+        let limit = terrain_hit.map_or(f64::INFINITY, |hit| hit.depth_m);
+        self.mesh_bvh.first(&ray, limit).or(terrain_hit)
     }
 
-    fn on_ground(&self, ray: &Ray) -> Option<Hit> {
+    fn cast_terrain(&self, ray: &Ray) -> Option<Hit> {
         let terrain = self.sequence.scene.terrain.as_ref();
         terrain
-            .zip(self.ground.as_ref())
-            .and_then(|(terrain, ground)| ground.first(terrain, ray, f64::INFINITY))
+            .zip(self.terrain_pyramid.as_ref())
+            .and_then(|(terrain, terrain_pyramid)| terrain_pyramid.first(terrain, ray, f64::INFINITY))
     }
 
-    /// Linear light that a ray brings from the one surface that it is said to meet, with fog by slant range:
-    /// where nothing is mixed, that is all. [`Oracle::light`] knows of layers.
+    /// Linear light of one hit, with fog by slant range. In a scene without blended surfaces this is all the
+    /// light of the ray; [`Oracle::radiance`] includes blended layers.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
-        self.paint.color(hit, uv.extend(1.0).length())
+        self.shading.color(hit, uv.extend(1.0).length())
     }
 
-    /// Linear light that the ray `uv` of a camera brings: of what lets none through, and of every layer
-    /// before it, each at its own place and mixed by its alpha with what is behind it.
+    /// Linear light along the ray `uv` of a camera: of the first opaque surface and of every blended layer in
+    /// front of it, composited by alpha.
     #[must_use]
-    pub fn light(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
+    pub fn radiance(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
         let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
         let direction = pose.ned_from_camera * way;
         if !self.blends {
-            return self.paint.color(self.cast(pose.position_ned_m, direction).as_ref(), range_per_depth);
+            return self.shading.color(self.cast(pose.position_ned_m, direction).as_ref(), range_per_depth);
         }
         let Some(ray) = Ray::new(pose.position_ned_m, direction) else {
-            return self.paint.color(None, range_per_depth);
+            return self.shading.color(None, range_per_depth);
         };
-        let on_ground = self.on_ground(&ray);
-        let limit = on_ground.map_or(f64::INFINITY, |hit| hit.depth_m);
-        let solid = self.meshes.first_solid(&ray, limit).or(on_ground);
-        let mut layers = self.meshes.layers(&ray, solid.map_or(f64::INFINITY, |hit| hit.depth_m));
-        // From the eye on: what is left of the light from behind becomes less with each layer.
+        let terrain_hit = self.cast_terrain(&ray);
+        let limit = terrain_hit.map_or(f64::INFINITY, |hit| hit.depth_m);
+        let solid = self.mesh_bvh.first_solid(&ray, limit).or(terrain_hit);
+        let mut layers = self.mesh_bvh.layers(&ray, solid.map_or(f64::INFINITY, |hit| hit.depth_m));
+        // Front to back: each layer attenuates the light from behind.
         layers.sort_by(|a, b| a.hit.depth_m.total_cmp(&b.hit.depth_m));
         let (mut sum, mut left) = (DVec3::ZERO, 1.0);
         for layer in &layers {
             let alpha = layer.alpha.clamp(0.0, 1.0);
-            sum += left * alpha * self.paint.color(Some(&layer.hit), range_per_depth);
+            sum += left * alpha * self.shading.color(Some(&layer.hit), range_per_depth);
             left *= 1.0 - alpha;
         }
-        sum + left * self.paint.color(solid.as_ref(), range_per_depth)
+        sum + left * self.shading.color(solid.as_ref(), range_per_depth)
     }
 
-    /// Whether anything stands between two points; the last millionth of the way does not count.
+    /// Whether a surface lies between two points, leaving out the last millionth of the segment.
     #[must_use]
-    pub fn hides(&self, from_ned_m: DVec3, to_ned_m: DVec3) -> bool {
+    pub fn is_occluded(&self, from_ned_m: DVec3, to_ned_m: DVec3) -> bool {
         self.cast(from_ned_m, to_ned_m - from_ned_m).is_some_and(|hit| hit.depth_m < 1.0 - 1e-6)
     }
 
-    fn zoomed_eye(&self, zoom: f64) -> Option<Arc<Eye>> {
-        // Not held while it is made: that is done in parallel, and a thread that waits for its parts may take
-        // up work that asks for an eye itself.
-        let kept = || self.zoomed.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, eye)) = kept().iter().find(|(bits, _)| *bits == zoom.to_bits()) {
-            return Some(eye.clone());
+    fn zoomed_lens(&self, zoom: f64) -> Option<Arc<LensInverse>> {
+        // The lock is not held while the lens is prepared. That runs in parallel, and a thread that waits for
+        // its parts may take up another task that needs a zoomed lens.
+        let cache = || self.zoomed.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, lens)) = cache().iter().find(|(bits, _)| *bits == zoom.to_bits()) {
+            return Some(lens.clone());
         }
-        let made = Arc::new(eye_at_zoom(&self.sequence.scenario.camera, zoom).ok()?);
-        let mut kept = kept();
-        if kept.len() >= ZOOMED_KEPT {
-            kept.remove(0);
+        let made = Arc::new(lens_at_zoom(&self.sequence.scenario.camera, zoom).ok()?);
+        let mut cache = cache();
+        if cache.len() >= ZOOM_CACHE_SIZE {
+            cache.remove(0);
         }
-        kept.push((zoom.to_bits(), made.clone()));
+        cache.push((zoom.to_bits(), made.clone()));
         Some(made)
     }
 }
 
 impl FrameView<'_> {
-    /// As [`Oracle::look`].
+    /// As [`Oracle::sample`].
     #[must_use]
-    pub fn look(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<Look> {
+    pub fn sample(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         let uv = self.ray(pixel, offset_px)?;
-        let t_s = self.mid_s(pixel) + phase * self.oracle.clock.exposure_s();
+        let t_s = self.mid_s(pixel) + phase * self.oracle.timing.exposure_s();
         let pose = self.oracle.sequence.path.pose(t_s);
-        Some(Look { t_s, pose, uv, hit: self.hit(&pose, uv) })
+        Some(RaySample { t_s, pose, uv, hit: self.hit(&pose, uv) })
     }
 
-    /// Ideal ray (u, v) of a place.
+    /// Ideal ray (u, v) of an image position.
     #[must_use]
     pub fn ray(&self, [x, y]: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
-        let eye: &Eye = match &self.eye {
-            FrameEye::Fixed(eye) => eye,
-            FrameEye::Zoomed(eye) => eye,
-            FrameEye::Blind => return None,
+        let lens: &LensInverse = match &self.lens {
+            FrameLens::Fixed(lens) => lens,
+            FrameLens::Zoomed(lens) => lens,
+            FrameLens::Invalid => return None,
         };
-        eye.ray(DVec2::new(f64::from(x), f64::from(y)) + offset_px)
+        lens.ray(DVec2::new(f64::from(x), f64::from(y)) + offset_px)
     }
 
     /// Mid-exposure of a pixel, path time, seconds.
     #[must_use]
     pub fn mid_s(&self, pixel: [u32; 2]) -> f64 {
-        self.stamp_s + self.oracle.clock.dt_s(pixel)
+        self.stamp_s + self.oracle.timing.dt_s(pixel)
     }
 
     fn hit(&self, pose: &CameraPose, uv: DVec2) -> Option<Hit> {
@@ -297,19 +298,20 @@ impl FrameView<'_> {
     }
 }
 
-fn eye(
+fn lens_inverse(
     camera: &CameraSpec,
     focal_px: [f64; 2],
     principal_px: [f64; 2],
     coefficients: &[f64],
-) -> Result<Eye, CameraError> {
+) -> Result<LensInverse, CameraError> {
     let lens = Lens::new(camera.lens.model, coefficients)
         .map_err(|source| CameraError::Lens { key: "camera".to_owned(), source })?;
-    Ok(Eye::new(camera.size_px, focal_px, principal_px, lens))
+    Ok(LensInverse::new(camera.size_px, focal_px, principal_px, lens))
 }
 
-/// Every number of a calibration linear in the zoom value between two entries of the table, held outside.
-fn eye_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<Eye, CameraError> {
+/// The camera at a zoom value: every number of the calibration is linear between two entries of the table and
+/// constant beyond its ends.
+fn lens_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<LensInverse, CameraError> {
     let table = &camera.zoom;
     let (Some(first), Some(last)) = (table.first(), table.last()) else {
         return Err(CameraError::ZoomValue(zoom));
@@ -330,14 +332,14 @@ fn eye_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<Eye, CameraError> {
     let coefficients: Vec<f64> = (0..count)
         .map(|i| mix(coefficient(&low.coefficients, i), coefficient(&high.coefficients, i)))
         .collect();
-    eye(camera, mix2(low.focal_px, high.focal_px), principal_px, &coefficients)
+    lens_inverse(camera, mix2(low.focal_px, high.focal_px), principal_px, &coefficients)
 }
 
 fn centre_px(camera: &CameraSpec) -> [f64; 2] {
     camera.size_px.map(|size| 0.5 * (f64::from(size) - 1.0))
 }
 
-/// Zoom value at a time: linear between the rows of the track, held outside; 1 without a track.
+/// Zoom value at a time: linear between the rows of the track, constant beyond its ends; 1 without a track.
 fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
     let (Some(first), Some(last)) = (track.first(), track.last()) else { return 1.0 };
     if t_s <= first.0 {

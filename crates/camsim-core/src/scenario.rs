@@ -1,8 +1,8 @@
-//! The scenario: one plain struct that TOML, `--set`, the command line and the viewer all edit.
+//! The scenario: one plain struct, edited by TOML files, `--set`, the command line and the viewer.
 //!
-//! Every key has a default except `flight.log` and the scene. Angles are degrees only where the key says
-//! `_deg`, lengths are metres, times seconds or `_ms`. Paths are as written in the file until the loader
-//! resolves them.
+//! Every key has a default except `flight.log` and the scene. Angles are in degrees only where the key ends
+//! in `_deg`; lengths are in metres, times in seconds or `_ms`. Paths are as written in the file until the
+//! loader resolves them.
 
 use std::path::PathBuf;
 
@@ -27,14 +27,14 @@ pub use validate::{
     validate, validate_camera,
 };
 
-/// Everything that one run depends on.
+/// All inputs of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Seed of every random number of the run.
+    /// Seed of all random numbers of the run.
     #[serde(default)]
     pub seed: u64,
-    /// The flight log and how to read it.
+    /// The flight log and how it is read.
     pub flight: FlightSpec,
     /// How the camera platform follows the log.
     #[serde(default)]
@@ -42,43 +42,43 @@ pub struct Scenario {
     /// The camera and all its imperfections.
     #[serde(default)]
     pub camera: CameraSpec,
-    /// What there is to see.
+    /// The scene.
     pub scene: SceneSpec,
-    /// Tolerances and the methods that keep them.
+    /// Tolerances and methods.
     #[serde(default)]
     pub quality: QualitySpec,
-    /// What is written.
+    /// Output channels and formats.
     #[serde(default)]
     pub output: OutputSpec,
 }
 
 impl Scenario {
-    /// Seed of the camera's noise: the scenario's, and the camera's name.
+    /// Seed of the camera's noise, from the scenario's seed and the camera's name.
     #[must_use]
     pub fn noise_seed(&self) -> u64 {
         crate::noise::camera_seed(self.seed, &self.camera.name)
     }
 }
 
-/// `[flight]`: the log and how its columns are meant.
+/// `[flight]`: the log and the meaning of its columns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlightSpec {
     /// The log file.
     pub log: PathBuf,
-    /// Column layout; `auto` detects it or refuses.
+    /// Column layout; `auto` detects it, or fails if it is ambiguous.
     #[serde(default)]
     pub format: LogFormat,
-    /// Unit of times whose column names none.
+    /// Unit of times whose column does not name one.
     #[serde(default)]
     pub time_unit: TimeUnit,
-    /// Unit of roll, pitch and yaw whose columns name none.
+    /// Unit of roll, pitch and yaw whose columns do not name one.
     #[serde(default)]
     pub angle_unit: AngleUnit,
     /// Whether angles wrap or count turns.
     #[serde(default)]
     pub angles: AngleKind,
-    /// Where attitude comes from.
+    /// Source of the attitude.
     #[serde(default)]
     pub attitude: AttitudeSource,
     /// Origin of the local NED frame.
@@ -87,7 +87,7 @@ pub struct FlightSpec {
     /// Vertical reference of the log's heights.
     #[serde(default)]
     pub height: HeightReference,
-    /// Part of the log that is flown, in seconds from its first good row; `None` is all of it.
+    /// Interval of the log that is flown, in seconds from its first good row; `None` is the whole log.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window_s: Option<[f64; 2]>,
     /// Time scale: 2 flies the log twice as fast.
@@ -99,7 +99,7 @@ pub struct FlightSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LogFormat {
-    /// Detect from header and values; refuse when two layouts fit.
+    /// Detected from header and values; an error if two layouts fit.
     #[default]
     Auto,
     /// `t, lat, lon, alt, roll, pitch, yaw` (degrees, metres up).
@@ -116,11 +116,11 @@ pub enum LogFormat {
     Gpx,
 }
 
-/// Units of time in a flight log.
+/// Time units of a flight log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeUnit {
-    /// Seconds, or what the values tell beyond doubt; refuse where they leave a doubt.
+    /// Seconds, or a unit that the values imply beyond doubt; an error if in doubt.
     #[default]
     Auto,
     /// Seconds.
@@ -141,7 +141,7 @@ pub enum TimeUnit {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AngleUnit {
-    /// Degrees, or what the values tell beyond doubt; refuse where they leave a doubt.
+    /// Degrees, or a unit that the values imply beyond doubt; an error if in doubt.
     #[default]
     Auto,
     /// Degrees.
@@ -150,20 +150,20 @@ pub enum AngleUnit {
     Rad,
 }
 
-/// How Euler angles in a log are to be read.
+/// Interpretation of Euler angles in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AngleKind {
     /// `Wrapped`, unless a column leaves both [-180, 180] and [0, 360).
     #[default]
     Auto,
-    /// The short way between two rows.
+    /// Rotation by the shorter way between two rows.
     Wrapped,
-    /// As written: 0 to 360 is a full turn.
+    /// As written: from 0 to 360 is a full turn.
     Continuous,
 }
 
-/// Where the attitude of the platform comes from.
+/// Source of the platform's attitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AttitudeSource {
@@ -190,14 +190,14 @@ pub enum Origin {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerSpec {
-    /// Method.
+    /// The method.
     pub kind: TrackerKind,
-    /// Control rate of `sqrt`, knot rate of `spline`, in hertz.
+    /// Control rate of `sqrt`, knot rate of `spline`, hertz.
     pub rate_hz: f64,
     /// Speed limit; `auto` is 1.2 times the 99.9th percentile of the log's own speed.
     pub max_speed_m_s: Auto<f64>,
     /// Acceleration limit; `auto` is 1.5 times the 99.9th percentile of the smoothed log's own, and at least
-    /// the paper's 19.6; with the paper's preset it is that.
+    /// the paper's 19.6. With the paper's preset it is 19.6.
     pub max_acceleration_m_s2: Auto<f64>,
     /// Angular rate limit; `auto` as for speed.
     pub max_angular_rate_deg_s: Auto<f64>,
@@ -206,14 +206,14 @@ pub struct TrackerSpec {
 }
 
 /// Acceleration limit of the paper's experiments: 2 g.
-pub const PAPER_ACCELERATION_M_S2: f64 = 19.6;
-/// Their angular acceleration limit.
-pub const PAPER_ANGULAR_ACCELERATION_DEG_S2: f64 = 60.0;
+pub(crate) const PAPER_ACCELERATION_M_S2: f64 = 19.6;
+/// Angular acceleration limit of the paper's experiments.
+pub(crate) const PAPER_ANGULAR_ACCELERATION_DEG_S2: f64 = 60.0;
 
 impl Scenario {
-    /// `[tracker]` as it counts: with the paper's preset `auto` accelerations are the paper's.
+    /// `[tracker]` with the preset applied: with the paper's preset, `auto` accelerations are the paper's.
     #[must_use]
-    pub fn tracker_in_force(&self) -> TrackerSpec {
+    pub fn effective_tracker(&self) -> TrackerSpec {
         let mut tracker = self.tracker.clone();
         if self.quality.preset == Preset::Paper {
             let or_paper = |limit: Auto<f64>, paper: f64| Auto::Value(limit.value().unwrap_or(paper));
@@ -238,7 +238,7 @@ impl Default for TrackerSpec {
     }
 }
 
-/// Methods of following the log.
+/// Methods by which the platform follows the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackerKind {
@@ -249,44 +249,43 @@ pub enum TrackerKind {
     /// Two nested SQRT loops per channel (paper section 3).
     #[default]
     Sqrt,
-    /// Limit-constrained quadratic B-spline over the whole log.
+    /// Quadratic B-spline fitted to the whole log under the limits.
     Spline,
 }
 
-/// `[quality]`: tolerances, and the methods that keep them.
+/// `[quality]`: tolerances and methods.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QualitySpec {
-    /// Whose methods: camsim's own, or the paper's.
+    /// Set of methods: camsim's own, or the paper's.
     pub preset: Preset,
-    /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
+    /// Bound on the 99th percentile of the source error over valid pixels.
     pub max_error_px: f64,
-    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place, the
-    /// terrain's level of detail and at silhouettes.
+    /// Bound on the RMS picture error in DN (1/255 of the linear range): resampling, exposure sampling,
+    /// misregistration, terrain level of detail, and silhouettes.
     pub max_error_dn: f64,
-    /// Bound on what the terrain's level of detail moves, pixels of the picture; what that costs counts in
+    /// Bound on the displacement by the terrain's level of detail, output pixels. Its picture error counts in
     /// `max_error_dn`.
     pub max_terrain_error_px: f64,
-    /// Temporal solver.
+    /// Temporal inverse.
     pub solver: Auto<Solver>,
     /// Depth look-ups of `reproject`, at most [`MAX_ITERATIONS`].
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure. At most
+    /// Exposure samples per pixel of path; with the paper preset, samples per exposure. At most
     /// [`MAX_BLUR_SAMPLES`].
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel, at most [`MAX_FOOTPRINT_TAPS`].
     pub footprint_taps: Auto<u32>,
-    /// Pixels of the ideal frame for each of the camera's, along a side.
+    /// Ideal pixels per camera pixel along a side.
     pub ideal_scale: Auto<f64>,
-    /// Samples of each pixel of the ideal frame, 1 or 4: with several, borders are known to a part of a
-    /// pixel.
+    /// Samples per pixel of the ideal frame, 1 or 4. Several samples locate borders within a pixel.
     pub ideal_samples: Auto<u32>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
-    /// Output frames that may be made from one ideal frame, at most [`MAX_FRAMES_PER_IDEAL`].
+    /// Largest number of output frames rendered from one ideal frame, at most [`MAX_FRAMES_PER_IDEAL`].
     #[serde(default = "frames_per_ideal")]
     pub frames_per_ideal: u32,
-    /// Colours of pixels at silhouettes.
+    /// Method for pixels at silhouettes.
     #[serde(default)]
     pub silhouettes: Silhouettes,
 }
@@ -322,37 +321,37 @@ pub enum Preset {
     /// The cheapest methods that keep the tolerances.
     #[default]
     Default,
-    /// The paper's own methods and approximations, as a base to measure against; [`crate::plan::paper`] lists
-    /// them. It fixes the solver (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the
-    /// samples of an exposure (100), and the tolerances choose nothing but the terrain's level of detail.
+    /// The methods and approximations of the paper, for comparison. The preset fixes the solver (eq. 18), one
+    /// ideal frame and one sample per pixel; `blur_samples` counts the samples of an exposure (100), and the
+    /// tolerances determine only the terrain's level of detail.
     Paper,
 }
 
-/// How pixels at silhouettes get their colour.
+/// Methods for pixels at silhouettes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Silhouettes {
-    /// As `plain` where that is expected to keep `max_error_dn`, otherwise as `rays`.
+    /// `plain` if it is expected to keep `max_error_dn`, otherwise `rays`.
     #[default]
     Auto,
-    /// As everywhere: from pixels of the ideal frame, each of which shows one surface.
+    /// As elsewhere: taps in the ideal frame, each of whose pixels shows one surface.
     Plain,
-    /// By rays of their own, over the pixel's area and exposure, through ideal frames that keep several
-    /// samples a pixel.
+    /// Silhouette rays over the pixel's area and exposure, through ideal frames with several samples per
+    /// pixel.
     Rays,
 }
 
-/// Temporal inverse methods.
+/// Methods of the temporal inverse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
-    /// One straight step at constant velocity and depth (paper eq. 16).
+    /// One straight step at constant velocity and depth (eq. 16 of the paper).
     Linear,
-    /// Heun's steps of at most 2.5 deg at constant velocity and depth (paper eq. 18).
+    /// Heun's steps of at most 2.5 deg at constant velocity and depth (eq. 18 of the paper).
     Rk2,
     /// Exact relative pose per row and sample, depth by fixed-point iteration.
     Reproject,
-    /// Every sample of every pixel by a ray of its own, in f64 on the CPU: the reference, slow.
+    /// A ray in f64 on the CPU for every sample of every pixel: the reference, slow.
     Oracle,
 }
 
@@ -360,13 +359,13 @@ pub enum Solver {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputSpec {
-    /// What to write for each frame.
+    /// Channels to write for each frame.
     pub channels: Vec<Channel>,
-    /// File formats; empty renders and reads back without encoding.
+    /// File formats; with none, frames are rendered and read back without being written.
     pub format: Vec<ImageFormat>,
-    /// Which clock every written stamp is on.
+    /// Clock of all written stamps.
     pub stamps: Stamps,
-    /// With `stamps = "zero"`: what that clock shows at the beginning of the window, nanoseconds.
+    /// With `stamps = "zero"`: time of that clock at the begin of the window, nanoseconds.
     pub epoch_ns: u64,
     /// Pixel type of EXR colour.
     pub exr_pixel: ExrPixel,
@@ -391,15 +390,15 @@ impl Default for OutputSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stamps {
-    /// The log's own.
+    /// The clock of the log.
     #[default]
     Log,
-    /// One that shows [`OutputSpec::epoch_ns`] at the beginning of `flight.window_s`.
+    /// A clock that shows [`OutputSpec::epoch_ns`] at the begin of `flight.window_s`.
     Zero,
 }
 
 impl OutputSpec {
-    /// What written stamps show at path time 0, nanoseconds: there the log's clock shows `log_epoch_ns`, and
+    /// Time of the written clock at path time 0, nanoseconds. The log's clock shows `log_epoch_ns` there, and
     /// the window begins at `start_s` of path time.
     #[must_use]
     pub fn stamp_epoch_ns(&self, log_epoch_ns: i64, start_s: f64) -> i64 {
@@ -412,15 +411,15 @@ impl OutputSpec {
     }
 }
 
-/// Things a frame can give.
+/// Channels of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Channel {
     /// The picture.
     Color,
-    /// Planar depth at the row's mid-exposure, metres, 0 where nothing is.
+    /// Planar depth at the row's mid-exposure, metres; 0 = nothing.
     Depth,
-    /// 1 where a ray exists.
+    /// 1 where a ray exists, else 0.
     Valid,
     /// `rows.csv`: time, pose and velocity of each row.
     Rows,
@@ -453,14 +452,14 @@ pub enum ExrPixel {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExrCompression {
-    /// Stored.
+    /// Uncompressed.
     None,
-    /// Run lengths.
+    /// Run-length encoding.
     Rle,
-    /// Deflate, one row a block.
+    /// Deflate, one row per block.
     #[default]
     Zip1,
-    /// Deflate, 16 rows a block.
+    /// Deflate, 16 rows per block.
     Zip16,
     /// Wavelet.
     Piz,

@@ -1,75 +1,78 @@
-//! The scene as plain data: terrain, meshes, pictures, sky, fog. No GPU and no file format in here.
+//! The scene as plain data: terrain, meshes, textures, sky, fog and light. Independent of GPU and file
+//! formats.
 //!
-//! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so
+//! All positions are local NED in metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so
 //! that the renderer can form camera-relative coordinates without cancellation.
 
 use crate::pose::CameraPose;
 
+pub mod batches;
+mod blend_split;
 pub mod board;
-pub mod box_tree;
-pub mod crossings;
-pub mod levels;
+mod box4;
+pub mod depth_sort;
 pub mod light;
 pub mod mesh;
-pub mod paint_order;
-pub mod picture_tiles;
-mod quad;
-pub mod ray_tree;
-pub mod surface_filter;
+pub mod mesh_lod;
+mod prefilter;
+pub mod proximity_bvh;
+pub mod ray_bvh;
 pub mod terrain;
 pub mod texture;
+mod texture_tiles;
 
+pub use batches::{Batch, PlacedShape, SceneBatches};
+pub use blend_split::{BlendSplit, split_intersecting_blended};
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
-pub use crossings::{Crossings, cut_where_blended_cross};
-pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
-pub use light::{Light, turned_normal};
+pub use light::{Light, transformed_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
-pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
-pub use surface_filter::{SurfaceFilter, SurfaceReads};
+pub use mesh_lod::{LodTolerance, ModelLod, SceneLods, ShapeLod, ShapeLods};
+pub use prefilter::{Prefilter, PrefilterTaps};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, DrawnCell, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk,
-    TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainVertex, VERTEX_BITS,
+    Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail,
+    TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainTiles, TerrainVertex,
 };
 pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
+pub use texture_tiles::{TILE_SIDE, TileGrid, TileSource, is_whole, tile_bytes};
 
-/// What there is to see.
+/// A scene.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Ground from an elevation model.
     pub terrain: Option<Terrain>,
-    /// Everything else that has a surface (the planar pattern is one of them).
+    /// All other surfaces, including the planar pattern and the calibration board.
     pub meshes: Vec<Mesh>,
-    /// Colour where no surface is, linear light.
+    /// Colour of the sky, linear light.
     pub sky_linear: [f32; 3],
-    /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
+    /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
     pub fog_visibility_m: Option<f64>,
-    /// Light on meshes whose shapes have normals; the ground has it in its picture ([`Terrain::light_up`]).
-    /// Without, colours are as they are.
+    /// Light on meshes whose shapes have normals. On the terrain, light is baked into the texture
+    /// ([`Terrain::bake_light`]). Without light, colours are used as they are.
     pub light: Option<Light>,
 }
 
 impl Scene {
-    /// Whether anything is mixed with what is behind it.
+    /// Whether any mesh is blended with what is behind it.
     #[must_use]
     pub fn has_blended(&self) -> bool {
         self.meshes.iter().any(|mesh| mesh.material.blends)
     }
 
-    /// Whether all borders are those of triangles: no surface is mixed with what is behind it or has holes by
-    /// its picture.
+    /// Whether all silhouettes are borders of triangles: no surface is blended or cut out by the alpha of its
+    /// texture.
     #[must_use]
-    pub fn has_borders_of_triangles(&self) -> bool {
+    pub fn has_triangle_borders_only(&self) -> bool {
         self.meshes.iter().all(|mesh| !mesh.material.blends && mesh.material.cutoff.is_none())
     }
 
-    /// Boxes around all meshes, NED.
+    /// Bounding boxes of all meshes, NED.
     #[must_use]
     pub fn mesh_bounds(&self) -> Vec<Aabb> {
         self.meshes.iter().map(Mesh::bounds).collect()
     }
 }
 
-/// Places of the boxes that may be in view, in order. `tangents`: u_min, u_max, v_min, v_max.
+/// Indices of the boxes that may be in view, in order. `tangents` are u_min, u_max, v_min, v_max.
 #[must_use]
 pub fn in_view(bounds: &[Aabb], pose: &CameraPose, tangents: [f64; 4]) -> Vec<u32> {
     let frustum = terrain::Frustum::new(pose, tangents);

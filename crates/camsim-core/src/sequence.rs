@@ -1,32 +1,48 @@
-//! A loaded scenario: everything that rendering needs, in memory and checked.
+//! A loaded scenario: all inputs of rendering, in memory and checked.
 
 use std::sync::Arc;
 
-use crate::{mount::CameraPath, scenario::Scenario, scene::Scene};
+use crate::{mount::CameraPath, photometric::vignette_weights, scenario::Scenario, scene::Scene};
 
-/// Everything that one run needs, loaded and validated. Immutable; shared between threads.
+/// All inputs of a run, loaded and validated. Immutable; shared between threads.
 #[derive(Clone, Debug)]
 pub struct Sequence {
     /// The resolved scenario.
     pub scenario: Scenario,
-    /// Camera pose at any instant; its time is seconds since the first good row of the log (after
-    /// `flight.speed`).
+    /// Camera pose at any instant of path time: seconds since the first good row of the log, after
+    /// `flight.speed`.
     pub path: Arc<CameraPath>,
-    /// What written stamps show at path time 0, nanoseconds: the log's clock, or that of `output.stamps`.
+    /// Time of the written stamps at path time 0, nanoseconds: on the log's clock, or that of
+    /// `output.stamps`.
     pub epoch_ns: i64,
-    /// Path time of frame 0's period, seconds (the beginning of `flight.window_s`).
+    /// Path time at which the period of frame 0 begins, seconds (the begin of `flight.window_s`).
     pub start_s: f64,
-    /// Number of frames that the window holds.
+    /// Number of frames in the window.
     pub frames: u64,
-    /// Terrain, pattern, sky.
+    /// The scene.
     pub scene: Arc<Scene>,
-    /// Vignette map, values 0..=1, row-major, with its size; `None` if there is none.
+    /// Vignette map, values 0..=1, row-major; `None` without one.
     pub vignette: Option<Arc<GrayImage>>,
-    /// `(t_s, zoom)` rows, by path time.
+    /// `(t_s, zoom)` rows by path time.
     pub zoom_track: Vec<(f64, f64)>,
 }
 
-/// A single-channel picture.
+impl Sequence {
+    /// Weights of the vignette map at every pixel, and the size of their picture; a single 1 without a map.
+    #[must_use]
+    pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {
+        let camera = &self.scenario.camera;
+        match &self.vignette {
+            Some(map) => {
+                let thresholds = camera.photometric.vignette_thresholds;
+                (camera.size_px, vignette_weights(map, camera.size_px, thresholds))
+            }
+            None => ([1, 1], vec![1.0]),
+        }
+    }
+}
+
+/// A single-channel image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayImage {
     /// Width, height.

@@ -1,17 +1,18 @@
-//! When each line of the image is exposed: delay, rolling shutter, exposure, interlacing (the paper's section
-//! 6).
+//! Exposure times of the rows of an image: delay, rolling shutter, exposure, interlacing (section 6 of the
+//! paper).
 //!
-//! Everything is relative to the frame's stamp and to the **mid-exposure** of a line:
+//! A row is exposed at once. Its time is relative to the stamp of the frame and is that of its
+//! **mid-exposure**:
 //!
-//! `dt = -delay + ((line + 0.5)/N - 0.5) t_r - (t_i if the row belongs to the earlier field)`
+//! `dt = -delay + ((row + 0.5)/N - 0.5) t_r - (t_i if the row belongs to the earlier field)`
 //!
-//! so that the middle of the image has exactly `-delay`. `line` counts rows from the top or columns from the
-//! left; the two reverse readout directions count from the other end. Fields are always rows, whatever the
-//! readout direction.
+//! so the middle of the image has exactly `-delay`. Rows of the readout count from the top or, as columns,
+//! from the left; the two reverse readout directions count from the other end. Interlaced fields always
+//! consist of image rows, for any readout direction.
 
 use crate::scenario::{FieldOr, Parity, Readout, ShutterSpec};
 
-/// What can be wrong with `[camera.shutter]`.
+/// Invalid values in `[camera.shutter]`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShutterError {
     /// Negative, NaN or infinite time.
@@ -21,28 +22,28 @@ pub enum ShutterError {
         key: &'static str,
         /// The value.
         value: f64,
-        /// What a negative value may have meant.
+        /// Possible intention behind a negative value.
         hint: &'static str,
     },
-    /// Not a frame rate.
-    #[error("camera.fps is {0}: it must be a positive finite number of frames a second")]
+    /// Invalid frame rate.
+    #[error("camera.fps is {0}: it must be a positive finite number of frames per second")]
     Fps(f64),
     /// An image without pixels.
     #[error("camera.size_px is [{0}, {1}]: both must be at least 1")]
     Size(u32, u32),
 }
 
-/// What a line of the readout is.
+/// Axis of the rows of the readout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum LinesAxis {
-    /// Lines are rows: a pixel's time depends on its y alone.
+pub enum RowAxis {
+    /// Rows of the readout are image rows: the time of a pixel depends on its y only.
     Rows,
-    /// Lines are columns: a pixel's time depends on its x, and on the parity of its y where fields are
-    /// interlaced.
+    /// Rows of the readout are image columns: the time of a pixel depends on its x, and, for interlaced
+    /// fields, on the parity of its y.
     Columns,
 }
 
-/// Timing of one frame's pixels relative to its stamp, checked.
+/// Checked timing of the pixels of a frame relative to its stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shutter {
     size_px: [u32; 2],
@@ -55,7 +56,7 @@ pub struct Shutter {
 }
 
 impl Shutter {
-    /// From `[camera.shutter]`; N is the height or the width of the image, by the direction of the readout.
+    /// Timing from `[camera.shutter]`. N is the height or the width of the image, by the readout direction.
     pub fn from_spec(spec: &ShutterSpec, fps: f64, size_px: [u32; 2]) -> Result<Self, ShutterError> {
         if !(fps.is_normal() && fps > 0.0) {
             return Err(ShutterError::Fps(fps));
@@ -69,11 +70,7 @@ impl Shutter {
         };
         Ok(Self {
             size_px,
-            delay_s: seconds(
-                "delay_ms",
-                spec.delay_ms,
-                "; it says how much older than its stamp the image is",
-            )?,
+            delay_s: seconds("delay_ms", spec.delay_ms, "; it is the age of the image at its stamp")?,
             readout_s: seconds(
                 "readout_ms",
                 spec.readout_ms,
@@ -90,58 +87,57 @@ impl Shutter {
         })
     }
 
-    /// Whether lines are rows or columns.
-    pub fn lines_axis(&self) -> LinesAxis {
+    /// Whether the rows of the readout are image rows or columns.
+    pub fn row_axis(&self) -> RowAxis {
         match self.direction {
-            Readout::TopToBottom | Readout::BottomToTop => LinesAxis::Rows,
-            Readout::LeftToRight | Readout::RightToLeft => LinesAxis::Columns,
+            Readout::TopToBottom | Readout::BottomToTop => RowAxis::Rows,
+            Readout::LeftToRight | Readout::RightToLeft => RowAxis::Columns,
         }
     }
 
-    /// N: rows or columns, by the direction of the readout.
+    /// N: the number of rows of the readout.
     pub fn lines(&self) -> u32 {
-        match self.lines_axis() {
-            LinesAxis::Rows => self.size_px[1],
-            LinesAxis::Columns => self.size_px[0],
+        match self.row_axis() {
+            RowAxis::Rows => self.size_px[1],
+            RowAxis::Columns => self.size_px[0],
         }
     }
 
-    /// Mid-exposure of a line relative to the stamp, seconds. Rows include their field's lag; columns are
-    /// those of the later field (see [`Shutter::dt_pixel_s`]).
-    pub fn dt_line_s(&self, line: u32) -> f64 {
+    /// Mid-exposure of a row of the readout relative to the stamp, seconds. Image rows include the lag of
+    /// their field; columns have the time of the later field (see [`Shutter::dt_pixel_s`]).
+    pub fn dt_row_s(&self, line: u32) -> f64 {
         let dt_s = self.dt_readout_s(line);
-        match self.lines_axis() {
-            LinesAxis::Rows => dt_s - self.field_lag_s(line),
-            LinesAxis::Columns => dt_s,
+        match self.row_axis() {
+            RowAxis::Rows => dt_s - self.field_lag_s(line),
+            RowAxis::Columns => dt_s,
         }
     }
 
     /// Mid-exposure of a pixel relative to the stamp, seconds.
     pub fn dt_pixel_s(&self, x: u32, y: u32) -> f64 {
-        let line = match self.lines_axis() {
-            LinesAxis::Rows => y,
-            LinesAxis::Columns => x,
+        let line = match self.row_axis() {
+            RowAxis::Rows => y,
+            RowAxis::Columns => x,
         };
         self.dt_readout_s(line) - self.field_lag_s(y)
     }
 
-    /// By how much a row is earlier than the readout alone says: the interlacing lag for rows of the first
-    /// field, else 0.
-    pub fn field_lag_s(&self, row: u32) -> f64 {
+    /// Lag of an image row by interlacing: that of the fields for rows of the first field, else 0.
+    pub(crate) fn field_lag_s(&self, row: u32) -> f64 {
         let parity = if row.is_multiple_of(2) { Parity::Even } else { Parity::Odd };
         if parity == self.first_field { self.interlace_s } else { 0.0 }
     }
 
-    /// Earliest begin and latest end of exposure of any pixel, relative to the stamp.
+    /// Earliest begin and latest end of the exposure of any pixel, relative to the stamp.
     pub fn window_s(&self) -> (f64, f64) {
         let last = self.lines() - 1;
-        // With one row only one field exists; with more, both do. For rows, the extreme lines of each field
-        // are among the outer two.
+        // An image of one row has only one field; others have both. Among image rows, the earliest and latest
+        // of each field are among the outer two.
         let rows = self.size_px[1];
         let mids = [0, 1.min(last), last.saturating_sub(1), last].into_iter().flat_map(|line| {
-            let ys = match self.lines_axis() {
-                LinesAxis::Rows => [line, line],
-                LinesAxis::Columns => [0, 1.min(rows - 1)],
+            let ys = match self.row_axis() {
+                RowAxis::Rows => [line, line],
+                RowAxis::Columns => [0, 1.min(rows - 1)],
             };
             ys.map(|y| self.dt_readout_s(line) - self.field_lag_s(y))
         });
@@ -150,7 +146,7 @@ impl Shutter {
         (min - 0.5 * self.exposure_s, max + 0.5 * self.exposure_s)
     }
 
-    /// How much older than its stamp the image centre is (-t_d), seconds.
+    /// Age of the image centre at its stamp (-t_d), seconds.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
     }
@@ -160,7 +156,7 @@ impl Shutter {
         self.readout_s
     }
 
-    /// Exposure t_e, seconds, centred on a line's mid-exposure.
+    /// Exposure time t_e, seconds, centred on the mid-exposure of a row.
     pub fn exposure_s(&self) -> f64 {
         self.exposure_s
     }
@@ -178,11 +174,6 @@ impl Shutter {
     /// Direction of the readout.
     pub fn direction(&self) -> Readout {
         self.direction
-    }
-
-    /// Whether all pixels have one time (the delay): no rolling shutter, no interlacing.
-    pub fn is_global(&self) -> bool {
-        self.readout_s == 0.0 && self.interlace_s == 0.0
     }
 
     fn dt_readout_s(&self, line: u32) -> f64 {
@@ -209,7 +200,7 @@ mod tests {
         ShutterSpec { delay_ms: 5.0, readout_ms: 33.0, exposure_ms: 8.0, ..ShutterSpec::default() }
     }
 
-    /// Window by visiting every pixel.
+    /// The window computed from every pixel.
     fn window_by_pixels(shutter: &Shutter, [width, height]: [u32; 2]) -> (f64, f64) {
         let mut window = (f64::INFINITY, f64::NEG_INFINITY);
         for y in 0..height {
@@ -228,30 +219,30 @@ mod tests {
     fn the_image_centre_has_exactly_the_delay() {
         // 5 rows: row 2 is the centre.
         let shutter = Shutter::from_spec(&spec(), 30.0, [7, 5]).unwrap();
-        assert_eq!(shutter.dt_line_s(2), -0.005);
-        assert_eq!(shutter.dt_line_s(0), -0.005 + 0.033 * (0.1 - 0.5));
-        assert_eq!(shutter.dt_line_s(4), -0.005 + 0.033 * (0.9 - 0.5));
-        // Both halves of an even image are symmetric about it.
+        assert_eq!(shutter.dt_row_s(2), -0.005);
+        assert_eq!(shutter.dt_row_s(0), -0.005 + 0.033 * (0.1 - 0.5));
+        assert_eq!(shutter.dt_row_s(4), -0.005 + 0.033 * (0.9 - 0.5));
+        // Both halves of an even image are symmetric about the centre.
         let even = Shutter::from_spec(&spec(), 30.0, [640, 480]).unwrap();
-        assert!((0.5 * (even.dt_line_s(0) + even.dt_line_s(479)) + 0.005).abs() < 1e-15);
-        assert!((even.dt_line_s(479) - even.dt_line_s(0) - 0.033 * 479.0 / 480.0).abs() < 1e-15);
+        assert!((0.5 * (even.dt_row_s(0) + even.dt_row_s(479)) + 0.005).abs() < 1e-15);
+        assert!((even.dt_row_s(479) - even.dt_row_s(0) - 0.033 * 479.0 / 480.0).abs() < 1e-15);
     }
 
     #[test]
-    fn the_other_directions_mirror_the_first() {
+    fn reverse_readout_mirrors_row_times() {
         let with = |readout| Shutter::from_spec(&ShutterSpec { readout, ..spec() }, 30.0, [6, 4]).unwrap();
         let (down, up) = (with(Readout::TopToBottom), with(Readout::BottomToTop));
         let (right, left) = (with(Readout::LeftToRight), with(Readout::RightToLeft));
         for i in 0..4 {
-            assert!((down.dt_line_s(i) - up.dt_line_s(3 - i)).abs() < 1e-15);
+            assert!((down.dt_row_s(i) - up.dt_row_s(3 - i)).abs() < 1e-15);
         }
         for i in 0..6 {
-            assert!((right.dt_line_s(i) - left.dt_line_s(5 - i)).abs() < 1e-15);
-            assert_eq!(right.dt_pixel_s(i, 3), right.dt_line_s(i));
+            assert!((right.dt_row_s(i) - left.dt_row_s(5 - i)).abs() < 1e-15);
+            assert_eq!(right.dt_pixel_s(i, 3), right.dt_row_s(i));
         }
-        assert!(right.dt_line_s(0) < right.dt_line_s(5));
+        assert!(right.dt_row_s(0) < right.dt_row_s(5));
         assert_eq!((down.lines(), right.lines()), (4, 6));
-        assert_eq!((down.lines_axis(), left.lines_axis()), (LinesAxis::Rows, LinesAxis::Columns));
+        assert_eq!((down.row_axis(), left.row_axis()), (RowAxis::Rows, RowAxis::Columns));
     }
 
     #[test]
@@ -261,24 +252,24 @@ mod tests {
         let shutter = Shutter::from_spec(&interlaced, 25.0, [4, 6]).unwrap();
         assert_eq!(shutter.interlace_s(), 0.02);
         for row in 0..6 {
-            let lag_s = plain.dt_line_s(row) - shutter.dt_line_s(row);
+            let lag_s = plain.dt_row_s(row) - shutter.dt_row_s(row);
             assert!((lag_s - if row % 2 == 0 { 0.02 } else { 0.0 }).abs() < 1e-15);
         }
         let odd =
             Shutter::from_spec(&ShutterSpec { first_field: Parity::Odd, ..interlaced.clone() }, 25.0, [4, 6])
                 .unwrap();
-        assert_eq!(odd.dt_line_s(0), plain.dt_line_s(0));
-        assert!((odd.dt_line_s(1) - plain.dt_line_s(1) + 0.02).abs() < 1e-15);
-        // Sideways readout: still rows.
+        assert_eq!(odd.dt_row_s(0), plain.dt_row_s(0));
+        assert!((odd.dt_row_s(1) - plain.dt_row_s(1) + 0.02).abs() < 1e-15);
+        // Sideways readout: fields are still image rows.
         let sideways =
             Shutter::from_spec(&ShutterSpec { readout: Readout::LeftToRight, ..interlaced }, 25.0, [4, 6])
                 .unwrap();
         assert!((sideways.dt_pixel_s(1, 1) - sideways.dt_pixel_s(1, 2) - 0.02).abs() < 1e-15);
-        assert_eq!(sideways.dt_pixel_s(1, 1), sideways.dt_line_s(1));
+        assert_eq!(sideways.dt_pixel_s(1, 1), sideways.dt_row_s(1));
     }
 
     #[test]
-    fn the_window_is_that_of_all_pixels() {
+    fn window_covers_all_pixels() {
         for readout in
             [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft]
         {
@@ -300,14 +291,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_on_is_an_instant() {
+    fn without_exposure_and_readout_the_window_is_an_instant() {
         let shutter = Shutter::from_spec(&ShutterSpec::default(), 30.0, [640, 480]).unwrap();
-        assert!(shutter.is_global());
         assert_eq!(shutter.window_s(), (0.0, 0.0));
     }
 
     #[test]
-    fn bad_times_are_named() {
+    fn invalid_times_are_refused() {
         for bad in [-1.0, f64::NAN, f64::INFINITY] {
             let error = |spec: ShutterSpec| Shutter::from_spec(&spec, 30.0, [4, 4]).unwrap_err().to_string();
             assert!(error(ShutterSpec { delay_ms: bad, ..spec() }).contains("delay_ms"));

@@ -1,35 +1,34 @@
-//! What a silhouette is. One definition for errors that are measured and for errors that are predicted; no
-//! picture depends on it.
+//! Definition of a silhouette, shared by measured and predicted errors. No rendered image depends on it.
 //!
-//! A silhouette is a step of depth at one instant: inverse depth that still changes by more than [`STEP`] of
-//! the nearer one when the two rays are brought to 1/256 of their distance. A slope, however oblique, changes
-//! by 1/256 then; a step stays. The border of the sky is a step of all of it. Where depth bends by more than
-//! [`FOLD`] from one pixel to the next, as at the foot of a wall, it counts too: the renderer cannot tell
-//! such a fold from a step and casts rays of its own there.
+//! A silhouette is a step of depth at one instant: an inverse depth that still changes by more than [`STEP`],
+//! relative to the nearer one, when the two rays are brought to 1/256 of their distance. A slope, however
+//! oblique, then changes by 1/256 of its difference; a step remains. The border of the sky is always a step.
+//! Creases, where inverse depth bends by more than [`CREASE`] from one pixel to the next, count as well, for
+//! instance the foot of a wall: the renderer cannot tell them from steps and casts silhouette rays there.
 
-/// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend
-/// counts: that of the renderer's marks.
-pub use crate::temporal::marks::EDGE_STEP as FOLD;
-/// Relative change of inverse depth.
+/// Second difference of inverse depth between pixels, relative to the nearest, above which there is a crease:
+/// the threshold of the renderer's edge mask.
+pub use crate::temporal::edge_mask::EDGE_STEP as CREASE;
+/// Relative change of inverse depth above which there is a step.
 pub const STEP: f64 = 0.005;
-/// Distance from a silhouette within which a pixel counts as "at" it, output pixels.
+/// Distance from a silhouette within which a pixel counts as at it, output pixels.
 pub const NEAR_PX: u32 = 3;
-/// Times that the two rays' distance is halved.
+/// Number of times that the distance between the two rays is halved.
 const HALVINGS: u32 = 8;
 
-/// Whether inverse depths at three even places may have a step between them: over a plane they lie on a
-/// straight line. Saves most looks.
+/// Whether three equally spaced inverse depths may have a step between them. On a plane they lie on a
+/// straight line. This test avoids most of the rays that [`steps`] needs.
 pub fn may_step(inverse_depths: [f64; 3]) -> bool {
     bends(inverse_depths, STEP)
 }
 
-/// Whether inverse depths at three even places bend by more than a share of the nearest one.
+/// Whether three equally spaced inverse depths bend by more than `share` of the nearest one.
 pub fn bends([a, b, c]: [f64; 3], share: f64) -> bool {
     (a - 2.0 * b + c).abs() > share * a.max(b).max(c)
 }
 
-/// Whether there is a step between two rays with the given inverse depths, 0 for the sky. `between` is that
-/// of the ray at a share of the way.
+/// Whether there is a step between two rays with the given inverse depths (0 for the sky). `between` returns
+/// the inverse depth of the ray at a share of the way.
 pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
     let differ = |a: f64, b: f64| (a - b).abs() > STEP * a.max(b);
     let (mut before, mut after) = ((0.0, from), (1.0, to));
@@ -39,7 +38,7 @@ pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
         }
         let share = 0.5 * (before.0 + after.0);
         let middle = (share, between(share));
-        // The step is in the half that changes more.
+        // The step is in the half with the larger change.
         if (before.1 - middle.1).abs() >= (middle.1 - after.1).abs() {
             after = middle
         } else {
@@ -75,7 +74,7 @@ mod tests {
                 assert!(found(step(0.2)) && found(step(-0.2)), "{at} {slope}");
                 assert!(!found(step(0.004)), "{at} {slope}");
             }
-            // Ground before the sky, and the sky before a roof.
+            // Ground in front of the sky, and the sky in front of a roof.
             assert!(found(|s| if s > at { 0.01 } else { 0.0 }) && found(|s| if s > at { 0.0 } else { 1e-6 }));
         }
         assert!(!found(|_| 0.0) && may_step([0.0, 0.0, 1e-6]) && !may_step([0.0; 3]));

@@ -1,51 +1,52 @@
-//! Temporal inverse and gather: output ray + instant -> where to look in the ideal frame (paper section 6).
+//! Temporal inverse and gather: from an output ray and an instant to the source in the ideal frame, and the
+//! mean colour over the exposure (section 6 of the paper).
 //!
-//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`; the
-//! paper's own models are in [`displacement`] and [`paper`].
+//! These functions are the f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and
+//! `shaders/reverse/gather/blur.wgsl`. The paper's own models are in [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::camera::CameraModel;
 
 pub mod displacement;
-pub mod edges;
-pub mod fine;
+pub mod edge_lines;
+pub mod edge_mask;
 mod footprint;
-pub mod lines;
-pub mod marks;
+mod multisample;
 pub mod paper;
 pub mod path;
-mod samples;
+pub mod silhouette_rays;
 mod stages;
-pub mod suspects;
+pub mod supersampled;
+pub mod unreliable_depth;
 
-pub use footprint::{Footprint, Kernel, TENT_PX2, TapStage, WIDEST_AREA_PX, tap_shares};
-pub use samples::{SAMPLE_PLACES, SAMPLES, middle_depth};
+pub use footprint::{Footprint, Kernel, MAX_AREA_SIDE_PX, TENT_PX2, TapStage, tap_offsets};
+pub use multisample::{SAMPLE_POSITIONS, SAMPLES, resolve_depth};
 pub use stages::{NodeDepths, PathStage};
 
-/// Most ideal frames of one output frame.
+/// Largest number of ideal frames of one output frame.
 pub const MAX_KEYS: u32 = 4;
 
-/// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as
-/// needed.
+/// Geometry of an ideal frame: a pinhole camera at the key instant, off-axis, with no more pixels than the
+/// output frame needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealGeometry {
     /// Width, height.
     pub size_px: [u32; 2],
     /// Focal lengths.
     pub focal_px: DVec2,
-    /// Principal point, in pixels of this frame (may lie outside).
+    /// Principal point, in pixels of this frame. It may lie outside of the frame.
     pub principal_px: DVec2,
 }
 
 impl IdealGeometry {
-    /// How many of its pixels are as long as one of a camera's, where that one's lens leaves it as it is.
+    /// Ideal pixels per camera pixel along a side, for a camera without distortion.
     #[must_use]
     pub fn scale(&self, camera: &CameraModel) -> f64 {
         self.focal_px.x / camera.focal_px.x
     }
 
-    /// `[u_min, u_max, v_min, v_max]` of the pixel area.
+    /// `[u_min, u_max, v_min, v_max]`: bounds of the pixel area as tangents u = x/z, v = y/z.
     #[must_use]
     pub fn tangents(&self) -> [f64; 4] {
         let size = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1]));
@@ -54,18 +55,18 @@ impl IdealGeometry {
         [low.x, high.x, low.y, high.y]
     }
 
-    /// Pixel of a direction given in key-camera coordinates (any positive scale).
+    /// Pixel of a direction in key-camera coordinates. The length of the direction does not matter.
     #[must_use]
     pub fn px_from_point(&self, in_key: DVec3) -> DVec2 {
         self.focal_px * (in_key.truncate() / in_key.z) + self.principal_px
     }
 
-    /// Whether a position lies on the frame's pixels.
+    /// Whether a position lies within the pixel area of the frame.
     #[must_use]
-    pub fn contains(&self, at_px: DVec2) -> bool {
-        at_px.cmpge(DVec2::splat(-0.5)).all()
-            && at_px.x <= f64::from(self.size_px[0]) - 0.5
-            && at_px.y <= f64::from(self.size_px[1]) - 0.5
+    pub fn contains(&self, position_px: DVec2) -> bool {
+        position_px.cmpge(DVec2::splat(-0.5)).all()
+            && position_px.x <= f64::from(self.size_px[0]) - 0.5
+            && position_px.y <= f64::from(self.size_px[1]) - 0.5
     }
 }
 
@@ -79,50 +80,51 @@ pub struct InverseDepthImage<'a> {
 }
 
 impl InverseDepthImage<'_> {
-    /// Bilinear in 1/z (exact on planes); the nearest texel where the four around belong to different
-    /// surfaces.
+    /// Inverse depth at a position: bilinear in 1/z, which is exact on planes, or that of the nearest texel
+    /// where the four neighbours belong to different surfaces.
     #[must_use]
-    pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
+    pub fn inverse_depth(&self, position_px: DVec2) -> f64 {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
-        let at = at_px.clamp(DVec2::ZERO, last);
-        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
-        let t = at - base;
+        let clamped = position_px.clamp(DVec2::ZERO, last);
+        let base = clamped.floor().min((last - 1.0).max(DVec2::ZERO));
+        let t = clamped - base;
         let load = |dx: f64, dy: f64| {
             let (x, y) = ((base.x + dx).min(last.x) as usize, (base.y + dy).min(last.y) as usize);
             f64::from(self.values[y * self.size_px[0] as usize + x])
         };
         let (d00, d10, d01, d11) = (load(0.0, 0.0), load(1.0, 0.0), load(0.0, 1.0), load(1.0, 1.0));
-        blend_inverse_depths([d00, d10, d01, d11], t)
+        interpolate_inverse_depth([d00, d10, d01, d11], t)
     }
 
-    /// The nearest texel, edges held.
+    /// Inverse depth of the nearest texel; positions outside take the border texel.
     #[must_use]
-    pub fn nearest(&self, at_px: DVec2) -> f64 {
-        f64::from(self.values[self.nearest_index(at_px)])
+    pub fn nearest(&self, position_px: DVec2) -> f64 {
+        f64::from(self.values[self.nearest_index(position_px)])
     }
 
-    /// Where the nearest texel stands in the values, edges held.
+    /// Index of the nearest texel in `values`; positions outside take the border texel.
     #[must_use]
-    pub fn nearest_index(&self, at_px: DVec2) -> usize {
+    pub(crate) fn nearest_index(&self, position_px: DVec2) -> usize {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
-        let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
-        at.y as usize * self.size_px[0] as usize + at.x as usize
+        let texel = (position_px + 0.5).floor().clamp(DVec2::ZERO, last);
+        texel.y as usize * self.size_px[0] as usize + texel.x as usize
     }
 
-    /// Largest less smallest of the four texels around a position.
+    /// Difference between the largest and the smallest of the four texels around a position.
     #[must_use]
-    pub fn spread(&self, at_px: DVec2) -> f64 {
+    pub fn spread(&self, position_px: DVec2) -> f64 {
         let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
-            .map(|half| self.nearest(at_px + DVec2::from_array(half)));
+            .map(|half| self.nearest(position_px + DVec2::from_array(half)));
         let [a, b, c, d] = corners;
         a.max(b).max(c).max(d) - a.min(b).min(c).min(d)
     }
 }
 
-/// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the
-/// way right and down.
+/// Inverse depth between four texels (top left, top right, bottom left, bottom right). `t` is the position
+/// within the cell, 0 to 1 to the right and down. The result is bilinear where the four belong to one
+/// surface, and that of the nearest texel elsewhere.
 #[must_use]
-pub fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
+pub fn interpolate_inverse_depth([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
     let low = d00.min(d10).min(d01).min(d11);
     let high = d00.max(d10).max(d01).max(d11);
     if low > 0.9 * high {
@@ -139,11 +141,11 @@ pub fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
     }
 }
 
-/// How far from a surface pixels of the sky go with it, pixels of the camera: as far as reads reach, and what
-/// the surface may be beside where it is first looked for.
+/// Distance from a surface within which sky pixels are reprojected with the depth of that surface, in camera
+/// pixels. It covers the reach of the gather's taps and the displacement of the surface during the iteration.
 pub const SKY_REACH_PX: f64 = 2.0;
 
-/// Where a surface is looked for around a place that shows the sky.
+/// Directions in which a surface is searched around a position that shows the sky.
 const SKY_DIRECTIONS: [DVec2; 8] = {
     const SIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
     [
@@ -158,64 +160,65 @@ const SKY_DIRECTIONS: [DVec2; 8] = {
     ]
 };
 
-/// What look-ups know of an ideal frame.
+/// An ideal frame as the temporal inverse reads it.
 #[derive(Clone, Copy, Debug)]
-pub struct KeyView<'a> {
-    /// Its pixels.
+pub struct KeyDepth<'a> {
+    /// Geometry of the frame.
     pub ideal: &'a IdealGeometry,
-    /// Its depth.
+    /// Inverse depth of the frame.
     pub depth: &'a InverseDepthImage<'a>,
-    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m (the
-    /// plan's `SeenPlane`). 0: infinitely far.
+    /// Plane that supplies the first guess of the depth: its inverse planar depth is the dot product with (u,
+    /// v, 1), in 1/m. A zero vector is infinitely far.
     pub plane: DVec3,
-    /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0: the plan's `sky_reach_px`.
+    /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0 to switch that rule off.
     pub sky_reach_px: f64,
 }
 
-impl KeyView<'_> {
-    /// Inverse depth of the surface that the last look-up finds, 1/m. Where it finds the sky, that of the
-    /// nearest surface of those within reach: the sky is of one colour, so that it may be read anywhere, and
-    /// a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two
-    /// as it should.
-    fn surface_at(&self, at_px: DVec2) -> f64 {
-        let found = self.depth.inverse_depth(at_px);
-        if found > 0.0 {
-            return found;
+impl KeyDepth<'_> {
+    /// Inverse depth of the surface at the last look-up, 1/m. If that look-up finds the sky, the nearest
+    /// surface within `sky_reach_px` replaces it. The sky has one colour, so it may be read anywhere; a pixel
+    /// beside a surface then stays beside that surface in the ideal frame, and the taps mix the two in the
+    /// right proportion.
+    fn surface_at(&self, position_px: DVec2) -> f64 {
+        let inverse_depth = self.depth.inverse_depth(position_px);
+        if inverse_depth > 0.0 {
+            return inverse_depth;
         }
         SKY_DIRECTIONS
             .iter()
-            .map(|direction| self.depth.nearest(at_px + self.sky_reach_px * *direction))
+            .map(|direction| self.depth.nearest(position_px + self.sky_reach_px * *direction))
             .fold(0.0, f64::max)
     }
 }
 
-/// Where an output ray looks in the ideal frame.
+/// Source of an output ray in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
-    /// Ideal pixels.
-    pub at_px: DVec2,
-    /// Inverse planar depth in the line's own camera, 1/m; 0 = sky.
+    /// Position, ideal pixels.
+    pub position_px: DVec2,
+    /// Inverse planar depth in the camera of the output row, 1/m; 0 is sky.
     pub inverse_depth: f64,
 }
 
-/// Exact relative pose, depth by fixed-point iteration; `None` behind the key camera or outside the ideal
-/// frame.
+/// Temporal inverse with the exact relative pose and depth by fixed-point iteration. `None` if the point is
+/// behind the key camera or outside of the ideal frame.
 ///
-/// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key
-/// frame's inverse depth w_key there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the
-/// error by `(parallax px) |grad w| / w`, beginning with that of the plane.
+/// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, with w = 1/z. The
+/// inverse depth w_key of the key frame at that point gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each
+/// look-up multiplies the error by `(parallax px) |grad w| / w`. The first guess comes from the plane in
+/// `key`.
 #[must_use]
 pub fn reproject(
     uv: DVec2,
-    key_from_line: (DMat3, DVec3),
+    key_from_row: (DMat3, DVec3),
     iterations: u32,
-    key: &KeyView<'_>,
+    key: &KeyDepth<'_>,
 ) -> Option<Source> {
-    source_at(uv, key_from_line, settle(uv, key_from_line, None, iterations, key).on_line, key.ideal)
+    source_at(uv, key_from_row, iterate_depth(uv, key_from_row, None, iterations, key).on_row, key.ideal)
 }
 
-/// Sources at the nodes of an exposure, whose poses relative to the key are `nodes`, in order of time; `mid`
-/// is that of mid-exposure.
+/// Sources at the nodes of an exposure. `nodes` are the poses of the row's camera relative to the key, in
+/// order of time; `mid` is the pose at mid-exposure.
 #[must_use]
 pub fn reproject_nodes(
     uv: DVec2,
@@ -223,13 +226,13 @@ pub fn reproject_nodes(
     mid: (DMat3, DVec3),
     depths: NodeDepths,
     iterations: u32,
-    key: &KeyView<'_>,
+    key: &KeyDepth<'_>,
 ) -> Vec<Option<Source>> {
-    let looked_up = |pose, guess, iterations| settle(uv, pose, guess, iterations, key).in_key;
+    let looked_up = |pose, guess, iterations| iterate_depth(uv, pose, guess, iterations, key).in_key;
     let (Some(&begin), Some(&end)) = (nodes.first(), nodes.last()) else { return Vec::new() };
     let begun_with = |pose, guess| looked_up(pose, Some(guess), iterations.max(2) - 1);
     let steps = (nodes.len() - 1).max(1) as f64;
-    let found: Vec<f64> = match depths {
+    let key_inverse_depths: Vec<f64> = match depths {
         NodeDepths::Mid => vec![looked_up(mid, None, iterations); nodes.len()],
         NodeDepths::Ends => {
             let first = looked_up(begin, None, iterations);
@@ -238,7 +241,7 @@ pub fn reproject_nodes(
         }
         NodeDepths::Three => {
             let middle = looked_up(mid, None, iterations);
-            let between = through_three([begun_with(begin, middle), middle, begun_with(end, middle)]);
+            let between = parabola_through([begun_with(begin, middle), middle, begun_with(end, middle)]);
             (0..nodes.len()).map(|node| between(node as f64 / steps)).collect()
         }
         NodeDepths::Each => {
@@ -250,85 +253,96 @@ pub fn reproject_nodes(
             std::iter::once(first).chain(nodes[1..].iter().scan(first, next)).collect()
         }
     };
-    nodes.iter().zip(found).map(|(&pose, found)| reproject_with(uv, pose, found, key.ideal)).collect()
+    nodes.iter().zip(key_inverse_depths).map(|(&pose, w)| reproject_with(uv, pose, w, key.ideal)).collect()
 }
 
-/// The parabola through what there is at the shares 0, 1/2 and 1.
-pub fn through_three([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
+/// The parabola through three values at 0, 1/2 and 1.
+pub fn parabola_through([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
     let slope = 4.0 * middle - 3.0 * begin - end;
     let bend = 2.0 * begin + 2.0 * end - 4.0 * middle;
     move |share| begin + share * (slope + share * bend)
 }
 
-/// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of
-/// [`reproject`].
+/// Source of a ray whose surface has inverse depth `key_inverse_depth` (1/m) in the key frame: the last step
+/// of [`reproject`].
 #[must_use]
 pub fn reproject_with(
     uv: DVec2,
-    key_from_line: (DMat3, DVec3),
-    found: f64,
+    key_from_row: (DMat3, DVec3),
+    key_inverse_depth: f64,
     ideal: &IdealGeometry,
 ) -> Option<Source> {
-    let (rotation, shift) = key_from_line;
-    let w = depth_on_line(rotation * uv.extend(1.0), shift, found).unwrap_or(0.0);
-    source_at(uv, key_from_line, w, ideal)
+    let (rotation, shift) = key_from_row;
+    let w = row_inverse_depth(rotation * uv.extend(1.0), shift, key_inverse_depth).unwrap_or(0.0);
+    source_at(uv, key_from_row, w, ideal)
 }
 
-/// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's
-/// ray.
-#[derive(Clone, Copy)]
-struct Settled {
-    in_key: f64,
-    on_line: f64,
+/// Inverse depths after the last look-up, 1/m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IteratedDepth {
+    /// In the key camera.
+    pub in_key: f64,
+    /// Of the same point on the ray of the output row.
+    pub on_row: f64,
 }
 
-/// `guess`: what the key frame is taken to have there at first, 1/m; `None` begins with the plane.
-fn settle(
+/// The fixed-point iteration of [`reproject`]. `guess` is a first inverse depth in the key frame, 1/m; without it the
+/// iteration starts at the plane.
+#[must_use]
+pub fn iterate_depth(
     uv: DVec2,
-    key_from_line: (DMat3, DVec3),
+    key_from_row: (DMat3, DVec3),
     guess: Option<f64>,
     iterations: u32,
-    key: &KeyView<'_>,
-) -> Settled {
-    let (rotation, shift) = key_from_line;
+    key: &KeyDepth<'_>,
+) -> IteratedDepth {
+    let (rotation, shift) = key_from_row;
     let direction = rotation * uv.extend(1.0);
-    let on_line = match guess {
-        Some(guess) => depth_on_line(direction, shift, guess).unwrap_or(0.0),
-        None => plane_on_line(direction, shift, key.plane),
+    let on_row = match guess {
+        Some(guess) => row_inverse_depth(direction, shift, guess).unwrap_or(0.0),
+        None => plane_inverse_depth(direction, shift, key.plane),
     };
-    let mut settled = Settled { in_key: guess.unwrap_or(0.0), on_line };
+    let mut depth = IteratedDepth { in_key: guess.unwrap_or(0.0), on_row };
     for look in 1..=iterations {
-        let at_px = key.ideal.px_from_point(direction + settled.on_line * shift);
-        let in_key = if look < iterations { key.depth.inverse_depth(at_px) } else { key.surface_at(at_px) };
-        settled =
-            Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
+        let position_px = key.ideal.px_from_point(direction + depth.on_row * shift);
+        let in_key = if look < iterations {
+            key.depth.inverse_depth(position_px)
+        } else {
+            key.surface_at(position_px)
+        };
+        depth = IteratedDepth {
+            in_key,
+            on_row: row_inverse_depth(direction, shift, in_key).unwrap_or(depth.on_row),
+        };
     }
-    settled
+    depth
 }
 
-/// Where the point at inverse depth `w` (1/m) of the line's ray is seen in the key frame.
-fn source_at(uv: DVec2, key_from_line: (DMat3, DVec3), w: f64, ideal: &IdealGeometry) -> Option<Source> {
-    let (rotation, shift) = key_from_line;
+/// Source of the point at inverse depth `w` (1/m) on the ray of an output row.
+fn source_at(uv: DVec2, key_from_row: (DMat3, DVec3), w: f64, ideal: &IdealGeometry) -> Option<Source> {
+    let (rotation, shift) = key_from_row;
     let in_key = rotation * uv.extend(1.0) + w * shift;
-    let at_px = ideal.px_from_point(in_key);
-    (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+    let position_px = ideal.px_from_point(in_key);
+    (in_key.z > 0.0 && ideal.contains(position_px)).then_some(Source { position_px, inverse_depth: w })
 }
 
-/// The inverse depth of a plane on the line's ray, 1/m: `n . z (R d + w t) = 1` gives `w = n . R d / (1 - n .
-/// t)`. 0 beyond its horizon and where the line's camera is not before it.
-pub fn plane_on_line(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
+/// Inverse depth at which the ray of an output row meets a plane, 1/m: `n . z (R d + w t) = 1` gives `w = n .
+/// R d / (1 - n . t)`. It is 0 beyond the horizon of the plane, and where the row's camera is not in front of
+/// the plane.
+pub fn plane_inverse_depth(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
     let before = 1.0 - plane.dot(shift);
     if before > 1e-3 { plane.dot(direction).max(0.0) / before } else { 0.0 }
 }
 
-/// `None` at or behind the line's own image plane.
-fn depth_on_line(direction: DVec3, shift: DVec3, found: f64) -> Option<f64> {
-    let scale = 1.0 - shift.z * found;
-    (scale > 1e-3).then(|| found * direction.z / scale)
+/// Inverse depth on the ray of an output row of a surface with inverse depth `key_inverse_depth` in the key
+/// frame. `None` at or behind the image plane of the row's camera.
+fn row_inverse_depth(direction: DVec3, shift: DVec3, key_inverse_depth: f64) -> Option<f64> {
+    let scale = 1.0 - shift.z * key_inverse_depth;
+    (scale > 1e-3).then(|| key_inverse_depth * direction.z / scale)
 }
 
-/// Samples for a stretch of path: `min(a L, L + 16)`, at least `at_least`, at most `cap` (NUMERICS section 3:
-/// a = 2 keeps white texture below 1/255).
+/// Number of exposure samples for a path of `length_px`: `min(a L, L + 16)`, at least `at_least` and at most
+/// `cap`. With a = 2 the error stays below 1/255 on white texture (docs/accuracy/stress.md).
 #[must_use]
 pub fn samples_for(length_px: f64, samples_per_px: f64, at_least: u32, cap: u32) -> u32 {
     ((samples_per_px * length_px).min(length_px + 16.0).ceil() as u32).clamp(at_least, cap.max(at_least))
@@ -344,13 +358,13 @@ pub struct ColorImage<'a> {
 }
 
 impl ColorImage<'_> {
-    /// Bilinear colour, edges held.
+    /// Bilinear colour; positions outside take the border pixel.
     #[must_use]
-    pub fn sample(&self, at_px: DVec2) -> DVec3 {
+    pub fn sample(&self, position_px: DVec2) -> DVec3 {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
-        let at = at_px.clamp(DVec2::ZERO, last);
-        let base = at.floor();
-        let t = at - base;
+        let clamped = position_px.clamp(DVec2::ZERO, last);
+        let base = clamped.floor();
+        let t = clamped - base;
         let load = |dx: f64, dy: f64| {
             let (x, y) = ((base.x + dx).min(last.x) as usize, (base.y + dy).min(last.y) as usize);
             let i = 4 * (y * self.size_px[0] as usize + x);
@@ -361,14 +375,15 @@ impl ColorImage<'_> {
         top.lerp(bottom, t.y)
     }
 
-    /// By a cubic spline, edges held: between pixels a bilinear read blurs. Softness 0 is Catmull and Rom's
-    /// spline, which hardly does; 1 is the B-spline, with a variance of a third of a square pixel an axis;
-    /// between them weights and variance are mixed. Without the four corners of its 4x4 pixels (at most 0.4 %
-    /// each at softness 0, 0.8 % at 0.5). May leave the range of its pixels by a tenth of their contrast.
+    /// Colour by a cubic spline, which blurs less than a bilinear read. Softness 0 is the Catmull-Rom spline;
+    /// softness 1 is the cubic B-spline, whose variance is a third of a square pixel per axis; values between
+    /// mix weights and variance. The four corners of the 4x4 pixels are left out (at most 0.4 % each at
+    /// softness 0, 0.8 % at 0.5). Overshoot is up to a tenth of the local contrast. Positions outside take
+    /// the border pixel.
     #[must_use]
-    pub fn spline(&self, at_px: DVec2, softness: DVec2) -> DVec3 {
-        let base = at_px.floor();
-        let f = at_px - base;
+    pub fn spline(&self, position_px: DVec2, softness: DVec2) -> DVec3 {
+        let base = position_px.floor();
+        let f = position_px - base;
         let g = 1.0 - f;
         let mix = |sharp: DVec2, soft: DVec2| sharp + (soft - sharp) * softness;
         let w0 = mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0);
@@ -388,14 +403,15 @@ impl ColorImage<'_> {
         sum / reads.iter().map(|read| read.0).sum::<f64>()
     }
 
-    /// Mean over a rectangle around a place, pixels being squares of one colour; edges held. Its sides along
-    /// x and y, pixels, are 1 and more: with sides of 1 this is the bilinear read.
+    /// Mean over a rectangle around a position, with pixels as squares of one colour. The sides along x and y
+    /// are 1 pixel or more; with sides of 1 this is the bilinear read. Positions outside take the border
+    /// pixel.
     #[must_use]
-    pub fn over_area(&self, at_px: DVec2, sides_px: DVec2) -> DVec3 {
-        let first = (at_px - 0.5 * (sides_px + 1.0)).floor() + 1.0;
-        // Of a pixel so far away the part that is within, of all of the rectangle.
+    pub fn over_area(&self, position_px: DVec2, sides_px: DVec2) -> DVec3 {
+        let first = (position_px - 0.5 * (sides_px + 1.0)).floor() + 1.0;
+        // Overlap of the pixel with the rectangle, as a share of the rectangle.
         let weight = |k: usize, px: f64| {
-            (0.5 * (sides_px[k] + 1.0) - (px - at_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k]
+            (0.5 * (sides_px[k] + 1.0) - (px - position_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k]
         };
         let count = [0, 1].map(|k: usize| (sides_px[k] + 1.0).ceil() as u32);
         let pixels = (0..count[1])
@@ -404,9 +420,9 @@ impl ColorImage<'_> {
     }
 }
 
-/// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each
-/// polynomial of the path has its samples uniformly in time, in the middles of equal parts, and at most `cap`
-/// of them.
+/// Mean colour over the exposure along the path through `nodes_px`, which are equally spaced in time. Each
+/// polynomial of the path has its samples at the middles of equal parts of its time, and at most `cap` of
+/// them.
 #[must_use]
 pub fn gather(
     nodes_px: &[DVec2],
@@ -418,8 +434,8 @@ pub fn gather(
 ) -> DVec3 {
     let taps = area.taps[0] * area.taps[1];
     if nodes_px.len() < 2 {
-        let at = nodes_px.first().copied().unwrap_or_default();
-        return (0..taps).map(|i| area.tap_color(color, at, i)).sum::<DVec3>() / f64::from(taps);
+        let source_px = nodes_px.first().copied().unwrap_or_default();
+        return (0..taps).map(|i| area.tap_color(color, source_px, i)).sum::<DVec3>() / f64::from(taps);
     }
     let curves = path::curves(nodes_px, path);
     let stretches = curves.len() as u32;
@@ -445,7 +461,8 @@ mod tests {
     use super::*;
     use crate::noise::pcg4d;
 
-    /// A tilted plane `n . x = 1` in key coordinates has inverse depth `n . (x/z)`: linear over the image.
+    /// A tilted plane `n . x = 1` in key coordinates has inverse depth `n . (x/z)`, which is linear over the
+    /// image.
     fn plane_image(ideal: &IdealGeometry, normal: DVec3) -> Vec<f32> {
         let [w, h] = ideal.size_px;
         (0..w * h)
@@ -457,16 +474,16 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_goes_through_its_three() {
+    fn parabola_through_three_values() {
         let parabola = |share: f64| 3.0 - 2.0 * share + 0.7 * share * share;
-        let through = through_three([0.0, 0.5, 1.0].map(parabola));
+        let through = parabola_through([0.0, 0.5, 1.0].map(parabola));
         for share in [0.0, 0.2, 0.5, 0.85, 1.0] {
             assert!((through(share) - parabola(share)).abs() < 1e-14, "{share}");
         }
     }
 
     #[test]
-    fn reprojection_over_a_plane_is_its_homography() {
+    fn reprojection_on_a_plane_matches_its_homography() {
         let ideal = IdealGeometry {
             size_px: [200, 150],
             focal_px: DVec2::splat(150.0),
@@ -482,30 +499,38 @@ mod tests {
             let d = uv.extend(1.0);
             let z = (1.0 - normal.dot(shift)) / normal.dot(rotation * d);
             let exact = ideal.px_from_point(rotation * d * z + shift);
-            let key = |plane| KeyView { ideal: &ideal, depth: &depth, plane, sky_reach_px: 0.0 };
+            let key = |plane| KeyDepth { ideal: &ideal, depth: &depth, plane, sky_reach_px: 0.0 };
             let far = key(DVec3::ZERO);
-            let found = reproject(uv, (rotation, shift), 12, &far).expect("in view");
-            // f32 depth: 6e-8 relative times about 8 px of parallax.
+            let source = reproject(uv, (rotation, shift), 12, &far).expect("in view");
+            // f32 depth: 6e-8 relative, times about 8 px of parallax.
             assert!(
-                (found.at_px - exact).length() < 2e-6 && (found.inverse_depth * z - 1.0).abs() < 1e-6,
-                "{found:?} {exact}"
+                (source.position_px - exact).length() < 2e-6 && (source.inverse_depth * z - 1.0).abs() < 1e-6,
+                "{source:?} {exact}"
             );
             let two = reproject(uv, (rotation, shift), 2, &far).expect("in view");
-            assert!((two.at_px - exact).length() < 0.2, "two look-ups: {}", (two.at_px - exact).length());
-            // Begun with the plane there is nothing to look for.
+            assert!(
+                (two.position_px - exact).length() < 0.2,
+                "two look-ups: {}",
+                (two.position_px - exact).length()
+            );
+            // With the true plane as the first guess, no iteration is needed.
             let none = reproject(uv, (rotation, shift), 0, &key(normal)).expect("in view");
-            assert!((none.at_px - exact).length() < 1e-10, "no look-up: {}", (none.at_px - exact).length());
+            assert!(
+                (none.position_px - exact).length() < 1e-10,
+                "no look-up: {}",
+                (none.position_px - exact).length()
+            );
             let one = reproject(uv, (rotation, shift), 1, &key(1.1 * normal)).expect("in view");
             assert!(
-                (one.at_px - exact).length() < 0.05,
+                (one.position_px - exact).length() < 0.05,
                 "a plane that is off by a tenth: {}",
-                (one.at_px - exact).length()
+                (one.position_px - exact).length()
             );
         }
     }
 
     #[test]
-    fn surfaces_are_not_mixed_at_a_depth_edge() {
+    fn depth_is_not_interpolated_across_edges() {
         let values = [0.1_f32, 0.001, 0.1, 0.001];
         let image = InverseDepthImage { size_px: [2, 2], values: &values };
         assert_eq!(image.inverse_depth(DVec2::new(0.4, 0.2)), f64::from(0.1_f32));
@@ -513,7 +538,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_over_an_area_is_that_of_the_pixels_in_it() {
+    fn area_mean_matches_pixel_overlaps() {
         let size_px = [12, 9];
         let value = |x: i64, y: i64| {
             f64::from(
@@ -522,33 +547,34 @@ mod tests {
         };
         let rgba: Vec<f32> = (0..108).flat_map(|i| [value(i % 12, i / 12) as f32, 0.5, 0.25, 1.0]).collect();
         let color = ColorImage { size_px, rgba: &rgba };
-        for (at_px, sides_px) in [
+        for (position_px, sides_px) in [
             (DVec2::new(5.3, 4.8), DVec2::new(2.3, 3.1)),
             (DVec2::new(5.5, 4.0), DVec2::new(3.0, 1.0)),
             (DVec2::new(0.2, 8.9), DVec2::new(4.7, 2.0)),
             (DVec2::new(-3.0, 14.0), DVec2::new(2.0, 5.0)),
         ] {
-            // Each pixel's part of the area, by the ends of both: over pixels of a frame whose borders go on.
+            // Overlap of each pixel with the area, computed from the ends of both; the border pixel continues
+            // outside.
             let part = |k: usize, px: i64| {
-                let [begin, end] = [-0.5, 0.5].map(|half| at_px[k] + half * sides_px[k]);
+                let [begin, end] = [-0.5, 0.5].map(|half| position_px[k] + half * sides_px[k]);
                 ((px as f64 + 0.5).min(end) - (px as f64 - 0.5).max(begin)).max(0.0) / sides_px[k]
             };
             let exact: f64 = (-20..40)
                 .flat_map(|y| (-20..40).map(move |x| (x, y)))
                 .map(|(x, y)| part(0, x) * part(1, y) * value(x, y))
                 .sum();
-            let found = color.over_area(at_px, sides_px);
+            let mean = color.over_area(position_px, sides_px);
             assert!(
-                (found - DVec3::new(exact, 0.5, 0.25)).abs().max_element() < 1e-7,
-                "{at_px} {sides_px}: {found} {exact}"
+                (mean - DVec3::new(exact, 0.5, 0.25)).abs().max_element() < 1e-7,
+                "{position_px} {sides_px}: {mean} {exact}"
             );
-            let one = color.over_area(at_px, DVec2::ONE);
-            assert!(one.distance(color.sample(at_px)) < 1e-12, "{at_px}: {one}");
+            let one = color.over_area(position_px, DVec2::ONE);
+            assert!(one.distance(color.sample(position_px)) < 1e-12, "{position_px}: {one}");
         }
     }
 
     #[test]
-    fn the_spline_meets_its_pixels_and_beats_bilinear_on_a_wave() {
+    fn spline_interpolates_pixels_and_beats_bilinear_on_a_wave() {
         let wave = |x: f64, y: f64| 0.5 + 0.25 * (1.3 * x).sin() + 0.2 * (1.1 * y + 0.4).sin();
         let rgba: Vec<f32> = (0..32 * 32)
             .flat_map(|i| [wave(f64::from(i % 32), f64::from(i / 32)) as f32, 0.5, 0.0, 1.0])
@@ -560,11 +586,11 @@ mod tests {
         );
         let (mut spline, mut bilinear) = (0.0, 0.0);
         for k in 0..200 {
-            let at = DVec2::new(8.0 + 0.077 * f64::from(k), 20.0 - 0.053 * f64::from(k));
-            let exact = wave(at.x, at.y);
-            spline += (color.spline(at, DVec2::ZERO).x - exact).powi(2);
-            bilinear += (color.sample(at).x - exact).powi(2);
-            assert!((color.spline(at, DVec2::splat(0.3)).y - 0.5).abs() < 1e-12, "a constant stays");
+            let position_px = DVec2::new(8.0 + 0.077 * f64::from(k), 20.0 - 0.053 * f64::from(k));
+            let exact = wave(position_px.x, position_px.y);
+            spline += (color.spline(position_px, DVec2::ZERO).x - exact).powi(2);
+            bilinear += (color.sample(position_px).x - exact).powi(2);
+            assert!((color.spline(position_px, DVec2::splat(0.3)).y - 0.5).abs() < 1e-12, "a constant stays");
         }
         assert!(spline < 0.1 * bilinear, "{spline:.2e} {bilinear:.2e}");
     }
@@ -578,8 +604,8 @@ mod tests {
         assert_eq!(area.taps, [3, 1]);
         let nodes = [DVec2::new(10.0, 3.0), DVec2::new(20.0, 3.0), DVec2::new(40.0, 3.0)];
         let mean = gather(&nodes, PathStage::Straight, &area, &color, 2.0, 256);
-        // Equal time on both segments: (15 + 30) / 2. The cyclic taps leave at most half a tap of bias over
-        // the sample count.
+        // Both segments last equally long: (15 + 30) / 2. The cyclic order of the taps leaves a bias of at
+        // most half a tap divided by the number of samples.
         assert!((mean.x - 22.5).abs() < 0.05 && (mean.y - 1.0).abs() < 1e-12, "{mean}");
     }
 }

@@ -1,13 +1,13 @@
-//! Tracker: from the rows of a flight log to a motion that a vehicle could fly (paper, section 3).
+//! Tracker: from the rows of a flight log to a motion that a vehicle could fly (section 3 of the paper).
 //!
 //! | kind | motion | limits | distance to the log |
 //! |---|---|---|---|
-//! | `sqrt` | two nested square-root loops on a double integrator follow the log smoothed without lag | kept at every tick | small |
+//! | `sqrt` | two nested square-root loops on a double integrator follow the log, smoothed without lag | kept at every tick | small |
 //! | `spline` | the same plant follows a quadratic B-spline fitted to the whole log under the acceleration limits | kept at every tick | smallest |
 //! | `linear` | straight lines and great circles between rows; velocity jumps at rows | none | zero |
 //! | `hold` | the pose of the latest row, without velocity | none | one row |
 //!
-//! Limits are on the lengths of the velocity, acceleration, body rate and angular acceleration vectors.
+//! The limits apply to the lengths of the velocity, acceleration, body rate and angular acceleration vectors.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ mod reference;
 mod report;
 mod spline;
 
-use reference::{Interpolated, Reference};
+use reference::{LogInterpolator, Reference};
 pub use report::{Channels, MotionUse, TrackReport};
 
 /// Limits of the platform, all positive and finite.
@@ -43,16 +43,16 @@ pub struct ResolvedLimits {
     pub max_angular_acceleration_rad_s2: f64,
 }
 
-/// Longest unbroken time, in seconds, for which each limit cut what the controller asked for.
+/// Longest uninterrupted time, in seconds, during which each limit reduced the controller's demand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Saturation {
-    /// At the speed limit.
+    /// At the speed limit, seconds.
     pub speed_s: f64,
-    /// At the acceleration limit.
+    /// At the acceleration limit, seconds.
     pub acceleration_s: f64,
-    /// At the angular rate limit.
+    /// At the angular rate limit, seconds.
     pub angular_rate_s: f64,
-    /// At the angular acceleration limit.
+    /// At the angular acceleration limit, seconds.
     pub angular_acceleration_s: f64,
 }
 
@@ -71,11 +71,11 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// All of them, in the order of [`ResolvedLimits`].
+    /// All limits, in the order of [`ResolvedLimits`].
     pub const ALL: [Self; 4] =
         [Self::MaxSpeed, Self::MaxAcceleration, Self::MaxAngularRate, Self::MaxAngularAcceleration];
 
-    /// The key below `[tracker]`.
+    /// Key below `[tracker]`.
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
@@ -87,54 +87,54 @@ impl Limit {
     }
 }
 
-/// An unbroken time in which a limit cut what the controller asked for, seconds of path time.
+/// An uninterrupted interval in which a limit reduced the controller's demand, seconds of path time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Hold {
-    /// Which limit.
+pub struct SaturationInterval {
+    /// The limit.
     pub limit: Limit,
-    /// First instant.
+    /// Begin of the interval.
     pub from_s: f64,
-    /// Last instant.
+    /// End of the interval.
     pub to_s: f64,
 }
 
-impl Hold {
-    /// Length, seconds.
+impl SaturationInterval {
+    /// Length of the interval, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.to_s - self.from_s
     }
 }
 
-/// What [`track`] gives.
+/// Result of [`track`].
 #[derive(Clone, Debug)]
-pub struct Tracked {
-    /// The motion; shared, for of hours of flight it is a gigabyte.
+pub struct TrackResult {
+    /// The motion. It is shared, because hours of flight take a gigabyte.
     pub trajectory: Arc<Trajectory>,
-    /// The limits, with `auto` resolved. `linear` and `hold` do not keep them.
+    /// The limits with `auto` resolved. `linear` and `hold` do not keep them.
     pub limits: ResolvedLimits,
-    /// How long the limits were hit; zero for `linear` and `hold`.
+    /// Longest time at each limit; zero for `linear` and `hold`.
     pub saturation: Saturation,
-    /// The longest times for which a limit was hit, the longest first, at most [`MOST_HOLDS`].
-    pub holds: Vec<Hold>,
+    /// The longest intervals at a limit, the longest first, at most [`MAX_INTERVALS`].
+    pub saturation_intervals: Vec<SaturationInterval>,
     /// Control rate, hertz.
     pub rate_hz: f64,
 }
 
-/// Saturation for longer than this is reported, seconds.
+/// Time at a limit above which there is a warning, seconds.
 const SATURATION_WORTH_A_WARNING_S: f64 = 1.0;
 
-/// RMS distance between motion and log from which it is told, metres.
-pub const FAR_M: f64 = 1.0;
-/// RMS angle between motion and log from which it is told, degrees.
-pub const FAR_DEG: f64 = 1.0;
-/// Instants compared for that.
-const MOST_COMPARED: f64 = 20_000.0;
-/// Times at a limit that are told.
-pub const MOST_HOLDS: usize = 32;
+/// RMS distance between motion and log above which there is a warning, metres.
+const FAR_M: f64 = 1.0;
+/// RMS angle between motion and log above which there is a warning, degrees.
+const FAR_DEG: f64 = 1.0;
+/// Most instants compared for these warnings.
+const MAX_COMPARED: f64 = 20_000.0;
+/// Most intervals at a limit that are reported.
+const MAX_INTERVALS: usize = 32;
 
-impl Tracked {
-    /// One sentence for each limit that was hit for more than one second, naming the key to change.
+impl TrackResult {
+    /// One sentence for each limit that was reached for more than one second, naming the key to change.
     pub fn warnings(&self) -> Vec<String> {
         let limits = &self.limits;
         [
@@ -155,12 +155,12 @@ impl Tracked {
         .collect()
     }
 
-    /// One sentence where the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`]
-    /// (RMS): the truth is the motion, not the log.
+    /// A warning if the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`] (RMS).
+    /// The truth of the frames is the motion, not the log.
     #[must_use]
     pub fn distance_warning(&self, rows: &[LogRow]) -> Option<String> {
         let (start_s, end_s) = self.trajectory.span_s();
-        let rate_hz = self.rate_hz.min(MOST_COMPARED / (end_s - start_s).max(1e-9));
+        let rate_hz = self.rate_hz.min(MAX_COMPARED / (end_s - start_s).max(1e-9));
         let TrackReport { rms, max_error, .. } = TrackReport::measure(&self.trajectory, rows, rate_hz)?;
         let [off_m, most_m] =
             [rms, max_error].map(|of| DVec3::new(of.north_m, of.east_m, of.down_m).length());
@@ -172,7 +172,8 @@ impl Tracked {
         })
     }
 
-    /// Errors against the interpolated log and the motion used, at every control tick.
+    /// Errors against the interpolated log, and the largest velocities and accelerations, over all control
+    /// ticks.
     pub fn report(&self, rows: &[LogRow]) -> Option<TrackReport> {
         TrackReport::measure(&self.trajectory, rows, self.rate_hz)
     }
@@ -181,15 +182,15 @@ impl Tracked {
 /// Why a log cannot be tracked.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TrackerError {
-    /// No row.
+    /// The log has no row.
     #[error("the flight log has no usable row; the tracker needs at least one")]
     Empty,
-    /// NaN or infinity in a row, or a quaternion that is not of unit length.
+    /// A row has NaN, infinity, or a quaternion that is not of unit length.
     #[error(
         "row {row} of the flight log (counted from 1, after repairs) has a number that is not finite or an attitude that is no rotation; remove the row"
     )]
     BadRow {
-        /// Counted from 1.
+        /// Row number, counted from 1.
         row: usize,
     },
     /// Time does not increase.
@@ -197,7 +198,7 @@ pub enum TrackerError {
         "row {row} of the flight log (counted from 1, after repairs) is not later than the row before it; sort the log and merge rows of equal time"
     )]
     TimeOrder {
-        /// Counted from 1.
+        /// Row number, counted from 1.
         row: usize,
     },
     /// A key of `[tracker]` is not positive and finite.
@@ -208,41 +209,41 @@ pub enum TrackerError {
         /// Its value.
         value: f64,
     },
-    /// Two rows are so close in time that the velocity between them is beyond f64.
+    /// Two rows are so close in time that the velocity between them overflows f64.
     #[error(
         "rows of the flight log are so close in time that the velocity between them is not finite; merge rows of nearly equal time"
     )]
     Overflow,
     /// The log is too long for the control rate.
     #[error(
-        "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate, raise flight.speed or leave rows out of the log"
+        "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MAX_TICKS}; lower the rate, raise flight.speed or leave rows out of the log"
     )]
     TooLong {
-        /// Length of the log.
+        /// Length of the log, seconds.
         span_s: f64,
-        /// Control rate.
+        /// Control rate, hertz.
         rate_hz: f64,
-        /// Ticks needed.
+        /// Number of ticks needed.
         ticks: f64,
     },
 }
 
-/// Bound on control ticks: 3 GiB of states, 14 hours at 400 Hz.
-const MOST_TICKS: usize = 20_000_000;
+/// Most control ticks: 3 GiB of states, 14 hours at 400 Hz.
+const MAX_TICKS: usize = 20_000_000;
 
-/// Standard deviation of the zero-lag smoothing of the reference that `sqrt` follows, seconds.
+/// Standard deviation of the zero-lag smoothing of the reference of `sqrt`, seconds.
 const REFERENCE_SIGMA_S: f64 = 0.09;
-/// Standard deviation of the smooth base that `spline` corrects, seconds.
+/// Standard deviation of the smoothed base that `spline` corrects, seconds.
 const SPLINE_BASE_SIGMA_S: f64 = 0.1;
 
-/// The motion that follows `rows` (strictly increasing in time) as `spec` says.
-pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerError> {
+/// The motion that follows `rows` (strictly increasing in time) by the method of `spec`.
+pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<TrackResult, TrackerError> {
     check_rows(rows)?;
     check_spec(spec)?;
     let rate_hz = spec.rate_hz;
-    let given = |trajectory: Option<Trajectory>, limits, saturation, holds| {
+    let given = |trajectory: Option<Trajectory>, limits, saturation, saturation_intervals| {
         let trajectory = Arc::new(trajectory.ok_or(TrackerError::Overflow)?);
-        Ok(Tracked { trajectory, limits, saturation, holds, rate_hz })
+        Ok(TrackResult { trajectory, limits, saturation, saturation_intervals, rate_hz })
     };
     match spec.kind {
         TrackerKind::Hold | TrackerKind::Linear => {
@@ -257,26 +258,32 @@ pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerErro
         }
         TrackerKind::Sqrt | TrackerKind::Spline => {
             let (reference, limits) = reference(rows, spec)?;
-            let plant::Followed { states, saturation, mut holds } = plant::follow(&reference, &limits);
+            let plant::PlantRun { states, saturation, mut saturation_intervals } =
+                plant::follow(&reference, &limits);
             let (start_s, end_s) = (rows[0].t_s, rows[rows.len() - 1].t_s);
-            holds
+            saturation_intervals
                 .iter_mut()
                 .for_each(|hold| (hold.from_s, hold.to_s) = (start_s + hold.from_s, start_s + hold.to_s));
-            given(Trajectory::uniform(start_s, reference.step_s, end_s, states), limits, saturation, holds)
+            given(
+                Trajectory::uniform(start_s, reference.step_s, end_s, states),
+                limits,
+                saturation,
+                saturation_intervals,
+            )
         }
     }
 }
 
-/// What is followed, and the limits, of which those of acceleration are learnt from the smoothed log.
+/// The reference to follow, and the limits; `auto` acceleration limits come from the smoothed log.
 fn reference(rows: &[LogRow], spec: &TrackerSpec) -> Result<(Reference, ResolvedLimits), TrackerError> {
     let (start_s, span_s) = (rows[0].t_s, rows[rows.len() - 1].t_s - rows[0].t_s);
     let step_s = 1.0 / spec.rate_hz;
     let ticks = (span_s * spec.rate_hz - 1e-6).ceil().max(0.0) + 1.0;
-    if ticks > MOST_TICKS as f64 {
+    if ticks > MAX_TICKS as f64 {
         return Err(TrackerError::TooLong { span_s, rate_hz: spec.rate_hz, ticks });
     }
     let count = ticks as usize + 1;
-    let mut log = Interpolated::new(rows).ok_or(TrackerError::Empty)?;
+    let mut log = LogInterpolator::new(rows).ok_or(TrackerError::Empty)?;
     let is_spline = spec.kind == TrackerKind::Spline;
     let sigma_s = if is_spline { SPLINE_BASE_SIGMA_S } else { REFERENCE_SIGMA_S };
     let smoothed = Reference::smoothed(&mut log, start_s, step_s, count, sigma_s);
@@ -285,7 +292,7 @@ fn reference(rows: &[LogRow], spec: &TrackerSpec) -> Result<(Reference, Resolved
         return Ok((smoothed, limits));
     }
     let raw = Reference::sampled(&mut log, start_s, step_s, count);
-    Ok((spline::planned(&raw, smoothed, &limits), limits))
+    Ok((spline::plan_spline(&raw, smoothed, &limits), limits))
 }
 
 fn check_rows(rows: &[LogRow]) -> Result<(), TrackerError> {
@@ -294,7 +301,7 @@ fn check_rows(rows: &[LogRow]) -> Result<(), TrackerError> {
     }
     for (i, row) in rows.iter().enumerate() {
         let unit = (row.ned_from_body.length_squared() - 1.0).abs() < 1e-6;
-        // Beyond 1e12 m or s nothing is left of f64's resolution and squares approach overflow.
+        // Beyond 1e12 m or s, f64 has too little resolution and squares approach overflow.
         let sane = row.t_s.abs() < 1e12 && row.position_ned_m.abs().max_element() < 1e12;
         if !(unit && sane && row.position_ned_m.is_finite()) {
             return Err(TrackerError::BadRow { row: i + 1 });
@@ -324,22 +331,23 @@ fn check_spec(spec: &TrackerSpec) -> Result<(), TrackerError> {
     Ok(())
 }
 
-/// Rows at least this far apart give the log's own speeds, so that steps of 50 us and quanta of 0.1 m do not.
+/// Least time between the rows from which the log's own speeds are measured, so that steps of 50 us and
+/// quanta of 0.1 m do not matter.
 const BASELINE_S: f64 = 0.2;
-/// `auto` is this factor times the log's own ...
+/// `auto` speed limits are this factor times the log's own speed at [`AUTO_RANK`].
 const AUTO_FACTOR: f64 = 1.2;
-/// ... speed at this rank ...
+/// Rank of the log's own speed, rate or acceleration from which `auto` limits are derived.
 const AUTO_RANK: f64 = 0.999;
-/// ... but at least 1 m/s ...
-const LEAST_SPEED_M_S: f64 = 1.0;
-/// ... and 10 deg/s.
-const LEAST_RATE_RAD_S: f64 = 0.174_532_925_199_432_95;
+/// Least `auto` speed limit, 1 m/s.
+const MIN_SPEED_M_S: f64 = 1.0;
+/// Least `auto` angular rate limit, 10 deg/s.
+const MIN_RATE_RAD_S: f64 = 0.174_532_925_199_432_95;
 
-/// `auto` accelerations are this factor times the smoothed log's own: more than speeds need, for what is cut
-/// there is a lag that lasts.
+/// `auto` acceleration limits are this factor times the smoothed log's own. The factor is larger than that
+/// for speeds, because an acceleration limit that is too low causes a lasting lag.
 const ACCELERATION_FACTOR: f64 = 1.5;
 
-/// `accelerations`: those of the smoothed log at [`AUTO_RANK`], m/s^2 and rad/s^2.
+/// Resolves `auto` limits. `accelerations` are those of the smoothed log at [`AUTO_RANK`], m/s^2 and rad/s^2.
 fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) -> ResolvedLimits {
     let (mut speeds, mut rates) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
     let mut later = 0;
@@ -358,7 +366,7 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
         max_speed_m_s: spec
             .max_speed_m_s
             .value()
-            .unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(LEAST_SPEED_M_S)),
+            .unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(MIN_SPEED_M_S)),
         max_acceleration_m_s2: spec
             .max_acceleration_m_s2
             .value()
@@ -366,7 +374,7 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
         max_angular_rate_rad_s: spec
             .max_angular_rate_deg_s
             .value()
-            .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(LEAST_RATE_RAD_S), f64::to_radians),
+            .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(MIN_RATE_RAD_S), f64::to_radians),
         max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.value().map_or_else(
             || (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()),
             f64::to_radians,
@@ -374,12 +382,12 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
     }
 }
 
-/// The value at [`AUTO_RANK`], 0 without values.
+/// Value at [`AUTO_RANK`]; 0 without values.
 fn high_rank(values: Vec<f64>) -> f64 {
     at_rank(values, AUTO_RANK)
 }
 
-/// The value at a rank from 0 to 1, 0 without values.
+/// Value at a rank from 0 to 1; 0 without values.
 fn at_rank(mut values: Vec<f64>, rank: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -388,8 +396,8 @@ fn at_rank(mut values: Vec<f64>, rank: f64) -> f64 {
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// One segment a row; `velocities` gives velocity and body rate from a row and the next one. The last row
-/// continues as the one before.
+/// A trajectory with one segment per row. `velocities` returns velocity and body rate from a row and the next
+/// one. The last row continues the motion of the one before.
 fn piecewise(rows: &[LogRow], velocities: impl Fn(&LogRow, &LogRow) -> (DVec3, DVec3)) -> Option<Trajectory> {
     let mut motion = (DVec3::ZERO, DVec3::ZERO);
     let knots = rows.iter().enumerate().map(|(i, row)| {

@@ -17,23 +17,24 @@ use crate::pose::BodyState;
 
 pub mod so3;
 
-/// Beyond this many seconds outside the span the motion stops, which keeps every finite time finite.
+/// Time outside of the span after which the motion stops, seconds; it keeps results finite at any finite
+/// time.
 const LONGEST_COAST_S: f64 = 1e9;
 
-/// When the knots are.
+/// Times of the knots.
 #[derive(Clone, Debug)]
-enum Clock {
+enum KnotTimes {
     /// Knot k at `start_s + k step_s`.
     Uniform { step_s: f64 },
-    /// Strictly increasing times, one a knot.
+    /// Strictly increasing times, one per knot.
     Listed(Vec<f64>),
 }
 
 /// Motion of the platform: segments of constant acceleration, each from one knot to the next.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    clock: Clock,
-    /// State at the beginning of each segment; never empty.
+    clock: KnotTimes,
+    /// State at the begin of each segment; never empty.
     knots: Vec<BodyState>,
     start_s: f64,
     end_s: f64,
@@ -42,7 +43,8 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Segments of equal length `step_s`, the first beginning at `start_s`; the last one ends at `end_s`.
+    /// Segments of equal length `step_s`, the first of which begins at `start_s`; the last one ends at
+    /// `end_s`.
     ///
     /// `None` if there is no knot, a number is not finite, or `end_s` is not within the segments or at most
     /// one step after them.
@@ -53,13 +55,13 @@ impl Trajectory {
             && start_s.is_finite()
             && end_s >= start_s
             && end_s <= beyond_s;
-        Self::build(Clock::Uniform { step_s }, start_s, end_s, ordered, knots)
+        Self::build(KnotTimes::Uniform { step_s }, start_s, end_s, ordered, knots)
     }
 
-    /// Segments that begin at `times_s` (strictly increasing, one a knot); the last one ends at `end_s`, not
-    /// before it begins.
+    /// Segments that begin at `times_s` (strictly increasing, one per knot); the last one ends at `end_s`.
     ///
-    /// `None` if there is no knot, a number is not finite, or the times are not as said.
+    /// `None` if there is no knot, a number is not finite, the times do not increase, or `end_s` is before
+    /// the begin of the last segment.
     pub fn listed(times_s: Vec<f64>, end_s: f64, knots: Vec<BodyState>) -> Option<Self> {
         let start_s = *times_s.first()?;
         let ordered = times_s.len() == knots.len()
@@ -67,10 +69,16 @@ impl Trajectory {
             && times_s.windows(2).all(|pair| pair[0] < pair[1])
             && times_s.last().is_some_and(|last| *last <= end_s)
             && end_s.is_finite();
-        Self::build(Clock::Listed(times_s), start_s, end_s, ordered, knots)
+        Self::build(KnotTimes::Listed(times_s), start_s, end_s, ordered, knots)
     }
 
-    fn build(clock: Clock, start_s: f64, end_s: f64, ordered: bool, knots: Vec<BodyState>) -> Option<Self> {
+    fn build(
+        clock: KnotTimes,
+        start_s: f64,
+        end_s: f64,
+        ordered: bool,
+        knots: Vec<BodyState>,
+    ) -> Option<Self> {
         let last = *knots.last()?;
         if !ordered || !knots.iter().all(is_finite) {
             return None;
@@ -81,7 +89,7 @@ impl Trajectory {
         Some(trajectory)
     }
 
-    /// First and last instant that the log covers, seconds.
+    /// First and last instant of the log, seconds.
     pub fn span_s(&self) -> (f64, f64) {
         (self.start_s, self.end_s)
     }
@@ -94,8 +102,8 @@ impl Trajectory {
     /// Instant at which segment `k` begins, seconds; `k` below [`Self::segments`].
     pub fn knot_s(&self, k: usize) -> f64 {
         match &self.clock {
-            Clock::Uniform { step_s } => self.start_s + step_s * k as f64,
-            Clock::Listed(times_s) => times_s[k.min(times_s.len() - 1)],
+            KnotTimes::Uniform { step_s } => self.start_s + step_s * k as f64,
+            KnotTimes::Listed(times_s) => times_s[k.min(times_s.len() - 1)],
         }
     }
 
@@ -104,10 +112,10 @@ impl Trajectory {
         &self.knots
     }
 
-    /// Motion state at `t_s`, at O(1) cost for control ticks and O(log n) for rows of a log.
+    /// Motion state at `t_s`, in O(1) for control ticks and O(log n) for rows of a log.
     ///
-    /// Outside [`Self::span_s`] the platform coasts: velocity and body rate stay as they are at the end, for
-    /// at most 1e9 s. NaN gives the beginning.
+    /// Outside of [`Self::span_s`] the platform coasts: velocity and body rate keep their values at the end,
+    /// for at most 1e9 s. NaN gives the begin.
     pub fn state(&self, t_s: f64) -> BodyState {
         if t_s >= self.end_s {
             return advance(&self.last, (t_s - self.end_s).min(LONGEST_COAST_S));
@@ -123,21 +131,22 @@ impl Trajectory {
         advance(&self.knots[k], t_s - self.knot_s(k))
     }
 
-    /// The segment that holds `t_s`, which is inside the span.
+    /// Index of the segment that contains `t_s`, which is inside the span.
     fn segment(&self, t_s: f64) -> usize {
         let last = self.knots.len() - 1;
         match &self.clock {
-            // Saturating cast: the quotient is not negative; rounding at a knot only moves a continuous seam.
-            Clock::Uniform { step_s } => (((t_s - self.start_s) / step_s) as usize).min(last),
-            Clock::Listed(times_s) => {
+            // Saturating cast: the quotient is not negative. Rounding at a knot only selects the adjacent
+            // segment, which is continuous there.
+            KnotTimes::Uniform { step_s } => (((t_s - self.start_s) / step_s) as usize).min(last),
+            KnotTimes::Listed(times_s) => {
                 times_s.partition_point(|knot| *knot <= t_s).saturating_sub(1).min(last)
             }
         }
     }
 }
 
-/// The state `tau_s` after `from`, which may be negative, under the accelerations of `from` (formulas in the
-/// module's text).
+/// The state `tau_s` after `from` (may be negative), under the accelerations of `from`; formulas in the
+/// module documentation.
 pub fn advance(from: &BodyState, tau_s: f64) -> BodyState {
     let (rate, alpha) = (from.rate_body_rad_s, from.angular_acceleration_body_rad_s2);
     let half2 = 0.5 * tau_s * tau_s;
@@ -184,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Several segments whose accelerations differ but whose states join.
+    /// Several segments with different accelerations whose states join.
     fn joined(step_s: f64, count: usize) -> Trajectory {
         let mut knots = vec![still()];
         for k in 1..count {
@@ -248,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn coasts_outside_and_survives_any_time() {
+    fn coasts_outside_and_is_finite_at_any_time() {
         let trajectory = joined(0.01, 10);
         let (start_s, end_s) = trajectory.span_s();
         for (inside_s, outside_s) in [(start_s, start_s - 2.0), (end_s, end_s + 3.0)] {

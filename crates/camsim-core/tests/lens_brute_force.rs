@@ -1,6 +1,6 @@
-//! Fold and validity of every calibration set by a scan that shares nothing with the library's inverse: the
-//! formulas are written out again, derivatives are finite differences, and a pixel's pre-images are counted
-//! by the winding number of the border's image.
+//! Fold and validity of every calibration set against an independent scan: the formulas are written out
+//! again, derivatives are finite differences, and the pre-images of a pixel are counted by the winding number
+//! of the border's image.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{PI, TAU};
@@ -12,8 +12,8 @@ use rayon::prelude::*;
 
 const RAYS: usize = 360;
 const STEPS: usize = 1500;
-/// A chord of the border's image is at most this far from the curve itself (360 rays, 1000 px): pixels nearer
-/// are not judged.
+/// Largest distance of a chord of the border's image from the curve (360 rays, 1000 px). Pixels nearer to the
+/// border are not tested.
 const UNJUDGED_PX: f64 = 0.1;
 
 struct Set {
@@ -72,7 +72,7 @@ impl Set {
         a.perp_dot(b)
     }
 
-    /// First radius on a ray where the determinant is not positive, or where 89 degrees end.
+    /// First radius along a ray at which the determinant is not positive, at most that of 89 degrees.
     fn fold_radius(&self, phi: f64) -> f64 {
         let ray = DVec2::from_angle(phi);
         let radius = |step: usize| (step as f64 / STEPS as f64 * 89.0 * PI / 180.0).tan();
@@ -88,7 +88,7 @@ impl Set {
     }
 }
 
-/// Turns of a closed polygon about a point, and its distance.
+/// Winding number of a closed polygon about a point, and its distance.
 fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
     let mut turned = 0.0;
     let mut distance = f64::INFINITY;
@@ -108,22 +108,21 @@ fn folds_and_valid_pixels_of_every_set() {
     assert!(judged > 60_000, "only {judged} pixels were judged");
 }
 
-/// Judges about a thousand pixels of one camera.
+/// Tests about a thousand pixels of one camera.
 fn judge(set: &Set) -> usize {
     let (name, camera) = (set.name, &set.camera);
     let fold: Vec<f64> = (0..RAYS).map(|ray| set.fold_radius(ray as f64 * TAU / RAYS as f64)).collect();
     for (ray, radius) in fold.iter().enumerate() {
         let phi = ray as f64 * TAU / RAYS as f64;
         let error = (camera.lens.fold_radius(phi) / radius - 1.0).abs();
-        // Finite differences of step 1e-6 next to a pole or a flat fold are worth 1e-4.
+        // Finite differences of step 1e-6 near a pole or a flat fold are accurate to 1e-4.
         assert!(
             error < 1e-4,
             "{name}, ray {ray}: fold at {}, the scan says {radius}",
             camera.lens.fold_radius(phi)
         );
     }
-    // A thousandth inside: at a fold that moves the image by a millionth, and it keeps clear of what a pole
-    // does to rounding.
+    // 0.1 % inside, which avoids the rounding errors near a pole and moves the image by 1e-6 at a fold.
     let border: Vec<DVec2> = fold
         .iter()
         .enumerate()

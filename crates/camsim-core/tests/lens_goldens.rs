@@ -1,4 +1,4 @@
-//! The lens models against figures of OpenCV (forward) and of a brute-force search (inverse):
+//! The lens models against values of OpenCV (forward) and of a brute-force search (inverse), from
 //! scripts/goldens/lens_opencv.py.
 #![allow(clippy::unwrap_used)]
 
@@ -7,9 +7,9 @@ use std::collections::HashMap;
 use camsim_core::lens::{Lens, LensModel};
 use glam::DVec2;
 
-/// Two correct f64 evaluations of the same formula, relative beyond 1.
+/// Tolerance between two f64 evaluations of the same formula, relative beyond 1.
 const FORWARD_TOLERANCE: f64 = 1e-9;
-/// The search stops at a residual of 1e-11; a lens that nearly folds magnifies that 1e3 times.
+/// Tolerance of the search, which stops at a residual of 1e-11; near a fold it is magnified 1e3 times.
 const INVERSE_TOLERANCE: f64 = 1e-8;
 
 fn lenses() -> HashMap<&'static str, Lens> {

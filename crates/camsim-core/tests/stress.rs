@@ -1,5 +1,5 @@
-//! Adversarial cases of gather and temporal inverse, f64 twins against integrals and rays in closed form. The
-//! table of figures is in docs/accuracy/stress.md.
+//! Adversarial cases of gather and temporal inverse: f64 twins against integrals and rays in closed form. The
+//! resulting table is in docs/accuracy/stress.md.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,14 +10,14 @@ use camsim_core::{
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
     temporal::{
-        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyView, displacement::Twist,
+        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyDepth, displacement::Twist,
         gather, reproject,
     },
 };
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-/// One texel black, the next white.
+/// Alternating black and white texels.
 fn checker(size_px: [u32; 2]) -> Vec<f32> {
     let value = |i: u32| ((i % size_px[0] + i / size_px[0]) % 2) as f32;
     (0..size_px[0] * size_px[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect()
@@ -26,8 +26,8 @@ fn checker(size_px: [u32; 2]) -> Vec<f32> {
 const POINT: Footprint =
     Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], kernel: Kernel::Spline(DVec2::ZERO) };
 
-/// Difference, in 1/255, between camsim's samples and 8000 along the same straight path: RMS and largest over
-/// places and directions.
+/// Difference, in DN, between camsim's samples and 8000 along the same straight path: RMS and largest over
+/// positions and directions.
 fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
     let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
     for direction in 0..12 {
@@ -35,13 +35,13 @@ fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
         for place in 0..40 {
             let centre = DVec2::new(128.0, 128.0)
                 + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
-            let found =
+            let undistorted =
                 gather(&[centre - half, centre + half], PathStage::Straight, &POINT, color, 2.0, 1024).x;
             let exact = (0..8000)
                 .map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0), DVec2::ZERO).x)
                 .sum::<f64>()
                 / 8e3;
-            let error = 255.0 * (found - exact).abs();
+            let error = 255.0 * (undistorted - exact).abs();
             square += error * error;
             worst = worst.max(error);
             count += 1.0;
@@ -57,13 +57,13 @@ fn a_checker_at_nyquist_is_blurred_to_its_mean() {
     for length_px in [4.0, 8.3, 16.0, 33.7, 64.0, 200.0] {
         let (rms, worst) = blur_error(&color, length_px);
         eprintln!("checker of one texel, {length_px} px: rms {rms:.2}, max {worst:.2} of 255");
-        // The rule min(2 L, L + 16) is for 1/255 RMS; the checker is what it is worst at.
+        // The rule min(2 L, L + 16) is for 1/255 RMS; a checkerboard is its worst case.
         assert!(rms < 2.0, "{length_px}: {rms}");
     }
 }
 
 #[test]
-fn no_path_is_no_blur() {
+fn without_a_path_there_is_no_blur() {
     let rgba = checker([16, 16]);
     let color = ColorImage { size_px: [16, 16], rgba: &rgba };
     for at in [DVec2::new(7.0, 5.0), DVec2::new(7.3, 5.9), DVec2::new(-0.5, 15.5)] {
@@ -100,37 +100,37 @@ fn level(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, f32) + Syn
 }
 
 #[test]
-fn a_path_longer_than_the_picture() {
+fn path_longer_than_the_image() {
     let shutter = ShutterSpec { exposure_ms: 100.0, ..ShutterSpec::default() };
     let spec = CameraSpec { size_px: [60, 20], focal_px: [50.0, 50.0], shutter, ..CameraSpec::default() };
     let wave = |uv: DVec2| (0.1, (0.5 + 0.4 * (uv.x * 9.0).sin()) as f32);
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(300.0, 0.0, 0.0), ..Twist::default() });
-    // 150 px over the exposure, of a picture of 60: found where the ideal frame is wide enough ...
+    // 150 px over the exposure in an image of 60 px: solved if the ideal frame is wide enough ...
     let wide = level([260, 40], 50.0, wave);
     let rendered = Pipeline::new(&spec, &wide, &motion, &Settings::default()).unwrap().render(None);
     for x in [0_u32, 31, 59] {
         let u = (f64::from(x) - 29.5) / 50.0;
         // Mean of the wave over 3 units of u.
         let expected = 0.5 + 0.4 * (9.0 * u).sin() * 13.5_f64.sin() / 13.5;
-        let found = f64::from(rendered.color_rgba[4 * (10 * 60 + x) as usize]);
-        // Bilinear reading of a wave with a period of 35 px loses (2 pi / 35)^2 / 12 of its height: 3e-3 of
+        let value = f64::from(rendered.color_rgba[4 * (10 * 60 + x) as usize]);
+        // A bilinear read of a wave with a period of 35 px loses (2 pi / 35)^2 / 12 of its amplitude: 3e-3 of
         // 0.03.
-        assert!((found - expected).abs() < 3e-4, "{x}: {found} {expected}");
+        assert!((value - expected).abs() < 3e-4, "{x}: {value} {expected}");
     }
-    // ... and nowhere, without panic, in one of its own size.
+    // ... and without a source, and without a panic, in an ideal frame of the same size.
     let narrow = level([60, 20], 50.0, wave);
     let rendered = Pipeline::new(&spec, &narrow, &motion, &Settings::default()).unwrap().render(None);
     assert!(rendered.color_rgba.iter().all(|v| *v == 0.0));
 }
 
-/// Boxes on level ground 100 m below a camera that looks straight down: in camera axes, x right, y down, z
-/// away.
+/// Boxes on level ground 100 m below a camera that looks straight down, in camera axes (x right, y down, z
+/// forward).
 struct Town;
 
 impl Town {
     const GROUND_M: f64 = 100.0;
 
-    /// Half widths 6 m, 20 m apart, 10 to 45 m high.
+    /// Boxes of half width 6 m, 20 m apart, 10 to 45 m high.
     fn boxes() -> impl Iterator<Item = (DVec3, DVec3)> {
         (-6..=6).flat_map(|i| {
             (-5..=5).map(move |j| {
@@ -142,7 +142,7 @@ impl Town {
         })
     }
 
-    /// First surface along `origin + t direction`, t > 0.
+    /// First intersection of `origin + t direction`, t > 0.
     fn cast(origin: DVec3, direction: DVec3) -> f64 {
         let mut nearest = (Self::GROUND_M - origin.z) / direction.z;
         for (low, high) in Self::boxes() {
@@ -171,7 +171,7 @@ fn a_second_of_rolling_shutter_over_buildings() {
     let camera = CameraModel::from_spec(&spec).unwrap();
     let shutter = Shutter::from_spec(&readout, 30.0, spec.size_px).unwrap();
     let depth = InverseDepthImage { size_px: ideal.geometry.size_px, values: &ideal.inverse_depth };
-    let key = KeyView { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO, sky_reach_px: 0.0 };
+    let key = KeyDepth { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO, sky_reach_px: 0.0 };
     let pipelines = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| {
         Pipeline::new(&spec, &ideal, &motion, &Settings { solver: Some(solver), ..Settings::default() })
             .unwrap()
@@ -188,9 +188,9 @@ fn a_second_of_rolling_shutter_over_buildings() {
         }
         let exact = ideal.geometry.px_from_point(hit);
         let two_looks = reproject(uv, (rotation, shift), 2, &key);
-        let found = pipelines.iter().map(|pipeline| pipeline.source([x, y], 0.0).ok()).chain([two_looks]);
-        for (errors, found) in errors.iter_mut().zip(found) {
-            errors.push(found.unwrap().at_px.distance(exact));
+        let sources = pipelines.iter().map(|pipeline| pipeline.source([x, y], 0.0).ok()).chain([two_looks]);
+        for (errors, sources) in errors.iter_mut().zip(sources) {
+            errors.push(sources.unwrap().position_px.distance(exact));
         }
     }
     let [linear, rk2, own, two_looks] = errors.map(|mut errors| {
@@ -214,8 +214,8 @@ fn a_second_of_rolling_shutter_over_buildings() {
         );
     }
     assert!(hidden > 500, "{hidden}");
-    // A texel's edge is up to half a texel from the building's, so a ray in a hundred may take the
-    // neighbour's surface.
+    // An edge in the texels is up to half a texel from that of the building, so one ray in a hundred may take
+    // the adjacent surface.
     assert!(own.2 < 0.05 && own.4 < 0.015, "{own:?}");
     assert!(rk2.4 > 5.0 * own.4 && two_looks.4 > 1.5 * own.4, "{rk2:?} {two_looks:?}");
 }

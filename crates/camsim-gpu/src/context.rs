@@ -1,8 +1,11 @@
 //! Adapter and device.
 
-use std::{fmt, sync::LazyLock};
+use std::{
+    fmt,
+    sync::{Arc, LazyLock, Mutex},
+};
 
-use crate::reverse::host::{self, ReverseOn};
+use crate::layout::Truth;
 
 /// Errors of the GPU side. Texts name the fix.
 #[derive(Debug, thiserror::Error)]
@@ -29,16 +32,6 @@ pub enum GpuError {
         adapter: String,
         /// What wgpu says.
         reason: String,
-    },
-    /// An environment variable has a value that means nothing.
-    #[error("{name}={value}: set it to {allowed}, or not at all")]
-    Setting {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: String,
-        /// What it may be.
-        allowed: &'static str,
     },
     /// The device stopped working.
     #[error(
@@ -106,7 +99,8 @@ impl fmt::Display for AdapterSummary {
 }
 
 /// Pixels that a thread takes on a software adapter: reading a line's poses costs llvmpipe up to two fifths
-/// of the kernel, and there are few processors to be kept busy (docs/PERFORMANCE.md).
+/// of the kernel, and there are few processors to be kept busy (docs/DECISIONS.md, "Gpu
+/// renderer").
 const SOFTWARE_PIXELS: u32 = 16;
 
 /// Device, queue, and what they run on.
@@ -124,10 +118,8 @@ pub struct GpuContext {
     pub(crate) max_picture_px: u32,
     /// Pixels of a line that a thread of the reverse kernel takes.
     pub(crate) pixels_a_thread: u32,
-    /// Where the reverse pipeline runs.
-    pub(crate) reverse_on: ReverseOn,
-    /// Whether the host draws the ideal frames that it reads.
-    pub(crate) ideal_on_host: bool,
+    /// The first error that the device reported outside of a call.
+    fault: Arc<Mutex<Option<String>>>,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr
@@ -195,47 +187,30 @@ fn named(choice: AdapterChoice, wanted: Option<String>) -> Vec<wgpu::Adapter> {
     found
 }
 
-/// Where the reverse pipeline runs: as `CAMSIM_REVERSE` says, or else on the host if the device is the host's
-/// processor, that has the vectors for it, and no other shaders are to be tried.
-fn reverse_on(is_software: bool) -> Result<ReverseOn, GpuError> {
-    match std::env::var_os("CAMSIM_REVERSE") {
-        None if is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none() => {
-            Ok(ReverseOn::Best)
+/// Keeps the first error that a device reports outside of a call.
+fn watch(device: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
+    let fault = Arc::new(Mutex::new(None));
+    let note = |fault: &Arc<Mutex<Option<String>>>, text: String| {
+        if let Ok(mut first) = fault.lock() {
+            first.get_or_insert(text);
         }
-        None => Ok(ReverseOn::Device),
-        Some(place) if place == "device" => Ok(ReverseOn::Device),
-        Some(place) if place == "host" => Ok(ReverseOn::Host),
-        Some(place) => Err(GpuError::Setting {
-            name: "CAMSIM_REVERSE",
-            value: place.to_string_lossy().into(),
-            allowed: "`device` or `host`",
-        }),
-    }
-}
-
-/// Whether the host draws the ideal frames that it makes output frames from: as `CAMSIM_IDEAL` says, or else
-/// beside a software adapter, unless other shaders are to be tried.
-fn ideal_on_host(is_software: bool, reverse_on: ReverseOn) -> Result<bool, GpuError> {
-    match std::env::var_os("CAMSIM_IDEAL") {
-        None => Ok(is_software
-            && reverse_on != ReverseOn::Device
-            && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
-        Some(place) if place == "device" => Ok(false),
-        Some(place) if place == "host" => Ok(true),
-        Some(place) => Err(GpuError::Setting {
-            name: "CAMSIM_IDEAL",
-            value: place.to_string_lossy().into(),
-            allowed: "`device` or `host`",
-        }),
-    }
+    };
+    let for_errors = fault.clone();
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&for_errors, error.to_string())));
+    let for_loss = fault.clone();
+    device.set_device_lost_callback(move |reason, text| {
+        if reason != wgpu::DeviceLostReason::Destroyed {
+            note(&for_loss, text);
+        }
+    });
+    fault
 }
 
 impl GpuContext {
     /// Opens the chosen adapter.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses,
-    /// [`GpuError::Setting`] if `CAMSIM_REVERSE` or `CAMSIM_IDEAL` says neither place.
+    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut candidates = ranked(choice);
         if candidates.is_empty() {
@@ -260,41 +235,49 @@ impl GpuContext {
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let pixels_a_thread = if is_software { SOFTWARE_PIXELS } else { 1 };
-        let reverse_on = reverse_on(is_software)?;
-        let ideal_on_host = ideal_on_host(is_software, reverse_on)?;
-        Ok(Self {
-            device,
-            queue,
-            adapter: summary,
-            is_software,
-            max_picture_px,
-            pixels_a_thread,
-            reverse_on,
-            ideal_on_host,
-        })
+        let fault = watch(&device);
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, fault })
     }
 
-    /// What renders, for people: the adapter, and that the host has a part in it where it has.
+    /// Whether the adapter is a driver that runs on this machine's processor.
     #[must_use]
-    pub fn describe(&self) -> String {
-        let host = match (self.reverses_on_host(), self.draws_on_host()) {
-            (true, true) => ", ideal frames and reverse pipeline on the host",
-            (true, false) => ", reverse pipeline on the host",
-            (false, _) => "",
-        };
-        format!("{}{host}", self.adapter)
+    pub fn is_software(&self) -> bool {
+        self.is_software
     }
 
-    /// Whether the host makes output frames from ideal frames where it can.
+    /// Largest side of a picture that is held whole.
     #[must_use]
-    pub fn reverses_on_host(&self) -> bool {
-        self.reverse_on != ReverseOn::Device
+    pub fn max_picture_px(&self) -> u32 {
+        self.max_picture_px
     }
 
-    /// Whether the host draws the ideal frames of those, where it can.
+    /// Holds pictures with longer sides in tiles, as if textures ended there: for tests, and where the
+    /// device's memory is short.
+    pub fn limit_pictures(&mut self, max_side_px: u32) {
+        self.max_picture_px = max_side_px.min(self.max_side_px());
+    }
+
+    /// Pixels of a row that each thread of the reverse kernel takes, 1 to 4096: by default 16 on a software
+    /// adapter and 1 on a card. Pictures are the same, byte for byte.
+    pub fn set_pixels_a_thread(&mut self, pixels: u32) {
+        self.pixels_a_thread = pixels.clamp(1, 4096);
+    }
+
+    /// Most pixels of an output frame with depth and coordinates.
     #[must_use]
-    pub fn draws_on_host(&self) -> bool {
-        self.ideal_on_host && self.reverses_on_host()
+    pub fn most_pixels_with_truth(&self) -> u64 {
+        self.max_storage_bytes() / size_of::<Truth>() as u64
+    }
+
+    /// Fails once the device has reported an error.
+    ///
+    /// # Errors
+    /// [`GpuError::Device`].
+    pub fn check(&self) -> Result<(), GpuError> {
+        match self.fault.lock().ok().and_then(|fault| fault.clone()) {
+            Some(text) => Err(GpuError::Device(text)),
+            None => Ok(()),
+        }
     }
 
     /// Largest side of a texture.

@@ -4,26 +4,21 @@
 use std::{collections::HashMap, ops::Range};
 
 use camsim_core::{
-    pose::CameraPose,
     scenario::Preset,
-    scene::{LevelTolerance, PlacedMesh, Scene},
-    temporal::IdealGeometry,
+    scene::{LodTolerance, PlacedMesh, Scene},
 };
-use camsim_plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX};
-use glam::{DMat3, DVec3};
+use camsim_plan::{
+    EdgeStage, FramePlan, SIZE_QUANTUM_PX,
+    uniforms::{IdealCamera, base_ned_m, ideal_camera},
+};
 
 use crate::{
-    context::GpuContext,
-    engine::RenderErrorBase,
-    layout::{IdealCamera, MeshPlacement},
-    recorder::Recorder,
-    shaders::ComposeError,
+    context::GpuContext, error::PassError, layout::MeshPlacement, recorder::Recorder, shaders::ComposeError,
     upload::SceneBuffers,
 };
 
 mod drawing;
 mod fine;
-pub mod host;
 mod layers;
 mod marks;
 mod near_marks;
@@ -142,11 +137,7 @@ fn color_format(preset: Preset) -> wgpu::TextureFormat {
     }
 }
 
-/// Rows from one ideal frame to the next in a target.
-#[must_use]
-pub fn key_rows(ideal: &IdealGeometry) -> u32 {
-    ideal.size_px[1].next_multiple_of(SIZE_QUANTUM_PX)
-}
+pub use camsim_plan::uniforms::key_rows;
 
 /// Pipelines of the ideal render.
 #[derive(Debug)]
@@ -154,7 +145,7 @@ pub struct IdealPass {
     /// Compiled when a silhouette is first in view.
     silhouettes: Option<SilhouettePasses>,
     /// Compiled when pixels first have several samples.
-    middle_depth: Option<MiddleDepthPass>,
+    resolve_depth: Option<MiddleDepthPass>,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
@@ -235,7 +226,7 @@ impl IdealPass {
             layout("camsim.ideal.placements", &[buffer_entry(0, wgpu::ShaderStages::VERTEX, storage)]);
         Ok(Self {
             silhouettes: None,
-            middle_depth: None,
+            resolve_depth: None,
             camera_layout,
             terrain_layout,
             mesh_layout,
@@ -261,7 +252,7 @@ impl IdealPass {
         };
         let camera =
             create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let placement_bytes = (buffers.placed.len() * size_of::<MeshPlacement>()) as u64;
+        let placement_bytes = (buffers.meshes.placed.len() * size_of::<MeshPlacement>()) as u64;
         let placements = create("camsim.ideal.placements", placement_bytes, wgpu::BufferUsages::STORAGE);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -312,16 +303,16 @@ impl IdealPass {
         buffers: &SceneBuffers,
         plan: &FramePlan,
         meshes: &[PlacedMesh],
-        tolerance: &LevelTolerance,
+        tolerance: &LodTolerance,
         target: &IdealTarget,
-    ) -> Result<u32, RenderErrorBase> {
+    ) -> Result<u32, PassError> {
         let plain = if target.sampled.is_some() {
             SurfaceKey::Fine(plan.surface_reads)
         } else {
             SurfaceKey::Plain(plan.surface_reads)
         };
-        if target.sampled.is_some() && self.middle_depth.is_none() {
-            self.middle_depth = Some(MiddleDepthPass::new(gpu)?);
+        if target.sampled.is_some() && self.resolve_depth.is_none() {
+            self.resolve_depth = Some(MiddleDepthPass::new(gpu)?);
         }
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine =
@@ -372,8 +363,8 @@ impl IdealPass {
         let mut pass = recorder.render_pass("ideal", Some(color), Some(depth_attachment(depth)));
         self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
         drop(pass);
-        if let (Some(sampled), Some(middle_depth)) = (&target.sampled, &self.middle_depth) {
-            middle_depth.encode(gpu, recorder, sampled, depth_attachment(&target.drawn_depth));
+        if let (Some(sampled), Some(resolve_depth)) = (&target.sampled, &self.resolve_depth) {
+            resolve_depth.encode(gpu, recorder, sampled, depth_attachment(&target.drawn_depth));
         }
         if let (Some(fine), Some(key), Some(passes), EdgeStage::Supersampled { thin, .. }) =
             (&target.fine, fine, &self.silhouettes, plan.edges)
@@ -439,12 +430,6 @@ impl IdealPass {
     }
 }
 
-/// What surfaces stand relative to when seen from a camera: in whole metres, so that sums with whole chunk
-/// centres are exact.
-pub(crate) fn base_ned_m(pose: &CameraPose) -> DVec3 {
-    pose.position_ned_m.round()
-}
-
 /// Linear colour, cleared to the sky's.
 fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::RenderPassColorAttachment<'a> {
     let [r, g, b] = scene.sky_linear.map(f64::from);
@@ -465,31 +450,6 @@ fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAtt
         view,
         depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
         stencil_ops: None,
-    }
-}
-
-/// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into
-/// the shift.
-fn ideal_camera(plan: &FramePlan, pose: &CameraPose, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
-    let ideal = &plan.ideal;
-    let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
-    let row = |i: usize| camera_from_ned.row(i).as_vec3().extend(0.0).to_array();
-    let [width, height] = ideal.size_px.map(f64::from);
-    let (f, c) = (ideal.focal_px, ideal.principal_px);
-    // The paper's fog comes after the gather.
-    let visibility_m = scene.fog_visibility_m.filter(|_| plan.linear_fog.is_none());
-    let fog = visibility_m.map_or(0.0, |visibility_m| 3.912 / visibility_m);
-    let [r, g, b] = scene.sky_linear;
-    IdealCamera {
-        clip_scale: [(2.0 * f.x / width) as f32, (-2.0 * f.y / height) as f32],
-        clip_shift: [(2.0 * (c.x + 0.5) / width - 1.0) as f32, (1.0 - 2.0 * (c.y + 0.5) / height) as f32],
-        camera_from_ned_x: row(0),
-        camera_from_ned_y: row(1),
-        camera_from_ned_z: row(2),
-        camera_from_base_m: (pose.position_ned_m - base_ned_m).as_vec3().extend(0.0).to_array(),
-        sky: [r, g, b, fog as f32],
-        near_m: NEAR_M as f32,
-        ..IdealCamera::default()
     }
 }
 

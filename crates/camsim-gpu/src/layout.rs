@@ -2,73 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use camsim_core::scene::MeshVertex;
-use camsim_plan::MAX_KEYS;
-
-/// Mirror of `Frame` in shaders/common/frame.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[expect(missing_docs, reason = "documented in the shader, field by field")]
-pub struct FrameUniforms {
-    pub size_px: [u32; 2],
-    pub ideal_size_px: [u32; 2],
-    pub ideal_focal_px: [f32; 2],
-    pub ideal_principal_px: [f32; 2],
-    pub focal_px: [f32; 2],
-    pub principal_px: [f32; 2],
-    pub near_m: f32,
-    pub nodes: u32,
-    pub line_axis: u32,
-    pub lines: u32,
-    pub fields: u32,
-    pub iterations: u32,
-    pub samples_per_px: f32,
-    pub max_samples: u32,
-    pub max_taps: u32,
-    pub coords_phase: f32,
-    pub light: f32,
-    pub noise_sigma: f32,
-    pub vignette_thresholds: [f32; 2],
-    pub seed: [u32; 2],
-    pub frame_number: u32,
-    pub mono: u32,
-    pub node_stride: u32,
-    pub edge_scale: u32,
-    pub edge_samples: u32,
-    pub rk2_step_rad: f32,
-    pub lens_tangential: [f32; 2],
-    pub key_position_ned_m: [f32; 4],
-    pub ned_from_key_x: [f32; 4],
-    pub ned_from_key_y: [f32; 4],
-    pub ned_from_key_z: [f32; 4],
-    pub key_velocity_m_s: [f32; 4],
-    pub key_rate_rad_s: [f32; 4],
-    pub lens_radial: [f32; 3],
-    pub pad0: u32,
-    pub linear_fog: [f32; 4],
-    pub keys: u32,
-    pub key_rows: u32,
-    pub exposure_share: f32,
-    pub sky_reach_px: f32,
-    pub planes: [[f32; 4]; MAX_KEYS as usize],
-}
-
-/// Mirror of `IdealCamera` in shaders/ideal/camera.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[expect(missing_docs, reason = "documented in the shader, field by field")]
-pub struct IdealCamera {
-    pub clip_scale: [f32; 2],
-    pub clip_shift: [f32; 2],
-    pub camera_from_ned_x: [f32; 4],
-    pub camera_from_ned_y: [f32; 4],
-    pub camera_from_ned_z: [f32; 4],
-    pub camera_from_base_m: [f32; 4],
-    pub sky: [f32; 4],
-    pub near_m: f32,
-    pub pad0: f32,
-    pub pad1: f32,
-    pub pad2: f32,
-}
+pub use camsim_plan::uniforms::{FrameUniforms, IdealCamera, Truth};
 
 /// Mirror of `KeyLayout` in shaders/ideal/near_marks.wgsl.
 #[repr(C)]
@@ -82,17 +16,6 @@ pub struct KeyLayout {
     pub pad0: u32,
     pub pad1: u32,
     pub pad2: u32,
-}
-
-/// Mirror of `Truth` in shaders/reverse/edges/seen.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[expect(missing_docs, reason = "documented in the shader, field by field")]
-pub struct Truth {
-    pub uv: [f32; 2],
-    pub source_px: [f32; 2],
-    pub point_ned_m: [f32; 3],
-    pub depth_m: f32,
 }
 
 /// A corner of a mesh: `shaders/ideal/mesh.wgsl`. Tints have 16 bits.
@@ -220,7 +143,7 @@ mod tests {
         let module = parse(
             shaders::compose(
                 "ideal/terrain.wgsl",
-                &crate::ideal::ground_slots(camsim_plan::SurfaceReads::Grid, true, true),
+                &crate::ideal::ground_slots(camsim_plan::PrefilterTaps::Grid, true, true),
             )
             .unwrap(),
         );
@@ -242,7 +165,7 @@ mod tests {
                 pad2,
             ]
         );
-        let slots = crate::ideal::mesh_slots(camsim_plan::SurfaceReads::Grid, 1, false, true);
+        let slots = crate::ideal::mesh_slots(camsim_plan::PrefilterTaps::Grid, 1, false, true);
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);

@@ -1,33 +1,29 @@
-//! The ideal render and the reverse pipeline on wgpu.
+//! Ideal frames and output frames on a GPU, by wgpu: passes, buffers and read-back. Software adapters (Mesa's
+//! lavapipe) count as GPUs.
 //!
-//! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) ->
-//! layout (mirrors of shader structs) -> scene upload -> staging and recorder (a frame's writes and commands)
-//! -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back). The engine executes
-//! [`camsim_plan::FramePlan`]s and decides nothing itself.
+//! [`GpuContext`] opens an adapter; [`GpuSession`] holds one sequence on it and records the passes that a
+//! [`FramePlan`](camsim_plan::FramePlan) names. It decides nothing itself. The crate `camsim-engine` feeds it.
+//!
+//! Modules in the order of the data flow: [`context`] (adapter and device), [`shaders`] (WGSL composition),
+//! [`layout`] (mirrors of shader structs), [`upload`] (the scene), [`staging`] and [`recorder`] (a frame's
+//! writes and commands), [`ideal`] (ideal frames), [`reverse`] (output frames), [`session`] (all passes of a
+//! frame, read-back).
 
 #![warn(missing_docs)]
 
 pub mod context;
-
-mod host;
-
-pub mod shaders;
-
+mod error;
+pub mod ideal;
 pub mod layout;
-
+pub mod recorder;
+pub mod reverse;
+pub mod session;
+pub mod shaders;
+pub mod staging;
 /// Tiles of large pictures.
 pub mod tiles;
 pub mod upload;
 
-pub mod staging;
-
-pub mod recorder;
-
-pub mod ideal;
-
-pub mod reverse;
-
-pub mod engine;
-
-pub use context::{AdapterChoice, GpuContext, GpuError};
-pub use engine::{Engine, RenderError};
+pub use context::{AdapterChoice, AdapterSummary, GpuContext, GpuError};
+pub use error::PassError;
+pub use session::{GpuJob, GpuSession, IdealImages, Submitted, Wanted};

@@ -6,24 +6,16 @@
 
 use std::collections::{HashMap, hash_map::Entry};
 
-use camsim_core::{
-    photometric::is_mono,
-    scenario::Scenario,
-    shutter::LinesAxis,
-    temporal::{TapStage, displacement::RK2_STEP_DEG},
-};
-use camsim_plan::{EdgeStage, FramePlan, LinearFog, MAX_KEYS, NEAR_M, RayStage, TemporalStage, table_shape};
-use glam::DMat3;
+use camsim_core::shutter::RowAxis;
+use camsim_plan::{FramePlan, RayStage};
 
 use crate::{
     context::GpuContext,
-    ideal::{FineTarget, key_rows, whole},
-    layout::FrameUniforms,
+    ideal::{FineTarget, whole},
     recorder::Recorder,
     shaders::{self, ComposeError},
 };
 
-pub mod host;
 mod key;
 pub mod lens_inverse;
 
@@ -202,9 +194,9 @@ fn pixels_a_thread(gpu: &GpuContext, key: PipelineKey) -> u32 {
 /// Along x and y, each as long as a thread's pixels along the lines and as wide as a workgroup across them.
 fn workgroups(plan: &FramePlan, pixels_a_thread: u32) -> [u32; 2] {
     let long = WORKGROUP_PX * pixels_a_thread;
-    let sides_px = match plan.shutter.lines_axis() {
-        LinesAxis::Rows => [long, WORKGROUP_PX],
-        LinesAxis::Columns => [WORKGROUP_PX, long],
+    let sides_px = match plan.shutter.row_axis() {
+        RowAxis::Rows => [long, WORKGROUP_PX],
+        RowAxis::Columns => [WORKGROUP_PX, long],
     };
     std::array::from_fn(|axis| plan.camera.size_px[axis].div_ceil(sides_px[axis]))
 }
@@ -364,80 +356,4 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
     [frame, ideal, lens, out]
 }
 
-/// Uniforms of a frame. `coords_phase` in [-0.5, 0.5] picks the instant of the exposure at which source
-/// coordinates are reported.
-#[must_use]
-pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
-    let photometric = &scenario.camera.photometric;
-    let noise_seed = scenario.noise_seed();
-    let (axis, lines, fields) = table_shape(&plan.shutter);
-    let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
-    let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
-    let lens = |i: usize| plan.camera.lens.coefficients().get(i).map_or(0.0, |&k| k as f32);
-    let linear_fog = plan
-        .linear_fog
-        .map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
-    let mut planes = [[0.0; 4]; MAX_KEYS as usize];
-    for (plane, key) in planes.iter_mut().zip(&plan.keys) {
-        *plane = plan.plane.seen_from(&key.pose).as_vec3().extend(0.0).to_array();
-    }
-    let (edge_scale, edge_samples) = match plan.edges {
-        EdgeStage::None => (1, 0),
-        EdgeStage::Supersampled { scale, samples, .. } => (scale, samples),
-    };
-    FrameUniforms {
-        size_px: plan.camera.size_px,
-        ideal_size_px: plan.ideal.size_px,
-        ideal_focal_px: plan.ideal.focal_px.as_vec2().to_array(),
-        ideal_principal_px: plan.ideal.principal_px.as_vec2().to_array(),
-        focal_px: plan.camera.focal_px.as_vec2().to_array(),
-        principal_px: plan.camera.principal_point_px.as_vec2().to_array(),
-        near_m: NEAR_M as f32,
-        nodes: plan.blur.map_or(1, |blur| blur.nodes),
-        node_stride: plan.blur.map_or(1, |blur| blur.stride),
-        line_axis: u32::from(axis == LinesAxis::Columns),
-        lines,
-        fields,
-        iterations: match plan.temporal {
-            TemporalStage::Reproject { iterations } => iterations,
-            _ => 0,
-        },
-        samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px as f32),
-        max_samples: plan.blur.map_or(1, |blur| blur.max_samples),
-        max_taps: match plan.taps {
-            TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
-            TapStage::Bilinear | TapStage::Spline | TapStage::Area => 1,
-        },
-        coords_phase,
-        light: photometric.light as f32,
-        noise_sigma: photometric.noise_sigma as f32,
-        vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
-        seed: [noise_seed as u32, (noise_seed >> 32) as u32],
-        frame_number: plan.frame as u32,
-        mono: u32::from(is_mono(photometric.output)),
-        key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),
-        ned_from_key_x: column(0),
-        ned_from_key_y: column(1),
-        ned_from_key_z: column(2),
-        edge_scale,
-        edge_samples,
-        keys: plan.keys.len() as u32,
-        key_rows: key_rows(&plan.ideal),
-        exposure_share: (plan.shutter.exposure_s()
-            / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
-        rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
-        lens_radial: [lens(0), lens(1), lens(4)],
-        lens_tangential: [lens(2), lens(3)],
-        linear_fog,
-        sky_reach_px: plan.sky_reach_px as f32,
-        planes,
-        key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
-        key_rate_rad_s: plan
-            .key_twist
-            .rate_rad_s
-            .extend(plan.key_twist.rate_rad_s.length())
-            .as_vec4()
-            .to_array(),
-        ..FrameUniforms::default()
-    }
-}
+pub use camsim_plan::uniforms::frame_uniforms;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use camsim_core::scene::{GroundTiles, TILE_SIDE, Terrain, TexelForm, TileSource, tile_bytes};
+use camsim_core::scene::{TILE_SIDE, Terrain, TerrainTiles, TexelForm, TileSource, tile_bytes};
 
 use crate::{
     context::{GpuContext, GpuError},
@@ -22,7 +22,7 @@ const MOST_LEVELS: usize = 32;
 #[derive(Debug)]
 pub struct TilePool {
     /// Which tiles a frame needs.
-    pub ground: Arc<GroundTiles>,
+    pub ground: Arc<TerrainTiles>,
     source: TileSource,
     layers: Option<Layers>,
     /// Place of each tile.
@@ -46,7 +46,7 @@ impl TilePool {
     /// For the ground's picture. Nothing is on the device yet.
     #[must_use]
     pub fn new(terrain: &Terrain, form: TexelForm) -> Self {
-        let ground = Arc::new(GroundTiles::new(terrain));
+        let ground = Arc::new(TerrainTiles::new(terrain));
         let source = TileSource::new(&terrain.texture, form, terrain.beyond);
         let place_of = vec![None; source.grid.count as usize];
         Self {

@@ -2,11 +2,7 @@
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
-use camsim_core::scene::{
-    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm,
-    Texture, Wrap, is_whole, levels::level_stretch,
-};
-use glam::{DMat3, DVec3};
+use camsim_core::scene::{Batch, Encoding, Scene, SceneBatches, Terrain, TexelForm, Texture, Wrap, is_whole};
 use wgpu::util::DeviceExt;
 
 use crate::{
@@ -20,14 +16,12 @@ use crate::{
 pub struct SceneBuffers {
     /// Terrain, if there is any.
     pub terrain: Option<TerrainBuffers>,
-    /// Meshes by shape and material.
+    /// The scene's meshes.
+    pub meshes: Arc<SceneBatches>,
+    /// Buffers of each batch of them.
     pub batches: Vec<MeshBatch>,
     /// Their pictures, once they have been [brought](SceneBuffers::bring_pictures).
     pub pictures: Vec<wgpu::TextureView>,
-    /// Where all meshes stand, those of a batch one after the other.
-    pub placed: Vec<PlacedShape>,
-    /// Boxes around them, NED.
-    pub bounds: Vec<Aabb>,
     /// Trilinear, edges held; the shader takes several taps where the footprint is long.
     pub sampler: wgpu::Sampler,
 }
@@ -57,14 +51,6 @@ pub struct MeshBatch {
     pub indices: wgpu::Buffer,
     /// Where in them each level is, the full shape first.
     pub ranges: Vec<Range<u32>>,
-    /// How far each level is from the full shape.
-    pub levels: Arc<ShapeLevels>,
-    /// The shape.
-    pub shape: Arc<Shape>,
-    /// What is on it, and the light that falls on that.
-    pub look: Material,
-    /// As above; none where it has no normals.
-    pub light: Option<Light>,
     /// What it shows outside of the picture.
     pub sampler: wgpu::Sampler,
     /// Normals, where light falls on them.
@@ -73,8 +59,6 @@ pub struct MeshBatch {
     pub material: wgpu::Buffer,
     /// Which pipeline draws it.
     pub kind: MeshKind,
-    /// Places of its meshes in [`SceneBuffers::placed`].
-    pub members: Range<u32>,
 }
 
 /// What pipelines of meshes differ in.
@@ -102,37 +86,19 @@ impl MeshKind {
     }
 }
 
-/// Where a mesh stands.
-#[derive(Clone, Debug)]
-pub struct PlacedShape {
-    /// NED position of the shape's origin, metres.
-    pub origin_ned_m: DVec3,
-    /// From the shape's axes to NED.
-    pub ned_from_shape: DMat3,
-    /// As [`level_stretch`].
-    pub stretch: f64,
-}
-
 impl SceneBuffers {
     /// Uploads a scene, but for its pictures.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] for what the adapter cannot hold.
-    pub fn new(gpu: &GpuContext, scene: &Scene) -> Result<Self, GpuError> {
+    pub fn new(gpu: &GpuContext, scene: &Scene, meshes: Arc<SceneBatches>) -> Result<Self, GpuError> {
         let sampler = create_sampler(gpu, [Wrap::Clamp; 2], false);
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
-        let (batches, order) = upload_meshes(gpu, scene);
-        batches.iter().try_for_each(|batch| {
-            check_picture(gpu, &batch.look.texture, "the picture of a mesh or pattern")
+        let batches = meshes.batches.iter().map(|batch| upload_batch(gpu, batch)).collect();
+        meshes.batches.iter().try_for_each(|batch| {
+            check_picture(gpu, &batch.material.texture, "the picture of a mesh or pattern")
         })?;
-        let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
-        let place = |mesh: &Mesh| {
-            let &Mesh { origin_ned_m, ned_from_shape, .. } = mesh;
-            PlacedShape { origin_ned_m, ned_from_shape, stretch: level_stretch(mesh) }
-        };
-        let placed = meshes().map(place).collect();
-        let bounds = meshes().map(Mesh::bounds).collect();
-        Ok(Self { terrain, batches, pictures: Vec::new(), placed, bounds, sampler })
+        Ok(Self { terrain, meshes, batches, pictures: Vec::new(), sampler })
     }
 
     /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the
@@ -145,14 +111,14 @@ impl SceneBuffers {
         }
         if self.pictures.len() < self.batches.len() {
             let mut known: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
-            let picture = |batch: &MeshBatch| {
-                let texture = &batch.look.texture;
+            let picture = |batch: &Batch| {
+                let texture = &batch.material.texture;
                 known
                     .entry(Arc::as_ptr(texture))
                     .or_insert_with(|| upload_texture(gpu, texture, None))
                     .clone()
             };
-            self.pictures = self.batches.iter().map(picture).collect();
+            self.pictures = self.meshes.batches.iter().map(picture).collect();
         }
     }
 
@@ -201,39 +167,8 @@ fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers,
     Ok(TerrainBuffers { picture })
 }
 
-/// Batches, and the meshes' order in them. Shapes that several share are uploaded once.
-fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> (Vec<MeshBatch>, Vec<usize>) {
-    let mut groups: Vec<(&Mesh, Vec<usize>)> = Vec::new();
-    let mut known: HashMap<*const Shape, Vec<usize>> = HashMap::new();
-    for (i, mesh) in scene.meshes.iter().enumerate() {
-        let of_shape = known.entry(Arc::as_ptr(&mesh.shape)).or_default();
-        match of_shape.iter().find(|&&group| groups[group].0.material.is(&mesh.material)) {
-            Some(&group) => groups[group].1.push(i),
-            None => {
-                of_shape.push(groups.len());
-                groups.push((mesh, vec![i]));
-            }
-        }
-    }
-    let levels = SceneLevels::new(scene);
-    let (mut batches, mut order) = (Vec::new(), Vec::new());
-    for (mesh, members) in groups {
-        let first = order.len() as u32;
-        order.extend(members);
-        batches.push(upload_batch(gpu, mesh, scene.light, levels.of(&mesh.shape), first..order.len() as u32));
-    }
-    (batches, order)
-}
-
-fn upload_batch(
-    gpu: &GpuContext,
-    mesh: &Mesh,
-    light: Option<Light>,
-    levels: Arc<ShapeLevels>,
-    members: Range<u32>,
-) -> MeshBatch {
-    let (shape, material) = (&mesh.shape, &mesh.material);
-    let light = light.filter(|_| shape.has_normals());
+fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
+    let Batch { shape, levels, material, light, .. } = batch;
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
     let (mut indices, mut ranges) = (Vec::<u32>::new(), Vec::new());
     for level in levels.levels() {
@@ -267,10 +202,6 @@ fn upload_batch(
             buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)
         }),
         ranges,
-        levels,
-        shape: shape.clone(),
-        look: mesh.material.clone(),
-        light,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
         kind: MeshKind {
@@ -279,7 +210,6 @@ fn upload_batch(
             lit: light.is_some(),
             blends: material.blends,
         },
-        members,
     }
 }
 
@@ -316,7 +246,7 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, border: Option<[u8; 4]>) 
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
         _ => TexelForm::Light,
     };
-    let mips = texture.mips_within(form, border);
+    let mips = texture.mips_with_border(form, border);
     let mut data = texture.texels(&texture.rgba8, form).into_owned();
     mips.iter().for_each(|mip| data.extend_from_slice(&mip.texels));
     let on_device = gpu.device.create_texture_with_data(

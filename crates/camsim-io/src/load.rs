@@ -10,7 +10,7 @@ use camsim_core::{
     scenario::{Auto, CameraSpec, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
     sequence::Sequence,
     temporal::SAMPLES,
-    tracker::{Tracked, TrackerError, track},
+    tracker::{TrackResult, TrackerError, track},
 };
 use glam::DVec2;
 
@@ -140,7 +140,7 @@ pub struct Loaded {
     /// The cleaned log; its report counts every repair.
     pub log: Arc<FlightLog>,
     /// The tracked trajectory with its limits.
-    pub tracked: Arc<Tracked>,
+    pub tracked: Arc<TrackResult>,
     /// Where the terrain lies.
     pub terrain: Option<TerrainSummary>,
     /// What a user should know but need not stop for.
@@ -222,7 +222,7 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
 fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
     let whole = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
     whole(&a.flight) == whole(&b.flight)
-        && a.tracker_in_force() == b.tracker_in_force()
+        && a.effective_tracker() == b.effective_tracker()
         && height_plan(a).0 == height_plan(b).0
 }
 
@@ -230,10 +230,10 @@ fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
 ///
 /// # Errors
 /// As [`load_sequence`].
-pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, Tracked), LoadError> {
+pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, TrackResult), LoadError> {
     let (log_height, _) = height_plan(scenario);
     let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
-    let tracked = track(&log.rows, &scenario.tracker_in_force())?;
+    let tracked = track(&log.rows, &scenario.effective_tracker())?;
     Ok((log, tracked))
 }
 
@@ -284,7 +284,7 @@ fn frames_outside(sequence: &Sequence) -> usize {
 
 /// What log and tracker have to say: limits that held the platform back, repairs.
 #[must_use]
-pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
+pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &TrackResult) -> Vec<String> {
     let mut warnings = tracked.warnings();
     warnings
         .extend(tracked.distance_warning(&log.rows).filter(|_| scenario.tracker.kind != TrackerKind::Hold));
@@ -352,7 +352,7 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
 fn warnings(
     sequence: &Sequence,
     log: &FlightLog,
-    tracked: &Tracked,
+    tracked: &TrackResult,
     terrain: Option<&TerrainSummary>,
 ) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
@@ -366,7 +366,7 @@ fn warnings(
         ));
     }
     if sequence.scenario.quality.ideal_samples == Auto::Value(SAMPLES)
-        && !sequence.scene.has_borders_of_triangles()
+        && !sequence.scene.has_triangle_borders_only()
     {
         warnings.push(format!(
             "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"

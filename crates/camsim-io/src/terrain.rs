@@ -329,7 +329,7 @@ pub fn read_terrain_in_light(
         ),
     };
     let [cols, rows] = dem.size;
-    let made = Terrain::of_grid(cols, rows, &grid, Arc::new(texture));
+    let made = Terrain::from_grid(cols, rows, &grid, Arc::new(texture));
     if grid.outside_crs.load(Ordering::Relaxed) {
         return Err(TerrainFileError::OutsideCrs {
             path: dem.path.clone(),
@@ -339,7 +339,7 @@ pub fn read_terrain_in_light(
     }
     let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
     terrain.beyond = ortho.as_ref().and_then(Ortho::color_beyond);
-    let picture_times = light.map_or(1, |light| terrain.light_up(light));
+    let picture_times = light.map_or(1, |light| terrain.bake_light(light));
     let summary = TerrainSummary { picture_times, ..grid.summary(&heights, without_picture) };
     Ok(LoadedTerrain { terrain, summary, notes })
 }

@@ -10,7 +10,7 @@
 use std::path::Path;
 
 use camsim_core::{
-    apply::{Pipeline, Settings, UnseenCounts},
+    apply::{NoSourceCounts, Pipeline, Settings},
     frame::RenderedFrame,
     scenario::OutputEncoding,
 };
@@ -131,7 +131,7 @@ fn row_s(y: u32) -> f64 {
 }
 
 /// Writes ideal picture, frame and camera; renders them as the program does.
-fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, UnseenCounts) {
+fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, NoSourceCounts) {
     let [width, height] = IDEAL_PX;
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (f64::from(x), f64::from(y))));
     let mut ideal =

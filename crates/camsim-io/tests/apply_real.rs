@@ -217,7 +217,7 @@ fn sources(pipeline: &Pipeline<'_>, spec: &CameraSpec, file: &FrameFile) -> (usi
         (0..480).flat_map(|y| (0..640).step_by(3).map(move |x| (x + y % 3, y))).filter(|(x, _)| *x < 640)
     {
         match pipeline.source([x, y], 0.0) {
-            Err(camsim_core::apply::Unseen::Hole) => holes += 1,
+            Err(camsim_core::apply::NoSource::Hole) => holes += 1,
             Err(_) => {}
             Ok(source) => {
                 let focal = glam::DVec2::from_array(spec.focal_px);
@@ -228,7 +228,7 @@ fn sources(pipeline: &Pipeline<'_>, spec: &CameraSpec, file: &FrameFile) -> (usi
                 let (rotation, shift) = file.motion.key_from(dt_s, 0.0);
                 let in_key = (rotation * uv.extend(1.0)) / source.inverse_depth + shift;
                 let texel = |dx: f64, dy: f64| {
-                    let at = (source.at_px + glam::DVec2::new(dx, dy)).round();
+                    let at = (source.position_px + glam::DVec2::new(dx, dy)).round();
                     let (x, y) = (
                         at.x.clamp(0.0, f64::from(width - 1)) as usize,
                         at.y.clamp(0.0, f64::from(height - 1)) as usize,

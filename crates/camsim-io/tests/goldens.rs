@@ -203,7 +203,7 @@ impl Model<'_> {
         let sky = inverse_depth == 0.0;
         let at_phase = |phase: f64| {
             if !(sky && has(Fault::SkyIsNear)) {
-                return Some(self.pipeline.source(pixel, phase).ok()?.at_px);
+                return Some(self.pipeline.source(pixel, phase).ok()?.position_px);
             }
             // That program's row times, from the ideal frame's instant.
             let row = f64::from(pixel[1]);
@@ -440,7 +440,7 @@ fn own_methods_beside_the_reference_programs() {
         for (x, y) in (0..height).step_by(3).flat_map(|y| (0..width).step_by(3).map(move |x| (x, y))) {
             for phase in [-0.5, 0.5] {
                 if let (Ok(a), Ok(b)) = (exact.source([x, y], phase), heun.source([x, y], phase)) {
-                    off_px.push(a.at_px.distance(b.at_px));
+                    off_px.push(a.position_px.distance(b.position_px));
                 }
             }
         }

@@ -11,7 +11,7 @@ use std::{
 
 use camsim_core::{
     noise::pcg4d,
-    scene::{Shape, ShapeLevels},
+    scene::{Shape, ShapeLods},
 };
 use camsim_io::gltf_file::{GltfOptions, read_gltf};
 use glam::{DVec3, Vec3};
@@ -81,7 +81,7 @@ fn levels_of_real_models_are_within_their_errors() {
             for mesh in
                 model.place(DVec3::ZERO, 0.0, 1.0).filter(|mesh| known.insert(Arc::as_ptr(&mesh.shape)))
             {
-                let levels = ShapeLevels::new(&mesh.shape);
+                let levels = ShapeLods::new(&mesh.shape);
                 let full = triangles(&mesh.shape, &levels.levels()[0].indices);
                 for level in &levels.levels()[1..] {
                     let some = triangles(&mesh.shape, &level.indices);
@@ -96,7 +96,10 @@ fn levels_of_real_models_are_within_their_errors() {
                 if path.ends_with("house-3-0.glb") && !normals {
                     let within_m =
                         0.02 * (full.iter().flatten().fold(0.0_f64, |most, at| most.max(at.length())));
-                    of_houses.push([full.len(), levels.levels()[levels.within(within_m)].indices.len() / 3]);
+                    of_houses.push([
+                        full.len(),
+                        levels.levels()[levels.coarsest_within(within_m)].indices.len() / 3,
+                    ]);
                 }
             }
         }

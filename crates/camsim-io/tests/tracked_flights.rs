@@ -45,7 +45,7 @@ fn agile_flights_are_followed_to_a_degree() {
         assert!(warning.contains("deg RMS from the log"), "{warning}");
         assert!(
             tracked
-                .holds
+                .saturation_intervals
                 .iter()
                 .all(|hold| hold.limit.key() == "max_angular_acceleration_deg_s2" || hold.duration_s() < 1.0)
         );

@@ -7,7 +7,7 @@
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
 use camsim_core::{mount::MountError, reference::OracleError, scenario::validate};
-use camsim_gpu::{Engine, GpuError, RenderError};
+use camsim_engine::{Engine, GpuError, RenderError};
 use serde::Serialize;
 
 use crate::{
@@ -129,7 +129,7 @@ pub fn run<E: From<BenchError>>(
     let chosen = choose(cases().map_err(BenchError::from)?, options)?;
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
-        adapter: engine.gpu().adapter.to_string(),
+        adapter: engine.to_string(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         quick: options.quick,
         cases: [0, chosen.len()],

@@ -136,7 +136,7 @@ struct Flight {
     rate_body_deg_s: [f64; 3],
 }
 
-/// All cases, in the order of the table in docs/ACCURACY.md.
+/// All cases, in the order of the tables of `camsim bench`.
 ///
 /// # Errors
 /// [`CaseError`], which no shipped case gives.

@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_gpu::{Engine, GpuError, RenderError};
+use camsim_engine::{Engine, GpuError, RenderError};
 use camsim_io::{
     camera_file::CameraFileError, flight_log::FlightLogError, load::LoadError, pictures::PictureError,
     scenario_file::ScenarioError, write::WriteError,

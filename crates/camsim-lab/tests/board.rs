@@ -11,7 +11,7 @@ use camsim_core::{
     scene::{Board, BoardPoint, ned_from_board},
     sequence::Sequence,
 };
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_engine::{AdapterChoice, Engine};
 use camsim_io::{board_file::read_board, load::load_sequence, scenario_file::read_scenario};
 use glam::{DVec2, DVec3};
 
@@ -146,9 +146,11 @@ fn edges_of_a_chessboard_are_where_the_lens_shows_them() {
         .points()
         .windows(2)
         .filter(|two| !(two[1].id as usize).is_multiple_of(columns))
-        .map(|two| (two[0].at_m, two[1].at_m));
+        .map(|two| (two[0].position_m, two[1].position_m));
     let edges: Vec<_> = along
-        .chain(board.points().iter().zip(&board.points()[columns..]).map(|(a, b)| (a.at_m, b.at_m)))
+        .chain(
+            board.points().iter().zip(&board.points()[columns..]).map(|(a, b)| (a.position_m, b.position_m)),
+        )
         .collect();
     let options =
         RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.5, ..RenderOptions::default() };
@@ -175,8 +177,9 @@ fn edges_of_tags_are_where_the_lens_shows_them() {
         ..spec
     });
     let eye = Eye::new(&sequence, &spec, FRAME);
-    let around =
-        |tag: &[BoardPoint]| (0..4).map(|k| (tag[k].at_m, tag[(k + 1) % 4].at_m)).collect::<Vec<_>>();
+    let around = |tag: &[BoardPoint]| {
+        (0..4).map(|k| (tag[k].position_m, tag[(k + 1) % 4].position_m)).collect::<Vec<_>>()
+    };
     let edges: Vec<_> = board.points().chunks_exact(4).flat_map(around).collect();
     let (rms, worst, count) = measure(&render(&sequence, FRAME), &eye, &edges);
     eprintln!("AprilGrid: {rms:.4} px RMS, at most {worst:.4} px over {count} edges");
@@ -190,7 +193,8 @@ fn opencv_found_the_camera_again() {
     let (mut squares, mut count) = (0.0, 0);
     for line in text.lines().skip(1) {
         let values: Vec<f64> = line.split(',').map(|value| value.parse().expect("a number")).collect();
-        let exact = Eye::new(&sequence, &spec, values[0] as u64).px(board.points()[values[1] as usize].at_m);
+        let exact =
+            Eye::new(&sequence, &spec, values[0] as u64).px(board.points()[values[1] as usize].position_m);
         squares += exact.distance_squared(DVec2::new(values[2], values[3]));
         count += 1;
     }

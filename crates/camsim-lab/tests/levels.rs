@@ -10,7 +10,7 @@ use camsim_core::{
     scenario::{Auto, Channel, QualitySpec, Silhouettes, Solver},
     sequence::Sequence,
 };
-use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
+use camsim_engine::{AdapterChoice, Engine, Finished};
 use camsim_lab::{
     bench::{knobs::resize, rounds::FRAME, truth::Truth},
     cases::cases,
@@ -81,9 +81,10 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
                 "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
                 case.name, predicted.resampling_dn, predicted.blur_dn, plan.surface_reads, plan.taps
             );
-            assert_eq!(predicted.levels_kept, predicted.picture_dn() <= max_error_dn, "{}", case.name);
-            assert_eq!(predicted.levels_kept, predicted.levels_in_the_way.is_none());
-            if !(BELOW..ABOVE).contains(&ratio) || predicted.levels_kept && measured_dn > ABOVE * max_error_dn
+            assert_eq!(predicted.picture_error_kept, predicted.picture_dn() <= max_error_dn, "{}", case.name);
+            assert_eq!(predicted.picture_error_kept, predicted.picture_error_obstacle.is_none());
+            if !(BELOW..ABOVE).contains(&ratio)
+                || predicted.picture_error_kept && measured_dn > ABOVE * max_error_dn
             {
                 outside
                     .push(format!("{} at {max_error_dn}: {measured_dn:.3} for {predicted_dn:.3}", case.name));
@@ -102,9 +103,11 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             let quality =
                 QualitySpec { max_error_dn: 0.5, ideal_scale: Auto::Value(1.0), ..QualitySpec::default() };
             let Found { plan, measured_dn } = find(&engine, &truth, &sequence, quality);
-            assert!(measured_dn > 1.0 && !plan.predicted.levels_kept, "{}: {measured_dn}", case.name);
+            assert!(measured_dn > 1.0 && !plan.predicted.picture_error_kept, "{}: {measured_dn}", case.name);
             assert!(
-                plan.predicted.levels_in_the_way.is_some_and(|cause| cause.contains("quality.ideal_scale"))
+                plan.predicted
+                    .picture_error_obstacle
+                    .is_some_and(|cause| cause.contains("quality.ideal_scale"))
             );
         }
     }
@@ -147,16 +150,16 @@ fn sources_beside_their_place_cost_what_is_predicted() {
             let Found { plan, measured_dn } = find(&engine, &truth, &sequence, quality.clone());
             let predicted = &plan.predicted;
             let sampled_dn = predicted.resampling_dn.hypot(predicted.blur_dn);
-            let predicted_dn = sampled_dn.hypot(predicted.displaced_dn);
+            let predicted_dn = sampled_dn.hypot(predicted.misregistration_dn);
             // Where it is lost in what sampling costs it tells nothing.
-            if predicted.displaced_dn < sampled_dn {
+            if predicted.misregistration_dn < sampled_dn {
                 continue;
             }
             seen += 1;
             let ratio = measured_dn / predicted_dn;
             eprintln!(
                 "{:<22} {name:<18} measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by displacement, {:.2e} px), ratio {ratio:.2}",
-                case.name, predicted.displaced_dn, predicted.total_px
+                case.name, predicted.misregistration_dn, predicted.total_px
             );
             if !(BELOW..ABOVE).contains(&ratio) {
                 outside.push(format!("{} {name}: {measured_dn:.3} for {predicted_dn:.3}", case.name));
@@ -189,10 +192,13 @@ fn a_vibration_that_few_nodes_are_blind_to_is_foretold_and_followed() {
     let (loose, swing_px) = planned(200.0);
     let (nodes, missed_px) = (loose.blur.expect("an exposure").solved(), loose.predicted.nodes_px);
     assert!(nodes == 2 && missed_px > 0.7 * swing_px, "{nodes} nodes miss {missed_px} px of {swing_px}");
-    assert!(loose.predicted.displaced_dn > 1.0, "{:?}", loose.predicted);
+    assert!(loose.predicted.misregistration_dn > 1.0, "{:?}", loose.predicted);
     // Two periods ask for four nodes each.
     let (tight, _) = planned(1.0);
-    assert!(tight.blur.expect("an exposure").solved() > 8 && tight.predicted.displaced_dn < 1.0, "{tight}");
+    assert!(
+        tight.blur.expect("an exposure").solved() > 8 && tight.predicted.misregistration_dn < 1.0,
+        "{tight}"
+    );
 }
 
 /// Where nothing keeps a tolerance the picture that is taken is near the best there is: whatever the
@@ -216,7 +222,7 @@ fn a_tighter_tolerance_makes_no_worse_picture() {
                 .expect("a planner")
                 .plan(FRAME)
                 .expect("a plan");
-            (plan.predicted.levels_kept, plan.predicted.picture_dn())
+            (plan.predicted.picture_error_kept, plan.predicted.picture_dn())
         };
         let all = [2.0, 1.0, 0.7, 0.5, 0.4, 0.3, 0.2, 0.1, 0.01]
             .map(|max_error_dn| (max_error_dn, predicted(max_error_dn)));
@@ -287,9 +293,13 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         let (all_dn, _, plan) = with(Silhouettes::Auto, Auto::Auto, Auto::Auto);
         let (rays_dn, _, with_rays) = with(Silhouettes::Rays, Auto::Auto, Auto::Auto);
         eprintln!("{}: {all_dn:.3} as planned, {rays_dn:.3} with rays", case.name);
-        assert!(plan.edges == EdgeStage::None && plan.predicted.levels_kept && all_dn < ABOVE);
+        assert!(plan.edges == EdgeStage::None && plan.predicted.picture_error_kept && all_dn < ABOVE);
         let ratio = rays_dn / with_rays.predicted.picture_dn();
-        assert!(with_rays.edges.has_rays() && with_rays.predicted.levels_kept, "{:?}", with_rays.predicted);
+        assert!(
+            with_rays.edges.has_rays() && with_rays.predicted.picture_error_kept,
+            "{:?}",
+            with_rays.predicted
+        );
         assert!(
             (BELOW..ABOVE).contains(&ratio),
             "{}: {rays_dn:.3} with rays, {ratio:.2} of the prediction",
@@ -304,10 +314,10 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         // Too little for the stairs of whole pixels.
         let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0), Auto::Value(1));
         assert!(
-            !forced.predicted.levels_kept
+            !forced.predicted.picture_error_kept
                 && forced
                     .predicted
-                    .levels_in_the_way
+                    .picture_error_obstacle
                     .is_some_and(|cause| cause.contains("quality.silhouettes"))
         );
     }
@@ -340,13 +350,14 @@ fn a_coarser_terrain_costs_what_is_predicted() {
         for allowed_px in [0.02, 1.0, 3.0] {
             let Found { plan, measured_dn } = coarse(allowed_px);
             let predicted = &plan.predicted;
-            let ground = predicted.ground.expect("a terrain");
-            let others_dn = predicted.resampling_dn.hypot(predicted.blur_dn).hypot(predicted.displaced_dn);
+            let ground = predicted.terrain.expect("a terrain");
+            let others_dn =
+                predicted.resampling_dn.hypot(predicted.blur_dn).hypot(predicted.misregistration_dn);
             let predicted_dn = others_dn.hypot(ground.surface_dn);
             let ratio = measured_dn / predicted_dn;
             eprintln!(
                 "{name} {allowed_px} px: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by {:.3} px), ratio {ratio:.2}",
-                ground.surface_dn, ground.displaced_px
+                ground.surface_dn, ground.displacement_px
             );
             assert!(
                 (0.6..ABOVE).contains(&ratio),

@@ -71,7 +71,7 @@ pub struct Exact {
 
 /// One picture to look at.
 #[derive(Clone, Copy)]
-pub struct Sight<'a> {
+pub struct PixelTruth<'a> {
     /// On the screen.
     pub sheet: &'a Sheet,
     /// Its pixels.
@@ -144,12 +144,12 @@ impl Heard {
     }
 
     /// The picture of a stage, of the frame that is shown.
-    pub fn sight(&self, stage: Stage) -> Option<Sight<'_>> {
+    pub fn sight(&self, stage: Stage) -> Option<PixelTruth<'_>> {
         let shown = self.shown.as_ref()?;
         if stage == Stage::Oracle {
             let Exact { picture, sheet, .. } = self.current_exact()?;
             let size_px = picture.sequence.scenario.camera.size_px;
-            return Some(Sight {
+            return Some(PixelTruth {
                 sheet,
                 size_px,
                 color_rgba: &picture.color_rgba,
@@ -164,7 +164,7 @@ impl Heard {
         let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
         let errors = shown.reply.errors.get(at).map(|errors| &**errors).zip(shown.errors.get(at));
         let depth = shown.reply.truths.get(at).map(|truth| &**truth).zip(shown.depths.get(at));
-        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan), errors, depth })
+        Some(PixelTruth { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan), errors, depth })
     }
 
     /// Path time of a frame's stamp, seconds.
@@ -178,7 +178,7 @@ impl Heard {
     /// it.
     pub fn point_ned_m(&self, pixel: [u32; 2]) -> Option<glam::DVec3> {
         let (looks, shown) = (self.current_looks()?, self.shown.as_ref()?);
-        looks.look(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
+        looks.sample(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
     }
 
     /// The first picture of the last reply.

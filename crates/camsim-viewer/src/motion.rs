@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use camsim_core::{
     camera::CameraModel,
     pose::CameraPose,
-    reference::{Look, Oracle},
+    reference::{Oracle, RaySample},
     scenario::CameraSpec,
 };
 use glam::{DVec2, DVec3};
@@ -50,7 +50,7 @@ pub fn paths(looks: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
 
 /// The way of what one pixel sees at its mid-exposure; `None` where it has no ray.
 pub fn path(looks: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
-    let look = looks.look(frame, pixel, DVec2::ZERO, 0.0)?;
+    let look = looks.sample(frame, pixel, DVec2::ZERO, 0.0)?;
     let sequence = looks.sequence();
     let camera = camera_of(&sequence.scenario.camera)?;
     let at = |t_s: f64| project(&camera, &sequence.path.pose(t_s), &look);
@@ -82,7 +82,7 @@ pub fn camera_of(spec: &CameraSpec) -> Option<Arc<CameraModel>> {
 }
 
 /// Where what a look sees is in the picture of another pose; the sky by its direction.
-pub fn project(camera: &CameraModel, pose: &CameraPose, look: &Look) -> Option<DVec2> {
+pub fn project(camera: &CameraModel, pose: &CameraPose, look: &RaySample) -> Option<DVec2> {
     let ned = match &look.hit {
         Some(hit) => hit.point_ned_m - pose.position_ned_m,
         None => look.pose.ned_from_camera * look.uv.extend(1.0),

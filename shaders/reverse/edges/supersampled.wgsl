@@ -1,6 +1,6 @@
 // Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with its own pose
 // and depth, and each with the colour of the one surface of the ideal frame that it meets, so that surfaces
-// never mix but by area and time. Twin: camsim_core::temporal::edges.
+// never mix but by area and time. Twin: camsim_core::temporal::silhouette_rays.
 #import ideal/fine.wgsl
 #import reverse/edges/near.wgsl
 #import <slot:surface_color>

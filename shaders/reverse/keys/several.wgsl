@@ -1,6 +1,6 @@
 // Several ideal frames, at the middles of equal parts of the window, one below the other in the same
 // textures. Every function that reads them or the poses goes to the key that was chosen last. Twin:
-// camsim_core::temporal::edges::key_of_rank.
+// camsim_core::temporal::silhouette_rays::nearest_key.
 
 var<private> chosen_key: u32 = 0u;
 

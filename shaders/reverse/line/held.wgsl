@@ -1,6 +1,6 @@
 // Poses of a line, read once for all of the pixels that a thread takes along it: llvmpipe reads a buffer lane
-// by lane, and where each pixel did so it took up to two fifths of the kernel (docs/PERFORMANCE.md, "Reads of
-// buffers").
+// by lane, and where each pixel did so it took up to two fifths of the kernel (docs/DECISIONS.md,
+// "Gpu renderer").
 const HELD_STEPS: u32 = STEPS * STRETCHES;
 
 var<private> held: array<Pose, HELD_STEPS + 1u>;

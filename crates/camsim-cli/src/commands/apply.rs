@@ -1,10 +1,10 @@
-//! `camsim apply`: the reverse pipeline on somebody else's ideal frame.
+//! `camsim apply`: the reverse pipeline on ideal frames of other programs.
 
 use std::{path::PathBuf, time::Instant};
 
 use anyhow::anyhow;
 use camsim_core::{
-    apply::{ApplyError, Pipeline, Settings, UnseenCounts},
+    apply::{ApplyError, NoSourceCounts, Pipeline, Settings},
     scenario::{MAX_BLUR_SAMPLES, Preset, Solver},
 };
 use camsim_io::{
@@ -24,49 +24,48 @@ use crate::{
 
 mod folder;
 
-/// Put an ideal RGB-D picture of any origin through a camera
+/// Apply a camera to an ideal RGB-D image of any origin
 ///
-/// Takes a picture with depth from Blender, AirSim, Gazebo or a depth camera, and gives what the camera would
-/// have taken: lens, delay, rolling shutter, exposure, interlacing, vignette, light, noise. In f64 on all
-/// cores; needs no graphics adapter. What the ideal picture does not show (beyond its border) is alpha 0. A
-/// FRAME.toml that names a folder or a table of pictures gives a folder of frames.
+/// Reads an image with depth from Blender, AirSim, Gazebo or a depth camera, and renders the frame of the
+/// camera: lens, delay, rolling shutter, exposure, interlacing, vignette, light, noise. Runs in f64 on all
+/// CPU cores, without a graphics adapter. Pixels whose source is outside of the ideal image have alpha 0. A
+/// FRAME.toml with a folder or a table of images gives a folder of frames.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 FRAME.toml (paths relative to it):
   color = \"ideal.png\"          EXR (linear), PNG, JPEG, BMP, TIFF, WebP; color_space = \"srgb\" | \"linear\"
   color_channels = [\"R\", \"G\", \"B\"], color_layer; depth_channel = \"Depth.Z\", depth_layer
-                               of an EXR with several layers or parts: whole names, or their ends; a name that is not there
-                               gets a list of those that are
+                               of an EXR with several layers or parts: full names, or their ends; an unknown name is
+                               answered with a list
   depth = \"depth.exr\"          EXR Z, PFM, TIFF or .npy of floats in metres, or 16-bit PNG, PGM, TIFF or .npy of whole numbers
                                with depth_per_metre (0.001 to 1e6), or 8-bit RGB PNG with depth_encoding = \"packed24\"
                                ((65025 R + 255 G + B) / 255 m) | \"carla\" (1000 (R + 256 G + 65536 B) / 16777215 m); positive
                                forward, 0 is unknown or sky: infinitely far
-  depth_rows = \"bottom-up\"     of a PFM: the row that it begins with | \"top-down\", as AirSim writes them
-  depth_max_m = 1e9            what is stored as that far, or farther, is no depth: the value that stands for the sky
+  depth_rows = \"bottom-up\"     row order of a PFM | \"top-down\", as AirSim writes them
+  depth_max_m = 1e9            stored depths from this value on mean sky
   depth_kind = \"planar\"        | \"range\", along the ray | \"inverse\": depth_per_metre / z, of disparities focal length in
                                pixels times baseline in metres
-  holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one | \"mark\": what looks
-                               there is alpha 0
-  focal_px = [307.6, 307.6]    of the ideal picture, which may be larger than the output
-  principal_point_px = [543.5, 407.5]   if left out its centre, of an EXR that of the display window
-  instant_ms = 0.0             when it was taken, from the stamp
-  [motion]                     a twist, constant in camera axes (x right, y down, z forward): a screw, whose velocity turns
-                               with the camera ...
+  holes = \"far\"               unknown depth is infinitely far | \"nearest\": that of the nearest pixel with a depth | \"mark\": alpha 0
+  focal_px = [307.6, 307.6]    of the ideal image, which may be larger than the output
+  principal_point_px = [543.5, 407.5]   by default the image centre, of an EXR that of the display window
+  instant_ms = 0.0             instant of the ideal image relative to the stamp
+  [motion]                     a constant twist in camera axes (x right, y down, z forward): a screw motion, whose velocity
+                               rotates with the camera ...
   velocity_m_s = [0.0, 0.0, 0.0]
   angular_rate_rad_s = [0.0, 0.0, 0.628]
   trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera; units by name: t_ms, x_mm),
                                and stamp_s; trajectory_format = \"tum\": t x y z qx qy qz qw without a header
-  flow = \"flow.flo\"            ... or where each pixel goes in flow_interval_ms, camera and things together: Middlebury .flo, .npy, or an EXR
+  flow = \"flow.flo\"            ... or optical flow over flow_interval_ms, by camera and objects together: Middlebury .flo, .npy, or an EXR
                                of two channels (of more: flow_channels = [\"X\", \"Y\"], right and down); flow_scale = [1, -1]
-                               where y is up
+                               if y is up
   [fog]                        end_m, color: with --preset paper only
 
-Many frames, in place of color, depth and stamp_s:
-  color = \"rgb/*.png\", depth = \"depth/*.png\"   paired by what stands for the *; name_unit = \"s\" | \"ms\" | \"us\" | \"ns\" says that it is
-                               a time: then paired with the nearest within max_gap_ms = 20
+Several frames, in place of color, depth and stamp_s:
+  color = \"rgb/*.png\", depth = \"depth/*.png\"   paired by the text of the *; with name_unit = \"s\" | \"ms\" | \"us\" | \"ns\" it is a time,
+                               paired with the nearest within max_gap_ms = 20
   color = \"rgb.txt\", depth = \"depth.txt\"       lists of `time file`
   frames = \"associations.txt\"                   a table of `time color time depth`, or a .csv of t_s (t_ms, t_us, t_ns), color, depth
-  fps = 30                     times for frames that have none, from motion.stamp_s on
+  fps = 30                     times for frames without one, starting at motion.stamp_s
 
 Examples:
   camsim apply CAMERA.toml FRAME.toml -o picture.png
@@ -76,35 +75,36 @@ Examples:
 pub struct Args {
     /// Camera file: the keys of [camera] at its root
     camera: PathBuf,
-    /// The ideal picture and how its camera moved
+    /// The ideal image and the motion of its camera
     frame: PathBuf,
-    /// Where the picture goes: .exr is linear R G B A with depth Z, .png is encoded as photometric.output
-    /// says; of many frames a folder
+    /// Output file: .exr is linear R G B A with depth Z, .png is encoded as photometric.output; a folder for
+    /// several frames
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Temporal inverse: reproject is exact, linear and rk2 are the paper's eqs. 16 and 18 [default:
-    /// reproject; rk2, and no other, with --preset paper]
+    /// Temporal inverse: reproject is exact, linear and rk2 are eqs. 16 and 18 of the paper [default:
+    /// reproject; --preset paper always uses rk2]
     #[arg(long, value_enum)]
     solver: Option<SolverArg>,
-    /// Methods: camsim's own, or the paper's
+    /// Set of methods: camsim's own, or the paper's
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArg,
-    /// Samples over the exposure; by the length of the path if left out (100 with --preset paper)
+    /// Exposure samples [default: by the length of the path; 100 with --preset paper]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_BLUR_SAMPLES)))]
     blur_samples: Option<u32>,
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Which of many frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; all if left out
+    /// For several frames, a selection: 7, 10..20 (without 20), 10..=20, 10.. or several with commas
+    /// [default: all]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
-    /// Of many frames: keep those that are there already; refused if the folder is of other inputs
+    /// For several frames: keep those that exist already; refused if the folder belongs to other inputs
     #[arg(long)]
     resume: bool,
-    /// Of many frames: formats of their colour [default: exr]
+    /// For several frames: colour formats [default: exr]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Vec<folder::Format>,
-    /// Frame number, or that of the first of many, which the noise depends on
+    /// Number of the (first) frame, which the noise depends on
     #[arg(long, default_value_t = 0, value_name = "N")]
     frame_number: u64,
 }
@@ -122,7 +122,7 @@ enum SolverArg {
 
 /// Reads, renders, writes.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    // As a scenario does.
+    // The same rule as for a scenario.
     if args.preset == PresetArg::Paper && args.solver.is_some_and(|solver| solver != SolverArg::Rk2) {
         return Err(Failure::bad_input(anyhow!(
             "--solver is rk2 with --preset paper; leave it out, or leave --preset out"
@@ -131,7 +131,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let is_picture = ends_as_picture(args);
     if !is_picture && args.output.extension().is_some() && !args.output.is_dir() {
         return Err(Failure::bad_input(anyhow!(
-            "-o {}: the name must end in .exr or .png, which chooses the format; of many frames it is a folder, whose name has no ending",
+            "-o {}: the name must end in .exr or .png, which selects the format; for several frames it is a folder, whose name has no ending",
             args.output.display()
         )));
     }
@@ -141,7 +141,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     {
         if present {
             console.warn(format_args!(
-                "{}: {key} is not used: the frame has one calibration and its own motion",
+                "{}: {key} is ignored: the frame has one calibration and its own motion",
                 args.camera.display()
             ));
         }
@@ -161,16 +161,16 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings)
         .map_err(|error| in_file(args, &error))
         .or_bad_input()?;
-    let (picture, unseen) = pipeline.render_and_count(vignette.as_ref());
+    let (picture, no_source) = pipeline.render_and_count(vignette.as_ref());
     let elapsed_s = begin.elapsed().as_secs_f64();
     folder::tell_gaps(args, &spec, &set, &[0], console)?;
     write_picture(&args.output, &picture, spec.photometric.output).or_failed()?;
 
     let [width, height] = spec.size_px;
     console.note(format_args!("{}: {width}x{height}, {elapsed_s:.2} s", args.output.display()));
-    tell_unseen(&unseen, f64::from(width) * f64::from(height), console);
+    warn_no_source(&no_source, f64::from(width) * f64::from(height), console);
     tell_reach(args, &pipeline, console);
-    console.detail(format_args!("{:.1} % of the ideal picture has no depth", 100.0 * file.without_depth));
+    console.detail(format_args!("{:.1} % of the ideal image has no depth", 100.0 * file.without_depth));
     console.detail(format_args!("{} exposure nodes", pipeline.nodes()));
     Ok(())
 }
@@ -180,11 +180,11 @@ fn ends_as_picture(args: &Args) -> bool {
     ["exr", "png"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// Of one frame there is nothing to choose or to resume.
+/// Checks the options for a single frame, which cannot be selected or resumed.
 fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> {
     if !is_picture {
         let message =
-            "one frame is one picture, whose name must end in .exr or .png, which chooses the format";
+            "a single frame is an image, whose name must end in .exr or .png, which selects the format";
         return Err(Failure::bad_input(anyhow!("-o {}: {message}", args.output.display())));
     }
     let given = [
@@ -194,20 +194,20 @@ fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> 
     ];
     match given.into_iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(Failure::bad_input(anyhow!(
-            "{option} is for many frames, and {} names one; leave it out",
+            "{option} is for several frames, and {} names one; leave it out",
             args.frame.display()
         ))),
         None => Ok(()),
     }
 }
 
-/// Frame `index`, with a warning where its depth says nothing.
+/// Frame `index`, with a warning if it has no depth.
 fn read(args: &Args, set: &FrameSet, index: usize, console: &mut Console<'_>) -> Result<FrameFile, Failure> {
     let file = set.read(index).or_bad_input()?;
     if file.without_depth == 1.0 && file.motion.translates() {
         let frame = args.frame.display();
         console
-            .warn(format_args!("{frame}: no pixel has a depth: all is taken as infinitely far, and the camera's velocity changes nothing"));
+            .warn(format_args!("{frame}: no pixel has a depth: everything is taken as infinitely far, and the camera's velocity has no effect"));
     }
     Ok(file)
 }
@@ -227,17 +227,17 @@ fn settings(args: &Args, file: &FrameFile, index: u64) -> Settings {
     }
 }
 
-/// What is empty, and why.
-fn tell_unseen(unseen: &UnseenCounts, pixels: f64, console: &mut Console<'_>) {
+/// Warns of pixels without a source, with the reasons.
+fn warn_no_source(no_source: &NoSourceCounts, pixels: f64, console: &mut Console<'_>) {
     let percent = |count: u64| 100.0 * count as f64 / pixels;
     let reasons = [
-        (unseen.no_ray, "the lens has no ray there"),
-        (unseen.outside, "beyond the border of the ideal picture, which should be larger"),
-        (unseen.holes, "where the ideal picture has no depth (holes = \"mark\")"),
-        (unseen.unknown_flow, "where the flow is not known (not a number, or above 1e9)"),
+        (no_source.no_ray, "the lens has no ray there"),
+        (no_source.outside, "outside of the ideal image, which should be larger"),
+        (no_source.holes, "where the ideal image has no depth (holes = \"mark\")"),
+        (no_source.unknown_flow, "where the flow is unknown (not a number, or above 1e9)"),
         (
-            unseen.torn_flow,
-            "where neighbours' flows have too little in common to be followed: is it a flow, in pixels, right and down?",
+            no_source.torn_flow,
+            "where the flow is too irregular to be inverted: is it in pixels, right and down?",
         ),
     ];
     let reasons: Vec<String> = reasons
@@ -245,35 +245,34 @@ fn tell_unseen(unseen: &UnseenCounts, pixels: f64, console: &mut Console<'_>) {
         .filter(|(count, _)| *count > 0)
         .map(|(count, why)| format!("{:.2} % {why}", percent(*count)))
         .collect();
-    if unseen.all() > 0 {
+    if no_source.all() > 0 {
         console.warn(format_args!(
             "{:.2} % of the picture is empty (alpha 0): {}",
-            percent(unseen.all()),
+            percent(no_source.all()),
             reasons.join("; ")
         ));
     }
 }
 
-/// How far beyond the two instants that a flow joins it is gone on with.
+/// Warns if a flow is extrapolated far beyond its interval.
 fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
     let Some([first, last]) = pipeline.flow_shares() else { return };
     let reach = format!(
-        "the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the picture"
+        "the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the ideal image"
     );
     if first.abs().max(last.abs()) > 1.0 + 1e-9 {
         let frame = args.frame.display();
         console.warn(format_args!(
-            "{frame}: {reach}: things are taken to go straight on, farther than was seen; check instant_ms and flow_interval_ms, or take a \
-             flow over a longer time"
+            "{frame}: {reach}: the flow is extrapolated by more than its own interval; check instant_ms and flow_interval_ms, or use a flow \
+             over a longer interval"
         ));
     } else {
-        let beyond =
-            if first < 0.0 || last > 1.0 { ": beyond it things are taken to go straight on" } else { "" };
+        let beyond = if first < 0.0 || last > 1.0 { ": outside of it the flow is extrapolated" } else { "" };
         console.detail(format_args!("{reach}{beyond}"));
     }
 }
 
-/// The file that an error is about, before its words.
+/// Prefixes an error with the file that it concerns.
 fn in_file(args: &Args, error: &ApplyError) -> anyhow::Error {
     let file = match error {
         ApplyError::Camera(_) | ApplyError::Shutter(_) => &args.camera,

@@ -1,40 +1,39 @@
-//! `camsim bench`: run time against error.
+//! `camsim bench`: run time and error.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_gpu::{AdapterChoice, Engine};
 use camsim_lab::bench::{BenchError, Options, Report, Step, run as measure};
 
 use crate::{
+    backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
     output::{check_folder, check_output, write_output},
 };
 
-/// Measure run time against error on this machine: every case with every method
+/// Measure run time and error on this machine, for every case with every method
 ///
-/// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the
-/// exact reference: of source coordinates in pixels, and of pictures in dB. On two processor cores that do
-/// nothing else, without a GPU, the whole takes about a quarter of an hour and --quick about half a minute;
-/// beside other work it takes as much longer, and its times are worth as much less. Files are written after
-/// each case, so that an interrupted run leaves what it has measured; there is no resuming. Rows: case,
-/// preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px,
-/// coord_max_px, psnr_db, predicted_px, and more behind them; null is what was not measured.
+/// Times are for frames rendered and read back; methods alternate within the same rounds. Errors are against
+/// the oracle: source errors in pixels, picture errors in dB. On two otherwise idle CPU cores without a GPU,
+/// all cases take about 15 minutes, and --quick about half a minute. Other load makes the run longer and the
+/// times less reliable. Files are written after each case, so an interrupted run keeps its results; it cannot
+/// be resumed. Columns: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame,
+/// coord_rms_px, coord_p99_px, coord_max_px, psnr_db, predicted_px and further ones; null is not measured.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  camsim bench --quick                        four cases, small pictures
-  camsim bench -o bench                       everything: bench.md, bench.json, bench.csv, bench.svg in ./bench
-  camsim bench --cases buildings,lens-s3      some cases or groups by name; groups are smooth, vibration, buildings,
+  camsim bench --quick                        four cases with small frames
+  camsim bench -o bench                       all cases: bench.md, bench.json, bench.csv, bench.svg in ./bench
+  camsim bench --cases buildings,lens-s3      cases or groups by name; groups are smooth, vibration, buildings,
                                               \"1 s windows\", exposure, lenses, \"all effects\"
-  camsim bench --quick --check                exit code 1 if a row chosen by the plan is beaten in time and error")]
+  camsim bench --quick --check                exit code 1 if another method is faster and more accurate than the planner's choice")]
 pub struct Args {
-    /// Cases or groups of them, with commas (in quotes where they have blanks: "1 s windows"); a name that
-    /// does not exist lists them all
+    /// Cases or groups, separated by commas (quote names with blanks: "1 s windows"); an unknown name lists
+    /// all
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     cases: Vec<String>,
-    /// Few cases, pictures of 320x240, few rounds
+    /// Few cases, frames of 320x240, few rounds
     #[arg(long)]
     quick: bool,
     /// Print JSON instead of tables
@@ -43,29 +42,32 @@ pub struct Args {
     /// Write the rows as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write error against time as a plot
+    /// Write a plot of error over time
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write all of it to a folder: bench.md, bench.json, bench.csv, bench.svg
+    /// Write bench.md, bench.json, bench.csv and bench.svg to a folder
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Fail if a row that the plan chose is beaten by another row of its case in both time and error
+    /// Fail if another method of the same case has both a lower time and a lower error than the planner's
+    /// choice
     #[arg(long)]
     check: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 /// Measures and prints.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let options = Options { cases: args.cases.clone(), quick: args.quick };
     check_files(args)?;
-    let engine = Engine::new(AdapterChoice::Best)?;
-    console.note(format_args!("adapter: {}", engine.gpu().describe()));
+    let engine = args.backend.open()?;
+    console.note(format_args!("rendering on {engine}"));
     let report = measure(&engine, &options, &mut |step| match step {
         Step::Begins(what) => {
             console.note(what);
             Ok(())
         }
-        // What is done is kept if a later case is interrupted.
+        // Written after each case, so that results survive an interruption.
         Step::Done(report) => files(args, report, console),
     })?;
     if args.json {
@@ -76,13 +78,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.note(report.summary());
     match report.violations.len() {
         beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow!(
-            "{beaten} rows that the plan chose are beaten in both time and error; the table lists them"
+            "{beaten} choices of the planner have a higher time and a higher error than another method; the table lists them"
         ))),
         _ => Ok(()),
     }
 }
 
-/// Ten minutes of work are not for a file that cannot be written.
+/// Checks that all files can be written, before ten minutes of measurements.
 fn check_files(args: &Args) -> Result<(), Failure> {
     if let Some(plot) = args
         .plot
@@ -98,7 +100,7 @@ fn check_files(args: &Args) -> Result<(), Failure> {
     [&args.csv, &args.plot].into_iter().flatten().try_for_each(|path| check_output(path))
 }
 
-/// Every file that was asked for, each whole.
+/// Writes the requested files.
 fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), Failure> {
     let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     if let Some(path) = beside("bench.md") {

@@ -1,4 +1,4 @@
-//! `camsim board`: a calibration board's picture, to print, and the points on it.
+//! `camsim board`: the image of a calibration board for printing, and its points.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ use crate::{
     output::{check_output, write_output},
 };
 
-/// Write a calibration board's picture and the places of its corners or circles
+/// Write the image of a calibration board, and the positions of its corners or circles
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -30,11 +30,11 @@ Examples:
 pub struct Args {
     /// Scenario with a [scene.board], or Kalibr's target YAML
     board: PathBuf,
-    /// Picture: .png or linear .exr
+    /// Image file: .png or linear .exr
     #[arg(short, long, value_name = "PICTURE")]
     output: Option<PathBuf>,
-    /// Points as id,x_m,y_m from the board's middle, x right and y down; of a scenario also n_m,e_m,d_m.
-    /// Standard output if there is no picture either
+    /// Points as id,x_m,y_m from the board's centre, x right and y down; for a scenario also n_m,e_m,d_m
+    /// [default without an image: standard output]
     #[arg(long, value_name = "CSV")]
     points: Option<PathBuf>,
 }
@@ -70,9 +70,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     write_output(args.points.as_deref(), console, |out| {
         writeln!(out, "id,x_m,y_m{}", if place.is_some() { ",n_m,e_m,d_m" } else { "" })?;
         for point in board.points() {
-            write!(out, "{},{:?},{:?}", point.id, point.at_m.x, point.at_m.y)?;
+            write!(out, "{},{:?},{:?}", point.id, point.position_m.x, point.position_m.y)?;
             if let Some((centre_ned_m, turn)) = place {
-                let ned = centre_ned_m + turn * point.at_m.extend(0.0);
+                let ned = centre_ned_m + turn * point.position_m.extend(0.0);
                 write!(out, ",{:?},{:?},{:?}", ned.x, ned.y, ned.z)?;
             }
             writeln!(out)?;

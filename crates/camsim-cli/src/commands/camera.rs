@@ -23,25 +23,24 @@ enum Command {
     Import(ImportArgs),
 }
 
-/// Turn another program's calibration into a CAMERA.toml
+/// Convert a calibration of another program to a CAMERA.toml
 ///
 /// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info (file, message, .ini),
 /// camodocal (VINS) YAML, COLMAP cameras.txt, Agisoft Metashape XML, OpenSfM and OpenDroneMap JSON, ORB-SLAM,
 /// OKVIS, Basalt, maplab, rpg_svo and ESIM files, the reference program's XML and Gyroflow lens profiles. The
-/// format is told by content; where a file leaves two readings open nothing is guessed, and --format or
-/// --camera decides.
+/// format is detected by content. If a file is ambiguous, it is not guessed: use --format or --camera.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim camera import camchain.yaml -o CAMERA.toml")]
 struct ImportArgs {
     /// Calibration file
     file: PathBuf,
-    /// Where the camera goes; standard output if left out
+    /// Output file [default: standard output]
     #[arg(short, long, value_name = "CAMERA.toml")]
     output: Option<PathBuf>,
     /// Read the file as this format
     #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(CameraFormat::ALL.map(CameraFormat::name)))]
     format: Option<String>,
-    /// Of several cameras in the file the one of this name
+    /// Name of the camera, if the file has several
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
 }
@@ -72,8 +71,8 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
 }
 
-/// A vignette is named relative to the calibration; the CAMERA.toml may be written elsewhere, so the path is
-/// made absolute where it leads to a file, and spoken of where it doesn't.
+/// A vignette is named relative to the calibration, and the CAMERA.toml may be written elsewhere. So the path
+/// is made absolute if the file exists, and a note is printed otherwise.
 fn keep_vignette_in_reach(imported: &mut ImportedCamera, calibration: &Path) {
     let Some(vignette) = &mut imported.spec.photometric.vignette else { return };
     match calibration.parent().unwrap_or(Path::new("")).join(&vignette).canonicalize() {

@@ -9,23 +9,23 @@ use crate::{
     failure::{Failure, OrFail},
 };
 
-/// Compare two pictures, or two folders of pictures
+/// Compare two images, or two folders of images
 ///
-/// Values are compared as stored, a code range being 0 to 1: EXR with EXR (linear), PNG with PNG (encoded).
-/// In folders, pictures of the same name are compared.
+/// Values are compared as stored, with the code range scaled to 0..1: EXR with EXR (linear), PNG with PNG
+/// (encoded). In folders, images of the same name are compared.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim compare out/color other/color --json")]
 pub struct Args {
-    /// First picture or folder
+    /// First image or folder
     a: PathBuf,
-    /// Second picture or folder
+    /// Second image or folder
     b: PathBuf,
-    /// Print JSON: rmse, max, psnr_db (null for equal pictures), ssim, differing, and each file of a folder
+    /// Print JSON: rmse, max, psnr_db (null for equal images), ssim, differing, and each file of a folder
     #[arg(long)]
     json: bool,
 }
 
-/// Prints how much two things differ.
+/// Prints the differences.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let report = compare_paths(&args.a, &args.b).or_bad_input()?;
     if args.json {
@@ -33,7 +33,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     for (only, folder) in [(&report.only_in_a, &args.a), (&report.only_in_b, &args.b)] {
         if !only.is_empty() {
-            console.warn(format_args!("{} pictures are only in {}", only.len(), folder.display()));
+            console.warn(format_args!("{} images are only in {}", only.len(), folder.display()));
         }
     }
     console.line(format_args!(
@@ -44,11 +44,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console.line(format_args!("{} {}", row(&file.figures), file.file))?;
     }
     let all =
-        if report.files.is_empty() { String::new() } else { format!(" all {} pictures", report.files.len()) };
+        if report.files.is_empty() { String::new() } else { format!(" all {} images", report.files.len()) };
     console.line(row(&report.total) + &all)?;
     if report.total.non_finite > 0 {
         console.warn(format_args!(
-            "{} pixels hold a NaN or an infinity and count only as differing",
+            "{} pixels contain NaN or infinity and count only as differing",
             report.total.non_finite
         ));
     }

@@ -7,7 +7,7 @@ use crate::{console::Console, failure::Failure};
 /// For example: camsim completions bash > ~/.local/share/bash-completion/completions/camsim
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Which shell
+    /// Shell
     shell: clap_complete::Shell,
 }
 

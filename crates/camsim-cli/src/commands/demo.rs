@@ -1,15 +1,16 @@
-//! `camsim demo`: pictures without a scenario of one's own.
+//! `camsim demo`: the built-in flight.
 
 use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use camsim_core::{frame::RenderedFrame, mount::CameraPath, scenario::LensSpec, sequence::Sequence};
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_engine::Engine;
 use camsim_io::{
     builtin,
     write::{WriteError, contact_sheet},
 };
 
 use crate::{
+    backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
     frame_source::Device,
@@ -17,31 +18,33 @@ use crate::{
     render_run::{self, Job},
 };
 
-/// Every n-th frame of the built-in flight is rendered: the turn shows in a few seconds of work.
+/// Every n-th frame of the built-in flight is rendered, so that its turn is covered within a few seconds.
 const FRAME_STEP: usize = 4;
-/// Thumbnails of the contact sheet, and how many stand side by side.
+/// Number of thumbnails on the contact sheet, and per row.
 const SHEET_FRAMES: usize = 12;
 const SHEET_COLUMNS: u32 = 4;
-/// Thumbnails are smaller by this factor.
+/// Reduction factor of the thumbnails.
 const SHEET_SHRINK: u32 = 2;
 
-/// Render the built-in flight: nothing to prepare
+/// Render the built-in flight; no input is needed
 ///
-/// Writes EXR and PNG frames, a contact sheet, and one frame as a perfect and as the imperfect camera sees
-/// it.
+/// Writes EXR and PNG frames, a contact sheet, and one frame of the perfect and the imperfect camera side by
+/// side.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Output folder
     #[arg(short, long, value_name = "DIR", default_value = "camsim-demo")]
     output: PathBuf,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 /// Renders the built-in flight.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let folder = &args.output;
     // The adapter first: without one there is no need to read anything.
-    let engine = Engine::new(AdapterChoice::Best)?;
-    console.note(format_args!("rendering on {}", engine.gpu().adapter));
+    let engine = args.backend.open()?;
+    console.note(format_args!("rendering on {engine}"));
     let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
     let scenario =
         ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
@@ -85,9 +88,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     ))?;
     console.line(format_args!("  {}/   linear EXR and sRGB PNG", folder.join("color").display()))?;
     console.line(format_args!("  {}/    time and pose of each row", folder.join("rows").display()))?;
-    console.line(format_args!("  {}   the flight at a glance", sheet.display()))?;
-    console
-        .line(format_args!("  {}   frame {middle} without and with the camera's flaws", pair.display()))?;
+    console.line(format_args!("  {}   contact sheet of the flight", sheet.display()))?;
+    console.line(format_args!(
+        "  {}   frame {middle} without and with the camera's imperfections",
+        pair.display()
+    ))?;
     console.line("next")?;
     console.line(format_args!("  camsim explain {}", scene.display()))?;
     console

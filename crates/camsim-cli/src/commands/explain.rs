@@ -1,20 +1,17 @@
-//! `camsim explain`: what one frame takes, without rendering it.
+//! `camsim explain`: the plan of one frame, without rendering it.
 
 use camsim_core::{
     scenario::{Auto, LightSpec, Solver},
-    scene::{self, GroundTiles, ModelDetail, SceneLevels, TerrainDetail, TexelForm, tile_bytes},
+    scene::{self, ModelLod, SceneLods, TerrainDetail, TerrainTiles, TexelForm, tile_bytes},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
-use camsim_gpu::{
-    ideal::host::draws,
-    reverse::host::{self, ReverseOn},
-};
 use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
-use camsim_plan::{FramePlan, PlanSummary, Planner};
+use camsim_plan::{FramePlan, Placement, PlanSummary, Planner};
 use serde::Serialize;
 
 use crate::{
+    backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
     frame_list::FrameListError,
@@ -22,11 +19,11 @@ use crate::{
     render_run::source_frame,
 };
 
-/// Largest texture side that plans are made for here: every adapter of the last decade has it, and `explain`
-/// needs none.
+/// Largest texture side assumed for the plan. Every adapter of the last decade supports it, and `explain`
+/// needs no adapter.
 const MAX_SIDE_PX: u32 = 16_384;
 
-/// Show what a frame takes: passes, sizes, samples, bounds, and each thing skipped with its reason
+/// Show the plan of a frame: passes, sizes, samples, error bounds, and what is skipped and why
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim explain flight.toml --frame 7 --set camera.shutter.exposure_ms=0")]
 pub struct Args {
@@ -38,6 +35,8 @@ pub struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 #[derive(Serialize)]
@@ -48,13 +47,14 @@ struct Explained<'a> {
     terrain: Option<Terrain>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
+    placement: Placement,
     source_frame: Source,
     level_of_detail: Option<LevelOfDetail>,
     models: Option<Models>,
     memory: Option<Memory>,
 }
 
-/// What the source coordinates x, y of `coords` are in, by the names that `frames.csv` has for it.
+/// The frame to which the source coordinates x, y of `coords` refer, with the names of `frames.csv`.
 #[derive(Serialize)]
 struct Source {
     ideal_width_px: u32,
@@ -65,7 +65,7 @@ struct Source {
     ideal_cy_px: f64,
     ideal_t_ns: i64,
     ideal_ned_m: [f64; 3],
-    /// ned_from_camera.
+    /// Rotation `ned_from_camera`.
     ideal_q_wxyz: [f64; 4],
 }
 
@@ -102,41 +102,41 @@ struct Tracker {
     saturation: Saturation,
 }
 
-/// What the ideal frame draws of the terrain.
+/// Level of detail of the terrain in the ideal frame.
 #[derive(Serialize)]
 pub(super) struct LevelOfDetail {
     pub(super) triangles: u64,
-    /// Triangles in sight that are left out because they face away.
+    /// Back-facing triangles in sight, which are not drawn.
     pub(super) away: u64,
-    /// Bound on how far the drawn terrain is from the full one, px of the picture.
+    /// Bound on the displacement by the level of detail, output px.
     pub(super) max_error_px: f64,
     pub(super) tolerance_px: f64,
-    /// How far depth may be off for it where the camera looks straight down, as a share of it.
+    /// Bound on the depth error seen from straight above, as a share of the depth.
     pub(super) depth_share: f64,
-    /// What the device holds of its triangles.
+    /// GPU memory of the triangles, bytes.
     pub(super) triangle_bytes: u64,
 }
 
-/// What the ideal frame draws of models and patterns.
+/// Level of detail of models and patterns in the ideal frame.
 #[derive(Serialize)]
 struct Models {
     #[serde(flatten)]
-    detail: ModelDetail,
-    /// Bound on how far what is drawn is from the full models, px of the picture.
+    detail: ModelLod,
+    /// Bound on the displacement by the level of detail, output px.
     tolerance_px: f64,
 }
 
-/// Memory for a terrain and its picture, bytes. Only what is in sight of a frame is on the device, but for a
-/// picture that is held whole.
+/// Memory for a terrain and its texture, bytes. The GPU holds only what is in sight, except for a texture
+/// that is not tiled.
 #[derive(Serialize)]
 struct Memory {
-    /// On the host: heights with what the level of detail needs.
+    /// Host memory: heights, with the data of the level of detail.
     heights_on_host: u64,
-    /// On the host: the picture, with its smaller versions if it is in tiles.
+    /// Host memory: the texture, with its mip levels if it is tiled.
     picture_on_host: u64,
-    /// On the device: the picture, whole or as many tiles as this frame may read.
+    /// GPU memory: the texture, or the tiles that this frame may read.
     picture_on_device: u64,
-    /// For a picture in tiles: those that this frame may read, and all.
+    /// For a tiled texture: the number of tiles that this frame may read, and of all tiles.
     tiles: Option<[u64; 2]>,
 }
 
@@ -166,10 +166,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         console
-            .warn("quality.solver is \"oracle\": `render` casts every ray and needs no plan; this is the one that the engine would make");
+            .warn("quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan of the default solver");
     }
-    let planner =
-        Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
+    let engine = args.backend.open()?;
+    let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, engine.max_side_px())
+        .or_bad_input()?;
+    let planner = planner.with_capabilities(engine.capabilities());
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
@@ -188,6 +190,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             terrain,
             warnings,
             plan: plan.summary(),
+            placement: plan.placement,
             source_frame,
             level_of_detail,
             models,
@@ -216,70 +219,57 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
     print_source(&source_frame, &plan, console)?;
-    if let Some(part) = part_of_host(&loaded.sequence, &plan) {
-        console.line(format_args!(
-            "on a software adapter the host {part} of this frame (`camsim info --help`)"
-        ))?;
-    }
+    let Placement { ideal, reverse } = plan.placement;
+    console.line(format_args!("rendered on {engine}"))?;
+    console.line(format_args!("  ideal frames by the {ideal}, output frame by the {reverse}"))?;
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes }) =
         level_of_detail
     {
         console.line("terrain in this frame")?;
         console.line(format_args!(
-            "  {triangles} triangles, off by at most {max_error_px:.3} px of the picture, of {tolerance_px:.3} allowed"
+            "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance {tolerance_px:.3})"
         ))?;
         console.line(format_args!(
-            "  the depth of what is seen from straight above is off by at most {depth_share:.1e} of it"
+            "  seen from straight above, depth is off by at most {depth_share:.1e} of itself"
         ))?;
         if away > 0 {
-            console.line(format_args!(
-                "  {away} more face away and are not drawn: from above they are hidden"
-            ))?;
+            console.line(format_args!("  {away} back-facing triangles are not drawn"))?;
         }
         if let Some(memory) = memory {
             print_memory(&memory, triangle_bytes, console)?;
         }
     }
-    if let Some(Models { detail: ModelDetail { meshes, triangles, finest_triangles }, tolerance_px }) = models
-    {
+    if let Some(Models { detail: ModelLod { meshes, triangles, finest_triangles }, tolerance_px }) = models {
         console.line("models in this frame")?;
         console.line(format_args!(
-            "  {meshes} meshes of {triangles} triangles, off by at most {tolerance_px:.3} px of the picture; {finest_triangles} at the finest level"
+            "  {meshes} meshes with {triangles} triangles, displaced by at most {tolerance_px:.3} output px; {finest_triangles} triangles at the finest level"
         ))?;
     }
     Ok(())
 }
 
-/// What the host does there in place of the device.
-fn part_of_host(sequence: &Sequence, plan: &FramePlan) -> Option<&'static str> {
-    match host::serves(plan) && draws(&sequence.scene, MAX_SIDE_PX) {
-        true => Some("draws the ideal frame and runs the reverse pipeline"),
-        false => ReverseOn::Best.is_host(plan).then_some("runs the reverse pipeline"),
-    }
-}
-
-/// As the ideal pass chooses for its middle key.
+/// Level of detail that the ideal pass chooses for its middle key frame.
 fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
     let scene = &sequence.scene;
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
-    let detail = || ModelDetail::new(scene, &SceneLevels::new(scene), &plan.ideal_pose(), &tolerance);
+    let detail = || ModelLod::new(scene, &SceneLods::new(scene), &plan.ideal_pose(), &tolerance);
     (!scene.meshes.is_empty()).then(|| Models {
         detail: detail(),
         tolerance_px: tolerance.error_px / plan.ideal.scale(&plan.camera),
     })
 }
 
-/// The choice that the ideal pass makes.
+/// Level of detail that the ideal pass chooses.
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let scale = plan.ideal.scale(&plan.camera);
     let placed =
-        detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
+        detail(terrain, plan).visible_mesh().placed(terrain, plan.ideal_pose().position_ned_m.round());
     let (lod, triangle_bytes) = (placed.lod, placed.bytes());
     let depth_share = plan.terrain_error_px / plan.ideal.focal_px.max_element();
     Some(LevelOfDetail {
         triangles: lod.triangles,
-        away: lod.away,
+        away: lod.back_facing,
         max_error_px: lod.max_error_px / scale,
         tolerance_px: plan.terrain_error_px / scale,
         depth_share,
@@ -300,7 +290,7 @@ fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a
 fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let picture = terrain.texture.rgba8.len() as u64;
-    let heights_on_host = terrain.host_bytes();
+    let heights_on_host = terrain.memory_bytes();
     if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
         return Some(Memory {
             heights_on_host,
@@ -309,7 +299,7 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
             tiles: None,
         });
     }
-    let ground = GroundTiles::new(terrain);
+    let ground = TerrainTiles::new(terrain);
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
     let all = u64::from(ground.grid.count);
     Some(Memory {
@@ -323,12 +313,12 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
 fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (heights, picture) = (mib(memory.heights_on_host), mib(memory.picture_on_host));
-    console.line(format_args!("  host: {heights:.1} MiB of heights, {picture:.1} MiB of picture"))?;
+    console.line(format_args!("  host memory: {heights:.1} MiB of heights, {picture:.1} MiB of texture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
     match memory.tiles {
-        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB, where the device draws it"))?,
+        None => console.line(format_args!("  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {picture:.1} MiB of texture"))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 32 MiB), where the device draws it"
+            "  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {tiles} of {all} texture tiles in {picture:.1} MiB (the cache holds at most twice the largest need of a frame, plus 32 MiB)"
         ))?,
     }
     Ok(())
@@ -354,7 +344,7 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
     Ok(())
 }
 
-/// What x and y of `coords` are in.
+/// Prints the frame to which x and y of `coords` refer.
 fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) -> Result<(), Failure> {
     let Source {
         ideal_width_px,
@@ -373,13 +363,13 @@ fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) ->
     console.line(format_args!(
         "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z {z:.9}, stamp {ideal_t_ns} ns"
     ))?;
-    if plan.shared_by.is_some() {
-        console.line("  which is this frame's own, though several are made from one ideal frame")?;
+    if plan.shared_frames.is_some() {
+        console.line("  this is the frame's own geometry, although several frames share one ideal frame")?;
     }
     Ok(())
 }
 
-/// What light does, and what of it no figure below counts.
+/// Prints the light, with its errors that are not predicted.
 fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
     let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
@@ -391,10 +381,10 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
             let [width, height] = terrain.texture.size_px;
             let finer = match summary.picture_times {
                 1 => String::new(),
-                times => format!(", made {times} times finer for it"),
+                times => format!(", upsampled {times} times"),
             };
             format!(
-                "; in the ground's picture of {width}x{height} px{finer}, in steps of 8 bits that no error below counts"
+                "; baked into the terrain texture of {width}x{height} px{finer}, in steps of 8 bits that are not in the predicted error"
             )
         }
         _ => String::new(),

@@ -1,34 +1,36 @@
 //! `camsim info`.
 
-use camsim_gpu::{
-    Engine,
-    context::{AdapterChoice, AdapterSummary, adapters},
-};
+use camsim_engine::{AdapterChoice, Engine};
+use camsim_gpu::context::{AdapterSummary, adapters};
 use serde::Serialize;
 
-use crate::{console::Console, failure::Failure};
+use crate::{backend::BackendArgs, console::Console, failure::Failure};
 
-/// Show graphics adapters, driver and limits, and which one is used
+/// Show what renders: graphics adapters with driver and limits, the processor, and which is used
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host draws ideal frames and makes output frames from them where it can; CAMSIM_REVERSE=device leaves both to the\nadapter, CAMSIM_REVERSE=host makes all output frames that it can, beside any adapter; CAMSIM_IDEAL=device or host says who draws the ideal\nframes of those. Pictures differ by rounding, and at borders\nof surfaces a little more where ideal frames have four samples a pixel."
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. A software adapter (Mesa's llvmpipe) runs on the processor:\nthere the cpu renderer makes all passes that it vectorises, and the adapter the others. --backend cpu needs no adapter\nat all. Pictures of the two differ by rounding. Exit code 3 if an adapter is demanded and there is none."
 )]
 pub struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 #[derive(Serialize)]
 struct Info {
     version: &'static str,
+    renders: String,
     adapters: Vec<Adapter>,
-    max_side_px: u32,
-    max_storage_buffer_bytes: u64,
-    reverse_on_host: bool,
-    /// And whether it draws the ideal frames of those, where it can.
-    ideal_on_host: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_side_px: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_storage_buffer_bytes: Option<u64>,
     cpu_threads: usize,
+    /// Whether the processor has the vector instructions that make the cpu renderer fast.
+    cpu_vectors: bool,
 }
 
 #[derive(Serialize)]
@@ -47,38 +49,40 @@ impl Adapter {
     }
 }
 
-/// Prints what this machine renders with.
+/// Prints the adapters of this machine.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let engine = Engine::new(AdapterChoice::Best)?;
-    let used = engine.gpu().describe();
-    let limits = engine.gpu().device.limits();
-    let info = Info {
-        version: env!("CARGO_PKG_VERSION"),
-        adapters: adapters(AdapterChoice::Best)
-            .into_iter()
-            .enumerate()
-            .map(|(i, adapter)| Adapter::of(adapter, i == 0))
-            .collect(),
-        max_side_px: engine.gpu().max_side_px(),
-        max_storage_buffer_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
-        reverse_on_host: engine.gpu().reverses_on_host(),
-        ideal_on_host: engine.gpu().draws_on_host(),
-        cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let engine = args.backend.open()?;
+    let info = info(&engine);
     if args.json {
         console.json(&info)?;
         return Ok(());
     }
     console.line(format_args!("camsim {}", info.version))?;
-    console.line(format_args!("used          {used}"))?;
+    console.line(format_args!("renders on    {}", info.renders))?;
     for adapter in info.adapters.iter().filter(|adapter| !adapter.used) {
         console.line(format_args!(
             "also there    {} ({}, {}, {})",
             adapter.name, adapter.kind, adapter.backend, adapter.driver
         ))?;
     }
-    console.line(format_args!("largest side  {} px", info.max_side_px))?;
-    console.line(format_args!("largest table {} MiB", info.max_storage_buffer_bytes >> 20))?;
-    console.line(format_args!("processors    {}", info.cpu_threads))?;
+    if let (Some(side_px), Some(bytes)) = (info.max_side_px, info.max_storage_buffer_bytes) {
+        console.line(format_args!("largest side  {side_px} px"))?;
+        console.line(format_args!("largest table {} MiB", bytes >> 20))?;
+    }
+    let vectors = if info.cpu_vectors { "with" } else { "without" };
+    console.line(format_args!("processors    {}, {vectors} vector instructions", info.cpu_threads))?;
     Ok(())
+}
+
+fn info(engine: &Engine) -> Info {
+    let listed = engine.gpu().map_or_else(Vec::new, |_| adapters(AdapterChoice::Best));
+    Info {
+        version: env!("CARGO_PKG_VERSION"),
+        renders: engine.to_string(),
+        adapters: listed.into_iter().enumerate().map(|(i, adapter)| Adapter::of(adapter, i == 0)).collect(),
+        max_side_px: engine.gpu().map(|gpu| gpu.max_side_px()),
+        max_storage_buffer_bytes: engine.gpu().map(|gpu| gpu.max_storage_bytes()),
+        cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
+        cpu_vectors: engine.capabilities().has_vectors,
+    }
 }

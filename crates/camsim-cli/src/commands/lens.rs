@@ -1,4 +1,4 @@
-//! `camsim lens`: points through a camera's lens, and what the calibration is worth.
+//! `camsim lens`: projects points through a lens, and checks the lens.
 
 use std::{
     fs::File,
@@ -17,7 +17,7 @@ use crate::{
     output::write_output,
 };
 
-/// Take points through a camera's lens, or check the lens
+/// Distort or undistort points with a camera's lens, or check the lens
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -34,11 +34,11 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px (NaN where u or v is not finite)
+    /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px (NaN if u or v is not finite)
     Distort(PointsArgs),
-    /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no answer)
+    /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no inverse)
     Undistort(PointsArgs),
-    /// Where the model folds, how much of the image has an inverse, and the worst forward-backward error
+    /// Show where the model folds, the share of the image with an inverse, and the largest round-trip error
     Check {
         /// Print JSON
         #[arg(long)]
@@ -48,10 +48,10 @@ enum Command {
 
 #[derive(Debug, clap::Args)]
 struct PointsArgs {
-    /// CSV of points; standard input if left out
+    /// CSV of points [default: standard input]
     #[arg(long, value_name = "CSV")]
     points: Option<PathBuf>,
-    /// Where the answers go, a row for each row; standard output if left out
+    /// Output CSV, one row per input row [default: standard output]
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
 }
@@ -71,7 +71,7 @@ fn read_camera(path: &Path) -> Result<CameraModel, Failure> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("{}: cannot be read", path.display()))
         .or_bad_input()?;
-    // What is not TOML at all is for the reader of camera files to explain.
+    // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
     let spec = if root.contains_key("camera") || root.contains_key("flight") {
         read_scenario(path, &[], None).or_bad_input()?.camera
@@ -97,15 +97,12 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
     })?;
     if beyond > 0 {
         console.warn(format_args!(
-            "{beyond} of {} points lie beyond the fold of the lens: the formula gives them pixels, but no camera shows them there",
+            "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but no real lens images them there",
             points.len()
         ));
     }
     if unknown > 0 {
-        console.warn(format_args!(
-            "{unknown} of {} points are not finite numbers: they have no pixels",
-            points.len()
-        ));
+        console.warn(format_args!("{unknown} of {} points are not finite and have no pixels", points.len()));
     }
     warn_of_none(&points, console);
     Ok(())
@@ -113,7 +110,7 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
 
 fn warn_of_none(points: &[DVec2], console: &mut Console<'_>) {
     if points.is_empty() {
-        console.warn("there are no points: the answer is a header alone");
+        console.warn("there are no points: only the header is written");
     }
 }
 
@@ -147,13 +144,13 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
         }
         _ => console.line("folds                          nowhere")?,
     }
-    console.line(format_args!("worst forward-backward error   {worst_roundtrip_px:.3e} px"))?;
+    console.line(format_args!("largest round-trip error       {worst_roundtrip_px:.3e} px"))?;
     let answer = if bijective {
         "yes"
     } else {
-        "no: some pixels have several ideal rays, so this calibration is not usable there"
+        "no: some pixels have several ideal rays, so the calibration is unusable there"
     };
-    console.line(format_args!("one ray a pixel                {answer}"))?;
+    console.line(format_args!("one ray per pixel              {answer}"))?;
     Ok(())
 }
 
@@ -201,7 +198,7 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
                 record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
             text.parse().map_err(|_| {
                 anyhow!(
-                    "line {line}: {} is `{text}`, which is no number; expected the columns {}",
+                    "line {line}: {} is `{text}`, which is not a number; expected the columns {}",
                     columns[i],
                     columns.join(",")
                 )
@@ -212,7 +209,7 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
     Ok(points)
 }
 
-/// Where the columns are, if the row names both. A byte-order mark may precede the first name.
+/// Indices of the columns, if the row names both. A byte-order mark may precede the first name.
 fn header(row: &csv::StringRecord, columns: [&str; 2]) -> Option<[usize; 2]> {
     let place = |name: &str| {
         row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
@@ -229,7 +226,7 @@ mod tests {
     const UV: [&str; 2] = ["u", "v"];
 
     #[test]
-    fn points_are_read_by_name_or_by_place() {
+    fn points_are_read_by_name_or_position() {
         let both = vec![DVec2::new(1.0, 2.0), DVec2::new(-3.5, 4e-3)];
         for text in [
             "u,v\n1,2\n-3.5,4e-3\n",
@@ -244,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_points_are_named_by_line() {
+    fn invalid_points_are_reported_by_line() {
         for (text, wanted) in [
             ("u,v\n1,x\n", "line 2: v is `x`"),
             ("u,v\n1\n", "line 2: v is missing"),

@@ -1,4 +1,4 @@
-//! `camsim render`: the main job.
+//! `camsim render`.
 
 use std::{
     ops::ControlFlow,
@@ -7,11 +7,12 @@ use std::{
 
 use anyhow::anyhow;
 use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Scenario, Solver, validate};
-use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
+use camsim_engine::Finished;
 use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::{
+    backend,
     console::Console,
     failure::{FAILED, Failure, OrFail},
     frame_list::{FrameList, Shard},
@@ -24,10 +25,10 @@ use crate::{
 /// Render the frames of a scenario
 ///
 /// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv
-/// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json, by
-/// which the run can be repeated: `camsim render DIR/run.json`. Paths in these files are relative to them, so
-/// that a folder can be moved together with what it names. Ctrl-C ends after the frames that are under way,
-/// and says how to go on.
+/// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json,
+/// which repeats the run: `camsim render DIR/run.json`. Paths in these files are relative to them, so a
+/// folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
+/// command that resumes the run.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -36,54 +37,69 @@ Examples:
   camsim render flight.toml --set camera.lens.model=pinhole --set 'camera.lens.coefficients=[]'
   camsim render flight.toml -o out --shard 2/4        the second of four machines
   camsim render flight.toml -o out --resume           only what is missing
+  camsim render flight.toml --backend cpu             without a graphics adapter
   camsim render flight.toml --backend reference --frames 7
-                                                      exactly and slowly, without a graphics adapter
+                                                      exactly and slowly
   camsim render flight.toml --format none --frames 0..50 --times
                                                       how fast, and where the time goes
-  camsim render --print-default > flight.toml         a scenario to begin with")]
+  camsim render --print-default > flight.toml         a scenario to start from")]
 pub struct Args {
     /// Scenario (TOML), or the run.json of an earlier run
     #[arg(required_unless_present = "print_default")]
     scenario: Option<PathBuf>,
-    /// Output folder; the scenario's name + "-frames" if left out
+    /// Output folder [default: the scenario's name + "-frames"]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Which frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; all if left out
+    /// Frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: all]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
     #[command(flatten)]
     changes: Changes,
-    /// What renders; gpu if left out, or reference where quality.solver is "oracle"
+    /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "oracle"]
     #[arg(long, value_enum)]
     backend: Option<Backend>,
-    /// Channels instead of output.channels
+    /// Channels, in place of output.channels
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = channel_parser())]
     outputs: Option<Vec<Channel>>,
-    /// File formats instead of output.format; none renders and reads back but writes no frame (for timing)
+    /// File formats, in place of output.format; none renders and reads back without writing frames (for
+    /// timing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Option<Vec<Format>>,
-    /// Keep frames whose files are there already (files are written whole, so what is in them is not read
-    /// again); refused if the folder is of another scenario, or a file that it names has changed
+    /// Keep frames whose files exist already (files are written completely, so they are not read again);
+    /// refused if the folder belongs to another scenario, or one of its input files has changed
     #[arg(long)]
     resume: bool,
-    /// Say at the end where the time went: on the host, and pass by pass on the device
+    /// Print the time of each stage at the end: on the host, and by pass on the GPU
     #[arg(long)]
     times: bool,
-    /// Render the I-th of N parts only, I from 1
+    /// Render only the I-th of N parts, with I from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Print a scenario with every key, its default and its meaning, and stop
+    /// Print a scenario with every key, its default and its meaning, and exit
     #[arg(long, exclusive = true)]
     print_default: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Backend {
-    /// The engine on wgpu, also on a software adapter
+    /// This machine's processor alone; needs no Vulkan driver
+    Cpu,
+    /// The graphics adapter alone, a software adapter where there is no card
     Gpu,
-    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as
-    /// quality.solver = "oracle", so no other solver goes with it, nor the paper's preset
+    /// The slow exact renderer: one ray per sample, in f64 on the CPU. It is equivalent to quality.solver =
+    /// "oracle", and excludes other solvers and the paper's preset
     Reference,
+}
+
+impl Backend {
+    /// The renderer of the engine, if it is one.
+    fn renderer(self) -> Option<backend::Backend> {
+        match self {
+            Self::Cpu => Some(backend::Backend::Cpu),
+            Self::Gpu => Some(backend::Backend::Gpu),
+            Self::Reference => None,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -92,7 +108,7 @@ enum Format {
     Exr,
     /// PNG in the encoding of camera.photometric.output
     Png,
-    /// No files of frames
+    /// No frame files
     None,
 }
 
@@ -107,7 +123,7 @@ const CHANNELS: [(&str, Channel); 5] = [
 fn channel_parser() -> impl TypedValueParser<Value = Channel> {
     PossibleValuesParser::new(CHANNELS.map(|(name, _)| name)).try_map(|name| {
         let known = CHANNELS.into_iter().find(|(known, _)| *known == name);
-        known.map(|(_, channel)| channel).ok_or_else(|| format!("`{name}` is no channel"))
+        known.map(|(_, channel)| channel).ok_or_else(|| format!("`{name}` is not a channel"))
     })
 }
 
@@ -121,7 +137,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
     let mut times = TimesTable::default();
     let is_quiet = console.is_quiet();
-    let loaded = times.timed("scenario's files", is_quiet, || inputs::load(&scenario, console))?;
+    let loaded = times.timed("scenario files", is_quiet, || inputs::load(&scenario, console))?;
     let frames = match &args.frames {
         None => (0..loaded.sequence.frames).collect(),
         Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
@@ -136,13 +152,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         warnings: &loaded.warnings,
         go_on: &go_on,
     };
+    let renderer = args.backend.and_then(Backend::renderer);
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        Box::new(times.timed("scene for rays", is_quiet, || Rays::new(&loaded.sequence))?)
+        Box::new(times.timed("ray-casting structures", is_quiet, || Rays::new(&loaded.sequence))?)
     } else {
-        engine = times.timed("adapter", is_quiet, || Engine::new(AdapterChoice::Best))?;
-        let mut device =
-            times.timed("scene onto the adapter", is_quiet, || Device::new(&engine, &loaded.sequence))?;
+        engine = times.timed("adapter", is_quiet, || backend::open(renderer))?;
+        let mut device = times.timed("scene upload", is_quiet, || Device::new(&engine, &loaded.sequence))?;
         if args.times {
             device.time_passes();
         }
@@ -155,17 +171,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let outcome = render_run::run(&job, &mut *source, console, &mut look).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
-            console.note(format_args!(
-                "frames that are written stay as they are; to go on with the others: {go_on}"
-            ));
+            console.note(format_args!("written frames are kept; to resume: {go_on}"));
         }
     })?;
     if !console.is_quiet() {
-        let kept = if outcome.skipped > 0 {
-            format!(" ({} were there already)", outcome.skipped)
-        } else {
-            String::new()
-        };
+        let kept =
+            if outcome.skipped > 0 { format!(" ({} existed)", outcome.skipped) } else { String::new() };
         let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
         let size_mb = outcome.bytes as f64 * 1e-6;
         let (frames, folder) = (outcome.frames, folder.display());
@@ -186,13 +197,13 @@ fn default_folder(scenario: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// `--backend reference` is written into the scenario, so that frames of the two backends never mix in one
+/// `--backend reference` becomes part of the scenario, so that frames of the two renderers never mix in one
 /// folder.
 fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scenario, Failure> {
     let oracle = Auto::Value(Solver::Oracle);
     let refused = |what: &str| {
         Err(Failure::bad_input(anyhow!(
-            "{what} does not go with --backend reference, which casts exact rays whatever the methods: leave --backend out, or use the default \
+            "{what} cannot be combined with --backend reference, which always casts exact rays: leave --backend out, or use the default \
              preset and solver (--preset default --set quality.solver=auto)"
         )))
     };
@@ -207,16 +218,16 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
                 Auto::Value(Solver::Rk2) => return refused("quality.solver = \"rk2\""),
                 Auto::Value(Solver::Reproject) => return refused("quality.solver = \"reproject\""),
             }
-            // Keys that go with `auto` and not with the oracle.
+            // Keys that are valid with `auto` but not with the oracle.
             if let Some(problem) = validate(&scenario).first() {
                 return Err(Failure::bad_input(anyhow!(
                     "{problem} (--backend reference is quality.solver = \"oracle\")"
                 )));
             }
         }
-        Some(Backend::Gpu) if scenario.quality.solver == oracle => {
+        Some(Backend::Cpu | Backend::Gpu) if scenario.quality.solver == oracle => {
             return Err(Failure::bad_input(anyhow!(
-                "quality.solver is \"oracle\", which --backend gpu does not have: leave --backend out, or change the solver (--set quality.solver=auto)"
+                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or change the solver (--set quality.solver=auto)"
             )));
         }
         _ => {}
@@ -238,7 +249,7 @@ fn with_outputs(mut scenario: Scenario, args: &Args) -> Result<Scenario, Failure
         scenario.output.format = without_repeats(&images.collect::<Vec<_>>());
         if formats.contains(&Format::None) && !scenario.output.format.is_empty() {
             return Err(Failure::bad_input(anyhow!(
-                "--format none stands alone: leave it out, or the other formats"
+                "--format none cannot be combined with other formats: leave it out, or the others"
             )));
         }
     }

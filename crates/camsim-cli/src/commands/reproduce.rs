@@ -3,28 +3,28 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_gpu::{AdapterChoice, Engine};
 use camsim_lab::reproduce::{Experiment, ReproduceError, Setup};
 
 use crate::{
+    backend::BackendArgs,
     console::Console,
     failure::{BAD_INPUT, Failure},
     output::check_folder,
 };
 
-/// Names the folder of the paper's inputs where `--data` does not.
+/// Environment variable with the folder of the paper's inputs, used without `--data`.
 const DATA_VARIABLE: &str = "CAMSIM_DATA";
-/// Pictures that circles can be found in, and that an adapter holds.
+/// Frame widths in which circles can be detected, and that an adapter supports.
 const WIDTHS_PX: std::ops::RangeInclusive<u32> = 96..=4096;
 
-/// Do the experiments of the paper's section 8 again
+/// Reproduce the experiments of section 8 of the paper
 ///
-/// Each experiment prints its tables and writes a folder of its own: tables (CSV), plots (SVG), pictures
-/// (PNG) and report.md with all of them. What came out, beside what the paper printed: docs/REPRODUCTION.md.
+/// Each experiment prints its tables and writes its own folder with tables (CSV), plots (SVG), images (PNG)
+/// and a report.md. Results beside those of the paper: docs/REPRODUCTION.md.
 ///
-/// The paper's flight log, camera poses and target are not part of camsim. Give their folder with --data (or
-/// the environment variable CAMSIM_DATA); without it, tracking, lens and map run on built-in substitutes and
-/// say so. The others need no file.
+/// The paper's flight log, camera poses and target are not part of camsim. Name their folder with --data (or
+/// the environment variable CAMSIM_DATA). Without it, tracking, lens and map run on built-in substitutes,
+/// with a note. The other experiments need no files.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Experiments:
@@ -41,22 +41,24 @@ Examples:
   camsim reproduce                                  all of them, in ./camsim-reproduce
   camsim reproduce time blur -o out                 two of them
   camsim reproduce tracking --data ~/camsim-data    on the paper's own log: ~/camsim-data/camsim/path_lawnmower.csv
-  camsim reproduce time --width 160                 small pictures, quick")]
+  camsim reproduce time --width 160                 small frames, fast")]
 pub struct Args {
-    /// Which ones; all if left out
+    /// Experiments [default: all]
     #[arg(value_name = "EXPERIMENT", value_enum)]
     experiments: Vec<Which>,
-    /// Output folder; each experiment has a folder in it
+    /// Output folder, with a folder for each experiment
     #[arg(short, long, value_name = "DIR", default_value = "camsim-reproduce")]
     output: PathBuf,
     /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/,
     /// terrain/
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In those of 128 px and less
-    /// lens finds no circle
+    /// Width of the frames (4:3), 96 to 4096 px; those of the paper are 640 px wide. At 128 px and less, lens
+    /// finds no circle
     #[arg(long, value_name = "PX", default_value_t = 640)]
     width: u32,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 /// An experiment, on the command line.
@@ -95,14 +97,14 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let data = data_folder(args)?;
     check_folder(&args.output)?;
-    // In the paper's order, whatever the order of the words.
+    // In the order of the paper.
     let asked: Vec<Experiment> = args.experiments.iter().map(|which| which.experiment()).collect();
     let chosen: Vec<Experiment> = Experiment::ALL
         .into_iter()
         .filter(|experiment| asked.is_empty() || asked.contains(experiment))
         .collect();
-    let engine = Engine::new(AdapterChoice::Best)?;
-    console.note(format_args!("rendering on {}", engine.gpu().adapter));
+    let engine = args.backend.open()?;
+    console.note(format_args!("rendering on {engine}"));
     if data.is_none() {
         console.note(format_args!(
             "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"
@@ -110,7 +112,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let scratch = args.output.join("inputs");
     let setup = Setup { engine: &engine, data: data.as_deref(), scratch: &scratch, width_px: args.width };
-    // What one experiment lacks is no reason to leave out the others.
+    // A failed experiment does not stop the others.
     let mut failures = Vec::new();
     for experiment in &chosen {
         console.note(format_args!("{} ...", experiment.name()));
@@ -128,7 +130,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let names = failures.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let error = anyhow!(
-        "{} of {} experiments were not done: {names}; the reasons stand above",
+        "{} of {} experiments failed: {names}; for the reasons see above",
         failures.len(),
         chosen.len()
     );
@@ -139,7 +141,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     })
 }
 
-/// Does one experiment, writes its folder and prints its tables.
+/// Runs one experiment, writes its folder and prints its tables.
 fn one(
     experiment: Experiment,
     setup: &Setup<'_>,
@@ -156,7 +158,7 @@ fn one(
     for (_, table) in &report.tables {
         console.line(format_args!("\n{}", table.text().trim_end()))?;
     }
-    console.line(format_args!("\n  all of it: {}\n", folder.join("report.md").display()))?;
+    console.line(format_args!("\n  report: {}\n", folder.join("report.md").display()))?;
     Ok(console.flush()?)
 }
 
@@ -178,7 +180,7 @@ fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
     )))
 }
 
-/// Files that cannot be read are bad input; everything else failed on the way.
+/// Files that cannot be read are invalid input; other errors are failures of the run.
 fn of_reproduction(error: ReproduceError) -> Failure {
     match error {
         ReproduceError::Gpu(error) => error.into(),

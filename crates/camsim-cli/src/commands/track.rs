@@ -1,4 +1,4 @@
-//! `camsim track`: the platform's motion without any picture.
+//! `camsim track`: the platform's motion, without frames.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,9 @@ use anyhow::anyhow;
 use camsim_core::{
     mount::CameraPath,
     scenario::Scenario,
-    tracker::{Channels, Hold, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
+    tracker::{
+        Channels, MotionUse, ResolvedLimits, Saturation, SaturationInterval, TrackReport, TrackResult,
+    },
     trajectory::Trajectory,
 };
 use camsim_io::write::{camera_trajectory_csv, trajectory_csv};
@@ -20,17 +22,16 @@ use crate::{
     render_run::{body_at, camera_at},
 };
 
-/// Rows that a trajectory file may have: the table is made in memory, about 300 bytes a row.
+/// Most rows of a trajectory file: the table is built in memory, about 300 bytes per row.
 const MOST_ROWS: f64 = 10e6;
 
-/// Follow the flight log and print the motion, without pictures
+/// Track the flight log and print the motion, without rendering
 ///
 /// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz
 /// (body rates, rad/s), alphax,alphay,alphaz (rad/s^2); with --of camera t_s,n_m,e_m,d_m, vn,ve,vd,
 /// qw,qx,qy,qz (ned_from_camera), wx,wy,wz (in optical axes): the optical centre with lever arm, mount and
-/// vibration. Rows begin with the first instant of flight.window_s and follow at the rate up to its end;
-/// without a window they are of all of the log. t_s is as in the log, or as output.stamps says. The report is
-/// of the whole log.
+/// vibration. Rows cover flight.window_s at the given rate, or the whole log without a window. t_s is on the
+/// clock of output.stamps. The report covers the whole log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -40,17 +41,17 @@ Examples:
 pub struct Args {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// Whose motion
+    /// Whose motion is printed
     #[arg(long, value_enum, default_value = "body")]
     of: Of,
-    /// Rows a second; tracker.rate_hz if left out
+    /// Rows per second [default: tracker.rate_hz]
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Where the motion goes; standard output if left out (with --report: not written then)
+    /// Output file [default: standard output; with --report the motion is not written]
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
     /// Print RMS and largest error against the interpolated log, the largest speeds and accelerations used,
-    /// and which limits held the motion back and when
+    /// and the intervals in which limits were reached
     #[arg(long)]
     report: bool,
     /// Print the report as JSON
@@ -60,7 +61,7 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Of {
-    /// The platform, which the log is of
+    /// The platform, whose motion the log contains
     Body,
     /// The camera on it, with lever arm, mount and vibration
     Camera,
@@ -73,12 +74,12 @@ struct Report<'a> {
     measured: &'a TrackReport,
     limits: ResolvedLimits,
     saturation: Saturation,
-    /// The longest times at a limit, seconds on the log's clock.
-    holds: Vec<Hold>,
+    /// Longest intervals at a limit, seconds on the log's clock.
+    saturation_intervals: Vec<SaturationInterval>,
 }
 
-/// Times at a limit that are printed.
-const SHOWN_HOLDS: usize = 10;
+/// Number of intervals at a limit that are printed.
+const SHOWN_INTERVALS: usize = 10;
 
 /// Tracks the log, writes the motion, prints the report.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -114,12 +115,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Path time of the window's beginning.
+/// Path time of the window's begin.
 fn window_start_s(scenario: &Scenario) -> f64 {
     scenario.flight.window_s.map_or(0.0, |[start_s, _]| start_s / scenario.flight.speed)
 }
 
-/// The window, or all of the log.
+/// The window, or the whole log.
 fn span_s(scenario: &Scenario, trajectory: &Trajectory) -> [f64; 2] {
     let all = trajectory.span_s();
     scenario.flight.window_s.map_or([all.0, all.1], |window| window.map(|t_s| t_s / scenario.flight.speed))
@@ -129,7 +130,7 @@ fn warn_of_few(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
     let vibration_hz = path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
-            "{rate_hz} rows a second are too few to show the mount's vibration of {vibration_hz} Hz: give --rate {:.0} or more",
+            "{rate_hz} rows per second are too few for the mount's vibration of {vibration_hz} Hz: use --rate {:.0} or more",
             8.0 * vibration_hz
         ));
     }
@@ -152,20 +153,24 @@ fn row_count([start_s, end_s]: [f64; 2], rate_hz: f64) -> Result<u64, Failure> {
 
 fn report(
     json: bool,
-    tracked: &Tracked,
+    tracked: &TrackResult,
     measured: &TrackReport,
     epoch_ns: i64,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    let Tracked { limits, saturation, rate_hz, .. } = *tracked;
+    let TrackResult { limits, saturation, rate_hz, .. } = *tracked;
     let on_clock = |t_s: f64| epoch_ns as f64 * 1e-9 + t_s;
-    let holds: Vec<Hold> = tracked
-        .holds
+    let saturation_intervals: Vec<SaturationInterval> = tracked
+        .saturation_intervals
         .iter()
-        .map(|hold| Hold { from_s: on_clock(hold.from_s), to_s: on_clock(hold.to_s), ..*hold })
+        .map(|interval| SaturationInterval {
+            from_s: on_clock(interval.from_s),
+            to_s: on_clock(interval.to_s),
+            ..*interval
+        })
         .collect();
     if json {
-        return Ok(console.json(&Report { rate_hz, measured, limits, saturation, holds })?);
+        return Ok(console.json(&Report { rate_hz, measured, limits, saturation, saturation_intervals })?);
     }
     let TrackReport { rms, max_error, max_used, samples, .. } = measured;
     console.line(format_args!("{samples} instants at {rate_hz} Hz, against the interpolated log"))?;
@@ -173,22 +178,19 @@ fn report(
     for ((name, rms), (_, max)) in channels(rms).into_iter().zip(channels(max_error)) {
         console.line(format_args!("{name:<12} {rms:>12.5} {max:>12.5}"))?;
     }
-    console.line(format_args!(
-        "{:<28} {:>12} {:>12} {:>12}",
-        "motion", "used at most", "limit", "held back, s"
-    ))?;
+    console.line(format_args!("{:<28} {:>12} {:>12} {:>12}", "motion", "largest", "limit", "at limit, s"))?;
     for (name, used, limit, held_s) in motion(max_used, &limits, &saturation) {
         console.line(format_args!("{name:<28} {used:>12.4} {limit:>12.4} {held_s:>12.3}"))?;
     }
-    if holds.is_empty() {
-        return Ok(console.line("no limit held the motion back")?);
+    if saturation_intervals.is_empty() {
+        return Ok(console.line("no limit was reached")?);
     }
-    console.line("held back longest, seconds on the log's clock")?;
-    for hold in holds.iter().take(SHOWN_HOLDS) {
-        let (key, duration_s) = (hold.limit.key(), hold.duration_s());
+    console.line("longest intervals at a limit, seconds on the log's clock")?;
+    for interval in saturation_intervals.iter().take(SHOWN_INTERVALS) {
+        let (key, duration_s) = (interval.limit.key(), interval.duration_s());
         console.line(format_args!(
             "  {:.3} to {:.3} ({duration_s:.3} s) by tracker.{key}",
-            hold.from_s, hold.to_s
+            interval.from_s, interval.to_s
         ))?;
     }
     Ok(())
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn hopeless_rates_are_refused() {
+    fn invalid_rates_are_refused() {
         let trajectory = Trajectory::listed(vec![0.0], 10.0, vec![still()]).unwrap();
         let span_s = <[f64; 2]>::from(trajectory.span_s());
         assert_eq!(row_count(span_s, 10.0).unwrap(), 101);

@@ -1,71 +1,69 @@
-//! `camsim verify`: the measured error of frames beside the predicted one.
+//! `camsim verify`: measured errors of frames against predicted ones.
 
 use std::convert::Infallible;
 
 use anyhow::anyhow;
 use camsim_core::{
     reference::{
-        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, IdealView, Judged, Oracle, RenderOptions,
-        TruthErrors, coord_errors, holes, image_errors, silhouettes, truth_errors,
+        CoordErrors, DEPTH_TOLERANCE, Disocclusion, ErrorStats, ErrorVerdict, IdealView, Oracle,
+        RenderOptions, TruthErrors, coord_errors, disocclusion, image_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, Channel, Solver},
 };
-use camsim_gpu::{
-    AdapterChoice, Engine,
-    engine::{Finished, Session},
-};
+use camsim_engine::{Finished, Session};
 use camsim_plan::{FramePlan, Predicted};
 use serde::Serialize;
 
 use super::explain::{LevelOfDetail, level_of_detail};
 use crate::{
+    backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
     frame_list::FrameList,
     inputs::{self, ScenarioArgs},
 };
 
-/// Frames that are looked at if none are named.
+/// Number of frames to verify by default.
 const DEFAULT_FRAMES: u64 = 5;
 
-/// Render frames with their plan and with the exact oracle, and show the measured error beside the predicted
-/// one
+/// Measure the errors of frames against the oracle, and compare them with the predicted errors
 ///
-/// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its
-/// own instant the plan has looked, in pixels of the ideal frame. Pixels within 3 px of a silhouette, or
-/// whose point the ideal frame does not see, are counted apart. With an exposure several of its instants are
-/// measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is above
-/// quality.max_error_px, and with --pictures if a picture is farther off than quality.max_error_dn. Beneath
-/// stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than
-/// a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than a hundredth
-/// is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
+/// The source error is the distance, in pixels of the ideal frame, between the source that was used for a
+/// pixel and that of its exact ray. Pixels within 3 px of a silhouette, and pixels whose point the ideal
+/// frame does not show, are listed separately. With an exposure, several of its instants are measured, and
+/// the worst is shown. The exit code is 1 if the 99th percentile of any frame is above quality.max_error_px,
+/// and with --pictures if the picture error is above quality.max_error_dn. If fewer than one pixel in twenty
+/// is away from silhouettes, the 99th percentile is that of all pixels. If more than one in a hundred is
+/// missing or falsely valid, or none can be compared, there is no percentile and the tolerance is exceeded. A
+/// second line shows the disoccluded share of the picture, predicted and measured.
 ///
-/// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands
-/// in a column of its own: the measured errors of sources hold only what it does to parallax. What it does to
-/// the picture is in the predicted error of that and measured by --pictures.
+/// The terrain is drawn at a level of detail within quality.max_terrain_error_px. The bound has its own
+/// column, because the source errors contain only its effect on parallax. Its effect on the picture is part
+/// of the predicted picture error, and --pictures measures it.
 ///
-/// Depth and points (north, east, down) of every pixel, at silhouettes too, are compared with the surface
-/// that the pixel's own ray meets. A depth or point that is off by more than 0.1 % of the depth, and that no
-/// surface within quality.max_error_px of the pixel's centre has, is a fault: one is enough for exit code 1.
+/// Depth and point (north, east, down) of every pixel, silhouettes included, are compared with the surface
+/// that the pixel's exact ray hits. A depth or point that is off by more than 0.1 % of the depth is a fault
+/// if no surface within quality.max_error_px of the pixel's centre has it. A single fault gives exit code 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  camsim verify flight.toml                            five frames spread over the sequence
-  camsim verify flight.toml --frames 0..10 --pictures  the light as well, against the oracle's own picture (slow)
+  camsim verify flight.toml                            five frames, evenly spread over the sequence
+  camsim verify flight.toml --frames 0..10 --pictures  the picture error as well, against the oracle's frame (slow)
   camsim verify flight.toml --set quality.max_error_px=0.001 --json")]
 pub struct Args {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// Which frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; five spread evenly if left
-    /// out
+    /// Frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: five, evenly spread]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
-    /// Compare the picture too: the oracle renders it, many rays a pixel
+    /// Measure the picture error too; the oracle renders each frame with many rays per pixel
     #[arg(long)]
     pictures: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
 }
 
 #[derive(Serialize)]
@@ -84,42 +82,43 @@ struct Verified {
     frame: u64,
     predicted: Predicted,
     measured: Measured,
-    /// Depths and points of all pixels; `None` where the solver tells where it looks and not what is there.
+    /// Errors of depths and points; `None` for solvers that compute sources without exact depths.
     truth: Option<Truth>,
-    /// The terrain as drawn.
+    /// Level of detail of the terrain.
     level_of_detail: Option<LevelOfDetail>,
-    /// Whether the 99th percentile that the frame is judged by is within the tolerance, and within the
-    /// prediction.
+    /// Whether the frame's 99th percentile is within the tolerance.
     kept: bool,
+    /// Whether the frame's 99th percentile is within the prediction.
     as_predicted: bool,
     picture: Option<Picture>,
-    /// What the prediction for the picture leaves out.
+    /// Causes of picture error that are not predicted.
     not_in_the_picture: Vec<String>,
 }
 
 #[derive(Serialize)]
 struct Measured {
-    /// Without those at silhouettes.
+    /// Pixels away from silhouettes.
     smooth: Figures,
     silhouettes: Figures,
     all: Figures,
-    /// Whose 99th percentile is held to the tolerance: "smooth", "all" where hardly any pixel is smooth, or
-    /// "nothing" where too many are falsely valid or missing.
+    /// Pixels whose 99th percentile is compared with the tolerance: "smooth", "all" if hardly any pixel is
+    /// smooth, or "nothing" if too many are falsely valid or missing.
     judged_by: &'static str,
     falsely_valid: u64,
     missing: u64,
-    /// Share of the picture that shows what no ideal frame sees.
-    hole_share: f64,
+    /// Disoccluded share of the picture.
+    disocclusion_share: f64,
 }
 
-/// Errors are shares of the depth; `null` where a surface is told for the sky or the sky for a surface.
+/// Errors are shares of the depth; `null` if sky and surface are confused.
 #[derive(Serialize)]
 struct Truth {
-    /// Whether every depth and point belongs to a surface that the pixel may see.
+    /// Whether every depth and point belongs to a surface near the pixel's ray.
     kept: bool,
     pixels: u64,
-    /// Depths off by more than 0.1 %, and those among them that no surface near the pixel has.
+    /// Number of depths that are off by more than 0.1 %.
     depth_beyond: u64,
+    /// Number of those that belong to no surface near the pixel's ray.
     depth_faults: u64,
     depth_max: Option<f64>,
     points_beyond: u64,
@@ -131,7 +130,7 @@ impl From<TruthErrors> for Truth {
     fn from(errors: TruthErrors) -> Self {
         let finite = |error: f64| error.is_finite().then_some(error);
         Self {
-            kept: errors.kept(),
+            kept: errors.is_consistent(),
             pixels: errors.pixels,
             depth_beyond: errors.depth_beyond,
             depth_faults: errors.depth_faults,
@@ -151,13 +150,13 @@ struct Figures {
     max_px: f64,
 }
 
-/// PSNR in dB on linear values, peak 1; `null` where there are no pixels or no difference.
+/// PSNR in dB on linear values, peak 1; `null` without pixels or without a difference.
 #[derive(Serialize)]
 struct Picture {
-    /// RMS over the whole picture, 1/255 of the linear range: what `quality.max_error_dn` bounds.
+    /// RMS error of the picture in DN, which `quality.max_error_dn` bounds.
     rms_dn: f64,
     predicted_dn: f64,
-    /// Whether that is within the tolerance.
+    /// Whether `rms_dn` is within the tolerance.
     kept: bool,
     psnr_db: Option<f64>,
     smooth_psnr_db: Option<f64>,
@@ -176,7 +175,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         return Err(Failure::bad_input(anyhow!(
-            "quality.solver is \"oracle\", which is what plans are verified against: leave it out, or add --set quality.solver=auto"
+            "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set quality.solver=auto"
         )));
     }
     let loaded = inputs::load(&scenario, console)?;
@@ -186,19 +185,20 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         None => spread(sequence.frames),
     };
     let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
-    let engine = Engine::new(AdapterChoice::Best)?;
+    let engine = args.backend.open()?;
     check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;
-    let adapter = engine.gpu().describe();
+    let adapter = engine.to_string();
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
     let tolerance_px = scenario.quality.max_error_px;
     let tolerance_dn = scenario.quality.max_error_dn;
     let mut report = Report { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
     if !args.json {
         let allowed_px = scenario.quality.max_terrain_error_px;
-        console
-            .line(format_args!("errors of source coordinates in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"))?;
         console.line(format_args!(
-            "terrain off: bound on how far the drawn terrain is from the full one, px of the picture; quality.max_terrain_error_px allows {allowed_px}"
+            "source errors in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"
+        ))?;
+        console.line(format_args!(
+            "terrain LOD: bound on the displacement by the terrain's level of detail, output px; quality.max_terrain_error_px = {allowed_px}"
         ))?;
         console.line(HEADER)?;
     }
@@ -231,23 +231,23 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if report.frames.iter().all(|frame| frame.kept) && report.frames.iter().any(of_truth) {
         let frames = frames_where(&of_truth);
         return Err(Failure::failed(anyhow!(
-            "depths or points of frame {frames} belong to no surface within {tolerance_px} px of their pixel"
+            "frame {frames}: depths or points belong to no surface within {tolerance_px} px of their pixel"
         )));
     }
     let Some(first) = report.frames.iter().find(|frame| !frame.kept) else {
         let frames = frames_where(&|frame| frame.picture.as_ref().is_some_and(|picture| !picture.kept));
         return Err(Failure::failed(anyhow!(
-            "quality.max_error_dn = {tolerance_dn} is broken in frame {frames}"
+            "frame {frames}: the picture error exceeds quality.max_error_dn = {tolerance_dn}"
         )));
     };
     let frames = frames_where(&|frame| !frame.kept);
     Err(Failure::failed(anyhow!(
-        "the tolerance of {tolerance_px} px is broken in frame {frames}: {}",
+        "frame {frames}: the source error exceeds the tolerance of {tolerance_px} px: {}",
         why_broken(first)
     )))
 }
 
-/// Coordinates are asked for here whatever `output.channels` says, so that leaving them out is no way out.
+/// Checks the number of pixels. Coordinates are always rendered here, regardless of `output.channels`.
 fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
     let [width, height] = size_px.map(u64::from);
     if width * height <= most {
@@ -260,28 +260,28 @@ fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
     )))
 }
 
-/// Of a frame whose tolerance is broken.
+/// Why a frame exceeds its tolerance.
 fn why_broken(frame: &Verified) -> String {
     let more = if is_more_than_predicted(frame.as_predicted, frame.measured.judged_by) {
         ", and the error is larger than predicted"
     } else {
         ""
     };
-    match (&frame.predicted.in_the_way, frame.measured.judged_by) {
-        (Some(cause), _) => format!("in the way is {cause}{more}"),
+    match (&frame.predicted.source_error_obstacle, frame.measured.judged_by) {
+        (Some(cause), _) => format!("limited by {cause}{more}"),
         (None, VOID) => {
-            "too many pixels have a source only in one of the two pictures, or there is none".to_owned()
+            "too many pixels have a source in one of the two frames only, or none can be compared".to_owned()
         }
-        _ => "the plan did not expect it".to_owned(),
+        _ => "this was not predicted".to_owned(),
     }
 }
 
-/// Where there is no error to compare there is none larger.
+/// Whether the error exceeds the prediction; false without a measured error.
 fn is_more_than_predicted(as_predicted: bool, judged_by: &str) -> bool {
     !as_predicted && judged_by != VOID
 }
 
-/// Frames spread evenly, the first and the last among them.
+/// Evenly spread frames, including the first and the last.
 fn spread(frames: u64) -> Vec<u64> {
     let count = frames.min(DEFAULT_FRAMES);
     (0..count).map(|i| if count > 1 { i * (frames - 1) / (count - 1) } else { 0 }).collect()
@@ -298,15 +298,15 @@ fn verify(
     let mut errors = measure(oracle, &first, 0.0)?;
     for phase in phases(&first.plan) {
         let found = measure(oracle, &at_phase(session, frame, phase)?, f64::from(phase))?;
-        if found.judged().p99_px() > errors.judged().p99_px() {
+        if found.verdict().p99_px() > errors.verdict().p99_px() {
             errors = found;
         }
     }
-    let judged = errors.judged();
-    let p99_px = judged.p99_px();
+    let verdict = errors.verdict();
+    let p99_px = verdict.p99_px();
     let picture = pictures.then(|| picture(oracle, &first));
-    let hole_share = unseen(oracle, &first.plan).share();
-    let is_exact = first.plan.tells_exact_truth();
+    let disocclusion_share = disocclusion_of(oracle, &first.plan).share();
+    let is_exact = first.plan.has_exact_truth();
     let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px)
         .filter(|_| is_exact)
         .map(Truth::from);
@@ -322,35 +322,35 @@ fn verify(
             smooth: errors.smooth.into(),
             silhouettes: errors.silhouettes.into(),
             all: errors.all.into(),
-            judged_by: match judged {
-                Judged::Smooth(_) => "smooth",
-                Judged::Everywhere(_) => "all",
-                Judged::Void => VOID,
+            judged_by: match verdict {
+                ErrorVerdict::Smooth(_) => "smooth",
+                ErrorVerdict::Everywhere(_) => "all",
+                ErrorVerdict::Void => VOID,
             },
             falsely_valid: errors.falsely_valid,
             missing: errors.missing,
-            hole_share,
+            disocclusion_share,
         },
         picture,
     })
 }
 
-/// Besides mid-exposure, which is solved for itself: the begin, the middles between two pairs of nodes, where
-/// the path is off most, and two more.
+/// Exposure phases to measure besides mid-exposure: the begin, the middles between two pairs of nodes, where
+/// the path deviates most, and two more.
 fn phases(plan: &FramePlan) -> Vec<f32> {
     let Some(blur) = plan.blur else { return Vec::new() };
     let steps = f64::from(blur.solved() - 1);
     let middle_of = |share: f64| (((share * steps).floor() + 0.5) / steps - 0.5) as f32;
-    // Exactly 0 would be mid-exposure. The last two are in step with no vibration.
+    // Exactly 0 would be mid-exposure. The last two are incommensurate with vibrations.
     [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191]
         .map(|phase| if phase == 0.0 { 1e-4 } else { phase })
         .to_vec()
 }
 
-/// Over the exposure, if it shows: its middle and both ends, as the probes of the plan look.
-fn unseen(oracle: &Oracle, plan: &FramePlan) -> Holes {
+/// Disocclusion of a frame, at mid-exposure and, with motion blur, at both ends, like the planner's probes.
+fn disocclusion_of(oracle: &Oracle, plan: &FramePlan) -> Disocclusion {
     let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
-    holes(oracle, plan.frame, &plan.key_poses(), phases)
+    disocclusion(oracle, plan.frame, &plan.key_poses(), phases)
 }
 
 fn at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finished, Failure> {
@@ -398,22 +398,23 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
     }
 }
 
-/// Where no percentile stands for the frame.
+/// `judged_by` of a frame without a percentile.
 const VOID: &str = "nothing";
 
-const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain off |";
+const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain LOD |";
 
 fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
-    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, hole_share } = measured;
+    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, disocclusion_share } =
+        measured;
     let terrain_off = verified
         .level_of_detail
         .as_ref()
         .map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
     let share = 100.0 * silhouettes.pixels as f64 / all.pixels.max(1) as f64;
-    let verdict = verdict([verified.kept, verified.as_predicted, predicted.kept], judged_by);
+    let verdict = verdict([verified.kept, verified.as_predicted, predicted.source_error_kept], judged_by);
     let why = match *judged_by {
-        "all" => format!(": hardly a pixel away from silhouettes, {:.2e} px of all", all.p99_px),
+        "all" => format!(": hardly any pixel is away from silhouettes, {:.2e} px over all", all.p99_px),
         VOID => ": too many pixels without a source".to_owned(),
         _ => String::new(),
     };
@@ -421,16 +422,18 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
-    let Predicted { resampling_dn, blur_dn, displaced_dn, ground, layers, holes, .. } = predicted;
-    let (surface_dn, layers_dn) =
-        (ground.map_or(0.0, |ground| ground.surface_dn), layers.map_or(0.0, |layers| layers.error_dn));
-    let expected = holes.map_or_else(
-        || "nobody looks for them".to_owned(),
-        |holes| format!("predicted {:.4} %", 100.0 * holes.share),
+    let Predicted {
+        resampling_dn, blur_dn, misregistration_dn, terrain, blended_depth, disocclusion, ..
+    } = predicted;
+    let surface_dn = terrain.map_or(0.0, |terrain| terrain.surface_dn);
+    let blended_dn = blended_depth.map_or(0.0, |blended| blended.error_dn);
+    let expected = disocclusion.map_or_else(
+        || "not predicted".to_owned(),
+        |disocclusion| format!("predicted {:.4} %", 100.0 * disocclusion.share),
     );
     console.line(format_args!(
-        "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
-        100.0 * hole_share
+        "       | disoccluded: {expected}, measured {:.4} % of the picture",
+        100.0 * disocclusion_share
     ))?;
     if let Some(truth) = &verified.truth {
         console.line(format_args!("       | {}", describe_truth(truth)))?;
@@ -441,19 +444,19 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
         console.line(format_args!(
-            "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
+            "       | picture: PSNR {all}, away from silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
         let verdict = match (*kept, *predicted_dn > tolerance_dn) {
             (true, _) => "kept",
-            (false, true) => "BROKEN as predicted",
-            (false, false) => "BROKEN against the prediction",
+            (false, true) => "EXCEEDED as predicted",
+            (false, false) => "EXCEEDED, not predicted",
         };
         console.line(format_args!(
-            "       | in all {rms_dn:.3}/255 (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; without silhouettes predicted {}",
-            estimate(resampling_dn.hypot(*blur_dn).hypot(*displaced_dn).hypot(surface_dn).hypot(layers_dn))
+            "       | picture error {rms_dn:.3} DN (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; away from silhouettes, predicted {}",
+            estimate(resampling_dn.hypot(*blur_dn).hypot(*misregistration_dn).hypot(surface_dn).hypot(blended_dn))
         ))?;
         for cause in &verified.not_in_the_picture {
-            console.line(format_args!("       | not in that prediction: {cause}"))?;
+            console.line(format_args!("       | not predicted: {cause}"))?;
         }
     }
     Ok(())
@@ -463,36 +466,36 @@ fn describe_truth(truth: &Truth) -> String {
     let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } =
         truth;
     let largest = |error: &Option<f64>| {
-        error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.3} %", 100.0 * error))
+        error.map_or_else(|| "sky instead of surface".to_owned(), |error| format!("{:.3} %", 100.0 * error))
     };
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
-        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); of no surface near the pixel: {depth_faults} and {point_faults}: {}",
+        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and {point_faults}: {}",
         largest(depth_max),
         largest(point_max),
-        if *kept { "kept" } else { "BROKEN" }
+        if *kept { "kept" } else { "FAULTS" }
     )
 }
 
-/// The tolerance and the prediction are kept or broken each by itself.
+/// Verdict on the tolerance and on the prediction.
 fn verdict([kept, as_predicted, predicted_kept]: [bool; 3], judged_by: &str) -> &'static str {
     match (kept, predicted_kept) {
         (true, _) if as_predicted => "kept",
         (true, _) => "kept, but more than predicted",
-        (false, true) => "BROKEN against the prediction",
+        (false, true) => "EXCEEDED, not predicted",
         (false, false) if is_more_than_predicted(as_predicted, judged_by) => {
-            "BROKEN, and more than predicted"
+            "EXCEEDED, and more than predicted"
         }
-        (false, false) => "BROKEN as predicted",
+        (false, false) => "EXCEEDED as predicted",
     }
 }
 
-/// A PSNR as RMS error in 1/255.
+/// Converts a PSNR to an RMS error in DN.
 fn rms_dn(psnr_db: f64) -> f64 {
     255.0 * 10_f64.powf(-psnr_db / 20.0)
 }
 
-/// An RMS error in 1/255 as PSNR.
+/// Converts an RMS error in DN to a PSNR.
 fn estimate(rms_dn: f64) -> String {
     if rms_dn > 0.0 { format!("{:.2} dB", -20.0 * (rms_dn / 255.0).log10()) } else { "no error".to_owned() }
 }
@@ -504,24 +507,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_error_is_said_in_words() {
+    fn no_error_is_written_in_words() {
         assert_eq!(estimate(2.55), "40.00 dB");
         assert_eq!(estimate(0.0), "no error");
         assert!((rms_dn(40.0) - 2.55).abs() < 1e-12 && rms_dn(f64::INFINITY) == 0.0);
     }
 
     #[test]
-    fn what_is_broken_and_what_was_foreseen_are_told_apart() {
+    fn verdicts_separate_tolerance_and_prediction() {
         assert_eq!(verdict([true, true, true], "smooth"), "kept");
         assert_eq!(verdict([true, false, true], "smooth"), "kept, but more than predicted");
-        assert_eq!(verdict([false, false, true], "smooth"), "BROKEN against the prediction");
-        assert_eq!(verdict([false, true, false], "all"), "BROKEN as predicted");
-        assert_eq!(verdict([false, false, false], "smooth"), "BROKEN, and more than predicted");
-        assert_eq!(verdict([false, false, false], VOID), "BROKEN as predicted");
+        assert_eq!(verdict([false, false, true], "smooth"), "EXCEEDED, not predicted");
+        assert_eq!(verdict([false, true, false], "all"), "EXCEEDED as predicted");
+        assert_eq!(verdict([false, false, false], "smooth"), "EXCEEDED, and more than predicted");
+        assert_eq!(verdict([false, false, false], VOID), "EXCEEDED as predicted");
     }
 
     #[test]
-    fn a_picture_that_cannot_be_measured_is_refused_with_the_most_that_can() {
+    fn too_large_frames_are_refused_with_the_limit() {
         assert!(check_size([2048, 2048], 4_194_304).is_ok());
         let error = check_size([4000, 3000], 4_194_304).unwrap_err().to_string();
         assert!(

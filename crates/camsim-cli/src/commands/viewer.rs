@@ -3,7 +3,7 @@
 use std::{io, ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use camsim_core::scenario::{Auto, Solver};
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_engine::{Backend, Engine};
 use camsim_io::load::load_sequence;
 use camsim_viewer::ExportJob;
 
@@ -21,7 +21,7 @@ pub struct Args {
     scenario: Option<PathBuf>,
 }
 
-/// Opens the window and stays until it is closed.
+/// Opens the window and returns when it is closed.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let exporter = Arc::new(|job: &ExportJob| {
         export(job).map_err(|failure| failure.to_string().trim_start_matches("error: ").to_owned())
@@ -29,7 +29,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     camsim_viewer::run(args.scenario.clone(), Some(exporter)).or_failed()
 }
 
-/// What `camsim render` does with the scenario; warnings go into `run.json`.
+/// Renders the scenario like `camsim render`; warnings go into `run.json`.
 pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let (mut out, mut err) = (io::sink(), io::sink());
     let mut console = Console::new(&mut out, &mut err);
@@ -54,7 +54,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     {
         Box::new(Rays::new(&loaded.sequence)?)
     } else {
-        engine = Engine::new(AdapterChoice::Best)?;
+        engine = Engine::open(Backend::Auto)?;
         Box::new(Device::new(&engine, &loaded.sequence)?)
     };
     let mut look = |_: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-    fn an_export_stops_when_it_is_told_to_and_else_writes_what_render_writes() {
+    fn export_matches_render_and_can_be_stopped() {
         let folder = tempfile::tempdir().expect("a folder");
         let job = ExportJob::new(small(), folder.path().join("all"), [3, 6]);
         export(&job).expect("written");

@@ -1,4 +1,4 @@
-//! The output folder before a run: whether what is in it may stay, and one run at a time where it is changed.
+//! Checks of the output folder before a run, and a lock against concurrent runs.
 
 use std::{
     fs::{File, OpenOptions, create_dir_all},
@@ -19,16 +19,16 @@ use crate::{
     failure::{Failure, OrFail},
 };
 
-/// What holds of the files of frames in a folder.
+/// State of the frame files in a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// They are this scenario's, or there are none.
+    /// They belong to this scenario, or there are none.
     Ours,
-    /// They are another scenario's, and all of them will be replaced.
+    /// They belong to another scenario, and all of them will be replaced.
     Replaced,
 }
 
-/// As [`standing`], and says what the user should know of it.
+/// As [`standing`], with messages to the user.
 pub fn check(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -39,7 +39,7 @@ pub fn check(
     match standing(job, files, inputs)? {
         Standing::Replaced if job.frames.iter().any(|&frame| files.exist(frame)) => {
             console.warn(format_args!(
-                "{} is of another scenario, or of files that have changed: its frames are replaced",
+                "{} belongs to another scenario, or its input files have changed: its frames are replaced",
                 job.folder.display()
             ));
         }
@@ -49,7 +49,7 @@ pub fn check(
     Ok(())
 }
 
-/// Frames of another scenario are never taken for this one's, nor left between them.
+/// State of a folder. Frames of another scenario are never kept among those of this one.
 pub fn standing(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<Standing, Failure> {
     let error = match check_resume(job.folder, &job.sequence.scenario, inputs) {
         Ok(true) => return Ok(Standing::Ours),
@@ -57,7 +57,7 @@ pub fn standing(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<St
         Err(error) => Some(error),
     };
     match error {
-        // Other files of the same frames: neither makes the other untrue.
+        // Other files of the same frames do not contradict each other.
         Some(ResumeError::Differs { made: BY_SCENARIO, differences, .. })
             if !job.resume && differences.iter().all(|text| is_of_files(text)) =>
         {
@@ -75,29 +75,29 @@ pub fn standing(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<St
     }
 }
 
-/// Keys that choose files and change none.
+/// Whether a key only selects files, without changing their contents.
 fn is_of_files(difference: &str) -> bool {
     ["output.channels was ", "output.format was "].iter().any(|key| difference.starts_with(key))
 }
 
-/// Refuses a folder with files of frames other than these, which are to be replaced.
+/// Refuses a folder with frame files other than those that will be replaced.
 pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<(), Failure> {
     let others = files.others(frames);
     let Some(first) = others.first() else { return Ok(()) };
     let count = others.len();
     Err(Failure::bad_input(anyhow!(
-        "{why}, and {count} files of frames, {first} the first, would stay between this run's: choose another folder with -o, or remove that one"
+        "{why}, and {count} files of other frames would remain ({first} is the first): choose another folder with -o, or remove that one"
     )))
 }
 
-/// Refuses frames of which nobody knows what made them, unless they are to be replaced.
+/// Refuses frames of unknown origin, unless they will be replaced.
 pub fn refuse_unknown(
     folder: &Path,
     frames: &[u64],
     files: &FrameFiles,
     is_resumed: bool,
 ) -> Result<(), Failure> {
-    let unknown = format!("{} has frames and no run.json that says what made them", folder.display());
+    let unknown = format!("{} has frames, but no run.json that describes their origin", folder.display());
     if is_resumed && frames.iter().any(|&frame| files.exist(frame)) {
         return Err(Failure::bad_input(anyhow!(
             "{unknown}: render without --resume, or into another folder"
@@ -111,32 +111,31 @@ fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
         check_resume_of(job.folder, "adapter", "by another adapter", &adapter)
     {
         console.warn(format_args!(
-            "{} was made by another adapter than {adapter}: frames that are there stay, and differ from what this one would make by what rounding does",
+            "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from new ones by rounding",
             path.display()
         ));
     }
 }
 
-/// Files that this scenario would have in the folder, whatever its channels.
+/// Files that this scenario could have in the folder, for any channels.
 pub fn files_of(scenario: &Scenario, folder: &Path) -> FrameFiles {
     FrameFiles::new(folder, &scenario.output, scenario.camera.photometric.output)
 }
 
-/// Holds the folder's tables against other runs in it until it is dropped. Where a file system knows no locks
-/// there is none.
+/// Locks the folder's tables against other runs until dropped. There is no lock if the file system has none.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "closing it unlocks")] Option<File>);
 
 impl Lock {
-    /// Waits for whoever has it.
+    /// Waits for the lock.
     pub fn take(folder: &Path) -> Result<Self, Failure> {
         create_dir_all(folder)
             .map_err(|error| {
-                anyhow!("{}: cannot be made: {error}; choose another folder with -o", folder.display())
+                anyhow!("{}: cannot be created: {error}; choose another folder with -o", folder.display())
             })
             .or_failed()?;
         let locked = |file: std::io::Result<File>| file.and_then(|file| file.lock().map(|()| file)).ok();
-        // The folder itself, so that nothing is left in it; some systems lock only what can be written.
+        // The folder itself is locked, so that no file is left in it; some systems lock only writable files.
         let file = || OpenOptions::new().create(true).append(true).open(folder.join(".camsim.lock"));
         Ok(Self(locked(File::open(folder)).or_else(|| locked(file()))))
     }

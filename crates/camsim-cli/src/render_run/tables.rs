@@ -1,4 +1,4 @@
-//! What stands beside the frames: `camera.toml`, the trajectories, `frames.csv`.
+//! Tables beside the frames: `camera.toml`, the trajectories, `frames.csv`.
 
 use std::collections::BTreeMap;
 
@@ -21,10 +21,10 @@ use crate::{
     failure::{Failure, OrFail},
 };
 
-/// Rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
+/// Most rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
 const MOST_TRAJECTORY_ROWS: f64 = 10e6;
 
-/// `camera.toml` and the trajectories, which the scenario alone decides.
+/// Writes `camera.toml` and the trajectories, which depend on the scenario only.
 pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
     let sequence = job.sequence;
     let Scenario { camera, tracker, .. } = &sequence.scenario;
@@ -47,7 +47,7 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
-            "camera_trajectory.csv has {rate_hz} rows a second, too few to show the mount's vibration of {vibration_hz} Hz (frames have it exactly): \
+            "camera_trajectory.csv has {rate_hz} rows per second, too few for the mount's vibration of {vibration_hz} Hz (which the frames contain exactly): \
              `camsim track SCENARIO.toml --of camera --rate {:.0} -o poses.csv` writes more",
             8.0 * vibration_hz
         ));
@@ -55,7 +55,7 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     Ok(())
 }
 
-/// Rows of `frames.csv` that are in the folder, of this scenario.
+/// Rows of this scenario in the folder's `frames.csv`.
 pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
     let path = frames_path(job.folder);
     let mut table = if is_ours { FrameTable::read(&path) } else { FrameTable::default() };
@@ -63,9 +63,9 @@ pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
     table.write(&path).or_failed()
 }
 
-/// Brings `frames.csv` up to what is there: rows of other runs stay with their files, `made` are this run's,
-/// and frames whose run never came to write their rows get them from their plans. Without any file of frames
-/// (`format = []`) the rows are those of the frames rendered.
+/// Updates `frames.csv`: rows of other runs stay with their files, `made` are those of this run, and frames
+/// whose run did not write its rows get them from their plans. Without frame files (`format = []`) the rows
+/// are those of the rendered frames.
 pub fn end_frames(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -90,7 +90,7 @@ pub fn end_frames(
     table.write(&path).or_failed()
 }
 
-/// What source coordinates of a plan are in.
+/// The frame to which the source coordinates of a plan refer.
 pub fn source_frame(sequence: &Sequence, plan: &FramePlan) -> SourceFrame {
     SourceFrame::new(plan, sequence.epoch_ns)
 }
@@ -135,7 +135,7 @@ pub fn camera_at(path: &CameraPath, epoch_ns: i64, t_s: f64) -> CameraRecord {
     }
 }
 
-/// Path time as a stamp, nanoseconds.
+/// Converts path time to a stamp, nanoseconds.
 fn stamp_ns(epoch_ns: i64, t_s: f64) -> i64 {
     epoch_ns.saturating_add((t_s * 1e9).round() as i64)
 }

@@ -1,56 +1,57 @@
-//! Optical flow in place of the camera's motion: for scenes in which things move by themselves.
+//! Optical flow instead of camera motion, for scenes with moving objects.
 //!
-//! Each pixel of the ideal frame says where what it shows will be after an interval T, in its own pixels;
-//! camera and things together. In between it is taken to go straight on, evenly: what pixel s shows is at `s
-//! + tau f(s)` when the share `tau = dt / T` of the interval has gone by. A ray that looks at p then sees the
-//! s with `s + tau f(s) = p`, and of several the nearest. What accelerates in the picture is off by at most
-//! `|f''| |dt (T - dt)| / 2` (f'' in px/s^2, any dt); a flow over a short interval says more.
+//! Each pixel of the ideal frame has a displacement f over an interval T, in ideal pixels, by the motion of
+//! camera and objects together. In between, motion is assumed uniform and straight: after the share `tau = dt
+//! / T` of the interval, the content of pixel s is at `s + tau f(s)`. The source of a ray at position p is
+//! the s with `s + tau f(s) = p`, and the nearest if there are several. For an accelerated image motion the
+//! error is at most `|f''| |dt (T - dt)| / 2` (f'' in px/s^2, any dt), so flow over a short interval is more
+//! accurate.
 //!
 //! | step | file |
 //! |---|---|
-//! | what has no flow takes that of the nearest that has; where two things meet | `flow/grid.rs` |
-//! | a sheet over each four pixels, what of it is at p, and what stands in where it is torn | `flow/cell.rs` |
-//! | which cells may be at p: a tree of boxes | `flow/blocks.rs` |
+//! | fills unknown flow from the nearest known pixel, finds motion boundaries | `flow/grid.rs` |
+//! | a bilinear sheet over each four pixels: its points at p, and substitutes where it is torn | `flow/cell.rs` |
+//! | candidate cells for p, from a tree of bounding boxes | `flow/blocks.rs` |
 //!
-//! Only `tau f`, the displacement that happens, is ever compared with a number of pixels: the same motion
-//! written for another interval is the same picture.
+//! Only the displacement `tau f` is compared with thresholds in pixels, so the result does not depend on the
+//! interval for which the flow is given.
 
 use std::ops::ControlFlow;
 
 use glam::{DMat2, DVec2};
 
-use super::Unseen;
+use super::NoSource;
 use crate::temporal::{IdealGeometry, InverseDepthImage, Source};
 
 mod blocks;
 mod cell;
 mod grid;
 
-use blocks::{Blocks, Look};
+use blocks::{Blocks, FlowQuery};
 use grid::Grid;
 
-/// Boxes that one look may open. A field of one thing takes a hundred; noise of 20 px in every pixel takes
-/// ten thousand.
-const MOST_BOXES: u32 = 1 << 15;
-/// Around a place where things part: what a pixel's area reaches, pixels.
+/// Most boxes that one query may open. A field with a single motion opens about a hundred; noise of 20 px in
+/// every pixel opens ten thousand.
+const MAX_BOXES: u32 = 1 << 15;
+/// Radius around a position within which motion boundaries matter for a pixel, pixels.
 const REACH_PX: f64 = 1.0;
 
-/// Where each pixel of an ideal frame goes.
+/// Optical flow of an ideal frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowField {
-    /// Width, height: the ideal frame's.
+    /// Width and height, equal to those of the ideal frame.
     pub size_px: [u32; 2],
-    /// Right and down, pixels, row-major; not a number where it is not known.
+    /// Displacement right and down, pixels, row-major; NaN where unknown.
     pub px: Vec<[f32; 2]>,
-    /// After how long, seconds; negative for a flow to an earlier instant.
+    /// Interval of the displacement, seconds; negative for flow to an earlier instant.
     pub interval_s: f64,
 }
 
-/// Which of several things at one place is seen, the larger: of known flow before unknown; no sheet's back;
-/// inverse depth; and for things without depth how far they move.
+/// Order among several sources of one position, the largest first: known flow before unknown, front of a
+/// sheet before its back, then inverse depth, then, without depth, the length of the flow.
 type Rank = [f64; 4];
 
-/// Finds sources in a flow.
+/// Inverts an optical flow.
 #[derive(Clone, Debug)]
 pub(super) struct FlowSearch {
     grid: Grid,
@@ -64,36 +65,36 @@ impl FlowSearch {
         Self { grid, blocks }
     }
 
-    /// What looks at `at_px` when the share `share` of the interval has gone by. `holes` says which pixels'
-    /// depth is unknown; empty is none.
+    /// Source of `position_px` after the share `share` of the interval. `holes` marks pixels with unknown
+    /// depth; empty means none.
     pub(super) fn source(
         &self,
-        at_px: DVec2,
+        position_px: DVec2,
         share: f64,
         depth: &InverseDepthImage<'_>,
         holes: &[bool],
         ideal: &IdealGeometry,
-    ) -> Result<Source, Unseen> {
-        if !at_px.is_finite() {
-            return Err(Unseen::Outside);
+    ) -> Result<Source, NoSource> {
+        if !position_px.is_finite() {
+            return Err(NoSource::Outside);
         }
-        let mut seen: Option<(Rank, DVec2)> = None;
+        let mut best: Option<(Rank, DVec2)> = None;
         let mut behind: Option<(Rank, DVec2)> = None;
-        let mut left = MOST_BOXES;
+        let mut left = MAX_BOXES;
         let _ = self.blocks.visit(
-            &Look { grid: &self.grid, at_px, shares: &[share], reach_px: 0.0 },
+            &FlowQuery { grid: &self.grid, position_px, shares: &[share], reach_px: 0.0 },
             &mut left,
             &mut |[column, row], _| {
                 let cell = self.grid.cell(column, row);
-                cell.sources(at_px, share, |source_px, is_front| {
+                cell.sources(position_px, share, |source_px, is_front| {
                     let rank = self.rank(source_px, is_front, depth);
-                    if ideal.contains(source_px) && seen.is_none_or(|known| rank > known.0) {
-                        seen = Some((rank, source_px));
+                    if ideal.contains(source_px) && best.is_none_or(|known| rank > known.0) {
+                        best = Some((rank, source_px));
                     }
                 });
-                if seen.is_none() {
+                if best.is_none() {
                     let rank = |corner_px| self.rank(corner_px, true, depth);
-                    cell.stand_ins(at_px, share, rank, |rank, source_px| {
+                    cell.fallback_sources(position_px, share, rank, |rank, source_px| {
                         if ideal.contains(source_px) && behind.is_none_or(|known| rank < known.0) {
                             behind = Some((rank, source_px));
                         }
@@ -103,16 +104,16 @@ impl FlowSearch {
             },
         );
         if left == 0 {
-            return Err(Unseen::TornFlow);
+            return Err(NoSource::TornFlow);
         }
-        let (_, source_px) = seen.or(behind).ok_or(Unseen::Outside)?;
+        let (_, source_px) = best.or(behind).ok_or(NoSource::Outside)?;
         if !self.grid.is_known(source_px) {
-            return Err(Unseen::UnknownFlow);
+            return Err(NoSource::UnknownFlow);
         }
         if !holes.is_empty() && holes[depth.nearest_index(source_px)] {
-            return Err(Unseen::Hole);
+            return Err(NoSource::Hole);
         }
-        Ok(Source { at_px: source_px, inverse_depth: depth.inverse_depth(source_px) })
+        Ok(Source { position_px: source_px, inverse_depth: depth.inverse_depth(source_px) })
     }
 
     fn rank(&self, source_px: DVec2, is_front: bool, depth: &InverseDepthImage<'_>) -> Rank {
@@ -125,23 +126,23 @@ impl FlowSearch {
         ]
     }
 
-    /// Change of the source for a change of where the ray looks: the inverse of `1 + tau df/ds`.
-    pub(super) fn source_from_look(&self, source_px: DVec2, share: f64) -> DMat2 {
+    /// Change of the source with the position of the ray: the inverse of `1 + tau df/ds`.
+    pub(super) fn source_from_ray(&self, source_px: DVec2, share: f64) -> DMat2 {
         let (cell, within) = self.grid.cell_at(source_px);
         let forward = DMat2::IDENTITY + cell.slope(within, share) * share;
         if forward.determinant().abs() > 1e-3 { forward.inverse() } else { DMat2::IDENTITY }
     }
 
-    /// Whether what is seen at a place may change from one thing to another within an exposure: a border at
-    /// which things part by more than `most_px`, or a fold, gets to the place.
-    pub(super) fn parts(&self, at_px: DVec2, shares: [f64; 2], most_px: f64) -> bool {
+    /// Whether the source at a position may jump within an exposure: a motion boundary with a jump of more
+    /// than `most_px`, or a fold of the sheet, reaches the position.
+    pub(super) fn may_separate(&self, position_px: DVec2, shares: [f64; 2], most_px: f64) -> bool {
         let exposure = (shares[1] - shares[0]).abs();
         let reach = shares[0].abs().max(shares[1].abs());
-        let mut left = MOST_BOXES;
-        let look = Look { grid: &self.grid, at_px, shares: &shares, reach_px: REACH_PX };
-        let found = self.blocks.visit(&look, &mut left, &mut |[column, row], within| {
+        let mut left = MAX_BOXES;
+        let query = FlowQuery { grid: &self.grid, position_px, shares: &shares, reach_px: REACH_PX };
+        let visited = self.blocks.visit(&query, &mut left, &mut |[column, row], within| {
             let may_tear = f64::from(within.tear) * exposure > most_px;
-            // Rows of a matrix that has no inverse beside 1 sum up to 1.
+            // The rows of a matrix with a singular sum with the identity add up to 1 or more.
             let may_fold = 2.0 * f64::from(within.steep) * reach >= 1.0;
             if may_tear || (may_fold && shares.iter().any(|share| self.grid.cell(column, row).folds(*share)))
             {
@@ -149,6 +150,6 @@ impl FlowSearch {
             }
             ControlFlow::Continue(())
         });
-        found.is_break() || left == 0
+        visited.is_break() || left == 0
     }
 }

@@ -1,4 +1,4 @@
-//! What the pipeline takes: the ideal frame; and why it, or a pixel of it, gives nothing.
+//! Inputs of the pipeline, and the reasons for which it, or one of its pixels, gives no result.
 
 use glam::DVec2;
 
@@ -8,13 +8,13 @@ use crate::{camera::CameraError, shutter::ShutterError, temporal::IdealGeometry}
 /// Why the pipeline cannot run.
 #[derive(Debug, thiserror::Error)]
 pub enum ApplyError {
-    /// The camera.
+    /// The camera is invalid.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The shutter.
+    /// The shutter is invalid.
     #[error(transparent)]
     Shutter(#[from] ShutterError),
-    /// The frame's images.
+    /// The images of the frame are invalid.
     #[error("the ideal frame has {what}: {fix}")]
     Frame {
         /// What is wrong.
@@ -22,83 +22,84 @@ pub enum ApplyError {
         /// What to do.
         fix: &'static str,
     },
-    /// The motion.
+    /// The motion is invalid.
     #[error(transparent)]
     Motion(#[from] PoseTrackError),
-    /// Methods that a flow leaves nothing to do.
+    /// Methods that a flow makes meaningless.
     #[error(
-        "a flow says where everything goes, which the paper's methods and solvers cannot use: leave --preset and --solver out, or the flow"
+        "a flow already contains all motion, so the paper's methods and solvers cannot be used with it: leave --preset and --solver out, or the flow"
     )]
     Flow,
     /// A solver that needs a scene.
     #[error(
-        "solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)"
+        "solver \"oracle\" needs a scene, which an ideal frame does not have: use \"reproject\" (exact up to what the frame shows)"
     )]
     Oracle,
-    /// Linear fog outside of the paper's preset.
+    /// Linear fog without the paper's preset.
     #[error(
-        "fog is a part of the ideal frame; the linear fog added afterwards belongs to the paper's methods: use the preset \"paper\", or leave fog out"
+        "linear fog after the blur belongs to the paper's methods (otherwise fog is part of the ideal frame): use the preset \"paper\", or leave fog out"
     )]
     Fog,
 }
 
-/// A pinhole RGB-D picture with its geometry.
+/// A pinhole RGB-D image with its geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdealFrame {
-    /// Its pixels; usually larger than the output's, so that lens and motion find sources.
+    /// Its geometry. It is usually larger than the output, so that lens and motion find their sources.
     pub geometry: IdealGeometry,
     /// Linear R G B A, row-major; A is not used.
     pub color_rgba: Vec<f32>,
     /// Inverse planar depth, 1/m, row-major; 0 = infinitely far (sky, or unknown).
     pub inverse_depth: Vec<f32>,
-    /// Where the depth is not known, so that what looks there has no answer; empty is nowhere.
+    /// Mask of pixels with unknown depth, row-major; empty means none. Rays that hit such a hole have no
+    /// result.
     pub holes: Vec<bool>,
-    /// When it was taken, seconds after the stamp.
+    /// Instant of the frame, seconds after the stamp.
     pub instant_s: f64,
 }
 
-/// Why a pixel shows nothing.
+/// Why a pixel has no source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unseen {
+pub enum NoSource {
     /// The lens has no ray there.
     NoRay,
-    /// It looks beyond the ideal frame's border, or behind its camera.
+    /// The source is beyond the border of the ideal frame, or behind its camera.
     Outside,
-    /// It looks where the depth is not known ([`IdealFrame::holes`]).
+    /// The depth at the source is unknown ([`IdealFrame::holes`]).
     Hole,
-    /// It looks where the flow is not known.
+    /// The flow at the source is unknown.
     UnknownFlow,
-    /// What it looks at could not be found: neighbours' flows have too little in common.
+    /// The source could not be found, because the flow of neighbouring pixels is too irregular.
     TornFlow,
 }
 
-/// Pixels that show nothing, by reason.
+/// Number of pixels without a source, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct UnseenCounts {
-    /// [`Unseen::NoRay`].
+pub struct NoSourceCounts {
+    /// Pixels with [`NoSource::NoRay`].
     pub no_ray: u64,
-    /// [`Unseen::Outside`].
+    /// Pixels with [`NoSource::Outside`].
     pub outside: u64,
-    /// [`Unseen::Hole`].
+    /// Pixels with [`NoSource::Hole`].
     pub holes: u64,
-    /// [`Unseen::UnknownFlow`].
+    /// Pixels with [`NoSource::UnknownFlow`].
     pub unknown_flow: u64,
-    /// [`Unseen::TornFlow`].
+    /// Pixels with [`NoSource::TornFlow`].
     pub torn_flow: u64,
 }
 
-impl UnseenCounts {
-    pub(super) fn add(&mut self, why: Unseen) {
+impl NoSourceCounts {
+    pub(super) fn add(&mut self, why: NoSource) {
         match why {
-            Unseen::NoRay => self.no_ray += 1,
-            Unseen::Outside => self.outside += 1,
-            Unseen::Hole => self.holes += 1,
-            Unseen::UnknownFlow => self.unknown_flow += 1,
-            Unseen::TornFlow => self.torn_flow += 1,
+            NoSource::NoRay => self.no_ray += 1,
+            NoSource::Outside => self.outside += 1,
+            NoSource::Hole => self.holes += 1,
+            NoSource::UnknownFlow => self.unknown_flow += 1,
+            NoSource::TornFlow => self.torn_flow += 1,
         }
     }
 
-    /// All of them.
+    /// Sum over all reasons.
     #[must_use]
     pub fn all(&self) -> u64 {
         self.no_ray + self.outside + self.holes + self.unknown_flow + self.torn_flow
@@ -106,31 +107,31 @@ impl UnseenCounts {
 }
 
 impl IdealFrame {
-    /// A flow for each pixel, over some time.
+    /// Checks the size, interval and values of a flow.
     pub(super) fn check_flow(&self, flow: &FlowField) -> Result<(), ApplyError> {
         let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });
         let [[width, height], [w, h]] = [self.geometry.size_px, flow.size_px];
         if [width, height] != [w, h] || flow.px.len() != w as usize * h as usize {
             return frame(
-                format!("a flow of {w}x{h} pixels beside a picture of {width}x{height}"),
-                "flow and colour must have one size",
+                format!("a flow of {w}x{h} pixels and an image of {width}x{height}"),
+                "flow and colour must have the same size",
             );
         }
         if !(flow.interval_s.is_finite() && flow.interval_s != 0.0) {
             return frame(
                 format!("a flow over {} s", flow.interval_s),
-                "give the time between the two instants that it joins",
+                "give the time between its two instants",
             );
         }
         Ok(())
     }
 
-    /// Planes that fill the geometry, and finite values.
+    /// Checks that the images fill the geometry with finite values.
     pub(super) fn check(&self) -> Result<(), ApplyError> {
         let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });
         let [width, height] = self.geometry.size_px.map(|side| side as usize);
         if width == 0 || height == 0 {
-            return frame("no pixel".into(), "give pictures of at least 1x1");
+            return frame("no pixel".into(), "give images of at least 1x1");
         }
         let holes_fit = self.holes.is_empty() || self.holes.len() == width * height;
         if self.color_rgba.len() != 4 * width * height
@@ -143,7 +144,7 @@ impl IdealFrame {
                     self.color_rgba.len(),
                     self.inverse_depth.len()
                 ),
-                "colour and depth must have one size",
+                "colour and depth must have the same size",
             );
         }
         let DVec2 { x: fx, y: fy } = self.geometry.focal_px;
@@ -161,20 +162,20 @@ impl IdealFrame {
         if self.inverse_depth.iter().any(|w| !(w.is_finite() && *w >= 0.0)) {
             return frame(
                 "depths that are negative or not finite".into(),
-                "0 stands for unknown or infinitely far",
+                "use 0 for unknown or infinitely far",
             );
         }
         if self.color_rgba.iter().any(|v| !v.is_finite()) {
             return frame(
                 "colours that are not finite".into(),
-                "clean the picture before: NaN would spread over every blur path",
+                "replace them first: NaN would spread along every blur path",
             );
         }
         Ok(())
     }
 }
 
-impl std::ops::AddAssign for UnseenCounts {
+impl std::ops::AddAssign for NoSourceCounts {
     fn add_assign(&mut self, other: Self) {
         self.no_ray += other.no_ray;
         self.outside += other.outside;

@@ -1,4 +1,4 @@
-//! The motion about the stamp: a constant twist of the camera, a table of its poses, or a flow.
+//! Motion about the stamp: a constant twist of the camera, a table of its poses, or an optical flow.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -8,26 +8,26 @@ use crate::{
     trajectory::so3::{exp, left_jacobian_times, log},
 };
 
-/// Instants that show the curve of a path over an exposure.
+/// Least number of instants at which the path over an exposure is evaluated.
 const INSTANTS: u32 = 32;
-/// Nothing is lost by a table that ends this much too early, seconds: the last digits of a time stamp.
+/// Tolerance for tables that end too early, seconds: rounding of time stamps.
 const COVER_SLACK_S: f64 = 1e-6;
 
-/// How the camera moves; times are seconds from the stamp.
+/// Motion during the frame; times are seconds from the stamp.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// Constant velocity and angular rate in the camera's own axes: the screw motion `exp(xi t)` on SE(3),
-    /// whose displacement field is the paper's eq. 10.
+    /// Constant velocity and angular rate in camera axes: the screw motion `exp(xi t)` on SE(3), whose
+    /// displacement field is eq. 10 of the paper.
     Twist(Twist),
     /// Poses over time.
     Poses(PoseTrack),
-    /// Where each pixel of the ideal frame goes, whatever moves it.
+    /// Displacement of each pixel of the ideal frame, by any motion.
     Flow(FlowField),
 }
 
 impl Motion {
-    /// `x_key = R x_line + t` (of a flow, in which the camera's part is not known apart, as if it stood
-    /// still), from the camera at `dt_s` to the camera at `instant_s`.
+    /// Relative pose `x_key = R x_row + t` from the camera at `dt_s` to the camera at `instant_s`. For a
+    /// flow, which does not separate the camera's motion, it is the identity.
     #[must_use]
     pub fn key_from(&self, dt_s: f64, instant_s: f64) -> (DMat3, DVec3) {
         match self {
@@ -48,7 +48,7 @@ impl Motion {
         }
     }
 
-    /// Velocity and angular rate in camera axes at an instant, for the solvers that hold them constant.
+    /// Velocity and angular rate in camera axes at an instant, for solvers that hold them constant.
     #[must_use]
     pub fn twist_at(&self, instant_s: f64) -> Twist {
         match self {
@@ -58,7 +58,7 @@ impl Motion {
         }
     }
 
-    /// Whether the camera changes its place, so that depth matters. A flow says it all without.
+    /// Whether the camera translates, so that depth matters. False for a flow.
     #[must_use]
     pub fn translates(&self) -> bool {
         match self {
@@ -68,10 +68,10 @@ impl Motion {
         }
     }
 
-    /// Whether a window is covered.
+    /// Checks that a time window is covered.
     ///
     /// # Errors
-    /// A table of poses that begins later or ends earlier.
+    /// A table of poses that begins later or ends earlier than the window.
     pub fn covers(&self, first_s: f64, last_s: f64) -> Result<(), PoseTrackError> {
         match self {
             Self::Twist(_) | Self::Flow(_) => Ok(()),
@@ -79,8 +79,7 @@ impl Motion {
         }
     }
 
-    /// The longest time between two rows of a table that a window, or its edge, lies between; 0 without a
-    /// table.
+    /// Longest time between two table rows in, or around the ends of, a window; 0 without a table.
     #[must_use]
     pub fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
         match self {
@@ -89,7 +88,7 @@ impl Motion {
         }
     }
 
-    /// Instants over an exposure at which to look at the path: four to a row of the table, at least 32.
+    /// Number of instants at which to evaluate the path over an exposure: four per table row, at least 32.
     #[must_use]
     pub fn instants(&self, exposure_s: f64) -> u32 {
         match self {
@@ -102,11 +101,11 @@ impl Motion {
 /// One row of a table of poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseRow {
-    /// Time, seconds, on the clock of the table.
+    /// Time on the clock of the table, seconds.
     pub t_s: f64,
-    /// Optical centre in the world, metres.
+    /// Position of the optical centre in the world, metres.
     pub position_m: DVec3,
-    /// Takes optical camera coordinates to the world; need not be of exactly unit length.
+    /// Rotation from optical camera coordinates to the world. Its length need not be exactly 1.
     pub world_from_camera: DQuat,
 }
 
@@ -118,49 +117,50 @@ pub enum PoseTrackError {
         "the trajectory has {0} row(s): at least two are needed to say how the camera moves; use [motion] velocity_m_s and angular_rate_rad_s for a constant twist"
     )]
     TooShort(usize),
-    /// A row that cannot be used.
+    /// A row with invalid values.
     #[error("trajectory row {row}: {what}")]
     Row {
-        /// Row from 1, the header not counted.
+        /// Row number from 1, without the header.
         row: usize,
         /// What is wrong.
         what: &'static str,
     },
-    /// The table does not reach as far as the frame's exposure.
+    /// The table does not cover the exposure of the frame.
     #[error(
         "the trajectory covers {from:+.6} s to {to:+.6} s about the stamp, the frame needs {first:+.6} s to {last:+.6} s: check stamp_s, or give more rows"
     )]
     Window {
-        /// Begin of the table from the stamp.
+        /// Begin of the table relative to the stamp, seconds.
         from: f64,
-        /// Its end.
+        /// End of the table relative to the stamp, seconds.
         to: f64,
-        /// Begin of the frame's window.
+        /// Begin of the frame's window, seconds.
         first: f64,
-        /// Its end.
+        /// End of the frame's window, seconds.
         last: f64,
     },
 }
 
-/// Poses over time about a stamp: straight lines and constant turns between rows.
+/// Poses over time about a stamp; between rows, translation is linear and rotation has a constant rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseTrack {
-    /// `t_s` from the stamp.
+    /// Rows with `t_s` relative to the stamp.
     rows: Vec<PoseRow>,
 }
 
 impl PoseTrack {
-    /// Rows on any clock, and the frame's stamp on the same clock.
+    /// Builds a track from rows on any clock and the stamp of the frame on the same clock.
     ///
     /// # Errors
-    /// Fewer than two rows, numbers that are not finite, no rotation, times that do not ascend.
+    /// Fewer than two rows, numbers that are not finite, a quaternion that is no rotation, or times that do
+    /// not ascend.
     pub fn new(mut rows: Vec<PoseRow>, stamp_s: f64) -> Result<Self, PoseTrackError> {
         if rows.len() < 2 {
             return Err(PoseTrackError::TooShort(rows.len()));
         }
         let mut before = f64::NEG_INFINITY;
-        // About the first position: a table in UTM or earth-centred coordinates keeps its last bits where
-        // they matter.
+        // Positions relative to the first: a table in UTM or earth-centred coordinates then keeps its
+        // precision where it matters.
         let origin_m = rows[0].position_m;
         for (i, row) in rows.iter_mut().enumerate() {
             let fail = |what| Err(PoseTrackError::Row { row: i + 1, what });
@@ -184,7 +184,7 @@ impl PoseTrack {
         Ok(Self { rows })
     }
 
-    /// Positions are about the first.
+    /// Positions are relative to the first.
     fn translates(&self) -> bool {
         self.rows.iter().any(|row| row.position_m != DVec3::ZERO)
     }
@@ -209,26 +209,26 @@ impl PoseTrack {
         (self.rows[self.rows.len() - 1].t_s - self.rows[0].t_s) / (self.rows.len() - 1) as f64
     }
 
-    /// The rows around an instant; the outermost pair outside.
-    fn around(&self, dt_s: f64) -> (&PoseRow, &PoseRow) {
+    /// The rows around an instant; outside of the table the outermost pair.
+    fn bracket(&self, dt_s: f64) -> (&PoseRow, &PoseRow) {
         let after = self.rows.partition_point(|row| row.t_s <= dt_s).clamp(1, self.rows.len() - 1);
         (&self.rows[after - 1], &self.rows[after])
     }
 
     fn pose(&self, dt_s: f64) -> (DVec3, DQuat) {
-        let (a, b) = self.around(dt_s);
+        let (a, b) = self.bracket(dt_s);
         let share = (dt_s - a.t_s) / (b.t_s - a.t_s);
         let turn = log(a.world_from_camera.inverse() * b.world_from_camera);
         (a.position_m.lerp(b.position_m, share), a.world_from_camera * exp(turn * share))
     }
 
     fn twist_at(&self, dt_s: f64) -> Twist {
-        let (a, b) = self.around(dt_s);
+        let (a, b) = self.bracket(dt_s);
         let step_s = b.t_s - a.t_s;
         let (_, world_from_camera) = self.pose(dt_s);
         Twist {
             velocity_m_s: world_from_camera.inverse() * ((b.position_m - a.position_m) / step_s),
-            // A constant turn keeps its axis, so its rate is the same in the axes of either row.
+            // At a constant rate the rotation axis is fixed, so the rate is equal in the axes of either row.
             rate_rad_s: log(a.world_from_camera.inverse() * b.world_from_camera) / step_s,
         }
     }
@@ -244,10 +244,9 @@ mod tests {
         Twist { velocity_m_s: DVec3::new(3.0, -2.0, 8.0), rate_rad_s: DVec3::new(0.3, -0.7, 1.1) }
     }
 
-    /// Points that stand still move in the camera by eq. 10: dr/dt = -V - w x r. Integrated by tiny steps,
-    /// backwards.
+    /// A static point moves in the camera by eq. 10, dr/dt = -V - w x r. Integrated backwards in small steps.
     #[test]
-    fn a_twist_is_the_flow_of_equation_10() {
+    fn twist_matches_equation_10() {
         let motion = Motion::Twist(twist());
         for dt_s in [0.4, -0.3, 1e-9, 0.0] {
             let (rotation, shift) = motion.key_from(dt_s + 0.1, 0.1);
@@ -255,7 +254,7 @@ mod tests {
             let steps = 4000;
             let h = dt_s / f64::from(steps);
             let flow = |r: DVec3| -twist().velocity_m_s - twist().rate_rad_s.cross(r);
-            // Classical Runge-Kutta from the line's instant back to the key's: error below 1e-13 here.
+            // Classical Runge-Kutta from the row's instant back to the key instant: error below 1e-13 here.
             let in_key = (0..steps).fold(in_line, |r, _| {
                 let k1 = flow(r);
                 let k2 = flow(r - 0.5 * h * k1);
@@ -268,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_step_is_that_around_a_window() {
+    fn longest_step_includes_the_window_ends() {
         let row = |t_s: f64| PoseRow { t_s, position_m: DVec3::ZERO, world_from_camera: DQuat::IDENTITY };
         let track = Motion::Poses(
             PoseTrack::new([0.0, 0.1, 0.2, 3.2, 3.3].map(|t_s| row(100.0 + t_s)).to_vec(), 100.0).unwrap(),
@@ -280,16 +279,16 @@ mod tests {
             ([1.0, 1.1], 3.0),
             ([3.21, 3.25], 0.1),
         ] {
-            let found = track.longest_step_s(window[0], window[1]);
-            assert!((found - expected).abs() < 1e-9, "{window:?}: {found}");
+            let step_s = track.longest_step_s(window[0], window[1]);
+            assert!((step_s - expected).abs() < 1e-9, "{window:?}: {step_s}");
         }
         assert_eq!(Motion::Twist(twist()).longest_step_s(0.0, 1.0), 0.0);
     }
 
     #[test]
-    fn a_dense_table_of_poses_is_the_twist_it_was_taken_from() {
+    fn dense_pose_table_reproduces_its_twist() {
         let motion = Motion::Twist(twist());
-        // Unix time, far from the origin.
+        // Unix time, far from zero.
         let (stamp_s, start_m) = (1_700_000_000.0, DVec3::new(4.2e5, 5.1e6, 500.0));
         let start = exp(DVec3::new(0.5, 1.0, -2.0));
         let rows: Vec<PoseRow> = (-1024..=1024)
@@ -303,8 +302,8 @@ mod tests {
         let track = Motion::Poses(PoseTrack::new(rows, stamp_s).unwrap());
         for dt_s in [0.2, -0.15, 0.0, 0.101] {
             let (a, b) = (track.key_from(dt_s, 0.01), motion.key_from(dt_s, 0.01));
-            // Straight lines between rows: |v'| h^2 / 8 = 1e-7 m at 8 m/s and 1.3 rad/s; coordinates have
-            // 1e-9 m.
+            // Linear interpolation between rows: |v'| h^2 / 8 = 1e-7 m at 8 m/s and 1.3 rad/s; coordinates
+            // are rounded to 1e-9 m.
             assert!(
                 (a.0.x_axis - b.0.x_axis).length() < 1e-9 && (a.1 - b.1).length() < 2e-7,
                 "{dt_s}: {:?} {:?}",
@@ -312,14 +311,14 @@ mod tests {
                 b.1
             );
         }
-        let found = track.twist_at(0.01);
+        let twist_found = track.twist_at(0.01);
         assert!(
-            (found.velocity_m_s - twist().velocity_m_s).length() < 3e-3
-                && (found.rate_rad_s - twist().rate_rad_s).length() < 1e-9
+            (twist_found.velocity_m_s - twist().velocity_m_s).length() < 3e-3
+                && (twist_found.rate_rad_s - twist().rate_rad_s).length() < 1e-9
         );
         assert_eq!(track.covers(-0.25, 0.25), Ok(()));
         assert!(matches!(track.covers(-0.26, 0.2), Err(PoseTrackError::Window { .. })));
-        // The same instant is exactly no motion.
+        // The same instant gives exactly no motion.
         let (rotation, shift) = track.key_from(0.1234, 0.1234);
         assert!(
             (rotation - DMat3::IDENTITY).to_cols_array().iter().all(|v| v.abs() < 1e-15)
@@ -328,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_that_cannot_be_used_are_refused_by_row() {
+    fn invalid_pose_tables_are_refused_by_row() {
         let row = |t_s: f64, w: f64| PoseRow {
             t_s,
             position_m: DVec3::ZERO,

@@ -10,8 +10,7 @@ use crate::temporal::IdealGeometry;
 mod flow;
 mod flow_interval;
 
-/// A frame whose pixels show the surface that `look` gives for a ray (u, v, 1): inverse depth and linear
-/// colour.
+/// A frame whose pixels show inverse depth and linear colour as `look` returns them for a ray (u, v, 1).
 fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3])) -> IdealFrame {
     let geometry = IdealGeometry {
         size_px,
@@ -45,18 +44,18 @@ fn solver(solver: Solver) -> Settings {
 
 const TILTED: DVec3 = DVec3::new(0.004, -0.006, 0.02);
 
-/// The plane `n . x = 1` of the ideal camera's axes has inverse depth `n . (u, v, 1)` there.
+/// The plane `n . x = 1` in axes of the ideal camera has inverse depth `n . (u, v, 1)`.
 fn tilted_plane(uv: DVec2) -> (f64, [f32; 3]) {
     (TILTED.dot(uv.extend(1.0)), [0.5; 3])
 }
 
-/// Where a line's ray `uv` meets that plane, by its homography: `z (n . R d) = 1 - n . t`.
+/// Source of a row's ray `uv` on that plane, by its homography: `z (n . R d) = 1 - n . t`.
 fn on_plane(uv: DVec2, (rotation, shift): (DMat3, DVec3), geometry: &IdealGeometry) -> DVec2 {
     let d = rotation * uv.extend(1.0);
     geometry.px_from_point(d * (1.0 - TILTED.dot(shift)) / TILTED.dot(d) + shift)
 }
 
-/// Worst distance of the sources from a truth, over a grid.
+/// Largest distance of the sources from the true ones, over a grid.
 fn worst(pipeline: &Pipeline<'_>, truth: impl Fn(DVec2, f64) -> DVec2) -> f64 {
     let [width, height] = pipeline.camera.size_px;
     let mut worst = 0.0_f64;
@@ -65,7 +64,8 @@ fn worst(pipeline: &Pipeline<'_>, truth: impl Fn(DVec2, f64) -> DVec2) -> f64 {
             for phase in [-0.5, 0.0, 0.5] {
                 let dt_s = pipeline.shutter.dt_pixel_s(x, y) + phase * pipeline.shutter.exposure_s();
                 let uv = pipeline.camera.unproject(DVec2::new(f64::from(x), f64::from(y))).unwrap();
-                worst = worst.max(pipeline.source([x, y], phase).unwrap().at_px.distance(truth(uv, dt_s)));
+                worst =
+                    worst.max(pipeline.source([x, y], phase).unwrap().position_px.distance(truth(uv, dt_s)));
             }
         }
     }
@@ -77,7 +77,7 @@ fn swing() -> Twist {
 }
 
 #[test]
-fn sources_over_a_plane_are_its_homography_and_the_ladder_descends() {
+fn sources_on_a_plane_match_its_homography_and_solvers_are_ordered_by_error() {
     let spec = CameraSpec {
         lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.28, 0.07, 1e-3, -5e-4] },
         ..camera(
@@ -104,7 +104,7 @@ fn sources_over_a_plane_are_its_homography_and_the_ladder_descends() {
 }
 
 #[test]
-fn nothing_moving_is_the_identity() {
+fn no_motion_is_the_identity() {
     let spec =
         camera([97, 61], 75.5, ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() });
     let color = |uv: DVec2| [(uv.x * 40.0).sin().abs() as f32, (uv.y * 55.0).cos().abs() as f32, 0.25];
@@ -113,10 +113,10 @@ fn nothing_moving_is_the_identity() {
     for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
         let pipeline = Pipeline::new(&spec, &ideal, &motion, &solver(which)).unwrap();
         for pixel in [[0, 0], [96, 60], [50, 31], [53, 7]] {
-            let at_px = pipeline.source(pixel, 0.5).unwrap().at_px;
+            let position_px = pipeline.source(pixel, 0.5).unwrap().position_px;
             assert!(
-                at_px.distance(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))) < 1e-10,
-                "{which:?} {pixel:?} {at_px}"
+                position_px.distance(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))) < 1e-10,
+                "{which:?} {pixel:?} {position_px}"
             );
         }
         let rendered = pipeline.render(None);
@@ -132,18 +132,18 @@ fn nothing_moving_is_the_identity() {
     }
 }
 
-/// A wall of half the picture 10 m away before a wall 40 m away; the camera moves sideways, so the near edge
-/// hides or bares the far wall.
+/// A wall over half of the image at 10 m in front of a wall at 40 m. The camera moves sideways, so the near
+/// edge covers or uncovers the far wall.
 #[test]
-fn at_a_depth_edge_each_ray_finds_the_surface_it_meets() {
+fn rays_at_a_depth_edge_find_their_surface() {
     let edge_m = 0.7;
     let (near, far) = (1.0 / 10.0, 1.0 / 40.0);
     let ideal = frame([300, 200], 200.0, |uv| {
         if uv.x * 10.0 > edge_m { (near, [1.0, 0.0, 0.0]) } else { (far, [0.0, 0.0, 1.0]) }
     });
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(30.0, 0.0, 0.0), ..Twist::default() });
-    // One row is one instant: 33 ms of readout over 100 rows shifts the near wall by up to 10 px, the far one
-    // by 2.5.
+    // Each row is exposed at one instant: 33 ms of readout over 100 rows shift the near wall by up to 10 px,
+    // the far one by 2.5 px.
     let spec = camera([200, 100], 200.0, ShutterSpec { readout_ms: 33.0, ..ShutterSpec::default() });
     let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
     let (mut wrong, mut all, mut unseen) = (0, 0, 0);
@@ -154,18 +154,18 @@ fn at_a_depth_edge_each_ray_finds_the_surface_it_meets() {
             let on_near_m = uv.x / near + shift_m;
             let w = if on_near_m > edge_m { near } else { far };
             let truth_m = DVec3::new(uv.x / w + shift_m, uv.y / w, 1.0 / w);
-            // A texel's edge may be half a texel from the wall's: 0.025 m there.
+            // The edge in the texels is up to half a texel from that of the wall: 0.025 m there.
             if (on_near_m - edge_m).abs() < 0.03 {
                 continue;
             }
             all += 1;
-            // What the near wall hid from the ideal camera cannot be known.
+            // Points that the near wall hid from the ideal camera are unknown.
             if w == far && truth_m.x / truth_m.z * 10.0 > edge_m {
                 unseen += 1;
                 continue;
             }
-            let found = pipeline.source([x, y], 0.0).unwrap();
-            let error_px = found.at_px.distance(ideal.geometry.px_from_point(truth_m));
+            let source = pipeline.source([x, y], 0.0).unwrap();
+            let error_px = source.position_px.distance(ideal.geometry.px_from_point(truth_m));
             wrong += u32::from(error_px > 1e-4);
         }
     }
@@ -176,8 +176,8 @@ fn at_a_depth_edge_each_ray_finds_the_surface_it_meets() {
 #[test]
 fn blur_is_the_mean_along_the_path() {
     let spec = camera([120, 90], 100.0, ShutterSpec { exposure_ms: 100.0, ..ShutterSpec::default() });
-    // Seen at 20 m from 40 m/s: 20 px over the exposure, linear in time, so the mean of a ramp is its value
-    // at the middle.
+    // At 20 m and 40 m/s: 20 px over the exposure, linear in time, so the mean of a ramp is its value at the
+    // middle.
     let ideal = frame([200, 150], 100.0, |uv| {
         (1.0 / 20.0, [(0.5 + 0.2 * uv.x) as f32, (0.5 + 0.3 * uv.y) as f32, 0.5])
     });
@@ -186,28 +186,28 @@ fn blur_is_the_mean_along_the_path() {
     let paper = Settings { preset: Preset::Paper, blur_samples: Some(10), ..Settings::default() };
     let by_paper = Pipeline::new(&spec, &ideal, &motion, &paper).unwrap().render(None);
     for (x, y) in [(60_u32, 45_u32), (30, 20), (100, 80)] {
-        let at = |frame: &RenderedFrame, channel: usize| {
+        let value = |frame: &RenderedFrame, channel: usize| {
             f64::from(frame.color_rgba[4 * (y * 120 + x) as usize + channel])
         };
         let expected = 0.5 + 0.2 * (f64::from(x) - 59.5) / 100.0;
-        assert!((at(&rendered, 0) - expected).abs() < 1e-5, "{} {expected}", at(&rendered, 0));
-        // Stored values are averaged there: 10 samples, ends included, of the encoded ramp.
+        assert!((value(&rendered, 0) - expected).abs() < 1e-5, "{} {expected}", value(&rendered, 0));
+        // The paper's preset averages stored values: 10 samples of the encoded ramp, ends included.
         let samples: f64 = (0..10)
             .map(|i| f64::from(srgb_from_linear((expected + 0.2 * (f64::from(i) / 9.0 - 0.5) * 0.2) as f32)))
             .sum::<f64>()
             / 10.0;
-        assert!((at(&by_paper, 0) - f64::from(linear_from_srgb(samples as f32))).abs() < 2e-5);
+        assert!((value(&by_paper, 0) - f64::from(linear_from_srgb(samples as f32))).abs() < 2e-5);
     }
 }
 
 #[test]
-fn a_turn_within_the_exposure_is_an_arc() {
+fn rotation_during_the_exposure_is_an_arc() {
     let spec = camera([161, 161], 100.0, ShutterSpec { exposure_ms: 1000.0, ..ShutterSpec::default() });
     let ideal = frame([301, 301], 100.0, |uv| (0.0, [(0.5 + 0.2 * uv.x) as f32, 0.0, 0.0]));
     let motion =
         Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 0.0, 36_f64.to_radians()), ..Twist::default() });
     let pipeline = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap();
-    // Sagitta of 36 deg at 113 px is 5.6 px; segments take it below 0.01 px.
+    // The sagitta of 36 deg at 113 px is 5.6 px; the segments reduce it below 0.01 px.
     assert!(pipeline.nodes() >= 24, "{}", pipeline.nodes());
     let rendered = pipeline.render(None);
     let half = 18_f64.to_radians();
@@ -215,13 +215,13 @@ fn a_turn_within_the_exposure_is_an_arc() {
         let u = (f64::from(x) - 80.0) / 100.0;
         // Mean of u cos(phi) over the arc.
         let expected = 0.5 + 0.2 * u * half.sin() / half;
-        let found = f64::from(rendered.color_rgba[4 * (80 * 161 + x) as usize]);
-        assert!((found - expected).abs() < 2e-5, "{x}: {found} {expected}");
+        let value = f64::from(rendered.color_rgba[4 * (80 * 161 + x) as usize]);
+        assert!((value - expected).abs() < 2e-5, "{x}: {value} {expected}");
     }
 }
 
 #[test]
-fn fog_belongs_to_the_papers_preset() {
+fn linear_fog_needs_the_paper_preset() {
     let fog = paper::LinearFog { end_m: 100.0, color: DVec3::new(0.5, 0.6, 0.7) };
     assert_eq!(fog.over(DVec3::ZERO, DVec2::ZERO, 0.02), fog.color * 0.5);
     assert_eq!(fog.over(DVec3::ZERO, DVec2::ONE, 0.0), fog.color);
@@ -238,7 +238,7 @@ fn fog_belongs_to_the_papers_preset() {
 }
 
 #[test]
-fn frames_that_cannot_be_used_are_refused() {
+fn invalid_frames_are_refused() {
     let spec = camera([4, 3], 10.0, ShutterSpec::default());
     let good = frame([4, 3], 10.0, |_| (0.1, [0.5; 3]));
     let motion = Motion::Twist(Twist::default());
@@ -249,13 +249,13 @@ fn frames_that_cannot_be_used_are_refused() {
     bad.inverse_depth[3] = f32::NAN;
     assert!(error(&bad, &Settings::default()).contains("not finite"));
     bad.inverse_depth.pop();
-    assert!(error(&bad, &Settings::default()).contains("one size"));
+    assert!(error(&bad, &Settings::default()).contains("same size"));
     assert!(
         error(&IdealFrame { color_rgba: vec![f32::INFINITY; 48], ..good.clone() }, &Settings::default())
             .contains("colours")
     );
     assert!(error(&good, &solver(Solver::Oracle)).contains("reproject"));
-    // A ray farther than 90 deg from the ideal camera's axis has no source, and no panic.
+    // A ray more than 90 deg from the axis of the ideal camera has no source and causes no panic.
     let about =
         Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 300.0, 0.0), velocity_m_s: DVec3::splat(1e9) });
     let blurred =
@@ -268,10 +268,10 @@ fn frames_that_cannot_be_used_are_refused() {
     }
 }
 
-/// A far wall, a hole in the depth and a near wall side by side: what looks into the hole has no answer, with
-/// every solver, and is counted.
+/// A far wall, a hole in the depth and a near wall side by side. Rays into the hole have no result, with
+/// every solver, and are counted.
 #[test]
-fn what_looks_into_a_marked_hole_is_empty_and_counted() {
+fn rays_into_holes_are_empty_and_counted() {
     let spec = camera([60, 20], 50.0, ShutterSpec { exposure_ms: 10.0, ..ShutterSpec::default() });
     let mut ideal = frame([120, 40], 50.0, |uv| (if uv.x < 0.0 { 0.1 } else { 0.5 }, [0.5; 3]));
     // Columns 55..65: 5 of each wall.
@@ -281,7 +281,7 @@ fn what_looks_into_a_marked_hole_is_empty_and_counted() {
     for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
         let pipeline = Pipeline::new(&spec, &ideal, &still, &solver(which)).unwrap();
         let (rendered, counts) = pipeline.render_and_count(None);
-        assert_eq!(counts, UnseenCounts { holes: 10 * 20, ..UnseenCounts::default() }, "{which:?}");
+        assert_eq!(counts, NoSourceCounts { holes: 10 * 20, ..NoSourceCounts::default() }, "{which:?}");
         let alpha = |x: usize| rendered.color_rgba[4 * (60 * 7 + x) + 3];
         assert_eq!(
             (24..36).map(alpha).collect::<Vec<_>>(),
@@ -289,14 +289,14 @@ fn what_looks_into_a_marked_hole_is_empty_and_counted() {
             "{which:?}"
         );
     }
-    // 0.4 m to the right, 100 ms before: the far wall by 0.4 * 0.1 * 50 = 2 px, the near one by 10. Every ray
-    // that meets neither wall where it was seen is empty, and none stands in with infinity.
+    // 0.4 m to the right, 100 ms earlier: the far wall moves by 0.4 * 0.1 * 50 = 2 px, the near one by 10 px.
+    // Rays that hit neither visible wall are empty, and none falls back to infinity.
     let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(-4.0, 0.0, 0.0), ..Twist::default() });
     let late = camera([60, 20], 50.0, ShutterSpec { delay_ms: 100.0, ..ShutterSpec::default() });
     let pipeline = Pipeline::new(&late, &ideal, &motion, &Settings::default()).unwrap();
-    let mut seen = [0; 3];
+    let mut counts = [0; 3];
     for x in 0..60 {
-        // Where the ray would look on either wall: 2 px to the right on the far one, 10 on the near one.
+        // Position of the ray on either wall: 2 px to the right on the far one, 10 px on the near one.
         let (on_far, on_near) = (x + 30 + 2, x + 30 + 10);
         let expected = if on_near >= 65 {
             Some((on_near, 0.5))
@@ -308,14 +308,15 @@ fn what_looks_into_a_marked_hole_is_empty_and_counted() {
         match (pipeline.source([x, 9], 0.0), expected) {
             (Ok(found), Some((at, w))) => {
                 assert!(
-                    (found.at_px.x - f64::from(at)).abs() < 1e-4 && (found.inverse_depth - w).abs() < 1e-6,
+                    (found.position_px.x - f64::from(at)).abs() < 1e-4
+                        && (found.inverse_depth - w).abs() < 1e-6,
                     "{x}: {found:?}"
                 );
-                seen[if w > 0.2 { 0 } else { 1 }] += 1;
+                counts[if w > 0.2 { 0 } else { 1 }] += 1;
             }
-            (Err(Unseen::Hole), None) => seen[2] += 1,
+            (Err(NoSource::Hole), None) => counts[2] += 1,
             other => panic!("{x}: {other:?}"),
         }
     }
-    assert!(seen.iter().all(|&count| count > 0), "{seen:?}");
+    assert!(counts.iter().all(|&count| count > 0), "{counts:?}");
 }

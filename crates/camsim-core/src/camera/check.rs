@@ -1,4 +1,4 @@
-//! What a calibration is worth: where it folds and how much of the image it explains.
+//! Check of a calibration: where the lens folds, and for which part of the image it has ideal rays.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::CameraModel;
 use crate::lens::{FOLD_RAYS, Lens};
 
-/// Pixels that a check looks at, about; larger images are sampled on a regular grid that includes the
-/// borders.
+/// Approximate number of pixels that are tested. Larger images are sampled on a regular grid that includes
+/// the borders.
 const MAX_SAMPLES: f64 = 250_000.0;
 
 /// Grid over the image on which the branch is tested for being one-to-one.
@@ -19,10 +19,10 @@ const BIJECTIVITY_GRID: u32 = 33;
 pub struct LensCheck {
     /// Share of the pixels that have an ideal ray.
     pub valid_fraction: f64,
-    /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it does neither
+    /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it has neither
     /// within 89 degrees.
     pub fold_radius_min: Option<f64>,
-    /// The largest such radius over all directions.
+    /// Largest such radius over all directions.
     pub fold_radius_max: Option<f64>,
     /// Largest `|project(unproject(p)) - p|` over valid pixels.
     pub worst_roundtrip_px: f64,
@@ -59,8 +59,8 @@ impl CameraModel {
         }
     }
 
-    /// On the branch the determinant is positive, so a distorted point has as many pre-images as the border's
-    /// image winds round it.
+    /// On the branch the determinant is positive, so the number of pre-images of a distorted point equals the
+    /// winding number of the border's image around it.
     fn is_bijective(&self) -> bool {
         let Some(border) = distorted_border(&self.lens) else { return true };
         let [width, height] = self.size_px.map(|size| f64::from(size - 1) / f64::from(BIJECTIVITY_GRID - 1));
@@ -73,7 +73,7 @@ impl CameraModel {
     }
 }
 
-/// Image of the fold curve, slightly inside of it (a pole itself has no image); `None` where the lens has no
+/// Image of the fold curve, slightly inside of it (a pole itself has no image); `None` for a lens without a
 /// fold curve.
 fn distorted_border(lens: &Lens) -> Option<Vec<DVec2>> {
     let radii = lens.fold_curve()?.radii();
@@ -84,7 +84,7 @@ fn distorted_border(lens: &Lens) -> Option<Vec<DVec2>> {
     Some(radii.iter().enumerate().map(ray).collect())
 }
 
-/// How often a closed polygon turns round a point, anticlockwise positive.
+/// Winding number of a closed polygon around a point, anticlockwise positive.
 fn winding_number(polygon: &[DVec2], point: DVec2) -> i32 {
     polygon
         .iter()

@@ -1,17 +1,17 @@
-//! The lens map on the CPU: twin of the GPU stage `lens_inverse`.
+//! The lens map on the CPU: f64 twin of the GPU stage `lens_inverse`.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
 use super::CameraModel;
 
-/// `u = v = INVALID_UV` marks a pixel of a lens map that has no ideal ray. Finite, because shaders may assume
-/// that infinities do not occur.
+/// `u = v = INVALID_UV` marks a pixel of a lens map without an ideal ray. The value is finite, because
+/// shaders may assume that infinities do not occur.
 pub const INVALID_UV: f32 = 1e30;
 
 impl CameraModel {
-    /// Ideal `[u, v]` of every pixel's centre, row-major, solved in f64; [`INVALID_UV`] twice where there is
-    /// none.
+    /// Ideal `[u, v]` at the centre of every pixel, row-major, solved in f64; [`INVALID_UV`] twice where
+    /// there is none.
     pub fn lens_inverse(&self) -> Vec<[f32; 2]> {
         let [width, height] = self.size_px;
         let row = |y: u32| {

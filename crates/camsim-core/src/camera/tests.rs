@@ -12,7 +12,7 @@ fn s3_opencv() -> CameraModel {
 }
 
 #[test]
-fn the_centre_of_the_image_is_between_the_middle_pixels() {
+fn image_centre_is_between_the_central_pixels() {
     let camera = CameraModel::from_spec(&CameraSpec::default()).unwrap();
     assert_eq!(camera.principal_point_px, DVec2::new(319.5, 239.5));
     assert_eq!(camera.unproject(DVec2::new(319.5, 239.5)).unwrap(), DVec2::ZERO);
@@ -20,7 +20,7 @@ fn the_centre_of_the_image_is_between_the_middle_pixels() {
 }
 
 #[test]
-fn a_fisheye_by_a_polynomial_explains_little_more_than_half_of_its_image() {
+fn polynomial_fisheye_covers_57_percent_of_its_image() {
     let report = s3_opencv().check();
     // 43 % of the frame lies beyond the fold: 236 px from the principal point.
     assert!((report.valid_fraction - 0.57).abs() < 0.005, "{report:?}");
@@ -31,7 +31,7 @@ fn a_fisheye_by_a_polynomial_explains_little_more_than_half_of_its_image() {
 }
 
 #[test]
-fn checks_of_harmless_cameras_are_clean() {
+fn checks_of_regular_cameras_are_clean() {
     let pinhole = CameraModel::from_spec(&CameraSpec::default()).unwrap().check();
     assert_eq!((pinhole.valid_fraction, pinhole.fold_radius_min, pinhole.bijective), (1.0, None, true));
     let k = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05];
@@ -54,7 +54,7 @@ fn checks_of_harmless_cameras_are_clean() {
 }
 
 #[test]
-fn bad_cameras_are_named() {
+fn invalid_cameras_are_refused() {
     let base = CameraSpec::default();
     let error = |spec: CameraSpec| CameraModel::from_spec(&spec).unwrap_err().to_string();
     assert!(error(CameraSpec { size_px: [0, 480], ..base.clone() }).contains("size_px"));
@@ -86,16 +86,20 @@ fn zoom_camera() -> CameraSpec {
 }
 
 #[test]
-fn zoom_interpolates_its_table_and_holds_outside() {
+fn zoom_interpolates_its_table_and_is_constant_beyond() {
     let spec = zoom_camera();
-    let at = |zoom: f64| {
+    let focal_and_k1 = |zoom: f64| {
         let camera = CameraModel::at_zoom(&spec, zoom).unwrap();
         (camera.focal_px.x, camera.lens.coefficients()[0])
     };
     let close = |(f, k): (f64, f64), (f2, k2): (f64, f64)| (f - f2).abs() < 1e-9 && (k - k2).abs() < 1e-12;
-    assert!(close(at(1.0), (400.0, -0.3)) && close(at(2.0), (800.0, -0.1)) && close(at(4.0), (1600.0, 0.0)));
-    assert!(close(at(1.5), (600.0, -0.2)) && close(at(3.0), (1200.0, -0.05)));
-    assert!(close(at(-7.0), (400.0, -0.3)) && close(at(f64::INFINITY), (1600.0, 0.0)));
+    assert!(
+        close(focal_and_k1(1.0), (400.0, -0.3))
+            && close(focal_and_k1(2.0), (800.0, -0.1))
+            && close(focal_and_k1(4.0), (1600.0, 0.0))
+    );
+    assert!(close(focal_and_k1(1.5), (600.0, -0.2)) && close(focal_and_k1(3.0), (1200.0, -0.05)));
+    assert!(close(focal_and_k1(-7.0), (400.0, -0.3)) && close(focal_and_k1(f64::INFINITY), (1600.0, 0.0)));
     assert!(matches!(CameraModel::at_zoom(&spec, f64::NAN), Err(CameraError::ZoomValue(_))));
     let table = ZoomTable::from_spec(&spec).unwrap().unwrap();
     assert_eq!([0.0, 1.4, 1.5, 1.6, 2.9, 3.1, 9.0].map(|zoom| table.nearest(zoom)), [0, 0, 0, 1, 1, 2, 2]);

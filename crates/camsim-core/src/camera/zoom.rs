@@ -1,13 +1,13 @@
-//! Calibrations over zoom.
+//! Calibrations by zoom value.
 
 use super::{CameraError, CameraModel};
 use crate::scenario::{CameraSpec, LensModel, ZoomSpec};
 
-/// The `[[camera.zoom]]` table: every number of a calibration is linear in the zoom value between two entries
-/// and held outside.
+/// The `[[camera.zoom]]` table. Every number of a calibration is linear in the zoom value between two
+/// entries, and constant beyond the ends.
 ///
-/// Linear interpolation cannot overshoot, so what is monotone over the table (the focal length, say) stays
-/// so.
+/// Linear interpolation cannot overshoot, so quantities that are monotone over the table (the focal length,
+/// for instance) stay monotone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZoomTable {
     size_px: [u32; 2],
@@ -16,7 +16,7 @@ pub struct ZoomTable {
 }
 
 impl ZoomTable {
-    /// `None` where the camera has no zoom table. Every entry is checked as a camera of its own.
+    /// The table of a camera; `None` without one. Every entry is checked as a camera of its own.
     pub fn from_spec(spec: &CameraSpec) -> Result<Option<Self>, CameraError> {
         if spec.zoom.is_empty() {
             return Ok(None);
@@ -28,7 +28,7 @@ impl ZoomTable {
             }
             last = entry.at;
         }
-        // The longest row decides how many coefficients there are; shorter ones end in zeros.
+        // The longest entry determines the number of coefficients; shorter ones end in zeros.
         let count = spec.zoom.iter().map(|entry| entry.coefficients.len()).max().unwrap_or(0);
         let mut entries = spec.zoom.clone();
         for (index, entry) in entries.iter_mut().enumerate() {
@@ -66,8 +66,8 @@ impl ZoomTable {
         camera("camera.zoom", self.size_px, self.model, &entry)
     }
 
-    /// Index of the entry whose zoom value is nearest (the lower one of two equally near): the map of that
-    /// entry starts the inverse.
+    /// Index of the entry with the nearest zoom value (the lower of two equally near). The lens map of that
+    /// entry provides the start of the inverse.
     pub fn nearest(&self, zoom: f64) -> usize {
         let above = self.entries.partition_point(|entry| entry.at <= zoom).min(self.entries.len() - 1);
         let below = above.saturating_sub(1);

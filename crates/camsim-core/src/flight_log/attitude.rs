@@ -1,11 +1,11 @@
-//! Attitudes while a log is cleaned: rotations where angles wrap, angles where turns count.
+//! Attitudes while a log is cleaned: rotations if angles wrap, angles if they count turns.
 
 use glam::{DQuat, EulerRot};
 
 use super::{RawAttitude, RawRow};
 use crate::scenario::AngleKind;
 
-/// Rotation that takes body (FRD) to north-east-down, from ZYX angles (roll, pitch, yaw) in degrees: `Rz(yaw)
+/// Rotation from body (FRD) to north-east-down for ZYX angles (roll, pitch, yaw) in degrees: `Rz(yaw)
 /// Ry(pitch) Rx(roll)`.
 pub fn body_from_euler_deg([roll, pitch, yaw]: [f64; 3]) -> DQuat {
     DQuat::from_euler(EulerRot::ZYX, yaw.to_radians(), pitch.to_radians(), roll.to_radians())
@@ -14,15 +14,15 @@ pub fn body_from_euler_deg([roll, pitch, yaw]: [f64; 3]) -> DQuat {
 /// Attitude relative to the row's own tangent frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Attitude {
-    /// A rotation: the short way between two rows.
+    /// A rotation, interpolated by the shorter way.
     Rotation(DQuat),
-    /// Roll, pitch, yaw in degrees, as written: turns count.
+    /// Roll, pitch, yaw in degrees as written, counting turns.
     Turns([f64; 3]),
     /// Unknown.
     Missing,
 }
 
-/// Angles beyond this cannot be told from rubbish, and lose their fraction in f64.
+/// Larger angles cannot be told from garbage, and lose their fraction in f64.
 const MAX_ANGLE_DEG: f64 = 1e9;
 
 impl Attitude {
@@ -47,7 +47,7 @@ impl Attitude {
         self == Self::Missing
     }
 
-    /// The rotation to the tangent frame; identity where missing.
+    /// Rotation to the tangent frame; identity if missing.
     pub(super) fn rotation(self) -> DQuat {
         match self {
             Self::Rotation(rotation) => rotation,
@@ -56,7 +56,7 @@ impl Attitude {
         }
     }
 
-    /// Between `self` (0) and `other` (1); the known one where the other is missing.
+    /// Interpolation between `self` (0) and `other` (1); the known one if the other is missing.
     pub(super) fn interpolate(self, other: Self, fraction: f64) -> Self {
         match (self, other) {
             (Self::Rotation(a), Self::Rotation(b)) => Self::Rotation(a.slerp(b, fraction).normalize()),
@@ -67,7 +67,7 @@ impl Attitude {
         }
     }
 
-    /// Angle between two attitudes, radians; the largest of the three changes where turns count. `None` where
+    /// Angle between two attitudes, radians; the largest of the three changes if they count turns. `None` if
     /// one is missing.
     pub(super) fn distance_rad(self, other: Self) -> Option<f64> {
         match (self, other) {
@@ -79,7 +79,7 @@ impl Attitude {
         }
     }
 
-    /// Mean of the known ones of attitudes that lie close together.
+    /// Mean of the known ones among attitudes that are close together.
     pub(super) fn mean(attitudes: impl Iterator<Item = Self> + Clone) -> Self {
         let known = attitudes.filter(|attitude| !attitude.is_missing());
         let count = known.clone().count() as f64;
@@ -101,8 +101,8 @@ impl Attitude {
             }
         }
         match (first, count > 0.0) {
-            // Two opposite rotations average to a sum near zero only when they are 180 degrees apart; then
-            // the first stands.
+            // The sum of two rotations is near zero only if they are 180 degrees apart; the first one is used
+            // then.
             (Some(first), _) => Self::Rotation(if sum.length() > 1e-3 { sum.normalize() } else { first }),
             (None, true) => Self::Turns(turns),
             (None, false) => Self::Missing,
@@ -117,9 +117,9 @@ pub(super) fn angle_between_rad(a: DQuat, b: DQuat) -> f64 {
     2.0 * relative.xyz().length().atan2(relative.w.abs())
 }
 
-/// Decides `Auto`: continuous where a column leaves both [-180, 180] and [0, 360).
+/// Decides `Auto`: continuous if a column leaves both [-180, 180] and [0, 360).
 ///
-/// A compass that writes 360.0 now and then leaves both by one value; such a column wraps if it also jumps by
+/// A compass that occasionally writes 360.0 leaves both by one value. Such a column wraps if it also jumps by
 /// more than 270 degrees between rows while most of its steps are small. Two rows 0 and 360 are a full turn.
 pub(super) fn is_continuous(rows: &[&RawRow], kind: AngleKind) -> bool {
     match kind {

@@ -7,7 +7,7 @@ use super::{
     RawRow,
     attitude::{self, Attitude},
     null_rows,
-    outliers::{self, Channel},
+    outliers::{self, OutlierSignal},
     track_attitude,
 };
 use crate::{
@@ -19,23 +19,23 @@ use crate::{
 /// has steps of 50 us).
 const MERGE_NS: i128 = 1_000_000;
 const GAP_S: f64 = 1.0;
-/// No position further from the origin than this is a position.
+/// Largest distance of a plausible position from the origin.
 const MAX_DISTANCE_M: f64 = 1e8;
-/// Smallest deviation of a position that counts as a spike.
+/// Least deviation of a position that counts as a spike.
 const SPIKE_FLOOR_M: f64 = 0.05;
-/// Smallest deviation of an attitude that counts as a glitch.
+/// Least deviation of an attitude that counts as a glitch.
 const GLITCH_FLOOR_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
-/// Rows put between two rows; 2500 turns in one step are not a flight.
+/// Most rows inserted between two rows; 2500 turns in one step are no flight.
 const MAX_PIECES: f64 = 10_000.0;
 
-/// A row on its way: position in local NED, attitude relative to its own tangent frame.
+/// A row during cleaning: position in local NED, attitude relative to its own tangent frame.
 #[derive(Clone, Copy, Debug)]
-struct Row {
+struct CleanRow {
     line: usize,
     t_ns: i64,
     position_ned_m: DVec3,
     attitude: Attitude,
-    /// The file states an attitude here, usable or not.
+    /// Whether the file states an attitude here, usable or not.
     states_attitude: bool,
 }
 
@@ -157,8 +157,12 @@ fn sort_by_time(rows: &mut [&RawRow], report: &mut CleaningReport) {
     rows.sort_by_key(|row| row.t_ns);
 }
 
-/// Positions to local NED, angles to attitudes; also gives the frame.
-fn localise(usable: &[&RawRow], options: &LogOptions, continuous: bool) -> (Vec<Row>, Option<LocalFrame>) {
+/// Converts positions to local NED and angles to attitudes; also returns the frame.
+fn localise(
+    usable: &[&RawRow],
+    options: &LogOptions,
+    continuous: bool,
+) -> (Vec<CleanRow>, Option<LocalFrame>) {
     let mut geoid = GeoidCache::new();
     let mut convert = |at: Geodetic| match options.height {
         HeightConversion::None => at,
@@ -170,23 +174,23 @@ fn localise(usable: &[&RawRow], options: &LogOptions, continuous: bool) -> (Vec<
         .iter()
         .filter_map(|row| {
             let position_ned_m = match row.position {
-                RawPosition::Geodetic(at) => {
-                    let at = convert(at);
-                    frame.get_or_insert_with(|| LocalFrame::new(at)).ned_from_geodetic(at)
+                RawPosition::Geodetic(geodetic) => {
+                    let geodetic = convert(geodetic);
+                    frame.get_or_insert_with(|| LocalFrame::new(geodetic)).ned_from_geodetic(geodetic)
                 }
                 RawPosition::Ned(ned) => ned,
             };
             let attitude = Attitude::from_raw(row.attitude, continuous);
             let states_attitude = row.attitude != RawAttitude::None;
-            row.t_ns.map(|t_ns| Row { line: row.line, t_ns, position_ned_m, attitude, states_attitude })
+            row.t_ns.map(|t_ns| CleanRow { line: row.line, t_ns, position_ned_m, attitude, states_attitude })
         })
         .collect();
     (rows, frame)
 }
 
-struct Positions<'a>(&'a [Row]);
+struct Positions<'a>(&'a [CleanRow]);
 
-impl Channel for Positions<'_> {
+impl OutlierSignal for Positions<'_> {
     fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64 {
         let (a, b) = (self.0[before].position_ned_m, self.0[after].position_ned_m);
         (a + (b - a) * fraction).distance(self.0[row].position_ned_m)
@@ -197,9 +201,9 @@ impl Channel for Positions<'_> {
     }
 }
 
-struct Attitudes<'a>(&'a [Row]);
+struct Attitudes<'a>(&'a [CleanRow]);
 
-impl Channel for Attitudes<'_> {
+impl OutlierSignal for Attitudes<'_> {
     fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64 {
         let (a, b) = (self.0[before].attitude, self.0[after].attitude);
         if a.is_missing() || b.is_missing() {
@@ -213,8 +217,8 @@ impl Channel for Attitudes<'_> {
     }
 }
 
-/// Drops position spikes. If the first row goes, the origin of a geodetic log stays where that row put it.
-fn drop_spikes(rows: &mut Vec<Row>, report: &mut CleaningReport) {
+/// Drops position spikes. If the first row is one, the origin of a geodetic log remains at that row.
+fn drop_spikes(rows: &mut Vec<CleanRow>, report: &mut CleaningReport) {
     let is_spike = outliers::find(&times_s(rows), &Positions(rows), SPIKE_FLOOR_M);
     let mut flags = is_spike.iter();
     rows.retain(|row| {
@@ -226,8 +230,8 @@ fn drop_spikes(rows: &mut Vec<Row>, report: &mut CleaningReport) {
     });
 }
 
-/// Counts missing attitudes and turns glitches into missing ones.
-fn mark_attitudes(rows: &mut [Row], report: &mut CleaningReport) {
+/// Counts missing attitudes and marks glitches as missing.
+fn mark_attitudes(rows: &mut [CleanRow], report: &mut CleaningReport) {
     for row in rows.iter().filter(|row| row.states_attitude && row.attitude.is_missing()) {
         report.attitude_missing.add(row.line);
     }
@@ -238,12 +242,12 @@ fn mark_attitudes(rows: &mut [Row], report: &mut CleaningReport) {
     }
 }
 
-/// Averages groups of rows that lie within 1 ms of the group's first.
-fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
+/// Averages groups of rows within 1 ms of the group's first row.
+fn merge(rows: &mut Vec<CleanRow>, report: &mut CleaningReport) {
     let mut merged = Vec::with_capacity(rows.len());
     let mut start = 0;
     while start < rows.len() {
-        let since_start_ns = |row: &Row| i128::from(row.t_ns) - i128::from(rows[start].t_ns);
+        let since_start_ns = |row: &CleanRow| i128::from(row.t_ns) - i128::from(rows[start].t_ns);
         let end = start + rows[start..].iter().take_while(|row| since_start_ns(row) < MERGE_NS).count();
         let group = &rows[start..end];
         for pair in group.windows(2) {
@@ -253,7 +257,7 @@ fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
         }
         let count = group.len();
         let offset_ns = group.iter().map(since_start_ns).sum::<i128>() / count as i128;
-        merged.push(Row {
+        merged.push(CleanRow {
             line: group[0].line,
             // Below 1 ms by construction.
             t_ns: group[0].t_ns.saturating_add(offset_ns as i64),
@@ -266,8 +270,8 @@ fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
     *rows = merged;
 }
 
-/// Interpolates missing attitudes between the known ones around them; holds the nearest one at the ends.
-fn fill_attitudes(rows: &mut [Row]) {
+/// Interpolates missing attitudes between their known neighbours, or takes the nearest one at the ends.
+fn fill_attitudes(rows: &mut [CleanRow]) {
     let known: Vec<usize> = (0..rows.len()).filter(|&i| !rows[i].attitude.is_missing()).collect();
     let mut next = 0;
     for i in 0..rows.len() {
@@ -288,7 +292,7 @@ fn fill_attitudes(rows: &mut [Row]) {
     }
 }
 
-fn count_gaps(rows: &[Row], report: &mut CleaningReport) {
+fn count_gaps(rows: &[CleanRow], report: &mut CleaningReport) {
     for pair in rows.windows(2) {
         let step_s = seconds_between(pair[0].t_ns, pair[1].t_ns);
         report.longest_step_s = report.longest_step_s.max(step_s);
@@ -298,9 +302,9 @@ fn count_gaps(rows: &[Row], report: &mut CleaningReport) {
     }
 }
 
-/// Puts rows between rows whose three angles change by more than 90 degrees together, so that slerp between
-/// rows keeps the turns.
-fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, LogError> {
+/// Inserts rows between rows whose three angles change by more than 90 degrees together, so that slerp
+/// between rows keeps the turns.
+fn insert_turns(rows: &[CleanRow], report: &mut CleaningReport) -> Result<Vec<CleanRow>, LogError> {
     let mut filled = vec![rows[0]];
     for pair in rows.windows(2) {
         let (a, b) = (pair[0], pair[1]);
@@ -314,7 +318,7 @@ fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, L
             for piece in 1..pieces as usize {
                 let fraction = piece as f64 / pieces;
                 let t_ns = i128::from(a.t_ns) + (span_ns * fraction) as i128;
-                filled.push(Row {
+                filled.push(CleanRow {
                     line: a.line,
                     t_ns: t_ns as i64,
                     position_ned_m: a.position_ned_m.lerp(b.position_ned_m, fraction),
@@ -329,11 +333,11 @@ fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, L
     Ok(filled)
 }
 
-fn times_s(rows: &[Row]) -> Vec<f64> {
+fn times_s(rows: &[CleanRow]) -> Vec<f64> {
     rows.iter().map(|row| seconds_between(rows[0].t_ns, row.t_ns)).collect()
 }
 
-/// Through i128: the difference of two i64 may not fit.
+/// Computed in i128, because the difference of two i64 may not fit.
 fn seconds_between(from_ns: i64, to_ns: i64) -> f64 {
     (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
 }

@@ -1,30 +1,30 @@
 //! Zeros that stand for a missing value: the fix at latitude 0, longitude 0, and the height 0 that receivers
-//! write before they know better.
+//! write before their first valid one.
 //!
-//! A zero may also be true: flights cross the equator and take off from the sea. What tells the two apart is
-//! that a true zero has neighbours near it. So a run of zeros is left out only if the good rows on both sides
-//! (as far as there are any) are a jump away that no aircraft flies.
+//! A zero may also be true: flights cross the equator and take off from the sea. A true zero has neighbours
+//! near it. So a run of zeros is dropped only if it is separated from the good rows on both sides (where
+//! there are any) by a jump that no aircraft flies.
 
 use super::{CleaningReport, RawPosition, RawRow, outliers::quantile};
 use crate::geodesy::Geodetic;
 
-/// Latitude or longitude exactly 0 and this far from the rows around is no place.
+/// Latitude or longitude of exactly 0 is invalid if the rows around are farther away than this.
 const FAR_DEG: f64 = 1.0;
-/// Heights closer to 0 than this may be a start from there.
+/// Heights closer to 0 than this may be a take-off from there.
 const FAR_HEIGHT_M: f64 = 10.0;
-/// Steeper than this is no climb.
+/// Largest plausible climb rate.
 const CLIMB_M_S: f64 = 20.0;
-/// And this many times the log's usual step.
+/// A jump must also exceed the usual step of the log by this factor.
 const USUAL_FACTOR: f64 = 10.0;
 
 /// Drops null fixes and null heights from rows in order of time, and counts them.
 pub(super) fn drop(rows: &mut Vec<&RawRow>, report: &mut CleaningReport) {
     let is_null_fix = |at: Geodetic| at.lat_deg() == 0.0 || at.lon_deg() == 0.0;
     let fixes = runs(rows, is_null_fix, |null, good, _| {
-        let away = |zero: f64, other: f64| {
+        let is_far = |zero: f64, other: f64| {
             zero == 0.0 && (other - zero).abs().min(360.0 - (other - zero).abs()) > FAR_DEG
         };
-        away(null.lat_deg(), good.lat_deg()) || away(null.lon_deg(), good.lon_deg())
+        is_far(null.lat_deg(), good.lat_deg()) || is_far(null.lon_deg(), good.lon_deg())
     });
     take(rows, &fixes, |line| report.null_fixes.add(line));
 
@@ -43,15 +43,15 @@ pub(super) fn drop(rows: &mut Vec<&RawRow>, report: &mut CleaningReport) {
     take(rows, &nulls, |line| report.null_heights.add(line));
 }
 
-/// Marks runs of rows that are null and away from the good rows at both ends. `is_away` gets a row of the
-/// run, the good one beside it and their distance in time.
+/// Marks runs of null rows that are away from the good rows at both ends. `is_away` receives a row of the
+/// run, the good row beside it and their distance in time.
 fn runs(
     rows: &[&RawRow],
     is_null: impl Fn(Geodetic) -> bool,
     is_away: impl Fn(Geodetic, Geodetic, f64) -> bool,
 ) -> Vec<bool> {
     let null_at = |row: usize| geodetic(rows[row]).is_some_and(&is_null);
-    let away = |null: usize, good: usize| match (geodetic(rows[null]), geodetic(rows[good])) {
+    let is_far = |null: usize, good: usize| match (geodetic(rows[null]), geodetic(rows[good])) {
         (Some(at), Some(beside)) => is_away(at, beside, step_s(rows[null], rows[good])),
         _ => false,
     };
@@ -67,8 +67,8 @@ fn runs(
         let after = (end < rows.len()).then_some(end);
         let is_alone = before.is_none() && after.is_none();
         if !is_alone
-            && before.is_none_or(|good| away(first, good))
-            && after.is_none_or(|good| away(end - 1, good))
+            && before.is_none_or(|good| is_far(first, good))
+            && after.is_none_or(|good| is_far(end - 1, good))
         {
             marks[first..end].fill(true);
         }

@@ -12,27 +12,27 @@
 //! hand-held logs (TUM-VI, EuRoC, TUM RGB-D) no deviation above the first threshold meets the third
 //! condition.
 
-/// Fewer rows than this are taken as they are: there is no "usual" to compare with.
+/// Shorter logs are taken as they are: there is no typical deviation to compare with.
 const MIN_ROWS: usize = 8;
 const TYPICAL_QUANTILE: f64 = 0.9;
 const TYPICAL_FACTOR: f64 = 12.0;
 const NEARBY_FACTOR: f64 = 8.0;
 const NEIGHBOURS_AGREE: f64 = 0.3;
-/// Over longer times, leaving and coming back may be flown.
+/// Over longer times, leaving and returning may be a real motion.
 const MAX_SINGLE_SPAN_S: f64 = 10.0;
 const MAX_BLOCK_SPAN_S: f64 = 0.5;
 const MAX_BLOCK: usize = 3;
 
-/// A column of rows that can be compared: `deviation(i, a, b, f)` is how far row i lies from the
-/// interpolation at fraction f between rows a and b, `distance(a, b)` how far two rows are apart. NaN says
-/// "cannot tell" and flags nothing.
-pub(super) trait Channel {
+/// A quantity of consecutive rows to be tested: `deviation(i, a, b, f)` is the distance of row i from the
+/// interpolation at fraction f between rows a and b, `distance(a, b)` that of two rows. NaN means unknown and
+/// is never flagged.
+pub(super) trait OutlierSignal {
     fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64;
     fn distance(&self, a: usize, b: usize) -> f64;
 }
 
-/// Marks outliers among rows at non-decreasing times `t_s`. `floor` is the smallest deviation that counts.
-pub(super) fn find(t_s: &[f64], channel: &impl Channel, floor: f64) -> Vec<bool> {
+/// Marks outliers among rows at non-decreasing times `t_s`. `floor` is the least deviation that counts.
+pub(super) fn find(t_s: &[f64], channel: &impl OutlierSignal, floor: f64) -> Vec<bool> {
     let count = t_s.len();
     let mut is_outlier = vec![false; count];
     if count < MIN_ROWS {
@@ -45,7 +45,7 @@ pub(super) fn find(t_s: &[f64], channel: &impl Channel, floor: f64) -> Vec<bool>
     };
     let deviations: Vec<f64> = (1..count - 1).map(|row| deviation_of(row, row - 1, row + 1)).collect();
     let threshold = floor.max(TYPICAL_FACTOR * quantile(&deviations, TYPICAL_QUANTILE));
-    // The rows next to a fault deviate too, so the nearest ones do not count as "usual" either.
+    // The rows next to a fault deviate as well, so the nearest ones are left out of the median.
     let nearby_median = |first: usize, last: usize| {
         let range = first.saturating_sub(7)..(last + 6).min(deviations.len());
         let nearby: Vec<f64> = range.filter(|&i| i + 2 < first || i > last).map(|i| deviations[i]).collect();
@@ -76,11 +76,11 @@ pub(super) fn find(t_s: &[f64], channel: &impl Channel, floor: f64) -> Vec<bool>
     is_outlier
 }
 
-/// The end rows have one neighbour only: a fault there is a step more than 20 times the usual one at the same
-/// pace, over the threshold. `from_end` counts rows from that end.
+/// The end rows have a single neighbour. A fault there is a step above the threshold and more than 20 times
+/// the usual one at the same speed. `from_end` counts rows from that end.
 fn flag_end(
     t_s: &[f64],
-    channel: &impl Channel,
+    channel: &impl OutlierSignal,
     threshold: f64,
     is_outlier: &mut [bool],
     from_end: impl Fn(usize) -> usize,
@@ -96,12 +96,12 @@ fn flag_end(
     }
 }
 
-/// The smaller one; NaN if one is NaN.
+/// The smaller of two numbers; NaN if one is NaN.
 fn nan_min(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.min(b) }
 }
 
-/// Quantile of the values that are numbers; 0 where there are none.
+/// Quantile of the values that are numbers; 0 if there are none.
 pub(super) fn quantile(values: &[f64], q: f64) -> f64 {
     let mut numbers: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     if numbers.is_empty() {

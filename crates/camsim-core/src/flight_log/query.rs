@@ -1,13 +1,14 @@
-//! Questions to a cleaned log: the pose at an instant, usual speeds.
+//! Queries of a cleaned log: pose at an instant, typical speeds.
 
 use glam::{DQuat, DVec3};
 
 use super::{FlightLog, LogRow, attitude::angle_between_rad};
 
-/// Speeds are measured over at least this long: a GPS quantum of 0.11 m over the log's shortest step of 1 ms
+/// Least time over which speeds are measured: a GPS quantum of 0.11 m over the log's shortest step of 1 ms
 /// would be 110 m/s.
 const SPEED_BASELINE_S: f64 = 0.25;
-/// Attitude is smoother than position, and real rates change faster.
+/// Least time over which angular rates are measured. Attitude is smoother than position, and real rates
+/// change faster.
 const RATE_BASELINE_S: f64 = 0.05;
 
 impl FlightLog {
@@ -16,9 +17,9 @@ impl FlightLog {
         self.rows.last().map_or(0.0, |row| row.t_s)
     }
 
-    /// Position (NED) and attitude (`ned_from_body`) at `t_s`: linear and slerp between rows, constant
-    /// velocity and angular rate outside (those of the first or last 0.25 s and 0.05 s); a log of one row
-    /// stands still. NaN in gives NaN out.
+    /// Position (NED) and attitude (`ned_from_body`) at `t_s`: linear and slerp between rows, with constant
+    /// velocity and angular rate outside (those of the first or last 0.25 s and 0.05 s). A log of one row
+    /// stands still. NaN gives NaN.
     pub fn interpolate(&self, t_s: f64) -> (DVec3, DQuat) {
         let rows = &self.rows;
         let after = rows.partition_point(|row| row.t_s <= t_s);
@@ -60,20 +61,20 @@ impl FlightLog {
         beyond(last, inner(SPEED_BASELINE_S), inner(RATE_BASELINE_S), t_s)
     }
 
-    /// Speed in m/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.25 s each. 0
-    /// for one row.
+    /// Speed, in m/s over at least 0.25 s, that is not exceeded during `fraction` (0..1) of the time. 0 for
+    /// one row.
     pub fn speed_percentile_m_s(&self, fraction: f64) -> f64 {
         self.percentile(fraction, SPEED_BASELINE_S, |a, b| a.position_ned_m.distance(b.position_ned_m))
     }
 
-    /// Angular rate in rad/s that is not exceeded during `fraction` (0..1) of the time; over at least 0.05 s
-    /// each. 0 for one row.
+    /// Angular rate, in rad/s over at least 0.05 s, that is not exceeded during `fraction` (0..1) of the
+    /// time. 0 for one row.
     pub fn angular_rate_percentile_rad_s(&self, fraction: f64) -> f64 {
         self.percentile(fraction, RATE_BASELINE_S, |a, b| angle_between_rad(a.ned_from_body, b.ned_from_body))
     }
 
-    /// Percentile of change per second, each row weighted by the time to the next one so that bursts of rows
-    /// do not count more.
+    /// Percentile of the change per second. Each row is weighted by the time to the next one, so that bursts
+    /// of rows have no more weight.
     fn percentile(&self, fraction: f64, baseline_s: f64, change: impl Fn(&LogRow, &LogRow) -> f64) -> f64 {
         let rows = &self.rows;
         let mut rates: Vec<(f64, f64)> = Vec::with_capacity(rows.len());
@@ -84,7 +85,7 @@ impl FlightLog {
                 end += 1;
             }
             let span_s = rows[end].t_s - rows[i].t_s;
-            // The tail of the log has no full baseline left; its motion is in the spans before.
+            // The end of the log has no full baseline left; its motion is part of earlier spans.
             if span_s >= baseline_s || rates.is_empty() {
                 rates.push((change(&rows[i], &rows[end]) / span_s, rows[i + 1].t_s - rows[i].t_s));
             }
@@ -106,14 +107,14 @@ fn between(a: &LogRow, b: &LogRow, fraction: f64) -> (DVec3, DQuat) {
     (a.position_ned_m.lerp(b.position_ned_m, fraction), slerp(a.ned_from_body, b.ned_from_body, fraction))
 }
 
-/// The short way, at any fraction (also outside 0..1).
+/// Slerp by the shorter way at any fraction, also outside of 0..1.
 fn slerp(a: DQuat, b: DQuat, fraction: f64) -> DQuat {
     let relative = a.inverse() * b;
     let relative = if relative.w < 0.0 { -relative } else { relative };
     (a * DQuat::from_scaled_axis(relative.to_scaled_axis() * fraction)).normalize()
 }
 
-/// From row `end` away from the log at the velocity between it and inner rows.
+/// Extrapolation from row `end` away from the log, at the velocity between it and inner rows.
 fn beyond(end: &LogRow, inner_position: &LogRow, inner_attitude: &LogRow, t_s: f64) -> (DVec3, DQuat) {
     let fraction = |inner: &LogRow| {
         let span_s = inner.t_s - end.t_s;

@@ -1,29 +1,29 @@
-//! What cleaning a log found and did.
+//! Report of the repairs of a log.
 
 use std::{collections::HashSet, fmt};
 
 use crate::scenario::AngleKind;
 
-/// How many line numbers a [`Finding`] keeps.
-pub const KEPT_LINES: usize = 8;
+/// Number of line numbers that a [`Finding`] lists.
+pub(super) const LISTED_LINES: usize = 8;
 
-/// Something that the reader of a log has to say about the file.
+/// A note of a log's reader about the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// Whether it is open to doubt; else it is plain information.
+    /// Whether it is a warning; otherwise it is information.
     pub is_warning: bool,
-    /// What was found and how it was taken; without the file's name.
+    /// Text of the note, without the file's name.
     pub text: String,
 }
 
-/// One kind of fault: how often, and where it was seen first.
+/// A kind of fault, with its count and first occurrences.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Finding {
-    /// Rows concerned.
+    /// Number of rows.
     pub count: usize,
-    /// File lines of the first few.
+    /// File lines of the first few rows.
     pub lines: Vec<usize>,
-    /// All of them, until their times are known.
+    /// File lines of all rows, until their times are known.
     pub(super) all: Vec<usize>,
 }
 
@@ -31,22 +31,23 @@ impl Finding {
     pub(super) fn add(&mut self, line: usize) {
         self.count += 1;
         self.all.push(line);
-        if self.lines.len() < KEPT_LINES {
+        if self.lines.len() < LISTED_LINES {
             self.lines.push(line);
         }
     }
 }
 
-/// Every repair, counted, with the lines of the first few.
+/// Counts of all repairs, with the lines of the first few.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CleaningReport {
     /// Rows of the file.
     pub rows_read: usize,
     /// Dropped: time or position missing, not finite or out of range.
     pub unusable: Finding,
-    /// Dropped: latitude or longitude exactly 0 far from all the others, as receivers write without a fix.
+    /// Dropped: latitude or longitude exactly 0 and far from all others, as receivers write without a fix.
     pub null_fixes: Finding,
-    /// Dropped: height exactly 0 far from the heights around, as receivers write before their first height.
+    /// Dropped: height exactly 0 and far from the heights around, as receivers write before their first
+    /// height.
     pub null_heights: Finding,
     /// Earlier than a row before them: sorted.
     pub out_of_order: Finding,
@@ -64,22 +65,22 @@ pub struct CleaningReport {
     pub gaps: Finding,
     /// The longest step between two rows, seconds of the log's clock.
     pub longest_step_s: f64,
-    /// Rows put in between because angles turn by more than 90 degrees.
+    /// Rows inserted because angles turn by more than 90 degrees.
     pub inserted: usize,
-    /// Where on the timeline the rows concerned are, as far as they have a time and without those of gaps:
-    /// seconds since the first good row, divided by the `speed` factor; ascending.
+    /// Times of the repaired rows that have one, without those of gaps: seconds since the first good row,
+    /// divided by the `speed` factor; ascending.
     pub repaired_s: Vec<f64>,
     /// How angles were read: `Wrapped` or `Continuous`, never `Auto`.
     pub angles: AngleKind,
 }
 
 impl CleaningReport {
-    /// Whether nothing had to be repaired (gaps are not repaired, only counted).
+    /// Whether nothing was repaired. (Gaps are counted, not repaired.)
     pub fn is_clean(&self) -> bool {
         self.findings().iter().all(|(_, finding)| finding.count == 0)
     }
 
-    /// Gives the lines of all rows that were repaired, and keeps them no longer.
+    /// Removes and returns the lines of all repaired rows.
     pub(super) fn take_lines(&mut self) -> HashSet<usize> {
         let Self {
             unusable,

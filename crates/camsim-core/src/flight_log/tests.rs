@@ -37,7 +37,7 @@ fn a_clean_log_passes_unchanged() {
 }
 
 #[test]
-fn a_full_turn_in_two_rows_turns() {
+fn continuous_angles_keep_a_full_turn() {
     let log = log(&[
         ned_row(1, 0.0, [0.0, 0.0, -3000.0], [0.0; 3]),
         ned_row(2, 10.0, [0.0, 0.0, -3000.0], [0.0, 0.0, 360.0]),
@@ -54,7 +54,7 @@ fn a_full_turn_in_two_rows_turns() {
 }
 
 #[test]
-fn a_compass_that_writes_360_wraps() {
+fn occasional_360_degrees_still_wraps() {
     let yaws = [358.0, 359.0, 360.0, 1.0, 2.0, 3.0];
     let rows: Vec<_> = yaws
         .iter()
@@ -105,7 +105,7 @@ fn faults_are_found_counted_and_repaired() {
 }
 
 #[test]
-fn spikes_of_several_rows_and_at_the_ends_go_too() {
+fn spikes_of_several_rows_and_at_the_ends_are_dropped() {
     let mut rows = straight(100);
     for i in [0, 50, 51, 99] {
         rows[i].position = RawPosition::Ned(DVec3::new(0.0, 60.0, -100.0));
@@ -115,11 +115,11 @@ fn spikes_of_several_rows_and_at_the_ends_go_too() {
     let mut many = straight(400);
     (100..200).for_each(|at| many[at].attitude = RawAttitude::EulerDeg([f64::NAN, 0.0, 0.0]));
     let report = log(&many).report;
-    assert_eq!((report.attitude_missing.lines.len(), report.repaired_s.len()), (report::KEPT_LINES, 100));
+    assert_eq!((report.attitude_missing.lines.len(), report.repaired_s.len()), (report::LISTED_LINES, 100));
 }
 
 #[test]
-fn motion_is_not_a_fault() {
+fn violent_motion_is_not_flagged() {
     // A shaken camera: 3 Hz, 20 degrees, sampled at 20 Hz; and a turn at a waypoint.
     let rows: Vec<_> = (0..200)
         .map(|i| {
@@ -182,7 +182,7 @@ fn track_attitude_of_a_coordinated_circle() {
 }
 
 #[test]
-fn geodetic_rows_use_the_tangent_frame_where_they_are() {
+fn geodetic_attitudes_use_the_local_tangent_frame() {
     let row = |line: usize, at: Geodetic| RawRow {
         line,
         t_ns: Some(line as i64 * 1_000_000_000),
@@ -222,7 +222,7 @@ fn speed_scales_time_and_gaps_are_counted() {
 }
 
 #[test]
-fn hostile_rows_give_errors_not_panics() {
+fn invalid_rows_give_errors_not_panics() {
     let options = LogOptions::default();
     assert_eq!(FlightLog::from_raw(&[], &options), Err(LogError::Empty));
     let nan = ned_row(4, 0.0, [f64::NAN; 3], [0.0; 3]);
@@ -265,7 +265,7 @@ fn geodetic_row(line: usize, t_s: f64, lat_deg: f64, lon_deg: f64, height_m: f64
 }
 
 #[test]
-fn zeros_that_stand_for_no_fix_are_left_out_and_true_zeros_stay() {
+fn null_fixes_are_dropped_and_true_zeros_are_kept() {
     let alps = |i: usize| geodetic_row(i + 1, i as f64, 47.0 + 1e-5 * i as f64, 8.0, 500.0 + i as f64);
     let mut rows: Vec<RawRow> = (0..20).map(alps).collect();
     for (i, lat, lon, height) in [
@@ -299,7 +299,7 @@ fn zeros_that_stand_for_no_fix_are_left_out_and_true_zeros_stay() {
 }
 
 #[test]
-fn attitudes_of_other_rows_are_no_repair() {
+fn rows_without_attitude_are_interpolated_without_a_repair() {
     let mut rows = straight(40);
     for row in rows.iter_mut().skip(1).step_by(2) {
         row.attitude = RawAttitude::None;

@@ -14,14 +14,13 @@ const GRAVITY_M_S2: f64 = 9.806_65;
 const MAX_BANK_DEG: f64 = 60.0;
 /// Half width of the fit.
 const HALF_WIDTH_S: f64 = 1.0;
-/// Rows that the fit reaches at least on either side.
+/// Least number of rows that the fit reaches on either side.
 const REACH_ROWS: usize = 3;
-/// Below this ground speed the track's direction is noise: heading is interpolated and bank and pitch fade
-/// out.
+/// Ground speed below which the direction of the track is noise. Heading is interpolated there, and bank and
+/// pitch fade out.
 const SLOW_M_S: f64 = 0.5;
 
-/// Sets the attitude of every row. Velocities are turned into the tangent frame at each row where there is a
-/// `frame`.
+/// Sets the attitude of every row. With a `frame`, velocities are rotated into the tangent frame at each row.
 pub(super) fn fill(rows: &mut [LogRow], frame: Option<&LocalFrame>) {
     let motions: Vec<(DVec3, DVec3)> = (0..rows.len()).map(|row| fit_motion(rows, row)).collect();
     let ned_from_local: Vec<_> = rows
@@ -53,8 +52,8 @@ pub(super) fn fill(rows: &mut [LogRow], frame: Option<&LocalFrame>) {
     }
 }
 
-/// Heading of each row; rows too slow to have one take it from the rows around, by the short way. All zero
-/// for a log that stands still.
+/// Heading of each row. Rows too slow to have one interpolate between their neighbours by the shorter way.
+/// All zero for a log that stands still.
 fn headings_rad(rows: &[LogRow], motions: &[(DVec3, DVec3)]) -> Vec<f64> {
     let mut known: Vec<(usize, f64)> = Vec::new();
     for (i, (velocity, _)) in motions.iter().enumerate() {
@@ -117,7 +116,7 @@ fn fit_motion(rows: &[LogRow], row: usize) -> (DVec3, DVec3) {
         let solution = (normal.inverse() * columns).transpose();
         return (solution.y_axis / half_width_s, 2.0 * solution.z_axis / (half_width_s * half_width_s));
     }
-    // Two rows: the velocity between them.
+    // With two rows, the velocity between them.
     let (a, b) = (rows[row.saturating_sub(1)], rows[(row + 1).min(rows.len() - 1)]);
     let span_s = b.t_s - a.t_s;
     if span_s > 0.0 {

@@ -6,9 +6,10 @@ use super::Geodetic;
 
 /// EGM96 geoid undulation in metres: ellipsoid height = height above mean sea level + undulation.
 ///
-/// Summed from the model's spherical harmonics to degree and order 360 (NIMA TR8350.2 with the height-anomaly
-/// correction of Rapp 1996), so it agrees with interpolated grids only to the grid's own error (15': 0.17 m
-/// at worst, 7 mm RMS). Takes about a millisecond: use [`GeoidCache`] for many points. NaN in gives NaN out.
+/// The sum of the model's spherical harmonics to degree and order 360 (NIMA TR8350.2, with the height-anomaly
+/// correction of Rapp 1996). It agrees with interpolated grids to within the error of the grid (15': 0.17 m
+/// at worst, 7 mm RMS). One evaluation takes about a millisecond: use [`GeoidCache`] for many points. NaN
+/// gives NaN.
 pub fn geoid_undulation_m(at: Geodetic) -> f64 {
     if !(at.lat_rad.is_finite() && at.lon_rad.is_finite()) {
         return f64::NAN;
@@ -16,11 +17,11 @@ pub fn geoid_undulation_m(at: Geodetic) -> f64 {
     egm96::egm96_compute_altitude_offset(at.lat_deg(), at.lon_deg())
 }
 
-/// Spacing of the cache's nodes. The shortest wave of the model is 1 degree, so a metre of it bends the
-/// surface by 39 m/deg^2 and bilinear interpolation over 0.02 degrees errs by 2 mm.
+/// Spacing of the cache's nodes. The shortest wave of the model is 1 degree, so an amplitude of 1 m has a
+/// curvature of 39 m/deg^2, and bilinear interpolation over 0.02 degrees errs by 2 mm.
 const NODE_DEG: f64 = 0.02;
 
-/// Undulations of many points near each other, to about 2 mm: nodes are computed once and interpolated
+/// Undulations at many points near each other, to about 2 mm: nodes are computed once and interpolated
 /// bilinearly.
 #[derive(Clone, Debug, Default)]
 pub struct GeoidCache {

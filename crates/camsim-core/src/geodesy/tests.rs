@@ -18,7 +18,7 @@ fn ecef_of_known_points() {
 }
 
 #[test]
-fn round_trip_at_the_awkward_places() {
+fn round_trip_at_poles_and_antimeridian() {
     for lat in [-90.0, -89.999_999_9, -45.0, -1e-9, 0.0, 1e-12, 30.0, 47.116, 89.9, 90.0] {
         for lon in [-180.0, -91.99, 0.0, 8.67, 179.999_999] {
             for height in [-10_000.0, -1.0, 0.0, 1078.0, 12_000.0, 1.0e6] {
@@ -58,12 +58,12 @@ fn origin_is_zero_and_axes_point_the_right_way() {
 #[test]
 fn local_attitude_agrees_with_finite_differences() {
     let frame = LocalFrame::new(Geodetic::from_deg(46.0, 7.0, 400.0));
-    let at = Geodetic::from_deg(47.3, 9.1, 3000.0);
-    let ned_from_local = frame.ned_from_local(at);
-    let base = frame.ned_from_geodetic(at);
-    let up = frame.ned_from_geodetic(Geodetic { height_m: at.height_m + 100.0, ..at }) - base;
-    let north = frame.ned_from_geodetic(Geodetic { lat_rad: at.lat_rad + 1e-6, ..at }) - base;
-    let east = frame.ned_from_geodetic(Geodetic { lon_rad: at.lon_rad + 1e-6, ..at }) - base;
+    let point = Geodetic::from_deg(47.3, 9.1, 3000.0);
+    let ned_from_local = frame.ned_from_local(point);
+    let base = frame.ned_from_geodetic(point);
+    let up = frame.ned_from_geodetic(Geodetic { height_m: point.height_m + 100.0, ..point }) - base;
+    let north = frame.ned_from_geodetic(Geodetic { lat_rad: point.lat_rad + 1e-6, ..point }) - base;
+    let east = frame.ned_from_geodetic(Geodetic { lon_rad: point.lon_rad + 1e-6, ..point }) - base;
     // 6 m steps against 1e-9 m rounding and 1e-6 rad of curvature.
     assert!((ned_from_local * DVec3::NEG_Z - up.normalize()).length() < 1e-10);
     assert!((ned_from_local * DVec3::X - north.normalize()).length() < 1e-6);
@@ -72,7 +72,7 @@ fn local_attitude_agrees_with_finite_differences() {
 }
 
 #[test]
-fn nonsense_stays_finite_or_is_named_invalid() {
+fn invalid_coordinates_stay_finite_or_are_refused() {
     assert!(!Geodetic::from_deg(f64::NAN, 0.0, 0.0).is_valid());
     assert!(!Geodetic::from_deg(0.0, f64::INFINITY, 0.0).is_valid());
     assert!(!Geodetic::from_deg(90.1, 0.0, 0.0).is_valid());
@@ -88,16 +88,16 @@ fn undulations_of_known_points() {
     // NGA's EGM96 calculator: 17.16 m at (0, 0); 47.65 m over Rothenthurm, bilinear (4 cm RMS) between the
     // nodes of GeographicLib's egm96-15 grid.
     assert!((geoid_undulation_m(Geodetic::from_deg(0.0, 0.0, 0.0)) - 17.16).abs() < 0.02);
-    let at = Geodetic::from_deg(47.116, 8.672, 1060.0);
-    assert!((geoid_undulation_m(at) - 47.65).abs() < 0.1, "{}", geoid_undulation_m(at));
+    let point = Geodetic::from_deg(47.116, 8.672, 1060.0);
+    assert!((geoid_undulation_m(point) - 47.65).abs() < 0.1, "{}", geoid_undulation_m(point));
     let mut cache = GeoidCache::new();
-    for at in [
-        at,
+    for point in [
+        point,
         Geodetic::from_deg(90.0, 10.0, 0.0),
         Geodetic::from_deg(-90.0, -10.0, 0.0),
         Geodetic::from_deg(27.988, 86.925, 0.0),
     ] {
-        assert!((cache.undulation_m(at) - geoid_undulation_m(at)).abs() < 0.01, "{at:?}");
+        assert!((cache.undulation_m(point) - geoid_undulation_m(point)).abs() < 0.01, "{point:?}");
     }
 }
 
@@ -116,8 +116,8 @@ fn undulations_agree_with_the_published_grid() {
         for column in (0..1440).step_by(96) {
             let index = 2 * (row * 1440 + column);
             let grid_m = f64::from(u16::from_be_bytes([samples[index], samples[index + 1]])) * 0.003 - 108.0;
-            let at = Geodetic::from_deg(90.0 - row as f64 * 0.25, column as f64 * 0.25, 0.0);
-            worst = worst.max((geoid_undulation_m(at) - grid_m).abs());
+            let point = Geodetic::from_deg(90.0 - row as f64 * 0.25, column as f64 * 0.25, 0.0);
+            worst = worst.max((geoid_undulation_m(point) - grid_m).abs());
         }
     }
     eprintln!("worst difference from the 15' grid: {worst:.4} m");

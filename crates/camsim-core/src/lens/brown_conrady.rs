@@ -6,18 +6,17 @@ use glam::{DMat2, DVec2};
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
 
-/// Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the
+/// Most Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the
 /// error: 60 reach the last bit.
 const MAX_STEPS: usize = 60;
 
-/// Steps without real progress after which there is nothing to be found.
+/// Steps without real progress after which the iteration is given up.
 const MAX_STALLS: u32 = 5;
 
-/// A solution whose image misses the wanted point by more than this (units of the focal length, relative
-/// beyond 1) is none.
+/// Largest residual of a solution, in units of the focal length (relative beyond 1).
 const MAX_RESIDUAL: f64 = 1e-9;
 
-/// Starts are kept this far inside the fold, where the Jacobian is safely regular.
+/// Starts are at most this share of the fold radius, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f64 = 0.95;
 
 /// With `r^2 = u^2 + v^2`:
@@ -43,7 +42,7 @@ impl BrownConrady {
         };
         let radial_only = formula.p1 == 0.0 && formula.p2 == 0.0;
         let fold = FoldCurve::new(radius_of_ray, radial_only, |ideal| formula.distort(ideal));
-        // The table knows the radial part alone; its own fold differs a little from that of the whole.
+        // The table covers the radial part alone, whose fold differs slightly from that of the whole model.
         let radial = Formula { p1: 0.0, p2: 0.0, ..formula };
         let radial_fold = first_irregular_angle(|angle| radial.margins(DVec2::new(angle.tan(), 0.0)))
             .unwrap_or(MAX_FIELD_RAD)
@@ -52,7 +51,7 @@ impl BrownConrady {
         Self { coefficients, fold, table }
     }
 
-    /// Forward; see the type.
+    /// Forward; the formula is that of the type.
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         Formula::new(&self.coefficients).distort(ideal)
     }
@@ -63,17 +62,17 @@ impl BrownConrady {
         Formula::new(&self.coefficients).jacobian(ideal)
     }
 
-    /// Guarded Newton. From the radial table, each step is pulled back where it would leave the principal
-    /// branch and halved where the residual grew. Accepted is only what is reproduced by the forward
-    /// function, lies inside the fold and has a positive determinant: on a branch whose border is a simple
-    /// curve that is complete, no wrong root passes.
+    /// Guarded Newton iteration. It starts from the radial table; each step is pulled back where it would
+    /// leave the principal branch, and halved where the residual grew. A result must reproduce the distorted
+    /// point, lie inside the fold and have a positive determinant. On a branch whose border is a simple curve
+    /// these conditions exclude every wrong root.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         let radius = distorted.length();
         if !distorted.is_finite() || radius > self.fold.distorted_max() {
             return None;
         }
         let from_table = distorted * self.table.ratio(radius);
-        // The second start serves strong tangential terms, for which the radial table says little.
+        // The second start is for strong tangential terms, where the radial table is a poor guess.
         self.newton(distorted, from_table).or_else(|| self.newton(distorted, 0.5 * distorted))
     }
 
@@ -102,13 +101,13 @@ impl BrownConrady {
                 next_error = formula.distort(next) - distorted;
             }
             let (before, after) = (error.length_squared(), next_error.length_squared());
-            // Not even a tiny step helps: this is the nearest the branch comes, or the last bit.
+            // Not even a tiny step helps: the branch comes no nearer, or the last bit is reached.
             if after >= before {
                 break;
             }
             (ideal, error) = (next, next_error);
-            // A root, double or not, is approached at least fourfold per step; what creeps slides along the
-            // fold.
+            // A root, double or not, is approached by at least a factor of four per step; slower progress
+            // means that the iteration slides along the fold.
             stalls = if after > 0.9 * before { stalls + 1 } else { 0 };
             if stalls == MAX_STALLS {
                 break;
@@ -120,7 +119,7 @@ impl BrownConrady {
         good.then_some(ideal)
     }
 
-    /// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of
+    /// `to`, or if that is outside of the fold, the point in its direction midway between the radius of
     /// `from` and the fold.
     fn inside(&self, from: DVec2, to: DVec2) -> DVec2 {
         let fold_radius = self.fold.radius(to.y.atan2(to.x));
@@ -131,7 +130,7 @@ impl BrownConrady {
     }
 }
 
-/// The bare formula.
+/// The formula without a domain.
 #[derive(Clone, Copy)]
 struct Formula {
     k1: f64,
@@ -179,8 +178,8 @@ impl Formula {
         DMat2::from_cols(DVec2::new(a, b), DVec2::new(b, c))
     }
 
-    /// What must stay positive on the principal branch: the determinant (with the sign of the trace, so that
-    /// a second sheet on which both eigenvalues are negative does not pass) and the denominator.
+    /// Quantities that are positive on the principal branch: the determinant (with the sign of the trace, so
+    /// that a second sheet with two negative eigenvalues is excluded) and the denominator.
     fn margins(&self, ideal: DVec2) -> [f64; 2] {
         let jacobian = self.jacobian(ideal);
         let det = jacobian.determinant();

@@ -4,25 +4,24 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-/// Rays of a fold curve.
+/// Number of rays of a fold curve.
 pub const FOLD_RAYS: usize = 720;
 
-/// Largest angle off axis that a lens may see here: 89 degrees. The ideal plane is infinite at 90, and a flat
+/// Largest angle off axis of any lens, 89 degrees. The ideal plane is infinite at 90 degrees, and a flat
 /// ideal frame ends well before.
-pub const MAX_FIELD_RAD: f64 = 89.0 * PI / 180.0;
+pub(crate) const MAX_FIELD_RAD: f64 = 89.0 * PI / 180.0;
 
-/// Steps of the scan along one ray, uniform in the angle off axis.
+/// Steps of the scan along a ray, uniform in the angle off axis.
 const SCAN_STEPS: usize = 256;
 
-/// Bisections that end a search: 60 halvings of a step reach the last bit of an f64.
+/// Bisections of a search: 60 halvings of a step reach the last bit of an f64.
 const BISECTIONS: usize = 60;
 
-/// Neighbouring rays whose radii differ by more than this ratio belong to different sheets of the fold:
-/// between them the nearer one counts.
+/// Neighbouring rays whose radii differ by more than this ratio belong to different sheets of the fold; the
+/// smaller radius holds between them.
 const SHEET_RATIO: f64 = 1.1;
 
-/// Radius of the border of the star-shaped domain of the principal branch, over the direction in the ideal
-/// plane.
+/// Radius of the border of the principal branch's star-shaped domain, by direction in the ideal plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoldCurve {
     radii: Vec<f64>,
@@ -31,7 +30,7 @@ pub struct FoldCurve {
 }
 
 impl FoldCurve {
-    /// From one radius per ray (`None`: regular up to [`MAX_FIELD_RAD`]) and the forward function.
+    /// The curve from one radius per ray (`None`: regular up to [`MAX_FIELD_RAD`]) and the forward function.
     pub(super) fn new(
         radius_of_ray: impl Fn(f64) -> Option<f64>,
         same_for_all: bool,
@@ -46,7 +45,7 @@ impl FoldCurve {
         };
         let folds = rays.iter().any(Option::is_some);
         let radii: Vec<f64> = rays.into_iter().map(|radius| radius.unwrap_or(limit)).collect();
-        // A hair inside: at a pole of the denominator itself the forward function is infinite.
+        // Slightly inside, because the forward function is infinite at a pole of the denominator.
         let distorted_max = radii
             .iter()
             .enumerate()
@@ -64,12 +63,12 @@ impl FoldCurve {
         if far > SHEET_RATIO * near { near } else { here + (next - here) * (position - ray) }
     }
 
-    /// The radii of all rays; ray i points to `phi = i 2 pi / FOLD_RAYS`.
+    /// Radii of all rays; ray i points to `phi = i 2 pi / FOLD_RAYS`.
     pub fn radii(&self) -> &[f64] {
         &self.radii
     }
 
-    /// Whether any ray ends at a fold or pole; if not, every ray ends at [`MAX_FIELD_RAD`].
+    /// Whether any ray ends at a fold or pole; if not, all end at [`MAX_FIELD_RAD`].
     pub fn folds(&self) -> bool {
         self.folds
     }
@@ -81,18 +80,18 @@ impl FoldCurve {
             .fold((f64::INFINITY, 0.0), |(min, max), radius| (min.min(*radius), max.max(*radius)))
     }
 
-    /// No point of the branch is imaged farther from the axis than this. (Inside the fold the lens is an open
-    /// map, so the farthest image is that of a border point; 0.1 % covers the border between rays.)
+    /// Bound on the distorted radius of the branch. (Inside the fold the lens is an open map, so the farthest
+    /// image is that of a border point; a margin of 0.1 % covers the border between rays.)
     pub fn distorted_max(&self) -> f64 {
         self.distorted_max * 1.001
     }
 }
 
-/// First value in `(0, limit_of_last_step]` of a ray's parameter where one of the `margins` is no longer
-/// positive.
+/// First parameter of a ray in `(0, limit_of_last_step]` at which one of the `margins` is not positive.
 ///
-/// `at(angle)` gives two functions that are positive on the regular part. They are sampled at [`SCAN_STEPS`]
-/// angles off axis; a dip below zero between two samples is found by searching every local minimum.
+/// `at(angle)` returns two functions that are positive on the regular part. They are sampled at
+/// [`SCAN_STEPS`] angles off axis; a dip below zero between two samples is found by searching every local
+/// minimum.
 pub(super) fn first_irregular_angle(at: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
     let step = MAX_FIELD_RAD / SCAN_STEPS as f64;
     // Written so that NaN counts as irregular.
@@ -118,7 +117,7 @@ pub(super) fn first_irregular_angle(at: impl Fn(f64) -> [f64; 2]) -> Option<f64>
     None
 }
 
-/// The last good parameter before `bad`.
+/// The last regular parameter before `bad`.
 fn bisect(mut good: f64, mut bad: f64, regular: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (good + bad);
@@ -131,7 +130,7 @@ fn bisect(mut good: f64, mut bad: f64, regular: impl Fn(f64) -> bool) -> f64 {
     good
 }
 
-/// Where a function with one minimum in `[low, high]` is lowest (golden section, 40 steps).
+/// Position of the minimum of a unimodal function in `[low, high]` (golden section, 40 steps).
 fn minimum(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (low.max(0.0), high);

@@ -8,8 +8,8 @@ use super::radial_table::RadialTable;
 /// With `theta = atan(r)`, `r = |(u, v)|`: `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4
 /// theta^8)`, distorted = `(u, v) theta_d / r`.
 ///
-/// Angles off axis from 0 to 89 degrees ([`MAX_FIELD_RAD`]) or to where theta_d stops growing: an ideal
-/// *plane* holds no more, so what a wider fisheye images outside of that has no ideal point here.
+/// Angles off axis range from 0 to 89 degrees ([`MAX_FIELD_RAD`]) or to where theta_d stops growing. An ideal
+/// *plane* holds no more, so points that a wider fisheye images outside have no ideal point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KannalaBrandt {
     /// `k1 k2 k3 k4`.
@@ -35,12 +35,12 @@ impl KannalaBrandt {
         self.theta_max
     }
 
-    /// Distorted radius of that angle: nothing is imaged farther from the axis.
+    /// Distorted radius of that angle, a bound on the branch.
     pub fn distorted_max(&self) -> f64 {
         theta_d(&self.coefficients, self.theta_max)
     }
 
-    /// Forward; see the type.
+    /// Forward; the formula is that of the type.
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         distort(&self.coefficients, ideal)
     }
@@ -60,7 +60,7 @@ impl KannalaBrandt {
         DMat2::IDENTITY * tangential + outer * (meridional - tangential)
     }
 
-    /// Bracketed Newton in theta, from the table; `None` beyond the largest angle.
+    /// Bracketed Newton iteration in theta, started from the table; `None` beyond the largest angle.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         let radius = distorted.length();
         if !distorted.is_finite() || radius > self.distorted_max() {

@@ -1,44 +1,43 @@
-//! The paper's lens inverse (section 5): Gauss-Newton from the distorted point, without a guard. f64 twin of
-//! `shaders/reverse/ray/gauss_newton.wgsl`.
+//! The paper's lens inverse (section 5): Gauss-Newton from the distorted point, without safeguards. f64 twin
+//! of `shaders/reverse/ray/gauss_newton.wgsl`.
 //!
-//! It is here for comparison: it gives up on rays that exist and accepts roots beyond the fold that no lens
-//! shows. [`Lens::undistort`] is the one to use.
+//! It is provided for comparison: it fails for some existing rays, and accepts roots beyond the fold that no
+//! lens shows. [`Lens::undistort`] is the one to use.
 
 use glam::DVec2;
 
 use super::Lens;
 
-/// Most steps.
-pub const MAX_STEPS: u32 = 50;
-/// Residual at which a point counts as found; see [`gauss_newton`] for its unit.
-pub const MAX_RESIDUAL: f64 = 0.1;
-/// Residual beyond which the search is given up.
-pub const DIVERGED: f64 = 500.0;
+/// Largest number of steps.
+const MAX_STEPS: u32 = 50;
+/// Residual at which the iteration has converged; for its unit see [`gauss_newton`].
+const MAX_RESIDUAL: f64 = 0.1;
+/// Residual beyond which the iteration has diverged.
+const DIVERGED: f64 = 500.0;
 
-/// Ideal point that the search ends at, or `None` where it does not converge.
+/// Ideal point at which the iteration converges, or `None`.
 ///
-/// Each step is `J^-1 (distorted - F(at))`, which is what Gauss-Newton's `(J'J)^-1 J'` comes to for a square
-/// J. The search ends without an answer when the residual grows or passes [`DIVERGED`], and with one when it
-/// falls below [`MAX_RESIDUAL`]. The residual is `|(W du, H dv)|`, picture sizes times normalised
-/// coordinates, as the paper's program measures it: less than a pixel where the focal length is shorter than
-/// the picture.
+/// Each step is `J^-1 (distorted - F(ideal))`, to which Gauss-Newton's `(J'J)^-1 J'` reduces for a square J.
+/// The iteration fails when the residual grows or exceeds [`DIVERGED`], and has converged when it is below
+/// [`MAX_RESIDUAL`]. The residual is `|(W du, H dv)|`, image size times normalised coordinates, as in the
+/// paper's program: less than a pixel where the focal length is shorter than the image.
 #[must_use]
 pub fn gauss_newton(lens: &Lens, distorted: DVec2, size_px: [u32; 2]) -> Option<DVec2> {
     let size = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1]));
-    let mut at = distorted;
-    let mut residual = distorted - lens.distort(at);
+    let mut ideal = distorted;
+    let mut residual = distorted - lens.distort(ideal);
     let mut error = f64::INFINITY;
     for _ in 0..MAX_STEPS {
-        let next = at + lens.jacobian(at).inverse() * residual;
+        let next = ideal + lens.jacobian(ideal).inverse() * residual;
         residual = distorted - lens.distort(next);
         let next_error = (size * residual).length();
-        // Written so that NaN ends the search too.
+        // Written so that NaN also ends the iteration.
         if !(next_error <= error && next_error <= DIVERGED) {
             return None;
         }
-        (at, error) = (next, next_error);
+        (ideal, error) = (next, next_error);
         if error < MAX_RESIDUAL {
-            return Some(at);
+            return Some(ideal);
         }
     }
     None
@@ -54,7 +53,7 @@ mod tests {
         scenario::{CameraSpec, LensModel, LensSpec},
     };
 
-    /// The paper's badly installed fisheye: Galaxy S3, calibrated by Agisoft Lens.
+    /// The paper's badly installed fisheye: Galaxy S3, calibrated with Agisoft Lens.
     fn fisheye() -> CameraModel {
         let coefficients = vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63];
         CameraModel::from_spec(&CameraSpec {
@@ -68,22 +67,23 @@ mod tests {
     }
 
     #[test]
-    fn on_the_papers_own_lens_it_misses_rays_and_accepts_false_ones() {
+    fn gauss_newton_misses_rays_and_accepts_false_roots_on_the_papers_lens() {
         let camera = fisheye();
         let [width, height] = camera.size_px;
         let (mut with_ray, mut missed, mut false_roots, mut worst_px) = (0_u32, 0_u32, 0_u32, 0.0_f64);
         for i in 0..width * height {
             let pixel = DVec2::new(f64::from(i % width), f64::from(i / width));
-            let found = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
+            let undistorted = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
             let truth = camera.unproject(pixel);
             with_ray += u32::from(truth.is_some());
-            match (found, truth) {
+            match (undistorted, truth) {
                 (None, Some(_)) => missed += 1,
-                (Some(found), truth) => match truth.filter(|truth| (found.distance(*truth) * 307.6075) < 1.0)
-                {
-                    Some(truth) => worst_px = worst_px.max(found.distance(truth) * 307.6075),
-                    None => false_roots += 1,
-                },
+                (Some(undistorted), truth) => {
+                    match truth.filter(|truth| (undistorted.distance(*truth) * 307.6075) < 1.0) {
+                        Some(truth) => worst_px = worst_px.max(undistorted.distance(truth) * 307.6075),
+                        None => false_roots += 1,
+                    }
+                }
                 (None, None) => {}
             }
         }
@@ -95,7 +95,7 @@ mod tests {
             100.0 * f64::from(missed) / f64::from(with_ray),
             percent(false_roots)
         );
-        // A prototype found 6.8 and 1.5; the share depends on who counts what as missed.
+        // The shares are about 6.8 and 1.5; they depend on what counts as missed.
         assert!(
             (3.0..12.0).contains(&(100.0 * f64::from(missed) / f64::from(with_ray)))
                 && percent(false_roots) > 0.3
@@ -103,12 +103,12 @@ mod tests {
     }
 
     #[test]
-    fn near_the_axis_it_is_as_good_as_any() {
+    fn gauss_newton_is_accurate_near_the_axis() {
         let camera = fisheye();
         for pixel in [DVec2::new(305.0, 226.0), DVec2::new(200.0, 300.0), DVec2::new(400.0, 120.0)] {
-            let found =
+            let undistorted =
                 gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px).unwrap();
-            assert!(camera.project(found).distance(pixel) < 0.1);
+            assert!(camera.project(undistorted).distance(pixel) < 0.1);
         }
     }
 }

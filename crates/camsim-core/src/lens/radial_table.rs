@@ -3,10 +3,10 @@
 /// Entries of a start table.
 pub const RADIAL_TABLE_LEN: usize = 257;
 
-/// `undistorted / distorted` radius against `s = sqrt(1 - distorted / distorted_max)`, uniform in s.
+/// `undistorted / distorted` radius, tabulated over `s = sqrt(1 - distorted / distorted_max)`, uniform in s.
 ///
-/// Near a fold the inverse runs like `fold - c sqrt(distorted_max - distorted)`: in s it is smooth, in the
-/// radius itself no table could follow it.
+/// Near a fold the inverse behaves like `fold - c sqrt(distorted_max - distorted)`, which is smooth in s but
+/// has an infinite slope in the radius.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadialTable {
     distorted_max: f64,

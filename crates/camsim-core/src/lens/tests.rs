@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Name, model, coefficients: real lenses, and those that break careless inverses.
+/// Name, model, coefficients: real lenses, and lenses that defeat simple inverses.
 fn gallery() -> Vec<(&'static str, Lens)> {
     use LensModel::{BrownConrady, KannalaBrandt, Pinhole};
     let sets: [(&'static str, LensModel, &[f64]); 14] = [
@@ -27,7 +27,7 @@ fn gallery() -> Vec<(&'static str, Lens)> {
     sets.into_iter().map(|(name, model, k)| (name, Lens::new(model, k).unwrap())).collect()
 }
 
-/// Largest radius to test on: inside the fold, and no farther than a flat image reaches.
+/// Largest radius to test: inside the fold, and no farther than a flat image reaches.
 fn usable_radius(lens: &Lens, phi: f64) -> f64 {
     (0.999 * lens.fold_radius(phi)).min(4.0)
 }
@@ -37,16 +37,16 @@ fn jacobians_agree_with_finite_differences() {
     let h = 1e-5;
     for (name, lens) in gallery() {
         for (phi, share) in [(0.0, 0.0), (0.3, 0.2), (1.9, 0.5), (3.7, 0.8), (5.5, 0.99)] {
-            let at = DVec2::from_angle(phi) * (share * usable_radius(&lens, phi));
-            let column = |step: DVec2| (lens.distort(at + step) - lens.distort(at - step)) / (2.0 * h);
+            let ideal = DVec2::from_angle(phi) * (share * usable_radius(&lens, phi));
+            let column = |step: DVec2| (lens.distort(ideal + step) - lens.distort(ideal - step)) / (2.0 * h);
             let numeric = DMat2::from_cols(column(DVec2::new(h, 0.0)), column(DVec2::new(0.0, h)));
-            let analytic = lens.jacobian(at);
+            let analytic = lens.jacobian(ideal);
             let scale = 1.0 + analytic.x_axis.abs().max_element() + analytic.y_axis.abs().max_element();
             // Central differences: h^2 times a third derivative that reaches some 1e3 near the folds of the
-            // wilder sets.
+            // more extreme lenses.
             assert!(
                 (numeric - analytic).abs_diff_eq(DMat2::ZERO, 1e-6 * scale),
-                "{name} at {at}: {numeric} vs {analytic}"
+                "{name} ideal {ideal}: {numeric} vs {analytic}"
             );
             assert!(
                 (analytic.x_axis.y - analytic.y_axis.x).abs() < 1e-12,
@@ -57,25 +57,25 @@ fn jacobians_agree_with_finite_differences() {
 }
 
 #[test]
-fn what_the_lens_shows_is_found_again() {
+fn undistort_inverts_distort_inside_the_fold() {
     for (name, lens) in gallery() {
         for ray in 0..90 {
             let phi = f64::from(ray) * 0.0698;
             for step in 0..=100 {
                 let ideal = DVec2::from_angle(phi) * (f64::from(step) * 0.01 * usable_radius(&lens, phi));
-                let found = lens.undistort(lens.distort(ideal));
-                let found =
-                    found.unwrap_or_else(|| panic!("{name}: {ideal} is inside the fold but not found"));
-                // 1e-3 short of a fold the inverse magnifies rounding (1e-16) some 1e3 times, its residual
+                let undistorted = lens.undistort(lens.distort(ideal));
+                let undistorted = undistorted
+                    .unwrap_or_else(|| panic!("{name}: {ideal} is inside the fold but not undistorted"));
+                // At 1e-3 from a fold the inverse magnifies rounding (1e-16) some 1e3 times; the residual
                 // test (1e-9) bounds the rest.
-                assert!((found - ideal).length() < 1e-6, "{name}: {ideal} became {found}");
+                assert!((undistorted - ideal).length() < 1e-6, "{name}: {ideal} became {undistorted}");
             }
         }
     }
 }
 
 #[test]
-fn folds_are_where_they_are_known_to_be() {
+fn fold_radii_match_closed_forms() {
     let radius = |model, k: &[f64]| Lens::new(model, k).unwrap().fold_radius(1.0);
     // r (1 + k r^2) peaks at 1/sqrt(-3 k).
     assert!((radius(LensModel::BrownConrady, &[-0.3]) - (1.0 / 0.9_f64).sqrt()).abs() < 1e-12);
@@ -85,33 +85,33 @@ fn folds_are_where_they_are_known_to_be() {
     );
     // theta (1 - 0.3 theta^2) peaks at 1/sqrt(0.9).
     assert!((radius(LensModel::KannalaBrandt, &[-0.3]) - (1.0 / 0.9_f64.sqrt()).tan()).abs() < 1e-12);
-    // 1 + 3 k1 r^2 + 5 k2 r^4 = 0 has no real root: the ring is nearly, not quite, singular.
+    // 1 + 3 k1 r^2 + 5 k2 r^4 = 0 has no real root: the ring is nearly singular.
     let ring = Lens::new(LensModel::BrownConrady, &[-1.0, 0.455]).unwrap();
     assert!(!ring.fold_curve().unwrap().folds());
-    // 0.449 makes it fold in a band 0.06 wide, narrower than the scan can be trusted to hit.
+    // With 0.449 it folds in a band 0.06 wide, narrower than the scan is sure to hit.
     let band = Lens::new(LensModel::BrownConrady, &[-1.0, 0.449_999]).unwrap();
     assert!((band.fold_radius(0.0) - 0.816_5).abs() < 1e-3, "{}", band.fold_radius(0.0));
     let monotone = Lens::new(LensModel::BrownConrady, &[-0.45, 0.25]).unwrap();
-    let found = monotone.undistort(monotone.distort(DVec2::new(1.2498, 0.0))).unwrap();
-    assert!((found.x - 1.2498).abs() < 1e-9);
+    let undistorted = monotone.undistort(monotone.distort(DVec2::new(1.2498, 0.0))).unwrap();
+    assert!((undistorted.x - 1.2498).abs() < 1e-9);
 }
 
 #[test]
-fn beyond_the_fold_there_is_no_answer() {
-    // Peak of r (1 - 0.3 r^2) is 0.70273 at 1.0541; the formula goes through zero at 1.826 and shows mirrored
-    // points beyond.
+fn no_inverse_beyond_the_fold() {
+    // The maximum of r (1 - 0.3 r^2) is 0.70273 at 1.0541; the formula passes through zero at 1.826 and gives
+    // mirrored points beyond.
     let lens = Lens::new(LensModel::BrownConrady, &[-0.3]).unwrap();
     assert!(lens.undistort(DVec2::new(0.7027, 0.0)).is_some());
     assert_eq!(lens.undistort(DVec2::new(0.7028, 0.0)), None);
     assert_eq!(lens.undistort(DVec2::new(0.0, -5.0)), None);
     let mirrored = lens.distort(DVec2::new(2.0, 0.0));
     assert!(mirrored.x < 0.0 && !lens.contains(DVec2::new(2.0, 0.0)));
-    let found = lens.undistort(mirrored).unwrap();
-    assert!(found.x < 0.0 && found.length() < 1.0541);
+    let undistorted = lens.undistort(mirrored).unwrap();
+    assert!(undistorted.x < 0.0 && undistorted.length() < 1.0541);
 }
 
 #[test]
-fn hostile_numbers_end_in_none() {
+fn non_finite_input_gives_none() {
     for (name, lens) in gallery() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert_eq!(lens.undistort(DVec2::new(bad, 0.1)), None, "{name}");
@@ -121,21 +121,21 @@ fn hostile_numbers_end_in_none() {
         assert_eq!(lens.undistort(DVec2::ZERO).unwrap(), DVec2::ZERO, "{name}");
         assert!(lens.undistort(DVec2::splat(5e-324)).unwrap().length() < 1e-300, "{name}");
         if !matches!(lens, Lens::Pinhole(_)) {
-            // Too far out for any of these; the point is that nothing hangs or panics.
+            // Too far out for any of these lenses; the test is that nothing hangs or panics.
             let _ = lens.undistort(DVec2::splat(1e200));
         }
     }
 }
 
 #[test]
-fn bad_coefficients_are_named() {
+fn invalid_coefficients_are_refused() {
     let error = |model, k: &[f64]| Lens::new(model, k).unwrap_err().to_string();
     assert!(error(LensModel::Pinhole, &[0.1]).contains("pinhole"));
     assert!(error(LensModel::BrownConrady, &[0.0; 9]).contains("k1 k2 p1 p2 k3 k4 k5 k6"));
     assert!(error(LensModel::KannalaBrandt, &[0.0; 5]).contains("at most 4"));
     assert!(error(LensModel::BrownConrady, &[0.1, f64::NAN]).contains("coefficients[1] is NaN"));
     assert!(Lens::with_reach(LensModel::Pinhole, &[], f64::NAN).is_err());
-    // Absurd but finite coefficients make a lens that sees next to nothing, not a panic.
+    // Absurd but finite coefficients give a lens with hardly any field, not a panic.
     for huge in [1e30, -1e30, 1e300, -1e300] {
         for position in 0..8 {
             let mut k = [0.0; 8];
@@ -149,8 +149,8 @@ fn bad_coefficients_are_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Whatever the lens: an answer is inside the fold, is imaged where it was asked for; and a point inside
-    /// is found.
+    /// For every lens: a result is inside the fold and reproduces the distorted point, and a point inside the
+    /// fold is found.
     #[test]
     fn random_lenses_round_trip(
         k in prop::array::uniform3(-0.6..0.6_f64),
@@ -164,11 +164,11 @@ proptest! {
             let direction = DVec2::from_angle(phi);
             let ideal = direction * (share * lens.fold_radius(phi).min(1.5));
             let distorted = lens.distort(ideal);
-            let found = lens.undistort(distorted);
-            prop_assert!(found.is_some(), "{ideal} inside the fold was not found");
-            let found = found.unwrap();
-            prop_assert!(lens.contains(found));
-            prop_assert!((lens.distort(found) - distorted).length() < 2e-9 * (1.0 + distorted.length()));
+            let undistorted = lens.undistort(distorted);
+            prop_assert!(undistorted.is_some(), "{ideal} inside the fold was not undistorted");
+            let undistorted = undistorted.unwrap();
+            prop_assert!(lens.contains(undistorted));
+            prop_assert!((lens.distort(undistorted) - distorted).length() < 2e-9 * (1.0 + distorted.length()));
         }
     }
 }

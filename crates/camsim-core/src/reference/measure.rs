@@ -1,40 +1,40 @@
-//! The error of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame,
-//! and of its light.
+//! Errors of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame,
+//! and of its colour.
 
 use std::sync::Arc;
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::{IdealView, Look, Oracle};
+use super::{IdealView, Oracle, RaySample};
 use crate::{
     frame::RenderedFrame,
-    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
+    silhouette::{CREASE, NEAR_PX, bends, may_step, steps},
 };
 
-/// Largest share of the pixels with a ray but no source in a frame that keeps its tolerance.
-pub const MOST_VOID_SHARE: f64 = 0.01;
+/// Largest share of pixels with a ray but without a source in a frame that keeps its tolerance.
+pub const MAX_VOID_SHARE: f64 = 0.01;
 
-/// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for
-/// the frame.
-const LEAST_SMOOTH_SHARE: f64 = 0.05;
+/// Least share of the compared pixels away from silhouettes for which their 99th percentile represents the
+/// frame.
+const MIN_SMOOTH_SHARE: f64 = 0.05;
 
-/// Errors of one kind of pixel, pixels of the ideal frame.
+/// Statistics of source errors, in pixels of the ideal frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorStats {
-    /// Pixels.
+    /// Number of pixels.
     pub count: u64,
-    /// Root mean square.
+    /// Root mean square error.
     pub rms_px: f64,
     /// 99th percentile.
     pub p99_px: f64,
-    /// Largest.
+    /// Largest error.
     pub max_px: f64,
 }
 
 impl ErrorStats {
-    /// Of a set of error magnitudes. One that is not a number makes all but the count infinite: it must not
-    /// hide.
+    /// Statistics of a set of error magnitudes. A value that is not a number makes all statistics but the
+    /// count infinite, so that it cannot go unnoticed.
     #[must_use]
     pub fn of(mut errors_px: Vec<f64>) -> Self {
         for error in &mut errors_px {
@@ -51,35 +51,34 @@ impl ErrorStats {
     }
 }
 
-/// How far a frame's source coordinates are from the oracle's.
+/// Errors of the source coordinates of a frame against those of the oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoordErrors {
     /// All pixels that have a source in both.
     pub all: ErrorStats,
-    /// Those farther than 3 px from any silhouette whose point the key camera sees.
+    /// Pixels farther than 3 px from any silhouette, whose point the key camera sees.
     pub smooth: ErrorStats,
-    /// The others.
+    /// All other pixels.
     pub silhouettes: ErrorStats,
-    /// Valid in the frame but not by the oracle.
+    /// Number of pixels with a ray in the frame but not in the oracle.
     pub falsely_valid: u64,
-    /// Valid by the oracle but not in the frame.
+    /// Number of pixels with a ray in the oracle but not in the frame.
     pub missing: u64,
 }
 
-/// By what a frame is held to `quality.max_error_px`.
+/// The error by which a frame is compared with `quality.max_error_px`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Judged {
-    /// The 99th percentile away from silhouettes, pixels of the ideal frame.
+pub enum ErrorVerdict {
+    /// 99th percentile away from silhouettes, pixels of the ideal frame.
     Smooth(f64),
-    /// Hardly any pixel (less than one in twenty) is away from silhouettes: the 99th percentile of all.
+    /// 99th percentile of all pixels, because fewer than one in twenty are away from silhouettes.
     Everywhere(f64),
-    /// There is no such percentile: more than a hundredth of the pixels are falsely valid or missing, or
-    /// there is none at all.
+    /// No percentile: more than one pixel in a hundred is falsely valid or missing, or none can be compared.
     Void,
 }
 
-impl Judged {
-    /// The percentile; infinite if there is none.
+impl ErrorVerdict {
+    /// The percentile; infinite without one.
     #[must_use]
     pub fn p99_px(self) -> f64 {
         match self {
@@ -90,70 +89,71 @@ impl Judged {
 }
 
 impl CoordErrors {
-    /// By what the frame is to be judged: nothing that was not measured counts as kept.
+    /// The error that decides whether the frame keeps its tolerance. A frame that could not be measured never
+    /// does.
     #[must_use]
-    pub fn judged(&self) -> Judged {
+    pub fn verdict(&self) -> ErrorVerdict {
         let void = self.falsely_valid + self.missing;
         let pixels = self.all.count + void;
-        if self.all.count == 0 || void as f64 > MOST_VOID_SHARE * pixels as f64 {
-            Judged::Void
-        } else if (self.smooth.count as f64) < LEAST_SMOOTH_SHARE * self.all.count as f64 {
-            Judged::Everywhere(self.all.p99_px)
+        if self.all.count == 0 || void as f64 > MAX_VOID_SHARE * pixels as f64 {
+            ErrorVerdict::Void
+        } else if (self.smooth.count as f64) < MIN_SMOOTH_SHARE * self.all.count as f64 {
+            ErrorVerdict::Everywhere(self.all.p99_px)
         } else {
-            Judged::Smooth(self.smooth.p99_px)
+            ErrorVerdict::Smooth(self.smooth.p99_px)
         }
     }
 }
 
-/// What is compared of one pixel.
-enum Compared {
+/// Result of the comparison of one pixel.
+enum ComparedPixel {
     Skipped,
     FalselyValid,
     Missing,
     Error { px: f64, at_silhouette: bool },
 }
 
-/// What the centre of every pixel of a frame sees, and which pixels are at silhouettes: looked at once,
-/// compared with any number of renderings.
+/// What the oracle sees at the centre of every pixel of a frame, and which pixels are at silhouettes.
+/// Computed once, it is compared with any number of renderings.
 #[derive(Debug)]
 pub struct CoordTruth {
     oracle: Arc<Oracle>,
-    looks: Vec<Option<Look>>,
+    samples: Vec<Option<RaySample>>,
     near: Vec<bool>,
 }
 
 impl CoordTruth {
-    /// Looks at a frame at exposure phase `phase` (-0.5 to 0.5).
+    /// Samples a frame at exposure phase `phase` (-0.5 to 0.5).
     #[must_use]
     pub fn new(oracle: Arc<Oracle>, frame: u64, phase: f64) -> Self {
-        let looks = looks(&oracle, frame, phase);
-        let near = dilated(&oracle, &edges(&oracle, &looks));
-        Self { oracle, looks, near }
+        let samples = pixel_samples(&oracle, frame, phase);
+        let near = dilated(&oracle, &edges(&oracle, &samples));
+        Self { oracle, samples, near }
     }
 
-    /// Pixels within 3 px of a silhouette, row-major.
+    /// Mask of the pixels within 3 px of a silhouette, row-major.
     #[must_use]
     pub fn near_silhouettes(&self) -> &[bool] {
         &self.near
     }
 
-    /// Pixels whose centre has a ray, row-major.
+    /// Mask of the pixels whose centre has a ray, row-major.
     pub fn valid(&self) -> impl Iterator<Item = bool> + '_ {
-        self.looks.iter().map(Option::is_some)
+        self.samples.iter().map(Option::is_some)
     }
 
-    /// As [`coord_errors`], of a rendering of this frame.
+    /// As [`coord_errors`], for a rendering of this frame.
     #[must_use]
     pub fn errors(&self, ideal: &IdealView, frame: &RenderedFrame, step: u32) -> Option<CoordErrors> {
-        compared(&self.oracle, &self.looks, &self.near, ideal, frame, step)
+        compared(&self.oracle, &self.samples, &self.near, ideal, frame, step)
     }
 }
 
 /// Compares `coords` of frame `number`, rendered from the ideal frame `ideal` at exposure phase `phase`, with
-/// the oracle: where the point that the pixel's own ray meets lies in the ideal frame. Every `step`-th pixel
-/// in both directions. A pixel counts as at a silhouette within 3 px of one, and where its true point is
-/// hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the
-/// sequence's.
+/// the oracle. The true source is the projection into the ideal frame of the point that the pixel's ray hits.
+/// Every `step`-th pixel in both directions is compared. A pixel counts as at a silhouette within 3 px of
+/// one, and where its point is hidden from the key camera or behind it. `None` without coords, or if the size
+/// differs from that of the sequence.
 #[must_use]
 pub fn coord_errors(
     oracle: &Oracle,
@@ -163,13 +163,13 @@ pub fn coord_errors(
     phase: f64,
     step: u32,
 ) -> Option<CoordErrors> {
-    let looks = looks(oracle, number, phase);
-    compared(oracle, &looks, &dilated(oracle, &edges(oracle, &looks)), ideal, frame, step)
+    let samples = pixel_samples(oracle, number, phase);
+    compared(oracle, &samples, &dilated(oracle, &edges(oracle, &samples)), ideal, frame, step)
 }
 
 fn compared(
     oracle: &Oracle,
-    looks: &[Option<Look>],
+    samples: &[Option<RaySample>],
     near: &[bool],
     ideal: &IdealView,
     frame: &RenderedFrame,
@@ -186,16 +186,18 @@ fn compared(
     }
     let compare = |i: usize| {
         let valid = frame.color_rgba[4 * i + 3] > 0.0;
-        match (&looks[i], valid) {
-            (None, false) => Compared::Skipped,
-            (None, true) => Compared::FalselyValid,
-            (Some(_), false) => Compared::Missing,
-            (Some(look), true) => {
-                let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
-                let unseen = ideal.in_key(look).z <= 0.0
-                    || look.hit.is_some_and(|hit| oracle.hides(ideal.pose.position_ned_m, hit.point_ned_m));
-                Compared::Error {
-                    px: found.distance(ideal.source_px(look)),
+        match (&samples[i], valid) {
+            (None, false) => ComparedPixel::Skipped,
+            (None, true) => ComparedPixel::FalselyValid,
+            (Some(_), false) => ComparedPixel::Missing,
+            (Some(sample), true) => {
+                let source_px = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
+                let unseen = ideal.in_key(sample).z <= 0.0
+                    || sample
+                        .hit
+                        .is_some_and(|hit| oracle.is_occluded(ideal.pose.position_ned_m, hit.point_ned_m));
+                ComparedPixel::Error {
+                    px: source_px.distance(ideal.source_px(sample)),
                     at_silhouette: near[i] || unseen,
                 }
             }
@@ -206,15 +208,15 @@ fn compared(
         .step_by(step as usize)
         .flat_map(|y| (0..width).step_by(step as usize).map(move |x| (y * width + x) as usize))
         .collect();
-    let compared: Vec<Compared> = chosen.into_par_iter().map(compare).collect();
+    let compared: Vec<ComparedPixel> = chosen.into_par_iter().map(compare).collect();
     let (mut smooth, mut at_edges) = (Vec::new(), Vec::new());
     let mut errors = CoordErrors::default();
     for pixel in compared {
         match pixel {
-            Compared::Skipped => {}
-            Compared::FalselyValid => errors.falsely_valid += 1,
-            Compared::Missing => errors.missing += 1,
-            Compared::Error { px, at_silhouette } => {
+            ComparedPixel::Skipped => {}
+            ComparedPixel::FalselyValid => errors.falsely_valid += 1,
+            ComparedPixel::Missing => errors.missing += 1,
+            ComparedPixel::Error { px, at_silhouette } => {
                 if at_silhouette { &mut at_edges } else { &mut smooth }.push(px)
             }
         }
@@ -225,24 +227,24 @@ fn compared(
     Some(errors)
 }
 
-/// How far a frame's light is from the oracle's. Peak is 1; channels R, G, B of pixels that are valid in
-/// both.
+/// Colour errors of a frame against the oracle as PSNR, with a peak of 1, over the channels R, G, B of pixels
+/// that are valid in both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageErrors {
-    /// All pixels.
+    /// PSNR of all pixels, dB.
     pub all_db: f64,
-    /// Those farther than 3 px from any silhouette.
+    /// PSNR of pixels farther than 3 px from any silhouette, dB.
     pub smooth_db: f64,
-    /// The others; infinite where there are none.
+    /// PSNR of all other pixels, dB; infinite without any.
     pub silhouettes_db: f64,
-    /// Pixels compared, and how many of them are at silhouettes.
+    /// Number of pixels compared, and of those at silhouettes.
     pub pixels: [u64; 2],
-    /// Largest difference of any channel.
+    /// Largest difference in any channel.
     pub max: f64,
 }
 
-/// Compares a frame with the oracle's, both in linear light; `near` is [`silhouettes`] of the frame. `None`
-/// if sizes differ.
+/// Compares a frame with that of the oracle, both in linear light. `near` is the mask [`silhouettes`] of the
+/// frame. `None` if the sizes differ.
 #[must_use]
 pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool]) -> Option<ImageErrors> {
     let same = truth.size_px == frame.size_px && truth.color_rgba.len() == frame.color_rgba.len();
@@ -258,7 +260,7 @@ pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool])
         pixels[kind] += 1;
         for (a, b) in a[..3].iter().zip(b) {
             let difference = (f64::from(*a) - f64::from(*b)).abs();
-            // Not a number is the largest difference of all.
+            // A difference that is not a number counts as infinite.
             let difference = if difference.is_nan() { f64::INFINITY } else { difference };
             squares[kind] += difference * difference;
             max = max.max(difference);
@@ -276,58 +278,58 @@ pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool])
     })
 }
 
-/// Pixels of a frame within 3 px of a silhouette at any of the exposure phases given (from -0.5 to 0.5),
+/// Mask of the pixels within 3 px of a silhouette at any of the given exposure phases (-0.5 to 0.5),
 /// row-major.
 #[must_use]
 pub fn silhouettes(oracle: &Oracle, frame: u64, phases: &[f64]) -> Vec<bool> {
     let size_px = oracle.sequence.scenario.camera.size_px;
     let mut marked = vec![false; size_px[0] as usize * size_px[1] as usize];
     for &phase in phases {
-        for (marked, edge) in marked.iter_mut().zip(edges(oracle, &looks(oracle, frame, phase))) {
+        for (marked, edge) in marked.iter_mut().zip(edges(oracle, &pixel_samples(oracle, frame, phase))) {
             *marked |= edge;
         }
     }
     dilated(oracle, &marked)
 }
 
-/// What the centre of every pixel sees.
-fn looks(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<Look>> {
+/// Samples at the centres of all pixels.
+fn pixel_samples(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<RaySample>> {
     let [width, height] = oracle.sequence.scenario.camera.size_px;
     let view = oracle.view(frame);
     (0..height)
         .into_par_iter()
         .flat_map_iter(|y| {
             let view = &view;
-            (0..width).map(move |x| view.look([x, y], DVec2::ZERO, phase))
+            (0..width).map(move |x| view.sample([x, y], DVec2::ZERO, phase))
         })
         .collect()
 }
 
-/// Pixels beside a step or at a fold of depth at their own instant. Where neighbours' looks suggest one, the
-/// pixel's camera looks for itself: a neighbour of another instant may see another place, and one of the
-/// other field surely does.
-fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
+/// Mask of the pixels beside a step or at a crease of depth at their own instant. Where neighbouring samples
+/// suggest one, rays of the pixel's own camera decide: a neighbour belongs to another instant, or even to the
+/// other field, and may see another point.
+fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
     let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
-    let field = oracle.clock.field_rows() as usize;
-    let inverse_depth = |look: &Look| look.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
+    let field = oracle.timing.field_rows() as usize;
+    let inverse_depth = |sample: &RaySample| sample.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
     let beside = |before: usize, i: usize, after: usize| {
-        let (Some(before), Some(here), Some(after)) = (&looks[before], &looks[i], &looks[after]) else {
+        let (Some(before), Some(here), Some(after)) = (&samples[before], &samples[i], &samples[after]) else {
             return false;
         };
-        let seen = inverse_depth(here);
-        if !may_step([inverse_depth(before), seen, inverse_depth(after)]) {
+        let here_w = inverse_depth(here);
+        if !may_step([inverse_depth(before), here_w, inverse_depth(after)]) {
             return false;
         }
-        let towards = |other: &Look, share: f64| {
+        let towards = |other: &RaySample, share: f64| {
             let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
             oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
         let [a, c] = [before, after].map(|other| towards(other, 1.0));
-        bends([a, seen, c], FOLD)
-            || steps(seen, a, |share| towards(before, share))
-            || steps(seen, c, |share| towards(after, share))
+        bends([a, here_w, c], CREASE)
+            || steps(here_w, a, |share| towards(before, share))
+            || steps(here_w, c, |share| towards(after, share))
     };
-    (0..looks.len())
+    (0..samples.len())
         .into_par_iter()
         .map(|i| {
             let (x, y, row) = (i % width, i / width, field * width);
@@ -342,10 +344,10 @@ fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
         .collect()
 }
 
-/// All pixels within 3 of a marked one, along rows and columns, of the same field.
+/// All pixels within 3 of a marked one along rows and columns of the same field.
 fn dilated(oracle: &Oracle, marked: &[bool]) -> Vec<bool> {
     let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
-    let (near, field) = (NEAR_PX as usize, oracle.clock.field_rows() as usize);
+    let (near, field) = (NEAR_PX as usize, oracle.timing.field_rows() as usize);
     let mut rows = vec![false; marked.len()];
     let mut all = vec![false; marked.len()];
     for (i, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {
@@ -368,26 +370,26 @@ mod tests {
     use super::*;
 
     fn errors(smooth: u64, silhouettes: u64, falsely_valid: u64, missing: u64) -> CoordErrors {
-        let of = |count, p99_px| ErrorStats { count, p99_px, ..ErrorStats::default() };
-        let all = of(smooth + silhouettes, 7.0);
+        let stats = |count, p99_px| ErrorStats { count, p99_px, ..ErrorStats::default() };
+        let all = stats(smooth + silhouettes, 7.0);
         CoordErrors {
             all,
-            smooth: of(smooth, 0.01),
-            silhouettes: of(silhouettes, 9.0),
+            smooth: stats(smooth, 0.01),
+            silhouettes: stats(silhouettes, 9.0),
             falsely_valid,
             missing,
         }
     }
 
     #[test]
-    fn nothing_is_judged_by_what_was_not_measured() {
-        assert_eq!(errors(900, 100, 0, 0).judged(), Judged::Smooth(0.01));
-        assert_eq!(errors(900, 100, 5, 5).judged(), Judged::Smooth(0.01));
-        assert_eq!(errors(900, 100, 6, 5).judged(), Judged::Void);
-        assert_eq!(errors(0, 0, 0, 19200).judged(), Judged::Void);
-        assert_eq!(errors(0, 0, 0, 0).judged(), Judged::Void);
-        assert_eq!(errors(49, 951, 0, 0).judged(), Judged::Everywhere(7.0));
-        assert_eq!(errors(50, 950, 0, 0).judged(), Judged::Smooth(0.01));
-        assert!(Judged::Void.p99_px().is_infinite());
+    fn verdict_needs_enough_measured_pixels() {
+        assert_eq!(errors(900, 100, 0, 0).verdict(), ErrorVerdict::Smooth(0.01));
+        assert_eq!(errors(900, 100, 5, 5).verdict(), ErrorVerdict::Smooth(0.01));
+        assert_eq!(errors(900, 100, 6, 5).verdict(), ErrorVerdict::Void);
+        assert_eq!(errors(0, 0, 0, 19200).verdict(), ErrorVerdict::Void);
+        assert_eq!(errors(0, 0, 0, 0).verdict(), ErrorVerdict::Void);
+        assert_eq!(errors(49, 951, 0, 0).verdict(), ErrorVerdict::Everywhere(7.0));
+        assert_eq!(errors(50, 950, 0, 0).verdict(), ErrorVerdict::Smooth(0.01));
+        assert!(ErrorVerdict::Void.p99_px().is_infinite());
     }
 }

@@ -1,8 +1,8 @@
-//! Rays against triangles and boxes.
+//! Intersections of rays with triangles and boxes.
 
 use glam::DVec3;
 
-/// A ray with what its tests need.
+/// A ray with the precomputed values of its intersection tests.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
     pub(super) origin: DVec3,
@@ -10,13 +10,13 @@ pub(super) struct Ray {
     inverse: DVec3,
     /// The axis along which the ray is longest, and the two others.
     axes: [usize; 3],
-    /// Shear that takes the direction to that axis, and its scale.
+    /// Shear that aligns the direction with that axis, and its scale.
     shear: [f64; 3],
 }
 
-/// A point seen along a ray: offset across it, and ray parameter.
+/// A point in the sheared space of a ray: offset across it, and scaled ray parameter.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct ShearedPoint {
     x: f64,
     y: f64,
     t: f64,
@@ -39,26 +39,26 @@ impl Ray {
         let axes = [(long + 1) % 3, (long + 2) % 3, long];
         let scale = 1.0 / direction[long];
         let shear = [direction[axes[0]] * scale, direction[axes[1]] * scale, scale];
-        // A component of zero would make 0/0 of a box whose face the ray lies in; a tiny one is as good.
+        // A zero component would give 0/0 for a box whose face contains the ray; a tiny one does not.
         let tiny = 1e-200 * size.max_element();
         let inverse = direction.map(|d| 1.0 / if d.abs() < tiny { tiny.copysign(d) } else { d });
         Some(Self { origin, direction, inverse, axes, shear })
     }
 
-    /// A point as the ray sees it (Woop, Benthin & Wald 2013): equal points are seen equally, so triangles
-    /// that share an edge agree on which side of it the ray passes.
-    pub(super) fn see(&self, point: DVec3) -> Seen {
+    /// A point in the sheared space of the ray (Woop, Benthin & Wald 2013). Equal points give equal results,
+    /// so triangles that share an edge agree on which side of it the ray passes.
+    pub(super) fn shear(&self, point: DVec3) -> ShearedPoint {
         let from_origin = point - self.origin;
         let along = from_origin[self.axes[2]];
-        Seen {
+        ShearedPoint {
             x: from_origin[self.axes[0]] - self.shear[0] * along,
             y: from_origin[self.axes[1]] - self.shear[1] * along,
             t: self.shear[2] * along,
         }
     }
 
-    /// Ray parameter at which a box is entered, 0 from within; `None` if it is missed before `limit`.
-    pub(super) fn enter(&self, low: DVec3, high: DVec3, limit: f64) -> Option<f64> {
+    /// Ray parameter at which a box is entered, 0 from inside; `None` if it is missed before `limit`.
+    pub(super) fn enter_box(&self, low: DVec3, high: DVec3, limit: f64) -> Option<f64> {
         let a = (low - self.origin) * self.inverse;
         let b = (high - self.origin) * self.inverse;
         let enter = a.min(b).max_element().max(0.0);
@@ -67,9 +67,9 @@ impl Ray {
     }
 }
 
-/// Ray parameter in `0 < t < limit` and weights of the corners where a ray meets a triangle, from either
+/// Ray parameter in `0 < t < limit` and barycentric weights of the intersection with a triangle, from either
 /// side.
-pub(super) fn meet([a, b, c]: [Seen; 3], limit: f64) -> Option<(f64, [f64; 3])> {
+pub(super) fn intersect_triangle([a, b, c]: [ShearedPoint; 3], limit: f64) -> Option<(f64, [f64; 3])> {
     let wa = c.x * b.y - c.y * b.x;
     let wb = a.x * c.y - a.y * c.x;
     let wc = b.x * a.y - b.y * a.x;
@@ -79,12 +79,12 @@ pub(super) fn meet([a, b, c]: [Seen; 3], limit: f64) -> Option<(f64, [f64; 3])> 
     let sum = wa + wb + wc;
     let weights = [wa / sum, wb / sum, wc / sum];
     let t = weights[0] * a.t + weights[1] * b.t + weights[2] * c.t;
-    // False for NaN, which a triangle seen from its edge or with a void corner gives.
+    // False for NaN, which results from a triangle seen edge-on or with a void corner.
     (t > 0.0 && t < limit).then_some((t, weights))
 }
 
-/// Smallest box around points; grown by a hair, so that rounding in [`Ray::enter`] never misses what lies on
-/// its faces.
+/// Smallest box around points, slightly enlarged so that rounding in [`Ray::enter_box`] never misses points
+/// on its faces.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) low: DVec3,

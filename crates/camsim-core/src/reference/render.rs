@@ -1,10 +1,10 @@
-//! Whole frames by the oracle: each sample of a pixel has its own place in the pixel's area and its own
-//! instant of the exposure.
+//! Rendering of whole frames: each sample has its own position in the pixel's area and its own instant of the
+//! exposure.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{FrameView, Look, Oracle};
+use super::{FrameView, Oracle, RaySample};
 use crate::{
     frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
@@ -15,33 +15,34 @@ use crate::{
     temporal::IdealGeometry,
 };
 
-/// Steps of the additive sequences that fill 3 and 2 dimensions evenly: powers of 1/g, `g^4 = g + 1`, and of
-/// 1/g, `g^3 = g + 1` (Roberts).
+/// Steps of the additive low-discrepancy sequences in 3 and 2 dimensions: powers of 1/g with `g^4 = g + 1`,
+/// and of 1/g with `g^3 = g + 1` (Roberts, the R sequences).
 const EVEN_3D: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
 const EVEN_2D: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-/// Samples of which one mean is formed for the estimate of the error.
+/// Samples per batch; the error is estimated from the means of batches.
 const BATCH: u32 = 8;
-/// Batches between two looks at the estimate.
+/// Batches between two checks of the estimate.
 const BATCHES_A_CHECK: u32 = 4;
 
-/// What a frame of the oracle holds, and how far it is refined.
+/// Channels of a frame of the oracle, and the accuracy to which it is refined.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// [`Channel::Depth`] and [`Channel::Coords`] cost a ray a pixel; the others are always there.
+    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel; the others
+    /// are always present.
     pub channels: Vec<Channel>,
-    /// Samples of each pixel, at least; rounded up to 32.
+    /// Least number of samples of each pixel; rounded up to 32.
     pub min_samples: u32,
-    /// Samples of a pixel, at most.
+    /// Largest number of samples of a pixel.
     pub max_samples: u32,
-    /// A pixel is finished when the standard error of its mean is below this, 1/255 of the linear range, in
-    /// each channel.
+    /// A pixel is finished when the standard error of its mean is below this in each channel, in DN (1/255 of
+    /// the linear range).
     pub tolerance_dn: f64,
-    /// Whether vignette, light, noise and saturation are applied; else the frame holds the light that
-    /// arrives.
+    /// Whether vignette, light, noise and saturation are applied. Without them, the frame holds the incoming
+    /// light.
     pub photometric: bool,
-    /// The ideal frame that the source coordinates of [`Channel::Coords`] refer to; without one they are 0.
+    /// Ideal frame to which the source coordinates of [`Channel::Coords`] refer. Without one they are 0.
     pub key: Option<IdealView>,
-    /// Pixels that are rendered, row-major; the others are left invalid. `None` is all.
+    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all.
     pub only: Option<Vec<bool>>,
 }
 
@@ -62,33 +63,33 @@ impl Default for RenderOptions {
 /// Pose and geometry of an ideal frame, for source coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealView {
-    /// Its pose.
+    /// Pose of the key camera.
     pub pose: CameraPose,
-    /// Its pixels.
+    /// Geometry of the frame.
     pub ideal: IdealGeometry,
 }
 
 impl IdealView {
-    /// Where what a look sees lies in the ideal frame, pixels: its point, or for the sky its direction. Not
-    /// finite on the horizon of the key camera, and mirrored behind it.
+    /// Projection into the ideal frame, in pixels, of the point of a sample, or of the direction for the sky.
+    /// Not finite in the plane of the key camera, and mirrored behind it.
     #[must_use]
-    pub fn source_px(&self, look: &Look) -> DVec2 {
-        let seen = self.in_key(look);
+    pub fn source_px(&self, sample: &RaySample) -> DVec2 {
+        let in_key = self.in_key(sample);
         self.ideal.principal_px
-            + DVec2::new(self.ideal.focal_px.x * seen.x, self.ideal.focal_px.y * seen.y) / seen.z
+            + DVec2::new(self.ideal.focal_px.x * in_key.x, self.ideal.focal_px.y * in_key.y) / in_key.z
     }
 
-    /// The same in coordinates of the key camera.
-    pub(super) fn in_key(&self, look: &Look) -> DVec3 {
-        let ned = match &look.hit {
+    /// Point of a sample, or direction for the sky, in coordinates of the key camera.
+    pub(super) fn in_key(&self, sample: &RaySample) -> DVec3 {
+        let ned = match &sample.hit {
             Some(hit) => hit.point_ned_m - self.pose.position_ned_m,
-            None => look.pose.ned_from_camera * look.uv.extend(1.0),
+            None => sample.pose.ned_from_camera * sample.uv.extend(1.0),
         };
         self.pose.ned_from_camera.conjugate() * ned
     }
 }
 
-/// How a frame converged.
+/// Convergence of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Convergence {
     /// Pixels with a ray.
@@ -97,12 +98,12 @@ pub struct Convergence {
     pub samples: u64,
     /// Pixels that stopped at `max_samples`.
     pub unfinished: u64,
-    /// Root mean square of the estimated standard errors, 1/255 of the linear range (before noise).
+    /// Root mean square of the estimated standard errors in DN (before noise).
     pub rms_error_dn: f64,
 }
 
-/// One row of a frame.
-struct Row {
+/// One row of a rendered frame.
+struct RenderedRow {
     color: Vec<[f32; 4]>,
     depth_m: Vec<f32>,
     coords: Vec<[f32; COORDS_CHANNELS]>,
@@ -110,8 +111,8 @@ struct Row {
     sum_of_squares: f64,
 }
 
-/// What all rows of a frame share.
-struct Job<'a> {
+/// Data that all rows of a frame share.
+struct FrameJob<'a> {
     oracle: &'a Oracle,
     view: FrameView<'a>,
     frame: u64,
@@ -121,19 +122,19 @@ struct Job<'a> {
 }
 
 impl Oracle {
-    /// Renders one frame, on all threads; the same bytes whatever their number.
+    /// Renders one frame on all threads. The result does not depend on their number.
     #[must_use]
     pub fn render(&self, frame: u64, options: &RenderOptions) -> RenderedFrame {
         self.render_reported(frame, options).0
     }
 
-    /// As [`Oracle::render`], and how it converged.
+    /// As [`Oracle::render`], with a report of the convergence.
     #[must_use]
     pub fn render_reported(&self, frame: u64, options: &RenderOptions) -> (RenderedFrame, Convergence) {
         let size_px = self.sequence.scenario.camera.size_px;
         let [depth, coords] =
             [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
-        let job = Job {
+        let job = FrameJob {
             oracle: self,
             view: self.view(frame),
             frame,
@@ -141,7 +142,8 @@ impl Oracle {
             noise_table: tail_table(),
             truth: depth || coords,
         };
-        let rows: Vec<Row> = (0..size_px[1]).into_par_iter().map(|y| job.row(y, size_px[0])).collect();
+        let rows: Vec<RenderedRow> =
+            (0..size_px[1]).into_par_iter().map(|y| job.row(y, size_px[0])).collect();
         let mut convergence = Convergence::default();
         let mut sum_of_squares = 0.0;
         for row in &rows {
@@ -163,17 +165,17 @@ impl Oracle {
         (rendered, convergence)
     }
 
-    /// Time, pose and velocity of each line of the readout at its mid-exposure.
+    /// Time, pose and velocity of each row of the readout at its mid-exposure.
     #[must_use]
     pub fn row_records(&self, frame: u64) -> Vec<RowRecord> {
         let stamp_s = self.stamp_s(frame);
         let record = |row| {
-            let t_s = stamp_s + self.clock.dt_line_s(row);
+            let t_s = stamp_s + self.timing.dt_row_s(row);
             let CameraPose { position_ned_m, ned_from_camera } = self.sequence.path.pose(t_s);
             let velocity_ned_m_s = self.sequence.path.velocity_ned(t_s);
             RowRecord { row, t_mid_ns: self.log_ns(t_s), position_ned_m, ned_from_camera, velocity_ned_m_s }
         };
-        (0..self.clock.lines()).map(record).collect()
+        (0..self.timing.lines()).map(record).collect()
     }
 
     fn log_ns(&self, t_s: f64) -> i64 {
@@ -181,16 +183,16 @@ impl Oracle {
     }
 }
 
-impl Job<'_> {
-    fn row(&self, y: u32, width: u32) -> Row {
-        let mut row = Row {
+impl FrameJob<'_> {
+    fn row(&self, y: u32, width: u32) -> RenderedRow {
+        let mut row = RenderedRow {
             color: Vec::with_capacity(width as usize),
             depth_m: Vec::new(),
             coords: Vec::new(),
             convergence: Convergence::default(),
             sum_of_squares: 0.0,
         };
-        let mut instants = Instants::new(self, y);
+        let mut instants = SamplePoses::new(self, y);
         for x in 0..width {
             // A pixel is valid where its centre has a ray.
             let wanted = self
@@ -211,16 +213,16 @@ impl Job<'_> {
                 row.color.push([0.0; 4]);
             }
             if self.truth {
-                let look = if valid { self.view.look([x, y], DVec2::ZERO, 0.0) } else { None };
-                row.depth_m.push(look.and_then(|look| look.hit).map_or(0.0, |hit| hit.depth_m as f32));
-                row.coords.push(look.map_or([0.0; COORDS_CHANNELS], |look| self.coords([x, y], &look)));
+                let sample = if valid { self.view.sample([x, y], DVec2::ZERO, 0.0) } else { None };
+                row.depth_m.push(sample.and_then(|sample| sample.hit).map_or(0.0, |hit| hit.depth_m as f32));
+                row.coords.push(sample.map_or([0.0; COORDS_CHANNELS], |sample| self.coords([x, y], &sample)));
             }
         }
         row
     }
 
     /// Mean light over area and exposure.
-    fn pixel(&self, [x, y]: [u32; 2], instants: &mut Instants<'_>) -> PixelMean {
+    fn pixel(&self, [x, y]: [u32; 2], instants: &mut SamplePoses<'_>) -> PixelMean {
         let options = self.options;
         let [shift_x, shift_y, _] = shifts(u64::from(y) << 32 | u64::from(x));
         let steps = if instants.exposure_s > 0.0 { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
@@ -236,10 +238,10 @@ impl Job<'_> {
                     (shift_x + f64::from(i) * steps[0]).fract(),
                     (shift_y + f64::from(i) * steps[1]).fract(),
                 );
-                // At the border of what the lens shows, the part of the area that it does show.
+                // At the border of the lens's field, the mean is over the part of the pixel that has rays.
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
                 let pose = instants.pose(x, i);
-                part += self.oracle.light(&pose, uv);
+                part += self.oracle.radiance(&pose, uv);
                 count += 1;
             }
             if count == 0 {
@@ -290,16 +292,18 @@ impl Job<'_> {
         )
     }
 
-    fn coords(&self, pixel: [u32; 2], look: &Look) -> [f32; COORDS_CHANNELS] {
-        let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(look));
-        let dt_s = self.oracle.clock.dt_s(pixel);
-        // Of the sky, which has no point, the direction.
-        let way = look.hit.map_or_else(|| sky_direction_ned(&look.pose, look.uv), |hit| hit.point_ned_m);
-        [look.uv.x, look.uv.y, source_px.x, source_px.y, dt_s, way.x, way.y, way.z].map(|value| value as f32)
+    fn coords(&self, pixel: [u32; 2], sample: &RaySample) -> [f32; COORDS_CHANNELS] {
+        let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(sample));
+        let dt_s = self.oracle.timing.dt_s(pixel);
+        // A sample of the sky has no point; its direction is stored.
+        let way =
+            sample.hit.map_or_else(|| sky_direction_ned(&sample.pose, sample.uv), |hit| hit.point_ned_m);
+        [sample.uv.x, sample.uv.y, source_px.x, source_px.y, dt_s, way.x, way.y, way.z]
+            .map(|value| value as f32)
     }
 }
 
-/// A pixel's mean and how it was reached.
+/// Mean of a pixel and its convergence.
 struct PixelMean {
     color: DVec3,
     samples: u32,
@@ -307,41 +311,41 @@ struct PixelMean {
     finished: bool,
 }
 
-/// Poses at the instants of a row's samples. Where rows are read at once all pixels of a row share the
-/// instants, and each pose is found once.
-struct Instants<'a> {
-    job: &'a Job<'a>,
+/// Poses at the instants of a row's samples. With readout by rows, all pixels of a row share the instants,
+/// and each pose is computed once.
+struct SamplePoses<'a> {
+    job: &'a FrameJob<'a>,
     y: u32,
     exposure_s: f64,
     shift: f64,
     shared: Option<Vec<CameraPose>>,
 }
 
-impl<'a> Instants<'a> {
-    fn new(job: &'a Job<'a>, y: u32) -> Self {
-        let exposure_s = job.oracle.clock.exposure_s();
-        let shared = job.oracle.clock.reads_rows().then(Vec::new);
+impl<'a> SamplePoses<'a> {
+    fn new(job: &'a FrameJob<'a>, y: u32) -> Self {
+        let exposure_s = job.oracle.timing.exposure_s();
+        let shared = job.oracle.timing.reads_rows().then(Vec::new);
         Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
     }
 
-    /// At sample `i` of pixel `x`.
+    /// Pose at sample `i` of pixel `x`.
     fn pose(&mut self, x: u32, i: u32) -> CameraPose {
-        let at = |i: u32, shift: f64| {
+        let pose = |i: u32, shift: f64| {
             let phase =
                 if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
             self.job.oracle.sequence.path.pose(self.job.view.mid_s([x, self.y]) + phase * self.exposure_s)
         };
-        let Some(shared) = &mut self.shared else { return at(i, self.shift) };
+        let Some(shared) = &mut self.shared else { return pose(i, self.shift) };
         let i = if self.exposure_s > 0.0 { i } else { 0 };
         while shared.len() <= i as usize {
-            let next = at(shared.len() as u32, self.shift);
+            let next = pose(shared.len() as u32, self.shift);
             shared.push(next);
         }
         shared[i as usize]
     }
 }
 
-/// Three numbers in 0..1 that look random (splitmix64).
+/// Three pseudo-random numbers in 0..1 (splitmix64).
 fn shifts(key: u64) -> [f64; 3] {
     let mut state = key;
     std::array::from_fn(|_| {
@@ -353,20 +357,20 @@ fn shifts(key: u64) -> [f64; 3] {
     })
 }
 
-/// The vignette map at a pixel: the map covers the picture, edge to edge; bilinear between its pixel centres,
-/// held beyond the outer ones.
+/// Value of the vignette map at a pixel. The map covers the image from edge to edge; values are bilinear
+/// between its pixel centres and constant beyond the outer ones.
 fn vignette(map: &GrayImage, pixel: [u32; 2], size_px: [u32; 2]) -> f64 {
     let [columns, rows] = map.size_px;
     let axis = |k: usize, of: u32| {
-        let at = (f64::from(pixel[k]) + 0.5) / f64::from(size_px[k]) * f64::from(of) - 0.5;
-        let at = at.max(0.0).min(f64::from(of) - 1.0);
-        let low = at as u32;
-        (low, (low + 1).min(of - 1), at - f64::from(low))
+        let map_px = (f64::from(pixel[k]) + 0.5) / f64::from(size_px[k]) * f64::from(of) - 0.5;
+        let map_px = map_px.max(0.0).min(f64::from(of) - 1.0);
+        let low = map_px as u32;
+        (low, (low + 1).min(of - 1), map_px - f64::from(low))
     };
     let ((x0, x1, tx), (y0, y1, ty)) = (axis(0, columns), axis(1, rows));
-    let at =
+    let value =
         |x: u32, y: u32| map.values.get((y * columns + x) as usize).map_or(0.0, |value| f64::from(*value));
-    let top = at(x0, y0) * (1.0 - tx) + at(x1, y0) * tx;
-    let bottom = at(x0, y1) * (1.0 - tx) + at(x1, y1) * tx;
+    let top = value(x0, y0) * (1.0 - tx) + value(x1, y0) * tx;
+    let bottom = value(x0, y1) * (1.0 - tx) + value(x1, y1) * tx;
     top * (1.0 - ty) + bottom * ty
 }

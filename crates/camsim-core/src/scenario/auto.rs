@@ -1,14 +1,14 @@
-//! Values that may also be a word: `"auto"`, `"field"`, `"first"`.
+//! Values that may also be a keyword: `"auto"`, `"field"`, `"first"`.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// A value, or `"auto"`: the planner chooses and `camsim explain` prints what it chose.
+/// A value, or `"auto"`: then the planner chooses, and `camsim explain` prints its choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Auto<T> {
     /// The planner chooses.
     #[default]
     Auto,
-    /// As given.
+    /// The given value.
     Value(T),
 }
 
@@ -79,7 +79,7 @@ impl<'de> Deserialize<'de> for FieldOr {
     }
 }
 
-/// One fixed word as a unit value of an untagged enum.
+/// A fixed keyword as the unit variant of an untagged enum.
 macro_rules! word {
     ($module:ident, $word:literal, $expected:literal) => {
         pub(super) mod $module {

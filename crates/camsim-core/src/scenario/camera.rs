@@ -1,4 +1,4 @@
-//! `[camera]`: also the whole of a CAMERA.toml.
+//! `[camera]`, which is also the content of a CAMERA.toml.
 
 use std::path::PathBuf;
 
@@ -10,8 +10,8 @@ use super::FieldOr;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSpec {
-    /// Which camera this is: part of the seed of its noise ([`crate::noise::camera_seed`]), so that cameras
-    /// on one platform do not share theirs.
+    /// Name of the camera. It is part of the seed of its noise ([`crate::noise::camera_seed`]), so that the
+    /// cameras of one platform have different noise.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// Width and height of the output.
@@ -22,21 +22,21 @@ pub struct CameraSpec {
     /// (H-1)/2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// Fraction of a frame period added to every stamp.
     pub phase: f64,
-    /// Where and how the camera sits on the platform.
+    /// Position and orientation on the platform.
     pub mount: MountSpec,
     /// Distortion.
     pub lens: LensSpec,
-    /// Calibrations over zoom, by ascending `at`; empty for a fixed lens.
+    /// Calibrations by zoom, with ascending `at`; empty for a fixed lens.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub zoom: Vec<ZoomSpec>,
-    /// CSV `t_s,zoom`: zoom over log time, linear between rows, held outside.
+    /// CSV `t_s,zoom`: zoom over log time, linear between rows, constant beyond the ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zoom_track: Option<PathBuf>,
-    /// When each row is exposed.
+    /// Exposure times of the rows.
     pub shutter: ShutterSpec,
     /// Vignette, light, noise, output encoding.
     pub photometric: PhotometricSpec,
@@ -69,17 +69,17 @@ pub struct MountSpec {
     pub angles_deg: [f64; 3],
     /// Lever arm in body axes (forward, right, down).
     pub offset_m: [f64; 3],
-    /// Sinusoids added to the mount.
+    /// Vibration: sinusoids added to the mount.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub vibration: Vec<VibrationSpec>,
 }
 
-/// One sinusoid `amplitude * sin(2 pi hz t + phase)` about or along one body axis, before the mount; t in
-/// seconds of flight since the log's first good row, whatever the window.
+/// A sinusoid `amplitude * sin(2 pi hz t + phase)` about or along one body axis, before the mount. The time t
+/// is in seconds of flight since the log's first good row, for any window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VibrationSpec {
-    /// Which degree of freedom.
+    /// Degree of freedom.
     pub axis: Axis,
     /// Amplitude of a rotation axis.
     #[serde(default)]
@@ -155,13 +155,13 @@ pub struct ZoomSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShutterSpec {
-    /// How much older than its stamp the image centre is (-t_d).
+    /// Age of the image centre at its stamp (-t_d).
     pub delay_ms: f64,
-    /// First row to last row (t_r).
+    /// Time from the first row to the last (t_r).
     pub readout_ms: f64,
     /// Direction of the readout.
     pub readout: Readout,
-    /// Exposure (t_e).
+    /// Exposure time (t_e).
     pub exposure_ms: f64,
     /// Lag between the two fields.
     pub interlace_ms: FieldOr,
@@ -212,10 +212,10 @@ pub enum Readout {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PhotometricSpec {
-    /// Vignette map image, resampled bilinearly to the output.
+    /// Vignette map, an image resampled bilinearly to the output.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<PathBuf>,
-    /// `[t1, t2]`: v < t1 is black, else min(v / t2, 1).
+    /// `[t1, t2]`: the weight is 0 if v < t1, else min(v / t2, 1).
     pub vignette_thresholds: [f64; 2],
     /// Gain on linear values.
     pub light: f64,

@@ -1,47 +1,47 @@
-//! `[scene]`: what there is to see.
+//! `[scene]`: the contents of the scene.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// One of, or several together.
+/// The scene: one of its parts, or several together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// Terrain from a DEM and an ortho-image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainSpec>,
-    /// A planar picture on the ground.
+    /// A planar image on the ground.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pattern: Option<PatternSpec>,
     /// A calibration board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
-    /// Models.
+    /// glTF models.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gltf: Vec<GltfSpec>,
     /// Sky colour, sRGB.
     #[serde(default = "sky")]
     pub sky: [f64; 3],
-    /// Visibility V: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
+    /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
-    /// Sun and sky; left out, colours are as they are.
+    /// Sun and sky light. Without it, colours are used as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light: Option<LightSpec>,
 }
 
-/// `scene.light`: factor of the colours of terrain and models, without shadows.
+/// `scene.light`: factor on the colours of terrain and models, without shadows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightSpec {
-    /// Where the sun is, degrees east of north.
+    /// Azimuth of the sun, degrees east of north.
     pub sun_azimuth_deg: f64,
-    /// How high it is above the horizon, degrees.
+    /// Elevation of the sun above the horizon, degrees.
     pub sun_elevation_deg: f64,
-    /// Of a colour that the sun meets at right angles.
+    /// Factor of the sun on a surface that faces it.
     pub sun: f64,
-    /// Of a colour that looks up; half of it for walls.
+    /// Factor of the sky on a surface that faces upwards; half of it on walls.
     pub sky: f64,
 }
 
@@ -51,33 +51,33 @@ impl Default for LightSpec {
     }
 }
 
-/// `scene.terrain`.
+/// `scene.terrain`: the ground.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainSpec {
-    /// GeoTIFF, ESRI ASCII grid or SRTM tile of heights.
+    /// Heights: a GeoTIFF, ESRI ASCII grid or SRTM tile.
     pub dem: PathBuf,
-    /// GeoTIFF, PNG, JPEG or WebP of colour; without georeference it covers the DEM's extent.
+    /// Colour: a GeoTIFF, PNG, JPEG or WebP. Without a georeference it covers the extent of the DEM.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ortho: Option<PathBuf>,
     /// Vertical reference of the DEM.
     #[serde(default)]
     pub height: HeightReference,
-    /// EPSG code, when the DEM does not state one.
+    /// EPSG code, if the DEM does not state one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub epsg: Option<u16>,
-    /// Unit of the heights, when the DEM does not state one, or two.
+    /// Unit of the heights, if the DEM states none, or two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_unit: Option<HeightUnit>,
-    /// The stored number of the ortho-image that is white; the largest that its bits can hold if left out.
+    /// Stored value of white in the ortho-image; by default the largest value of its bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ortho_white: Option<f64>,
-    /// What is seen where the ortho-image has nothing.
+    /// Ground outside of the ortho-image.
     #[serde(default)]
     pub beyond: Beyond,
 }
 
-/// Of heights.
+/// Unit of heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeightUnit {
@@ -90,7 +90,7 @@ pub enum HeightUnit {
 }
 
 impl HeightUnit {
-    /// Metres in one.
+    /// Length of the unit in metres.
     #[must_use]
     pub fn metres(self) -> f64 {
         match self {
@@ -101,118 +101,118 @@ impl HeightUnit {
     }
 }
 
-/// Ground without a picture.
+/// Ground without ortho-image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Beyond {
-    /// A neutral grey.
+    /// Neutral grey.
     #[default]
     Grey,
-    /// The colours of the picture's border, as far as there is ground.
+    /// The colours of the ortho-image's border.
     Edge,
     /// No ground.
     Void,
 }
 
-/// `scene.pattern`: level at the origin's height, image top to the north.
+/// `scene.pattern`: a level image at the height of the origin, with its top to the north.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PatternSpec {
-    /// The picture.
+    /// The image.
     pub image: PathBuf,
-    /// Width on the ground; the height follows from the picture's shape.
+    /// Width on the ground; the height follows from square pixels.
     pub width_m: f64,
     /// Centre: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
 }
 
-/// `scene.board`: its parameters, or Kalibr's file of them.
+/// `scene.board`: a calibration board, by its parameters or by a target file of Kalibr.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardSpec {
-    /// Kalibr's target YAML, in place of the parameters.
+    /// Target file (YAML) of Kalibr, in place of the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<PathBuf>,
-    /// What is on it.
+    /// Kind of board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<BoardKind>,
-    /// Chessboard: inner corners; ChArUco: squares; else circles or tags, from left to right.
+    /// Number along the width: inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<u32>,
-    /// The same from top to bottom.
+    /// Number along the height: inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<u32>,
-    /// Side of a square or of a tag, or spacing of circles as OpenCV means it.
+    /// Side of a square or tag, or the spacing of circles as OpenCV defines it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f64>,
-    /// Height of a chessboard's squares, if it is another.
+    /// Height of a chessboard's squares, if different from their width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub row_size_m: Option<f64>,
-    /// Of a circle; half the spacing if left out.
+    /// Diameter of a circle; half the spacing by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
-    /// Gap between tags of an AprilGrid, as a share of their side; 0.3 if left out.
+    /// Gap between tags of an AprilGrid, as a share of their side; 0.3 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spacing: Option<f64>,
-    /// Side of a ChArUco board's markers; three quarters of a square if left out.
+    /// Side of a ChArUco board's markers; three quarters of a square by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub marker_m: Option<f64>,
-    /// Of a ChArUco board's markers; 4x4 if left out.
+    /// Dictionary of a ChArUco board's markers; 4x4 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dictionary: Option<Dictionary>,
-    /// Number of the first tag or marker; 0 if left out.
+    /// Number of the first tag or marker; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_id: Option<u32>,
-    /// White around it, at least; left out, what its kind usually has.
+    /// Least width of the white margin; by default that usual for the kind of board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin_m: Option<f64>,
-    /// Its middle: `"origin"` or `[north_m, east_m, down_m]`.
+    /// Position of the centre: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
-    /// Its middle on Earth, in place of `at`: latitude and longitude in degrees, height in metres as
-    /// `flight.height` says.
+    /// Geodetic position of the centre, in place of `at`: latitude and longitude in degrees, height in metres
+    /// in the datum of `flight.height`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// Roll, pitch, yaw: 0 0 0 lies face up, its top in the north; pitch 90 stands, and is looked at
-    /// northwards.
+    /// Roll, pitch, yaw. At 0 0 0 the board lies face up with its top to the north; at pitch 90 it stands
+    /// upright and faces a viewer who looks north.
     #[serde(default)]
     pub angles_deg: [f64; 3],
 }
 
-/// `[[scene.gltf]]`: a model, once or wherever a table says.
+/// `[[scene.gltf]]`: a model, placed once or by a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GltfSpec {
-    /// The model: `.gltf` or `.glb`.
+    /// The model, a `.gltf` or `.glb` file.
     pub file: PathBuf,
-    /// Where its origin is: `"origin"` or `[north_m, east_m, down_m]`.
+    /// Position of the model's origin: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
-    /// The same on Earth, in place of `at`: latitude and longitude in degrees, height in metres as
-    /// `flight.height` says.
+    /// Geodetic position of the model's origin, in place of `at`: latitude and longitude in degrees, height
+    /// in metres in the datum of `flight.height`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// A table of places in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and if wanted
+    /// Table of placements, in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and optionally
     /// `heading_deg` and `scale`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placements: Option<PathBuf>,
-    /// Where its front (+z) looks, degrees east of north. With 180 its x is east, as maps have it.
+    /// Direction of the model's front (+z), degrees east of north. With 180, its x axis is east, as in maps.
     #[serde(default)]
     pub heading_deg: f64,
-    /// Metres for each of its metres.
+    /// Scale: metres per unit of the model.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Whether its origin is put on the terrain, whatever height its place has.
+    /// Whether the model's origin is placed on the terrain, whatever its height.
     #[serde(default)]
     pub on_ground: bool,
-    /// Which of the file's scenes; the file's own choice if left out.
+    /// Index of the scene in the file; by default the file's own choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<u32>,
-    /// Time within its animations, seconds; as its nodes stand if left out.
+    /// Time in the model's animations, seconds; by default nodes keep their static pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
-    /// Which animation; all of them together if left out.
+    /// Index of the animation; by default all animations together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<u32>,
 }
@@ -221,15 +221,15 @@ fn one() -> f64 {
     1.0
 }
 
-/// Calibration boards.
+/// Kinds of calibration boards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BoardKind {
-    /// Squares, black and white in turn.
+    /// Alternating black and white squares.
     Chessboard,
     /// Circles in rows and columns.
     Circles,
-    /// Circles of which every other row is shifted by half their distance.
+    /// Circles in rows, every other one shifted by half the distance.
     AsymmetricCircles,
     /// Kalibr's grid of AprilTags 36h11.
     Aprilgrid,
@@ -237,7 +237,7 @@ pub enum BoardKind {
     Charuco,
 }
 
-/// ArUco markers, by the squares of their inside: the first 250 of OpenCV's.
+/// ArUco dictionaries by squares per side; the first 250 markers of OpenCV's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dictionary {
     /// `DICT_4X4_50`, `_100`, `_250`.

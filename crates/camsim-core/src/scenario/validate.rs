@@ -1,4 +1,4 @@
-//! Range checks: what no run could mean, each with its key and the way out.
+//! Range checks: values that no run can use, each with its key and a remedy.
 
 use std::fmt;
 
@@ -10,18 +10,18 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
 
-/// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these
-/// never does.
+/// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
+/// converged after this many never does.
 pub const MAX_ITERATIONS: u32 = 64;
-/// Most samples for a pixel of path, or for an exposure in the paper's preset. Two a pixel keep white texture
-/// below 1/255 (NUMERICS section 3).
+/// Largest number of samples per pixel of path, or per exposure in the paper's preset. Two per pixel keep the
+/// error below 1/255 on white texture (docs/accuracy/stress.md).
 pub const MAX_BLUR_SAMPLES: u32 = 4096;
-/// Most reads along a side of a pixel; the planner takes 4 at most.
+/// Largest number of footprint taps per side of a pixel; the planner uses at most 4.
 pub const MAX_FOOTPRINT_TAPS: u32 = 64;
-/// Most output frames of one ideal frame.
+/// Largest number of output frames per ideal frame.
 pub const MAX_FRAMES_PER_IDEAL: u32 = 64;
 
-/// One value that no run can use.
+/// An invalid value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// Dotted key, array elements by index (`camera.zoom.1.at`).
@@ -36,7 +36,8 @@ impl fmt::Display for Problem {
     }
 }
 
-/// All values of `scenario` that are out of range, in the order of the file; empty when it can be run.
+/// All values of `scenario` that are out of range, in the order of the file; empty if the scenario can be
+/// run.
 pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     let mut check = Check::default();
     check_flight(&mut check, scenario);
@@ -47,7 +48,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check.problems
 }
 
-/// The same for a camera alone; keys begin with `camera.`.
+/// As [`validate`], for a camera alone; keys begin with `camera.`.
 pub fn validate_camera(camera: &CameraSpec) -> Vec<Problem> {
     let mut check = Check::default();
     check_camera(&mut check, camera);
@@ -90,7 +91,7 @@ impl Check {
 
     fn count(&mut self, key: &str, value: Auto<u32>, most: u32) {
         self.require(value.value().is_none_or(|count| (1..=most).contains(&count)), key, || {
-            format!("must be 1 to {most}; leave it out or write \"auto\" to have it chosen")
+            format!("must be 1 to {most}; leave it out or write \"auto\" for the planner's choice")
         });
     }
 }
@@ -132,7 +133,7 @@ fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
     }
 }
 
-/// Larger pictures than this are typing errors on every adapter there is.
+/// Largest side of an image; larger ones are typing errors on every adapter.
 pub const MAX_SIDE_PX: u32 = crate::camera::MAX_SIZE_PX;
 
 fn check_camera(check: &mut Check, camera: &CameraSpec) {
@@ -156,10 +157,10 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
         check.finite(key("phase_deg"), &[vibration.phase_deg]);
         let rotation = matches!(vibration.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
         check.require(!rotation || vibration.amplitude_m.abs() == 0.0, key("amplitude_m"), || {
-            "does not go with a rotation axis; use amplitude_deg".into()
+            "is for translation axes; use amplitude_deg".into()
         });
         check.require(rotation || vibration.amplitude_deg.abs() == 0.0, key("amplitude_deg"), || {
-            "does not go with a translation axis; use amplitude_m".into()
+            "is for rotation axes; use amplitude_m".into()
         });
     }
 
@@ -194,12 +195,12 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.not_negative(
         "camera.shutter.delay_ms",
         shutter.delay_ms,
-        "it says how much older than its stamp the image centre is",
+        "it is the age of the image centre at its stamp",
     );
     check.not_negative(
         "camera.shutter.readout_ms",
         shutter.readout_ms,
-        "turn the direction with camera.shutter.readout",
+        "reverse the direction with camera.shutter.readout",
     );
     check.not_negative("camera.shutter.exposure_ms", shutter.exposure_ms, "0 is an instant");
     if let FieldOr::Ms(ms) = shutter.interlace_ms {
@@ -237,7 +238,7 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
     check.require(coefficients.len() <= most, key, || {
         format!("has {} values where at most {most} fit; {order}", coefficients.len())
     });
-    // Three are what other programs call k1 k2 k3.
+    // Three coefficients are what other programs call k1 k2 k3.
     let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
     check.require(!radial_alone, key, || {
         format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not")
@@ -269,12 +270,12 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(
         quality.silhouettes != Silhouettes::Rays || quality.ideal_samples != Auto::Value(SAMPLES),
         "quality.ideal_samples",
-        || "is for silhouettes without rays of their own, which quality.silhouettes = \"rays\" asks for; leave one of them out".into(),
+        || "excludes silhouette rays (quality.silhouettes = \"rays\"); leave one of them out".into(),
     );
     check.require(
         quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)),
         "quality.ideal_scale",
-        || "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into(),
+        || "must be 1 to 5 ideal pixels per camera pixel, or \"auto\"".into(),
     );
     check.require(
         (1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal),
@@ -302,19 +303,21 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     });
 }
 
-/// What the paper's methods cannot do, and keys that they leave nothing to.
+/// Combinations that the paper's methods do not support, and keys without an effect in that preset.
 fn check_paper(check: &mut Check, scenario: &Scenario) {
     let (quality, camera) = (&scenario.quality, &scenario.camera);
     let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
     let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
     check.require(camera.lens.model != LensModel::KannalaBrandt && !rational, "quality.preset", || {
-        "\"paper\" knows pinhole and brown-conrady lenses with k1 k2 p1 p2 k3 only; write \"default\"".into()
+        "\"paper\" supports only pinhole and brown-conrady lenses with k1 k2 p1 p2 k3; write \"default\""
+            .into()
     });
     check.require(matches!(quality.solver, Auto::Auto | Auto::Value(Solver::Rk2)), "quality.solver", || {
         "is rk2 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
     check.require(quality.iterations == Auto::Auto, "quality.iterations", || {
-        "does not go with quality.preset = \"paper\", which looks the depth up once; leave it out".into()
+        "cannot be combined with quality.preset = \"paper\", which looks the depth up once; leave it out"
+            .into()
     });
     check.require(
         matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)),

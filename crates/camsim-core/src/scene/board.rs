@@ -1,9 +1,10 @@
-//! Calibration boards, made from their parameters: chessboards, circle grids, AprilGrids, ChArUco boards.
+//! Calibration boards, generated from their parameters: chessboards, circle grids, AprilGrids, ChArUco
+//! boards.
 //!
-//! A board is black shapes on white. Its picture holds how much of each texel is black, exactly, and its
-//! scale is chosen so that the shapes' edges fall between texels wherever their sizes have a common measure.
-//! There a bilinear read is half black exactly on the edge; an edge within a texel is off by at most 1.5 -
-//! sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least [`LEAST_TEXELS`].
+//! A board has black shapes on white. Its texture holds the exact coverage of each texel by black, at a scale
+//! at which the edges of the shapes fall between texels wherever their sizes have a common measure. There a
+//! bilinear read is half black exactly on the edge. An edge within a texel is displaced by at most 1.5 -
+//! sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least [`MIN_TEXELS`].
 
 use std::sync::Arc;
 
@@ -17,38 +18,38 @@ mod codes;
 mod layout;
 mod raster;
 
-/// Texels of a square, a tag or a spacing, at least: 0.086 of them are less than a thousandth.
-const LEAST_TEXELS: f64 = 90.0;
-/// Texels along the longer side that a picture aims at.
+/// Least number of texels along a square, a tag or a spacing; 0.086 texels are less than a thousandth of it.
+const MIN_TEXELS: f64 = 90.0;
+/// Preferred number of texels along the longer side.
 const AIM_TEXELS: f64 = 1536.0;
-/// Texels along a side, at most.
-const MOST_TEXELS: f64 = 8192.0;
-/// Squares, circles or tags along a side, at most.
-const MOST_ALONG: u32 = 80;
+/// Largest number of texels along a side.
+const MAX_TEXELS: f64 = 8192.0;
+/// Largest number of squares, circles or tags along a side.
+const MAX_ALONG: u32 = 80;
 
-/// What is wrong with a board's parameters.
+/// Invalid parameters of a board.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key} {message}")]
 pub struct BoardError {
     /// The key below `scene.board`.
     pub key: &'static str,
-    /// What is wrong, and what to do.
+    /// What is wrong, and how to correct it.
     pub message: String,
 }
 
-fn wrong<T>(key: &'static str, message: impl Into<String>) -> Result<T, BoardError> {
+fn refuse<T>(key: &'static str, message: impl Into<String>) -> Result<T, BoardError> {
     Err(BoardError { key, message: message.into() })
 }
 
-/// A point that calibration code looks for.
+/// A point that calibration programs detect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardPoint {
-    /// Chessboard, circles and ChArUco: row by row from the top left, as OpenCV counts. AprilGrid: four times
-    /// the tag's number, and the corners of a tag anticlockwise from the one at the bottom left, as Kalibr
-    /// counts.
+    /// Number of the point. Chessboard, circles and ChArUco: row by row from the top left, as in OpenCV.
+    /// AprilGrid: four times the tag's number, with the corners of a tag anticlockwise from the bottom left,
+    /// as in Kalibr.
     pub id: u32,
-    /// From the board's middle: right and down, metres.
-    pub at_m: DVec2,
+    /// Position from the centre of the board: right and down, metres.
+    pub position_m: DVec2,
 }
 
 /// A board of known dimensions.
@@ -59,27 +60,27 @@ pub struct Board {
 }
 
 impl Board {
-    /// The board that a scenario describes; `spec.target` has been read into the other keys.
+    /// The board of a scenario. `spec.target` has already been read into the other keys.
     ///
     /// # Errors
     /// [`BoardError`] names the key.
     pub fn from_spec(spec: &BoardSpec) -> Result<Self, BoardError> {
         let Some(kind) = spec.kind else {
-            return wrong(
+            return refuse(
                 "kind",
                 "is missing: give \"chessboard\", \"circles\", \"asymmetric-circles\", \"aprilgrid\" or \"charuco\", or target = \"kalibr.yaml\"",
             );
         };
         let count = |key, value: Option<u32>, least: u32| match value {
-            Some(n) if (least..=MOST_ALONG).contains(&n) => Ok(n),
-            Some(n) => wrong(key, format!("is {n}; {least} to {MOST_ALONG} make sense here")),
-            None => wrong(key, "is missing, and has no default; add it"),
+            Some(n) if (least..=MAX_ALONG).contains(&n) => Ok(n),
+            Some(n) => refuse(key, format!("is {n}; it must be {least} to {MAX_ALONG}")),
+            None => refuse(key, "is missing, and has no default; add it"),
         };
         let metres = |key, value: f64| {
             if value.is_finite() && value > 0.0 {
                 Ok(value)
             } else {
-                wrong(key, format!("is {value}; give metres above 0"))
+                refuse(key, format!("is {value}; give metres above 0"))
             }
         };
         let [columns, rows] = match kind {
@@ -89,10 +90,10 @@ impl Board {
             _ => [count("columns", spec.columns, 1)?, count("rows", spec.rows, 1)?],
         };
         let Some(size_m) = spec.size_m else {
-            return wrong("size_m", "is missing, and has no default; add it");
+            return refuse("size_m", "is missing, and has no default; add it");
         };
         let size_m = metres("size_m", size_m)?;
-        refuse_keys_of_others(spec, kind)?;
+        check_foreign_keys(spec, kind)?;
         let layout = match kind {
             BoardKind::Chessboard => layout::chessboard(
                 columns,
@@ -104,7 +105,7 @@ impl Board {
                 let nearest_m =
                     if kind == BoardKind::Circles { size_m } else { std::f64::consts::SQRT_2 * size_m };
                 if diameter_m >= nearest_m {
-                    return wrong(
+                    return refuse(
                         "diameter_m",
                         format!("is {diameter_m}, but circles are {nearest_m:.4} m apart: make it smaller"),
                     );
@@ -114,7 +115,7 @@ impl Board {
             BoardKind::Aprilgrid => {
                 let spacing = spec.spacing.unwrap_or(0.3);
                 if !(spacing > 0.0 && spacing <= 1.0) {
-                    return wrong(
+                    return refuse(
                         "spacing",
                         format!(
                             "is {spacing}; give the gap between tags as a share of size_m, above 0 and up to 1"
@@ -127,7 +128,7 @@ impl Board {
             BoardKind::Charuco => {
                 let marker_m = metres("marker_m", spec.marker_m.unwrap_or(0.75 * size_m))?;
                 if marker_m >= size_m {
-                    return wrong(
+                    return refuse(
                         "marker_m",
                         format!("is {marker_m}, but a square has {size_m} m: make it smaller"),
                     );
@@ -138,74 +139,78 @@ impl Board {
         };
         let margin_m = spec.margin_m.unwrap_or(layout.usual_margin_m);
         if !(margin_m.is_finite() && margin_m >= 0.0) {
-            return wrong("margin_m", format!("is {margin_m}; give metres, 0 or more"));
+            return refuse("margin_m", format!("is {margin_m}; give metres, 0 or more"));
         }
         let board = Self { layout, margin_m };
         let side = board.scale().texels.max_element();
-        if side > MOST_TEXELS {
-            return wrong(
+        if side > MAX_TEXELS {
+            return refuse(
                 "margin_m",
                 format!(
-                    "or the number of squares makes a picture of {side:.0} texels; {MOST_TEXELS} are possible"
+                    "or the number of squares gives a texture of {side:.0} texels, more than {MAX_TEXELS}"
                 ),
             );
         }
         Ok(board)
     }
 
-    /// What calibration code looks for, in the order of their numbers.
+    /// The points that calibration programs detect, in the order of their numbers.
     pub fn points(&self) -> &[BoardPoint] {
         &self.layout.points
     }
 
-    /// The board in linear light.
+    /// Texture of the board, linear light.
     pub fn picture(&self) -> Texture {
         raster::draw(&self.layout, &self.scale())
     }
 
-    /// The board as a flat mesh with its middle at `centre_ned_m`, turned as [`ned_from_board`] says.
+    /// The board as a flat mesh with its centre at `centre_ned_m`, rotated as by [`ned_from_board`].
     pub fn mesh(&self, centre_ned_m: DVec3, ned_from_board: DMat3) -> Mesh {
         let scale = self.scale();
         let corner = |u: f64, v: f64| {
-            let at_m =
+            let position_m =
                 self.layout.low_m + (DVec2::new(u, v) * scale.texels - scale.margin_texels) * scale.texel_m;
-            MeshVertex::new((ned_from_board * at_m.extend(0.0)).as_vec3().to_array(), [u as f32, v as f32])
+            MeshVertex::new(
+                (ned_from_board * position_m.extend(0.0)).as_vec3().to_array(),
+                [u as f32, v as f32],
+            )
         };
         let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
         Mesh::new(vertices, vec![0, 3, 1, 0, 2, 3], Arc::new(self.picture()), centre_ned_m, Wrap::Clamp)
     }
 
-    /// Texels of the picture.
+    /// Texel size of the texture.
     fn scale(&self) -> raster::Scale {
         raster::Scale::new(&self.layout, self.margin_m)
     }
 }
 
-/// From a board's own axes (right, down, into it) to north-east-down, for roll, pitch and yaw in degrees as
-/// of a body whose nose is the board's top and whose floor is its back: 0 0 0 lies face up with its top in
-/// the north, pitch 90 stands and is looked at northwards.
+/// Rotation from the board's axes (right, down, into the board) to north-east-down. Roll, pitch and yaw in
+/// degrees are those of a body whose nose is the top of the board and whose belly is its back: at 0 0 0 the
+/// board lies face up with its top to the north; at pitch 90 it stands upright and faces a viewer who looks
+/// north.
 pub fn ned_from_board(angles_deg: [f64; 3]) -> DMat3 {
     let [roll, pitch, yaw] = angles_deg.map(f64::to_radians);
     let ned_from_body = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, yaw, pitch, roll));
-    // Right is the body's right, down is its tail, into is its floor.
+    // Right is the body's right, down is its tail, and into the board is its belly.
     ned_from_body * DMat3::from_cols(DVec3::Y, -DVec3::X, DVec3::Z)
 }
 
 fn first_id(spec: &BoardSpec, tags: u32, known: usize) -> Result<u32, BoardError> {
     let first = spec.first_id.unwrap_or(0);
     if u64::from(first) + u64::from(tags) > known as u64 {
-        return wrong(
+        return refuse(
             "first_id",
             format!(
-                "is {first} and the board has {tags} tags, but the family has {known}: fewer columns or rows"
+                "is {first} and the board has {tags} tags, but the family has only {known}: use fewer columns or rows"
             ),
         );
     }
     Ok(first)
 }
 
-/// A key that a board of this kind does not have is a mistake that nobody would see in the picture.
-fn refuse_keys_of_others(spec: &BoardSpec, kind: BoardKind) -> Result<(), BoardError> {
+/// Refuses keys of other kinds of board: such a mistake would not be visible in the image.
+fn check_foreign_keys(spec: &BoardSpec, kind: BoardKind) -> Result<(), BoardError> {
     use BoardKind::{Aprilgrid, AsymmetricCircles, Charuco, Chessboard, Circles};
     let given: [(&'static str, bool, &[BoardKind]); 6] = [
         ("row_size_m", spec.row_size_m.is_some(), &[Chessboard]),
@@ -216,13 +221,13 @@ fn refuse_keys_of_others(spec: &BoardSpec, kind: BoardKind) -> Result<(), BoardE
         ("first_id", spec.first_id.is_some(), &[Aprilgrid, Charuco]),
     ];
     match given.iter().find(|(_, given, of)| *given && !of.contains(&kind)) {
-        Some((key, ..)) => wrong(key, "does not belong to a board of this kind: leave it out"),
+        Some((key, ..)) => refuse(key, "does not belong to a board of this kind: leave it out"),
         None => Ok(()),
     }
 }
 
 impl Dictionary {
-    /// Squares along a side of a marker's inside, and what is white there.
+    /// Squares along a side of a marker's interior, and its white squares as bits.
     fn code(self, id: u32) -> (u32, u64) {
         let id = id as usize;
         match self {

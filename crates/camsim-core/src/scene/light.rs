@@ -1,28 +1,28 @@
-//! Sun and sky on request: how much of the light a surface sends back, besides its colour (Lambert).
+//! Sun and sky light with the Lambert model: the factor on the colour of a surface.
 //!
-//! `I(n) = sun max(0, n.s) + sky (1 + n.up) / 2`, with s towards the sun: a plane that is met at right angles
-//! by the sun has `sun` of its albedo, and one that faces upwards all of `sky`. No shadows and no gloss: it
-//! depends on the surface's point (and its side) alone, so that a point keeps its brightness wherever it is
-//! seen from, and whenever.
+//! `I(n) = sun max(0, n.s) + sky (1 + n.up) / 2`, with s towards the sun. A surface facing the sun gets `sun`
+//! of its albedo, a surface facing upwards all of `sky`. There are no shadows and no gloss, so the factor
+//! depends on the surface point and its side only; a point has the same brightness from everywhere and at all
+//! times.
 //!
-//! Models interpolate the normals of their corners and take I of what that gives, *not made a unit vector
-//! again*: I is then at most `sun + sky / 2` times as different as two normals are, which is what their
-//! levels of detail are bounded by. The ground has it in its picture.
+//! Meshes interpolate the normals of their vertices and evaluate I for the result *without normalising it*: I
+//! then differs by at most `sun + sky / 2` times the difference of the normals, which bounds the error of the
+//! levels of detail. On the terrain, light is baked into the texture.
 
 use glam::{DMat3, DVec3};
 
-mod ground;
+mod bake;
 #[cfg(test)]
-mod ground_tests;
+mod bake_tests;
 
-/// Where light comes from.
+/// Directional sun light and ambient sky light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Unit vector towards the sun, NED.
     pub to_sun_ned: DVec3,
-    /// What is left of a colour where the sun meets it at right angles; 0..=1.
+    /// Factor on the colour of a surface that faces the sun; 0..=1.
     pub sun: f64,
-    /// What an open sky adds to a face that looks up; 0..=1, with the sun's at most 1.
+    /// Factor added by the sky to a surface that faces upwards; 0..=1, together with the sun at most 1.
     pub sky: f64,
 }
 
@@ -36,22 +36,22 @@ impl Light {
         Self { to_sun_ned, sun, sky }
     }
 
-    /// Factor of a colour where the outward normal is this, 0..=1; shorter than a unit vector where it lies
-    /// between corners.
+    /// Factor on the colour of a surface with this outward normal, 0..=1. An interpolated normal is shorter
+    /// than a unit vector.
     #[must_use]
-    pub fn on(&self, normal_ned: DVec3) -> f64 {
+    pub fn factor(&self, normal_ned: DVec3) -> f64 {
         (self.sun * normal_ned.dot(self.to_sun_ned).max(0.0) + self.sky * 0.5 * (1.0 - normal_ned.z))
             .clamp(0.0, 1.0)
     }
 }
 
-/// Where a normal in a shape's axes points once the shape stands: by the cofactors of its matrix, which are
-/// its inverse's transpose but for the length. Zero where a matrix leaves nothing of it.
+/// World normal of a normal in a shape's axes, by the cofactor matrix, which is the inverse transpose up to
+/// scale. Zero if the matrix is singular in that direction.
 #[must_use]
-pub fn turned_normal(ned_from_shape: &DMat3, normal: DVec3) -> DVec3 {
+pub fn transformed_normal(ned_from_shape: &DMat3, normal: DVec3) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|axis| ned_from_shape.row(axis));
     let cofactors = [y.cross(z), z.cross(x), x.cross(y)];
-    // Mirrored triangles are turned back; their normals are not.
+    // Mirrored triangles are flipped back; their normals are not.
     let sign = if x.dot(cofactors[0]) < 0.0 { -1.0 } else { 1.0 };
     (sign * DVec3::from_array(cofactors.map(|row| row.dot(normal)))).normalize_or_zero()
 }
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_has_its_closed_form() {
+    fn light_matches_its_closed_form() {
         // From the south-west, 30 degrees up.
         let light = Light::new(225_f64.to_radians(), 30_f64.to_radians(), 0.7, 0.3);
         let (cos, sin) = (0.75_f64.sqrt(), 0.5);
@@ -71,7 +71,7 @@ mod tests {
             (light.to_sun_ned - DVec3::new(-cos * 0.5_f64.sqrt(), -cos * 0.5_f64.sqrt(), -sin)).length()
                 < 1e-12
         );
-        // Level ground, a ceiling, walls to the sun, away from it and past it.
+        // Level ground, a ceiling, and walls facing the sun, away from it and sideways.
         let wall = DVec3::new(-0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0);
         for (normal, expected) in [
             (DVec3::NEG_Z, 0.7 * sin + 0.3),
@@ -82,7 +82,11 @@ mod tests {
             (light.to_sun_ned, 0.7 + 0.3 * 0.75),
             (DVec3::ZERO, 0.15),
         ] {
-            assert!((light.on(normal) - expected).abs() < 1e-12, "{normal}: {} {expected}", light.on(normal));
+            assert!(
+                (light.factor(normal) - expected).abs() < 1e-12,
+                "{normal}: {} {expected}",
+                light.factor(normal)
+            );
         }
     }
 
@@ -99,12 +103,12 @@ mod tests {
         };
         for k in 0..2000 {
             let (m, n) = (within_ball(2 * k), within_ball(2 * k + 1));
-            assert!((light.on(m) - light.on(n)).abs() <= 0.9 * (m - n).length() + 1e-12, "{m} {n}");
+            assert!((light.factor(m) - light.factor(n)).abs() <= 0.9 * (m - n).length() + 1e-12, "{m} {n}");
         }
     }
 
     #[test]
-    fn normals_stay_across_their_surfaces() {
+    fn transformed_normals_stay_perpendicular() {
         let (along, across) = (DVec3::new(1.0, 2.0, -0.5), DVec3::new(-0.3, 0.7, 1.1));
         let normal = along.cross(across).normalize();
         let turn = DMat3::from_quat(DQuat::from_rotation_z(0.4) * DQuat::from_rotation_x(1.9));
@@ -116,16 +120,16 @@ mod tests {
         ] {
             let matrix = turn * DMat3::from_diagonal(DVec3::from_array(scale));
             let (a, b) = (matrix * along, matrix * across);
-            let found = turned_normal(&matrix, normal);
+            let turned = transformed_normal(&matrix, normal);
             assert!(
-                (found.length() - 1.0).abs() < 1e-12
-                    && found.dot(a.normalize()).abs() < 1e-12
-                    && found.dot(b.normalize()).abs() < 1e-12
+                (turned.length() - 1.0).abs() < 1e-12
+                    && turned.dot(a.normalize()).abs() < 1e-12
+                    && turned.dot(b.normalize()).abs() < 1e-12
             );
-            // The side that it is on moves along with it.
-            assert!(found.dot(matrix * normal) > 0.0, "{scale:?}");
-            assert_eq!(found.dot(a.cross(b)) < 0.0, mirrored);
+            // The side of the surface moves along with it.
+            assert!(turned.dot(matrix * normal) > 0.0, "{scale:?}");
+            assert_eq!(turned.dot(a.cross(b)) < 0.0, mirrored);
         }
-        assert_eq!(turned_normal(&DMat3::ZERO, normal), DVec3::ZERO);
+        assert_eq!(transformed_normal(&DMat3::ZERO, normal), DVec3::ZERO);
     }
 }

@@ -1,27 +1,26 @@
-//! Textured triangle meshes: a shape, what it is covered with, and where it stands. Many meshes may share one
-//! shape.
+//! Textured triangle meshes: a shape, its material, and its placement. Several meshes may share one shape.
 
 use std::{collections::HashMap, sync::Arc};
 
 use glam::{DMat3, DVec3};
 
-use super::{Aabb, Light, Texture, light::turned_normal, terrain::intersect_triangle, texture::Wrap};
+use super::{Aabb, Light, Texture, light::transformed_normal, terrain::intersect_triangle, texture::Wrap};
 
-/// A corner of a [`Shape`].
+/// A vertex of a [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct MeshVertex {
-    /// Metres in the shape's own axes, from [`Mesh::origin_ned_m`].
+    /// Position in the shape's own axes, metres from [`Mesh::origin_ned_m`].
     pub position_m: [f32; 3],
     /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right
     /// one.
     pub uv: [f32; 2],
-    /// Factor of the texture's colour, linear light, and of its alpha; 0..=1.
+    /// Factor on the texture's linear colour and on its alpha; 0..=1.
     pub tint: [f32; 4],
 }
 
 impl MeshVertex {
-    /// A corner that leaves the texture as it is.
+    /// A vertex with tint 1.
     pub const fn new(position_m: [f32; 3], uv: [f32; 2]) -> Self {
         Self { position_m, uv, tint: [1.0; 4] }
     }
@@ -33,29 +32,29 @@ impl Default for MeshVertex {
     }
 }
 
-/// Triangles in axes of their own.
+/// Triangles in their own axes.
 #[derive(Clone, Debug, Default)]
 pub struct Shape {
-    /// Corners.
+    /// The vertices.
     pub vertices: Vec<MeshVertex>,
-    /// Three a triangle, each below `vertices.len()`.
+    /// Three indices per triangle, each below `vertices.len()`.
     pub indices: Vec<u32>,
-    /// Outward unit normals of the corners, in the shape's own axes; none for what no light falls on.
+    /// Outward unit normals of the vertices in the shape's own axes; empty for unlit shapes.
     pub normals: Vec<[f32; 3]>,
 }
 
 impl Shape {
-    /// Whether light falls on it: each corner has a normal.
+    /// Whether the shape is lit: each vertex has a normal.
     #[must_use]
     pub fn has_normals(&self) -> bool {
         !self.normals.is_empty() && self.normals.len() == self.vertices.len()
     }
 
-    /// For each corner the first that is equal to it in all: files give each side corners of its own, for
-    /// normals and pictures that may not be there.
+    /// For each vertex the first one that equals it in all attributes. Files repeat vertices per side for
+    /// normals and textures that may be absent.
     #[must_use]
-    pub fn first_equals(&self) -> Vec<u32> {
-        // 0 and -0 are one number.
+    pub fn canonical_vertices(&self) -> Vec<u32> {
+        // 0 and -0 are equal.
         let bits = |values: &[f32]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u32>>();
         let normal = |i: u32| self.normals.get(i as usize).map_or_else(Vec::new, |normal| bits(normal));
         let mut known = HashMap::new();
@@ -67,7 +66,7 @@ impl Shape {
             .collect()
     }
 
-    /// Smallest box around the corners, in the shape's own axes.
+    /// Bounding box of the vertices in the shape's own axes.
     pub fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         self.vertices
@@ -77,29 +76,29 @@ impl Shape {
     }
 }
 
-/// What a surface looks like.
+/// Appearance of a surface.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// The picture on it.
+    /// Its texture.
     pub texture: Arc<Texture>,
-    /// Behaviour outside of the picture, across and down.
+    /// Wrap mode across and down.
     pub wrap: [Wrap; 2],
-    /// Whether a magnified texel has sharp borders.
+    /// Whether magnified texels have sharp borders (nearest filter).
     pub nearest: bool,
-    /// Light that is added to the picture's, linear.
+    /// Emitted light added to the texture's, linear.
     pub emissive: [f32; 3],
-    /// Where the picture's alpha, times the tint's, is below this there is no surface. The picture at full
-    /// size counts, bilinear.
+    /// Alpha cut-off: there is no surface where the alpha of texture times tint is below it, by the
+    /// full-resolution texture, bilinear.
     pub cutoff: Option<f32>,
-    /// Whether its colour is mixed with what is behind it, by alpha, wherever there is any: the cut-off then
-    /// says where it has depth.
+    /// Whether the colour is blended with what is behind by alpha. The cut-off then decides where the surface
+    /// has depth.
     pub blends: bool,
-    /// Whether only the side is there from which the triangles turn anticlockwise.
+    /// Whether only the front face is visible, whose corners are anticlockwise.
     pub one_sided: bool,
 }
 
 impl Material {
-    /// A picture, seen from both sides, without holes.
+    /// An opaque, two-sided texture.
     pub fn picture(texture: Arc<Texture>, wrap: Wrap) -> Self {
         Self {
             texture,
@@ -112,37 +111,43 @@ impl Material {
         }
     }
 
+    /// Whether its picture is read between texels, and is not mirrored beyond its borders.
+    #[must_use]
+    pub fn is_bilinear(&self) -> bool {
+        self.texture.size_px == [1, 1] || (!self.nearest && !self.wrap.contains(&Wrap::Mirror))
+    }
+
     /// Whether two materials share their texture and are otherwise equal.
-    pub fn is(&self, other: &Self) -> bool {
+    pub fn is_same_as(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.texture, &other.texture)
             && (self.wrap, self.nearest, self.cutoff, self.one_sided)
                 == (other.wrap, other.nearest, other.cutoff, other.one_sided)
             && (self.emissive, self.blends) == (other.emissive, other.blends)
     }
 
-    /// Alpha at a place of the picture, in f64: what the cut-off is compared with, but for the tint.
+    /// Alpha at texture coordinates in f64, which the cut-off is compared with after multiplication by the
+    /// tint.
     pub fn alpha_at(&self, uv: [f64; 2]) -> f64 {
         self.texture.alpha_at(uv, self.wrap, self.nearest)
     }
 }
 
-/// A shape that stands somewhere.
+/// A placed shape with a material.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// Its triangles.
+    /// The triangles.
     pub shape: Arc<Shape>,
-    /// What is on them.
+    /// The appearance.
     pub material: Material,
     /// NED position of the shape's origin, metres.
     pub origin_ned_m: DVec3,
-    /// From the shape's axes to north-east-down; may turn, scale and mirror. Triangles have their fronts
-    /// where they turn anticlockwise as the mesh stands: those of a shape that is mirrored turn the other way
-    /// in its own axes.
+    /// Matrix from the shape's axes to north-east-down; it may rotate, scale and mirror. Front faces are
+    /// anticlockwise in the world, so those of a mirrored shape are clockwise in its own axes.
     pub ned_from_shape: DMat3,
 }
 
 impl Mesh {
-    /// A mesh whose corners are in north-east-down from `origin_ned_m`, three `indices` a triangle.
+    /// A mesh whose vertices are in north-east-down from `origin_ned_m`, with three `indices` per triangle.
     pub fn new(
         vertices: Vec<MeshVertex>,
         indices: Vec<u32>,
@@ -159,9 +164,8 @@ impl Mesh {
         }
     }
 
-    /// A level picture on the ground: image top to the north, image left to the west, `width_m` from the
-    /// picture's left edge to its right edge; the height follows from square pixels. `centre_ned_m` is the
-    /// middle of the picture.
+    /// A level image on the ground, with its top to the north and its left to the west. `width_m` is its
+    /// width; the height follows from square pixels. `centre_ned_m` is its centre.
     pub fn level_picture(texture: Arc<Texture>, centre_ned_m: DVec3, width_m: f64) -> Self {
         let [width_px, height_px] = texture.size_px.map(f64::from);
         let half_east = (0.5 * width_m) as f32;
@@ -174,8 +178,8 @@ impl Mesh {
         Self::new(vertices, vec![0, 3, 1, 0, 2, 3], texture, centre_ned_m, Wrap::Clamp)
     }
 
-    /// First point along `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture
-    /// coordinates there. Looks at every triangle, and neither at its side nor at holes.
+    /// First intersection with `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture
+    /// coordinates. Tests every triangle, and ignores facing and holes.
     pub fn intersect(
         &self,
         origin_ned_m: DVec3,
@@ -201,13 +205,7 @@ impl Mesh {
         best
     }
 
-    /// Lower bound of the distance from a point to the mesh, metres: that of its bounding box.
-    pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
-        let bounds = self.bounds();
-        if bounds.is_empty() { f64::INFINITY } else { bounds.distance_m(position_ned_m) }
-    }
-
-    /// Box around the mesh, NED: of a turned shape the box around its own.
+    /// Bounding box in NED; for a rotated shape, that of the rotated box.
     pub fn bounds(&self) -> Aabb {
         self.shape.bounds().turned(self.ned_from_shape, self.origin_ned_m)
     }
@@ -219,38 +217,37 @@ impl Mesh {
                 * glam::Vec3::from(self.shape.vertices[vertex as usize].position_m).as_dvec3()
     }
 
-    /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right
-    /// side, and no hole.
-    pub fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
-        self.faces(corners, direction_ned)
+    /// Whether a ray along `direction_ned` that hits a triangle of the shape is stopped there: by the visible
+    /// side and outside of holes.
+    pub fn is_visible(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
+        self.is_facing(corners, direction_ned)
             && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
     }
 
-    /// Whether a triangle is there for what looks along a direction.
-    pub fn faces(&self, corners: [u32; 3], direction_ned: DVec3) -> bool {
+    /// Whether a triangle is visible from a direction.
+    pub fn is_facing(&self, corners: [u32; 3], direction_ned: DVec3) -> bool {
         let [a, b, c] = corners.map(|v| self.position_ned_m(v));
         !self.material.one_sided || (b - a).cross(c - a).dot(direction_ned) < 0.0
     }
 
-    /// Alpha between three corners.
+    /// Interpolated alpha in a triangle.
     pub fn alpha_at(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
         self.material.alpha_at(self.uv_at(corners, weights)) * self.tint_at(corners, weights)[3]
     }
 
-    /// Texture coordinates between three corners.
+    /// Interpolated texture coordinates in a triangle.
     pub fn uv_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 2] {
-        let of = corners.map(|v| self.shape.vertices[v as usize].uv);
-        [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(of[k][axis])).sum())
+        let uv = corners.map(|v| self.shape.vertices[v as usize].uv);
+        [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(uv[k][axis])).sum())
     }
 
-    /// Tint between three corners.
+    /// Interpolated tint in a triangle.
     pub fn tint_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 4] {
-        let of = corners.map(|v| self.shape.vertices[v as usize].tint);
-        [0, 1, 2, 3].map(|channel: usize| (0..3).map(|k| weights[k] * f64::from(of[k][channel])).sum())
+        let tint = corners.map(|v| self.shape.vertices[v as usize].tint);
+        [0, 1, 2, 3].map(|channel: usize| (0..3).map(|k| weights[k] * f64::from(tint[k][channel])).sum())
     }
 
-    /// Factor of the picture's colour between three corners, seen along a direction: light on the side that
-    /// is seen, or 1 without normals.
+    /// Interpolated light factor in a triangle on the side seen along a direction; 1 without normals.
     pub fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
         if !self.shape.has_normals() {
             return 1.0;
@@ -258,12 +255,15 @@ impl Mesh {
         let outward: DVec3 = (0..3).map(|k| weights[k] * self.normal_ned(corners[k])).sum();
         let [a, b, c] = corners.map(|v| self.position_ned_m(v));
         let is_front = (b - a).cross(c - a).dot(direction_ned) < 0.0;
-        light.on(if is_front { outward } else { -outward })
+        light.factor(if is_front { outward } else { -outward })
     }
 
-    /// A corner's normal as the mesh stands.
+    /// World normal of a vertex.
     fn normal_ned(&self, vertex: u32) -> DVec3 {
-        turned_normal(&self.ned_from_shape, glam::Vec3::from(self.shape.normals[vertex as usize]).as_dvec3())
+        transformed_normal(
+            &self.ned_from_shape,
+            glam::Vec3::from(self.shape.normals[vertex as usize]).as_dvec3(),
+        )
     }
 }
 
@@ -273,7 +273,7 @@ mod tests {
     use crate::scene::Encoding;
 
     #[test]
-    fn a_level_picture_has_its_top_in_the_north_and_its_left_in_the_west() {
+    fn level_picture_has_top_to_the_north_and_left_to_the_west() {
         let texture = Texture { size_px: [4, 2], rgba8: vec![255; 32], encoding: Encoding::Srgb };
         let mesh = Mesh::level_picture(Arc::new(texture), DVec3::new(100.0, -50.0, 3.0), 40.0);
         let top_left = mesh.shape.vertices.iter().position(|v| v.uv == [0.0, 0.0]).expect("corner");
@@ -286,7 +286,7 @@ mod tests {
             "{t} {uv:?}"
         );
         assert_eq!(mesh.intersect(DVec3::new(111.0, -40.0, -7.0), DVec3::Z, 100.0), None);
-        // Both triangles turn the same way and cover the rectangle.
+        // Both triangles have the same orientation and cover the rectangle.
         let area: f64 = mesh
             .shape
             .indices
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_shape_is_within_its_box_and_shows_one_side() {
+    fn rotated_shape_is_within_its_bounds_and_one_sided() {
         let texture = Arc::new(Texture {
             size_px: [2, 1],
             rgba8: vec![9, 9, 9, 0, 9, 9, 9, 255],
@@ -314,13 +314,13 @@ mod tests {
         }
         let triangle = [mesh.shape.indices[0], mesh.shape.indices[1], mesh.shape.indices[2]];
         let sees = |mesh: &Mesh, weights: [f64; 3]| {
-            [DVec3::Z, -DVec3::Z].map(|direction| mesh.shows(triangle, weights, direction))
+            [DVec3::Z, -DVec3::Z].map(|direction| mesh.is_visible(triangle, weights, direction))
         };
         assert_eq!(sees(&mesh, [0.2, 0.3, 0.5]), [true, true]);
         mesh.material.one_sided = true;
         let one = sees(&mesh, [0.2, 0.3, 0.5]);
         assert!(one[0] != one[1], "{one:?}");
-        // Corners 0, 3, 1: uv (0, 0), (1, 1), (1, 0). The left half has no content.
+        // Corners 0, 3, 1: uv (0, 0), (1, 1), (1, 0). The left half is transparent.
         mesh.material = Material { one_sided: false, cutoff: Some(0.5), ..mesh.material };
         assert_eq!(
             [sees(&mesh, [0.9, 0.05, 0.05]), sees(&mesh, [0.1, 0.5, 0.4])],

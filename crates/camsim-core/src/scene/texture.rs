@@ -1,4 +1,4 @@
-//! Pictures that cover surfaces, and their smaller versions.
+//! Textures and their mip levels.
 
 use std::{
     borrow::Cow,
@@ -9,13 +9,13 @@ use std::{
 use half::f16;
 use rayon::prelude::*;
 
-/// How the colour bytes of a [`Texture`] stand for light. Alpha is always linear.
+/// Encoding of the colour bytes of a [`Texture`]. Alpha is always linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Encoding {
     /// IEC 61966-2-1 transfer curve.
     #[default]
     Srgb,
-    /// Proportional to light.
+    /// Linear light.
     Linear,
 }
 
@@ -40,20 +40,20 @@ impl Encoding {
     }
 }
 
-/// What a texture shows outside of 0..=1.
+/// Wrap mode: the continuation of a texture outside of 0..=1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The nearest border pixel.
     #[default]
     Clamp,
-    /// The picture again.
+    /// Periodic repetition.
     Repeat,
-    /// The picture again, every other time turned over.
+    /// Periodic repetition, mirrored every other time.
     Mirror,
 }
 
 impl Wrap {
-    /// The pixel of a row of `size` that is shown at a place of the endless row.
+    /// Pixel of a row of `size` pixels at a position of the endless row.
     pub fn texel(self, at: f64, size: u32) -> usize {
         let last = f64::from(size) - 1.0;
         let within = match self {
@@ -64,7 +64,7 @@ impl Wrap {
                 twice.min(2.0 * f64::from(size) - 1.0 - twice)
             }
         };
-        // What is not a number shows the first.
+        // NaN gives the first pixel.
         within.clamp(0.0, last.max(0.0)) as usize
     }
 }
@@ -79,7 +79,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// A picture, row-major from its top-left pixel, four bytes a pixel. Alpha 0 marks pixels without content.
+/// A texture, row-major from its top-left pixel, four bytes per pixel. Alpha 0 marks pixels without content.
 #[derive(Clone, PartialEq)]
 pub struct Texture {
     /// Width, height; both at least 1.
@@ -90,19 +90,19 @@ pub struct Texture {
     pub encoding: Encoding,
 }
 
-/// How a device holds the texels of a [`Texture`]: R G B A, not premultiplied.
+/// Form in which the GPU holds the texels of a [`Texture`]: R G B A, not premultiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TexelForm {
-    /// Bytes in the texture's [`Encoding`], which the device decodes.
+    /// Bytes in the texture's [`Encoding`], which the GPU decodes.
     Stored,
-    /// Half floats of linear light, as devices decode roughly: bytes of sRGB are off by up to 0.35/255 of the
-    /// linear range with Mesa's software driver and by 1.08/255 on an NVIDIA H200. Halves round by at most
-    /// 2^-11 of the value. Smaller versions have not been rounded to bytes.
+    /// Half floats of linear light. GPUs decode sRGB approximately, with errors of up to 0.35/255 of the
+    /// linear range in Mesa's software driver and 1.08/255 on an NVIDIA H200. Half floats round by at most
+    /// 2^-11 of the value, and mip levels are not rounded to bytes.
     Light,
 }
 
 impl TexelForm {
-    /// Bytes of a texel.
+    /// Bytes per texel.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -112,12 +112,12 @@ impl TexelForm {
     }
 }
 
-/// One of the smaller versions of a [`Texture`].
+/// A mip level of a [`Texture`].
 #[derive(Clone, PartialEq)]
 pub struct MipLevel {
     /// Width, height.
     pub size_px: [u32; 2],
-    /// Row after row, in the form that was asked for.
+    /// Row-major texels in the requested form.
     pub texels: Vec<u8>,
 }
 
@@ -136,65 +136,66 @@ impl fmt::Debug for MipLevel {
     }
 }
 
-/// Colour in linear light, premultiplied by alpha: the only form in which pixels may be averaged.
+/// Colour in linear light, premultiplied by alpha: the form in which pixels may be averaged.
 struct LinearImage {
     size_px: [usize; 2],
     premultiplied: Vec<[f32; 4]>,
 }
 
 impl Texture {
-    /// One pixel of one colour.
+    /// A texture of one pixel.
     pub fn uniform(rgba: [u8; 4], encoding: Encoding) -> Self {
         Self { size_px: [1, 1], rgba8: rgba.to_vec(), encoding }
     }
 
-    /// Alpha at texture coordinates, 0..=1: bilinear, or that of the nearest pixel.
+    /// Alpha at texture coordinates, 0..=1: bilinear, or nearest.
     pub fn alpha_at(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool) -> f64 {
-        self.read_at(uv, wrap, nearest, |pixel| f64::from(pixel[3]) / 255.0)
+        self.sample_at(uv, wrap, nearest, |pixel| f64::from(pixel[3]) / 255.0)
     }
 
-    /// What `value` makes of pixels, at texture coordinates: bilinear, or that of the nearest pixel.
-    pub fn read_at<T>(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool, value: impl Fn(&[u8]) -> T) -> T
+    /// Value at texture coordinates, interpolated bilinearly over the results of `value`, or that of the
+    /// nearest pixel.
+    pub fn sample_at<T>(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool, value: impl Fn(&[u8]) -> T) -> T
     where
         T: Add<Output = T> + Mul<f64, Output = T>,
     {
-        let at = [0, 1].map(|k: usize| uv[k] * f64::from(self.size_px[k]) - 0.5);
+        let texel = [0, 1].map(|k: usize| uv[k] * f64::from(self.size_px[k]) - 0.5);
         let read = |x: f64, y: f64| {
             let index = wrap[1].texel(y, self.size_px[1]) * self.size_px[0] as usize
                 + wrap[0].texel(x, self.size_px[0]);
             value(self.rgba8.get(4 * index..4 * index + 4).unwrap_or(&[0, 0, 0, 255]))
         };
         if nearest {
-            return read((at[0] + 0.5).floor(), (at[1] + 0.5).floor());
+            return read((texel[0] + 0.5).floor(), (texel[1] + 0.5).floor());
         }
-        let (x, y) = (at[0].floor(), at[1].floor());
-        let (tx, ty) = (at[0] - x, at[1] - y);
+        let (x, y) = (texel[0].floor(), texel[1].floor());
+        let (tx, ty) = (texel[0] - x, texel[1] - y);
         let row = |y: f64| read(x, y) * (1.0 - tx) + read(x + 1.0, y) * tx;
         row(y) * (1.0 - ty) + row(y + 1.0) * ty
     }
 
-    /// The levels 1, 2, ... down to 1x1 (level 0 is the texture itself); each side is half of the level
-    /// above, rounded down, at least 1.
+    /// Mip levels 1, 2, ... down to 1x1 (level 0 is the texture itself). Each side is half of that of the
+    /// level above, rounded down, at least 1.
     ///
-    /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it
-    /// covers, so odd sizes keep the picture in place. Colour is weighted by alpha: pixels without content do
-    /// not darken their neighbours.
+    /// The filter is an area-weighted box in linear light: a pixel averages exactly the rectangle that it
+    /// covers, so odd sizes cause no shift. Colour is weighted by alpha, so pixels without content do not
+    /// darken their neighbours.
     pub fn mips(&self, form: TexelForm) -> Vec<MipLevel> {
-        self.mips_within(form, None)
+        self.mips_with_border(form, None)
     }
 
-    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) around each level, in place of
-    /// its outermost texels: what a clamped picture shows beyond is then the same at every level, if its own
-    /// outermost texels are of that colour.
-    pub fn mips_within(&self, form: TexelForm, border: Option<[u8; 4]>) -> Vec<MipLevel> {
+    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) in place of the outermost texels
+    /// of each level. If the outermost texels of the texture have that colour too, a clamped texture
+    /// continues with the same colour at every level.
+    pub fn mips_with_border(&self, form: TexelForm, border: Option<[u8; 4]>) -> Vec<MipLevel> {
         let border = border.map(|color| self.texels(&color, form).into_owned());
         let mut levels = Vec::new();
         if self.size_px == [1, 1] {
             return levels;
         }
         let table = self.encoding.decode_table();
-        // The picture itself never stands there in floats: of a large one they would take four times its
-        // memory.
+        // The full level is never converted to floats, which would take four times the memory of a large
+        // texture.
         let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| {
             linear(&table, &self.rgba8[4 * at..4 * at + 4])
         });
@@ -220,7 +221,7 @@ impl Texture {
         }
     }
 
-    /// The texels of the picture itself, or of a piece of it (`rgba8`), in a form.
+    /// Texels of the texture, or of a part of it (`rgba8`), in a form.
     pub fn texels<'a>(&self, rgba8: &'a [u8], form: TexelForm) -> Cow<'a, [u8]> {
         if form == TexelForm::Stored {
             return Cow::Borrowed(rgba8);
@@ -238,8 +239,8 @@ impl Texture {
         Cow::Owned(halves)
     }
 
-    /// Gives its outermost pixels a colour.
-    pub fn frame(&mut self, color: [u8; 4]) {
+    /// Sets the outermost pixels to a colour.
+    pub(crate) fn fill_border(&mut self, color: [u8; 4]) {
         let [width, height] = self.size_px.map(|side| side as usize);
         for (index, pixel) in self.rgba8.chunks_exact_mut(4).enumerate() {
             let [x, y] = [index % width, index / width];
@@ -249,9 +250,9 @@ impl Texture {
         }
     }
 
-    /// A larger picture, with so many pixels of a colour on each side.
+    /// A larger texture with a margin of one colour on each side.
     #[must_use]
-    pub fn within(&self, margin_px: u32, color: [u8; 4]) -> Self {
+    pub fn padded(&self, margin_px: u32, color: [u8; 4]) -> Self {
         let size_px = self.size_px.map(|side| side + 2 * margin_px);
         let mut rgba8 = color.repeat(size_px[0] as usize * size_px[1] as usize);
         let (row_bytes, margin) = (4 * self.size_px[0] as usize, margin_px as usize);
@@ -265,11 +266,11 @@ impl Texture {
     /// Linear R G B A of a pixel, not premultiplied.
     ///
     /// # Panics
-    /// For a pixel that there is not.
+    /// If the pixel is outside of the texture.
     #[must_use]
     pub fn linear_at(&self, [x, y]: [u32; 2]) -> [f32; 4] {
-        let at = 4 * (y as usize * self.size_px[0] as usize + x as usize);
-        let pixel = &self.rgba8[at..at + 4];
+        let first_byte = 4 * (y as usize * self.size_px[0] as usize + x as usize);
+        let pixel = &self.rgba8[first_byte..first_byte + 4];
         let light = self.encoding.decode_table();
         [
             light[usize::from(pixel[0])],
@@ -279,9 +280,9 @@ impl Texture {
         ]
     }
 
-    /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear
-    /// sampling across the border of the content does not pull in black. Alpha stays as it is. Does nothing
-    /// to an opaque (or an empty) picture.
+    /// Gives pixels of alpha 0 the colour of the nearest coarser level with content, so that bilinear reads
+    /// at the border of the content do not blend in black. Alpha is unchanged. No effect on opaque or empty
+    /// textures.
     pub fn bleed_into_transparent(&mut self) {
         let mut transparent = self.rgba8.chunks_exact(4).filter(|pixel| pixel[3] == 0).peekable();
         if transparent.peek().is_none() {
@@ -294,8 +295,8 @@ impl Texture {
             let (x, y) = (index % width, index / width);
             let donor = levels.iter().find_map(|level| {
                 let [w, h] = level.size_px.map(|n| n as usize);
-                let at = 4 * ((y * h / full_height).min(h - 1) * w + (x * w / full_width).min(w - 1));
-                (level.texels[at + 3] > 0).then(|| &level.texels[at..at + 3])
+                let first_byte = 4 * ((y * h / full_height).min(h - 1) * w + (x * w / full_width).min(w - 1));
+                (level.texels[first_byte + 3] > 0).then(|| &level.texels[first_byte..first_byte + 3])
             });
             if let Some(rgb) = donor {
                 pixel[..3].copy_from_slice(rgb);
@@ -315,7 +316,7 @@ impl LinearImage {
         Self::half_of(self.size_px, |at| self.premultiplied[at])
     }
 
-    /// Half of a picture by its pixels, row after row.
+    /// Halves an image that is given by its pixels, row by row.
     fn half_of([width, height]: [usize; 2], pixel_at: impl Fn(usize) -> [f32; 4] + Sync) -> Self {
         let [to_width, to_height] = [(width / 2).max(1), (height / 2).max(1)];
         let columns: Vec<_> = (0..to_width).map(|x| cover(x, width, to_width)).collect();
@@ -343,7 +344,7 @@ impl LinearImage {
                 for (byte, value) in out.iter_mut().zip([r, g, b]) {
                     *byte = encoding.encode_byte(value / alpha);
                 }
-                // Any content at all must stay distinguishable from none.
+                // Any content must remain distinguishable from none.
                 out[3] = ((alpha * 255.0 + 0.5) as u8).max(1);
             }
         });
@@ -366,10 +367,10 @@ impl LinearImage {
     }
 }
 
-/// Source pixels that target pixel `to` of `to_size` covers among `from_size`: the first one and the share of
-/// each (sum 1). Halving covers at most 3 pixels: n / floor(n/2) <= 3.
+/// Source pixels covered by target pixel `to` of `to_size`, among `from_size`: the first one, and the weight
+/// of each (sum 1). Halving covers at most 3 pixels: n / floor(n/2) <= 3.
 fn cover(to: usize, from_size: usize, to_size: usize) -> (usize, [f32; 3]) {
-    // In units of 1/to_size source pixels everything is an integer.
+    // In units of 1/to_size source pixels all borders are integers.
     let (begin, end) = (to * from_size, (to + 1) * from_size);
     let first = begin / to_size;
     let weights = std::array::from_fn(|i| {
@@ -385,7 +386,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_transfer_curve_inverts_for_every_byte() {
+    fn srgb_round_trip_of_every_byte() {
         for byte in 0..=255u8 {
             let linear = linear_from_srgb(f32::from(byte) / 255.0);
             assert_eq!(Encoding::Srgb.encode_byte(linear), byte);
@@ -393,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_go_on_as_they_wrap() {
+    fn wrap_modes_continue_a_texture() {
         let row = |wrap: Wrap| (-4..6).map(|at| wrap.texel(f64::from(at), 3)).collect::<Vec<_>>();
         assert_eq!(row(Wrap::Clamp), [0, 0, 0, 0, 0, 1, 2, 2, 2, 2]);
         assert_eq!(row(Wrap::Repeat), [2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
@@ -402,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn averaging_happens_in_linear_light() {
+    fn mips_average_in_linear_light() {
         let texture = Texture {
             size_px: [2, 1],
             rgba8: vec![0, 0, 0, 255, 255, 255, 255, 255],
@@ -416,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_sizes_are_weighted_by_area() {
+    fn mips_of_odd_sizes_are_weighted_by_area() {
         // 3 -> 1: equal thirds. 5 -> 2: 1, 1, 1/2 | 1/2, 1, 1 of 2.5.
         let texture = Texture {
             size_px: [5, 1],
@@ -437,38 +438,38 @@ mod tests {
     }
 
     #[test]
-    fn a_border_is_of_its_colour_at_every_level() {
+    fn border_colour_is_kept_at_every_mip_level() {
         let texture =
             Texture { size_px: [12, 9], rgba8: [200, 100, 50, 255].repeat(108), encoding: Encoding::Srgb };
         let grey = [118, 118, 118, 255];
         let plain = texture.mips(TexelForm::Stored);
-        for (level, plain) in texture.mips_within(TexelForm::Stored, Some(grey)).iter().zip(&plain) {
+        for (level, plain) in texture.mips_with_border(TexelForm::Stored, Some(grey)).iter().zip(&plain) {
             let [width, height] = level.size_px;
             for y in 0..height {
                 for x in 0..width {
-                    let at = 4 * (y * width + x) as usize;
+                    let first_byte = 4 * (y * width + x) as usize;
                     let is_outermost = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
                     assert_eq!(
-                        level.texels[at..at + 4],
+                        level.texels[first_byte..first_byte + 4],
                         if is_outermost { grey } else { [200, 100, 50, 255] },
                         "{x} {y} of {width} {height}"
                     );
-                    assert_eq!(plain.texels[at..at + 4], [200, 100, 50, 255]);
+                    assert_eq!(plain.texels[first_byte..first_byte + 4], [200, 100, 50, 255]);
                 }
             }
         }
-        let larger = texture.within(2, grey);
+        let larger = texture.padded(2, grey);
         assert_eq!((larger.size_px, larger.rgba8.len()), ([16, 13], 4 * 16 * 13));
         assert_eq!(
             [larger.linear_at([1, 6]), larger.linear_at([2, 2])],
             [grey, [200, 100, 50, 255]].map(|c| Texture::uniform(c, Encoding::Srgb).linear_at([0, 0]))
         );
-        let halves = texture.mips_within(TexelForm::Light, Some(grey));
+        let halves = texture.mips_with_border(TexelForm::Light, Some(grey));
         assert_eq!(halves[0].texels[..8], *texture.texels(&grey, TexelForm::Light));
     }
 
     #[test]
-    fn void_pixels_do_not_darken() {
+    fn transparent_pixels_do_not_darken_mips() {
         let mut texture = Texture {
             size_px: [4, 1],
             rgba8: vec![0, 0, 0, 0, 200, 100, 50, 255, 0, 0, 0, 0, 0, 0, 0, 0],
@@ -486,7 +487,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_are_the_light_of_bytes_and_versions_are_not_rounded_to_bytes() {
+    fn half_floats_hold_linear_light_and_mips_are_not_rounded_to_bytes() {
         let halves = |bytes: &[u8]| -> Vec<f64> {
             bytes.chunks_exact(2).map(|b| f16::from_ne_bytes([b[0], b[1]]).to_f64()).collect()
         };
@@ -494,7 +495,7 @@ mod tests {
             let stored = f64::from(byte) / 255.0;
             if stored <= 0.040_45 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
         };
-        // A half has 11 bits, the last of which may round up.
+        // A half float has 11 bits, the last of which may be rounded up.
         let near = |found: f64, exact: f64| (found - exact).abs() <= exact / 2047.0;
         let rgba8: Vec<u8> = (0..=255).flat_map(|byte| [byte, byte, 255 - byte, byte]).collect();
         let texture = Texture { size_px: [16, 16], rgba8, encoding: Encoding::Srgb };
@@ -504,17 +505,17 @@ mod tests {
             assert!((0..4).all(|k| near(texel[k], expected[k])), "{byte}: {texel:?} {expected:?}");
         }
         assert_eq!(*texture.texels(&texture.rgba8, TexelForm::Stored), texture.rgba8);
-        // The mean of two neighbours, where bytes have only one of the two.
+        // The mean of two neighbours, which bytes cannot represent.
         let pair = Texture {
             size_px: [2, 1],
             rgba8: vec![200, 40, 9, 255, 201, 41, 10, 255],
             encoding: Encoding::Srgb,
         };
         let mips = pair.mips(TexelForm::Light);
-        let found = halves(&mips[0].texels);
+        let values = halves(&mips[0].texels);
         for (k, byte) in [200, 40, 9].into_iter().enumerate() {
-            assert!(near(found[k], 0.5 * (exact(byte) + exact(byte + 1))), "{byte}: {}", found[k]);
+            assert!(near(values[k], 0.5 * (exact(byte) + exact(byte + 1))), "{byte}: {}", values[k]);
         }
-        assert_eq!((mips[0].size_px, found[3]), ([1, 1], 1.0));
+        assert_eq!((mips[0].size_px, values[3]), ([1, 1], 1.0));
     }
 }

@@ -1,72 +1,73 @@
-//! Reads of an output pixel in the ideal frame: which of them, where around the source, and in which order.
+//! Taps of an output pixel in the ideal frame: their kernel, their offsets from the source and their order
+//! over the exposure.
 //!
-//! Twin of `shaders/reverse/gather/tap`.
+//! f64 twin of `shaders/reverse/gather/tap`.
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
 use super::ColorImage;
 
-/// What reads the ideal frame for one sample.
+/// Method by which one exposure sample reads the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TapStage {
-    /// One bilinear read.
+    /// One bilinear tap.
     Bilinear,
-    /// One read of a cubic spline, as soft as the pixel is wide.
+    /// One tap of a cubic spline, whose softness follows from the width of the pixel.
     Spline,
-    /// The mean over the pixel's area; the spline where a pixel is up to sqrt 2 ideal pixels wide.
+    /// Mean over the area of the pixel; the spline where the pixel is up to sqrt 2 ideal pixels wide.
     Area,
-    /// A grid of bilinear reads; one of them where a pixel is up to sqrt 3 ideal pixels wide.
+    /// A grid of bilinear taps; one tap where the pixel is up to sqrt 3 ideal pixels wide.
     Grid {
-        /// Reads along a side, at most.
+        /// Largest number of taps along a side.
         most: u32,
     },
-    /// The same, but for the spline where a pixel is so narrow.
+    /// A grid of bilinear taps, or the spline where the pixel is up to sqrt 3 ideal pixels wide.
     SplineOrGrid {
-        /// Reads along a side, at most.
+        /// Largest number of taps along a side.
         most: u32,
     },
 }
 
-/// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has
-/// this variance (times 12), 1 of the ideal pixel and 2 of the tent.
+/// Squared width, in ideal pixels, above which a grid of bilinear taps represents a pixel. A single tap has
+/// this variance (times 12): 1 from the ideal pixel and 2 from the tent.
 pub const TENT_PX2: f64 = 3.0;
 
-/// Widest area that is read, ideal pixels: six of them along each axis.
-pub const WIDEST_AREA_PX: f64 = 5.0;
+/// Largest side of an area that is read, ideal pixels: six pixels along each axis.
+pub const MAX_AREA_SIDE_PX: f64 = 5.0;
 
-/// Areas of no longer sides are not read: a little more than 1, so that rounding decides nothing.
+/// Areas with shorter sides are not read. The value is slightly above 1, so that rounding does not decide.
 const NARROW_AREA_PX: f64 = 1.000_05;
 
-/// How ideal pixels around a source are weighed, along x and y.
+/// Weights of the ideal pixels around a source, along x and y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kernel {
-    /// Between the four nearest.
+    /// Bilinear between the four nearest pixels.
     Bilinear,
-    /// By a cubic spline of this softness.
+    /// Cubic spline of this softness.
     Spline(DVec2),
-    /// By the part of a rectangle of these sides that each of them covers, ideal pixels, from 1 to
-    /// [`WIDEST_AREA_PX`]. Of sides of 1 that is the bilinear one.
+    /// Overlap of each pixel with a rectangle of these sides, in ideal pixels, from 1 to
+    /// [`MAX_AREA_SIDE_PX`]. Sides of 1 give the bilinear kernel.
     Area(DVec2),
 }
 
-/// Reads of an output pixel in the ideal frame.
+/// Taps of an output pixel in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Extent of the grid of reads along x and y, ideal pixels: the pixel's own, less what each read covers,
-    /// so that the variances agree.
+    /// Extent of the tap grid along the output pixel's x axis, in ideal pixels: the pixel's own side,
+    /// shortened so that grid and tap together have the variance of the pixel.
     pub dx: DVec2,
-    /// See above.
+    /// Extent of the tap grid along the output pixel's y axis, ideal pixels.
     pub dy: DVec2,
-    /// Reads along each.
+    /// Number of taps along x and along y.
     pub taps: [u32; 2],
-    /// What each of them is.
+    /// Kernel of each tap.
     pub kernel: Kernel,
 }
 
 impl Footprint {
-    /// Of a pixel with the sides `dx` and `dy`, columns of d(ideal px)/d(output px).
+    /// Footprint of a pixel with sides `dx` and `dy`, the columns of d(ideal px)/d(output px).
     #[must_use]
     pub fn new(dx: DVec2, dy: DVec2, stage: TapStage) -> Self {
         let most = match stage {
@@ -90,7 +91,7 @@ impl Footprint {
         Self { dx, dy, taps, kernel }
     }
 
-    /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
+    /// Offset of tap `i` (cyclic) from the centre of the pixel, ideal pixels.
     #[must_use]
     pub fn offset_px(&self, i: u32) -> DVec2 {
         let ([nx, ny], [x, y]) = (self.taps, self.cell(i));
@@ -102,7 +103,7 @@ impl Footprint {
     /// Column and row of tap `i` (cyclic) in the grid.
     pub fn cell(&self, i: u32) -> [u32; 2] {
         let [nx, ny] = self.taps;
-        let place = place_of_turn(self.taps, i % (nx * ny));
+        let place = tap_cell(self.taps, i % (nx * ny));
         [place % nx, place / nx]
     }
 
@@ -117,15 +118,17 @@ impl Footprint {
     }
 }
 
-/// Sides of the rectangle that is read of a pixel: along the frame's own axes, so that with the ideal pixels'
-/// own width its variance is the pixel's, which has the same along all axes if it is a square, however that
-/// is turned. What ideal pixels of several samples have themselves is not taken off besides, as it is of
-/// grids: borders come out sharper so, and nearer to what they are.
+/// Sides of the axis-aligned rectangle that is read for a pixel. Together with the width of an ideal pixel,
+/// its variance equals that of the output pixel; a square pixel has the same variance along all axes,
+/// whatever its rotation. Unlike for grids, the variance that supersampled ideal pixels already have is not
+/// subtracted: borders are sharper and more accurate that way.
 fn sides_of_area(dx: DVec2, dy: DVec2) -> DVec2 {
-    (dx * dx + dy * dy - 1.0).clamp(DVec2::ONE, DVec2::splat(WIDEST_AREA_PX * WIDEST_AREA_PX)).map(f64::sqrt)
+    (dx * dx + dy * dy - 1.0)
+        .clamp(DVec2::ONE, DVec2::splat(MAX_AREA_SIDE_PX * MAX_AREA_SIDE_PX))
+        .map(f64::sqrt)
 }
 
-/// `n` reads evenly over a length d have the variance `d^2 (1 - 1/n^2) / 12`.
+/// `n` taps spread evenly over a length d have the variance `d^2 (1 - 1/n^2) / 12`.
 fn spread(side: DVec2, taps: u32) -> DVec2 {
     if taps == 1 {
         return DVec2::ZERO;
@@ -134,14 +137,14 @@ fn spread(side: DVec2, taps: u32) -> DVec2 {
     side * ((length2 - TENT_PX2).max(0.0) / (1.0 - f64::from(taps * taps).recip()) / length2).sqrt()
 }
 
-/// The order in which the cells of a grid are read while the exposure goes by: cells count row after row,
-/// four bits each and the first one lowest. By columns and rows, of which there are no fewer columns.
+/// Order in which the cells of a grid are read during the exposure. Cells are numbered row by row, four bits
+/// each, the first one lowest. The key is columns and rows, with columns >= rows.
 ///
-/// Each read is of one cell at one instant, so that cells and instants must not go together: read row after
-/// row, a path across the rows is longer or shorter than it is. These orders were found by search to leave
-/// least of borders in any direction, for paths of 0.8 to 8 ideal pixels, and to be near the pixel's centre
-/// on the whole wherever they stop (scripts/order_of_reads.py).
-const TURNS: [([u32; 2], u64); 6] = [
+/// Each tap reads one cell at one instant, so cell and instant must be uncorrelated: in plain row order, a
+/// path across the rows would appear longer or shorter than it is. These orders were found by search
+/// (scripts/order_of_reads.py). They minimise the error at borders of any direction for paths of 0.8 to 8
+/// ideal pixels, and their mean stays near the pixel's centre wherever the sequence stops.
+const TAP_ORDERS: [([u32; 2], u64); 6] = [
     ([4, 1], 0x1302),
     ([3, 2], 0x42_0531),
     ([4, 2], 0x2471_6035),
@@ -150,26 +153,26 @@ const TURNS: [([u32; 2], u64); 6] = [
     ([4, 4], 0x64df_2790_c5be_318a),
 ];
 
-/// The cell that is read in a turn. Grids that have no order of their own begin with the first cell and the
-/// last one, the second and the one before the last, and so on.
-fn place_of_turn([nx, ny]: [u32; 2], turn: u32) -> u32 {
+/// Cell of a turn. Grids without an entry in the table alternate: first, last, second, last but one, and so
+/// on.
+fn tap_cell([nx, ny]: [u32; 2], turn: u32) -> u32 {
     let [columns, rows] = [nx.max(ny), nx.min(ny)];
-    let Some((_, turns)) = TURNS.iter().find(|(grid, _)| *grid == [columns, rows]) else {
+    let Some((_, turns)) = TAP_ORDERS.iter().find(|(grid, _)| *grid == [columns, rows]) else {
         return if turn % 2 == 1 { nx * ny - 1 - turn / 2 } else { turn / 2 };
     };
     let place = (turns >> (4 * turn)) as u32 & 15;
-    // The same of a grid that is higher than wide, with rows and columns changed.
+    // The order of the transposed grid, for a grid with more rows than columns.
     if nx >= ny { place } else { place % columns * nx + place / columns }
 }
 
-/// Where the reads of a grid of `taps` along each side lie, in the order in which they are read: shares of
-/// its sides from the middle on.
+/// Offsets of the taps of a grid, in the order in which they are read, as shares of the grid's sides from its
+/// centre.
 #[must_use]
-pub fn tap_shares(taps: [u32; 2]) -> Vec<[f32; 2]> {
+pub fn tap_offsets(taps: [u32; 2]) -> Vec<[f32; 2]> {
     let [nx, ny] = taps.map(|n| n.max(1));
     let share = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
     (0..nx * ny)
-        .map(|turn| place_of_turn([nx, ny], turn))
+        .map(|turn| tap_cell([nx, ny], turn))
         .map(|place| [share(place % nx, nx), share(place / nx, ny)])
         .collect()
 }
@@ -180,8 +183,8 @@ mod tests {
     use crate::temporal::{PathStage, gather};
 
     #[test]
-    fn reads_have_the_variance_of_the_pixel_that_they_stand_for() {
-        // A parabola's mean over an area tells its variance.
+    fn taps_have_the_variance_of_the_pixel() {
+        // The mean of a parabola over an area gives its variance.
         let size_px = [40, 40];
         let parabola = |i: u32| (f64::from(i % 40) - 20.0).powi(2) + 1.0 / 12.0;
         let rgba: Vec<f32> =
@@ -189,67 +192,68 @@ mod tests {
         let color = ColorImage { size_px, rgba: &rgba };
         let mean = |width_px: f64, stage: TapStage| {
             let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
-            let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
-            // Over all positions between the pixels, about each of them.
+            let position_px = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
+            // Averaged over all positions between pixels.
             let about = |k: u32| {
-                let (found, x) =
-                    (gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8), at(k).x - 20.0);
+                let (found, x) = (
+                    gather(&[position_px(k)], PathStage::Straight, &area, &color, 2.0, 8),
+                    position_px(k).x - 20.0,
+                );
                 found.x - 2.0 * x * found.y + x * x
             };
             (0..16).map(about).sum::<f64>() / 16.0
         };
         for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
-            let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
+            let variance = mean(width_px, TapStage::SplineOrGrid { most: 4 });
             assert!(
-                (found - width_px * width_px / 12.0).abs() < 2e-3,
-                "{width_px}: {found} {}",
+                (variance - width_px * width_px / 12.0).abs() < 2e-3,
+                "{width_px}: {variance} {}",
                 width_px * width_px / 12.0
             );
         }
-        // An area has the pixel's own variance with the ideal pixels' squares; what they are the mean of is
-        // not taken off.
+        // An area read has the variance of the pixel plus that of the ideal pixels, which is not subtracted.
         for width_px in [1.5, 2.0, 2.6, 3.4, 5.0] {
-            let found = mean(width_px, TapStage::Area) - (width_px * width_px + 1.0) / 12.0;
-            assert!(found.abs() < 2e-3, "{width_px}: {found}");
+            let variance = mean(width_px, TapStage::Area) - (width_px * width_px + 1.0) / 12.0;
+            assert!(variance.abs() < 2e-3, "{width_px}: {variance}");
         }
         assert_eq!(mean(1.4, TapStage::Area), mean(1.4, TapStage::Spline), "narrow ones are splines");
-        // What one bilinear read is off by, and that a grid is the same where it has several.
+        // Error of a single bilinear tap, and of a grid that has only one tap.
         assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
         for [width_px, is_off_by] in
             [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]]
         {
-            let found = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
-            assert!((found - is_off_by).abs() < 2e-3, "{width_px}: {found} {is_off_by}");
+            let variance = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
+            assert!((variance - is_off_by).abs() < 2e-3, "{width_px}: {variance} {is_off_by}");
         }
     }
 
     #[test]
-    fn areas_are_as_wide_however_a_square_pixel_is_turned_and_no_wider_than_is_read() {
-        let of = |turn: f64, width_px: f64| {
+    fn areas_are_invariant_to_rotation_and_bounded() {
+        let footprint = |turn: f64, width_px: f64| {
             let across = width_px * DVec2::from_angle(turn);
             Footprint::new(across, across.perp(), TapStage::Area).kernel
         };
-        let Kernel::Area(sides_px) = of(0.0, 2.5) else { panic!("a wide pixel") };
+        let Kernel::Area(sides_px) = footprint(0.0, 2.5) else { panic!("a wide pixel") };
         assert!(sides_px.distance(DVec2::splat((2.5_f64 * 2.5 - 1.0).sqrt())) < 1e-12);
         for turn in [0.1, 0.7, 2.0] {
-            let Kernel::Area(turned_px) = of(turn, 2.5) else { panic!("a wide pixel") };
+            let Kernel::Area(turned_px) = footprint(turn, 2.5) else { panic!("a wide pixel") };
             assert!(turned_px.distance(sides_px) < 1e-12, "{turn}: {turned_px}");
         }
-        assert_eq!(of(0.3, 9.0), Kernel::Area(DVec2::splat(WIDEST_AREA_PX)));
-        // Narrow along one axis alone.
+        assert_eq!(footprint(0.3, 9.0), Kernel::Area(DVec2::splat(MAX_AREA_SIDE_PX)));
+        // Narrow along one axis only.
         let one = Footprint::new(3.0 * DVec2::X, DVec2::Y, TapStage::Area);
         assert_eq!(one.kernel, Kernel::Area(DVec2::new(8.0_f64.sqrt(), 1.0)));
     }
 
     #[test]
-    fn every_cell_has_its_turn_and_no_round_that_is_cut_short_is_far_off() {
+    fn tap_orders_visit_every_cell_and_stay_centred() {
         for [nx, ny] in (1..=6).flat_map(|nx| (1..=6).map(move |ny| [nx, ny])) {
             let count = nx * ny;
-            let places: Vec<u32> = (0..count).map(|turn| place_of_turn([nx, ny], turn)).collect();
+            let places: Vec<u32> = (0..count).map(|turn| tap_cell([nx, ny], turn)).collect();
             let mut sorted = places.clone();
             sorted.sort_unstable();
             assert_eq!(sorted, (0..count).collect::<Vec<_>>(), "{nx} x {ny}");
-            // In cells, of all reads together: 1/n of that is what n reads are off by.
+            // In cells, summed over all taps; 1/n of it is the offset of n taps.
             let middle = 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1));
             let mut sum = DVec2::ZERO;
             for place in places {
@@ -261,11 +265,11 @@ mod tests {
     }
 
     #[test]
-    fn cells_and_instants_do_not_go_together() {
-        for [nx, ny] in TURNS.iter().flat_map(|&([nx, ny], _)| [[nx, ny], [ny, nx]]) {
+    fn tap_cells_and_instants_are_uncorrelated() {
+        for [nx, ny] in TAP_ORDERS.iter().flat_map(|&([nx, ny], _)| [[nx, ny], [ny, nx]]) {
             let count = nx * ny;
             let cell = |turn: u32| {
-                let place = place_of_turn([nx, ny], turn);
+                let place = tap_cell([nx, ny], turn);
                 DVec2::new(f64::from(place % nx), f64::from(place / nx))
                     - 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1))
             };

@@ -1,24 +1,25 @@
 //! The paper's gather: samples on the straight segment between the two ends of the exposure, both ends
-//! included, on stored values. f64 twins of `shaders/reverse/gather/straight.wgsl` and
+//! included, on stored (encoded) values. f64 twins of `shaders/reverse/gather/straight.wgsl` and
 //! `shaders/reverse/color/stored.wgsl`.
 
 use glam::{DVec2, DVec3};
 
 use super::ColorImage;
 
-/// Mean of `samples` equally weighted samples from the first end to the last; one sample is the middle.
+/// Mean of `samples` samples of equal weight from the first end to the last; a single sample is taken at the
+/// middle.
 ///
-/// With both ends included it averages over a path `samples / (samples - 1)` too long: the paper's choice
-/// (its eq. 20 in steps).
+/// Because both ends are included, the mean is over a path that is too long by `samples / (samples - 1)`.
+/// That is the paper's choice (eq. 20 in steps).
 #[must_use]
 pub fn gather_straight(ends_px: [DVec2; 2], samples: u32, stored: &ColorImage<'_>) -> DVec3 {
-    let at = |i: u32| if samples < 2 { 0.5 } else { f64::from(i) / f64::from(samples - 1) };
+    let share = |i: u32| if samples < 2 { 0.5 } else { f64::from(i) / f64::from(samples - 1) };
     let count = samples.max(1);
-    (0..count).map(|i| stored.sample(ends_px[0].lerp(ends_px[1], at(i)))).sum::<DVec3>() / f64::from(count)
+    (0..count).map(|i| stored.sample(ends_px[0].lerp(ends_px[1], share(i)))).sum::<DVec3>() / f64::from(count)
 }
 
-/// `mix(color, sky, clamp(distance / end, 0, 1))`, the paper's linear fog, on stored values. Sky
-/// (`inverse_depth` 0) is all fog.
+/// The paper's linear fog on stored values: `mix(color, sky, clamp(distance / end, 0, 1))`. Sky
+/// (`inverse_depth` 0) is entirely fog.
 #[must_use]
 pub fn linear_fog(color: DVec3, sky: DVec3, uv: DVec2, inverse_depth: f64, end_m: f64) -> DVec3 {
     let amount = uv.extend(1.0).length() / (inverse_depth * end_m).max(1e-30);

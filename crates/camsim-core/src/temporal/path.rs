@@ -1,29 +1,29 @@
-//! Path of a source over the exposure: polynomials of time through a few places that are known exactly. Twin
-//! of `shaders/reverse/gather/path/*.wgsl`.
+//! Path of a source over the exposure: polynomials of time through a few positions that are known exactly.
+//! f64 twin of `shaders/reverse/gather/path/*.wgsl`.
 
 use glam::DVec2;
 
 use super::PathStage;
 
-/// Most places on one polynomial.
-const MOST: usize = 5;
+/// Most points on one polynomial.
+const MAX_POINTS: usize = 5;
 
-/// The polynomial through up to five places equally far apart in time, by Newton's forward differences.
+/// The polynomial through up to five points that are equally spaced in time, by Newton's forward differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Curve {
-    differences: [DVec2; MOST],
-    /// Of the chords from place to place, pixels.
+    differences: [DVec2; MAX_POINTS],
+    /// Length of the chords between the points, pixels.
     pub length_px: f64,
 }
 
 impl Curve {
-    /// Through `places`; what is beyond the fifth is left out.
+    /// The polynomial through `places`; points after the fifth are ignored.
     #[must_use]
     pub fn through(places: &[DVec2]) -> Self {
-        let mut row = [DVec2::ZERO; MOST];
-        let count = places.len().min(MOST);
+        let mut row = [DVec2::ZERO; MAX_POINTS];
+        let count = places.len().min(MAX_POINTS);
         row[..count].copy_from_slice(&places[..count]);
-        let mut differences = [row[0]; MOST];
+        let mut differences = [row[0]; MAX_POINTS];
         for (order, difference) in differences.iter_mut().enumerate().skip(1) {
             for i in 0..count.saturating_sub(order) {
                 row[i] = row[i + 1] - row[i];
@@ -33,7 +33,7 @@ impl Curve {
         Self { differences, length_px: places.windows(2).map(|pair| pair[0].distance(pair[1])).sum() }
     }
 
-    /// Place after so many steps from the first one.
+    /// Position after `steps` steps from the first point.
     #[must_use]
     pub fn at(&self, steps: f64) -> DVec2 {
         let [p, d1, d2, d3, d4] = self.differences;
@@ -41,7 +41,7 @@ impl Curve {
     }
 }
 
-/// The polynomials through all of `places`, one after the other: one for each so many steps as `stage` says.
+/// The polynomials through all of `places`, one after the other; `stage` sets the number of points of each.
 pub fn curves(places: &[DVec2], stage: PathStage) -> impl ExactSizeIterator<Item = Curve> + '_ {
     let steps = stage.steps() as usize;
     (0..places.len().saturating_sub(1) / steps)
@@ -53,9 +53,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_curve_goes_through_its_places_and_is_a_polynomial_of_their_number() {
-        for steps in 1..MOST {
-            // Of the same degree: met everywhere.
+    fn curve_interpolates_its_points() {
+        for steps in 1..MAX_POINTS {
+            // A path of the same degree is reproduced everywhere.
             let path = |t: f64| DVec2::new(3.0 - t + 0.5 * t.powi(steps as i32), 2.0 * t);
             let places: Vec<DVec2> = (0..=steps).map(|k| path(k as f64)).collect();
             let curve = Curve::through(&places);
@@ -67,8 +67,8 @@ mod tests {
     }
 
     #[test]
-    fn a_swing_is_missed_by_no_more_than_the_bound_of_each_stage() {
-        // p = sin(w t), h from node to node.
+    fn sinusoidal_paths_stay_within_the_bound_of_each_stage() {
+        // p = sin(w t), with the step h between nodes.
         for (stage, bound) in PathStage::ALL.into_iter().zip([1.0 / 8.0, 1.0 / 15.58, 1.0 / 33.0]) {
             for wh in [0.2_f64, 0.5, 1.0] {
                 let path = |t: f64| DVec2::new((wh * t + 0.4).sin(), 0.0);

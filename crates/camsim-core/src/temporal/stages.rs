@@ -1,47 +1,47 @@
-//! What the path of an exposure is made of.
+//! Methods for the exposure path: where its depths are looked up, and by which curve its nodes are joined.
 
 use serde::Serialize;
 
-/// Where the key frame's depth is looked up that the nodes of an exposure take.
+/// Nodes of an exposure at which the depth of the key frame is looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NodeDepths {
-    /// At mid-exposure, for all.
+    /// At mid-exposure; all nodes use that depth.
     Mid,
-    /// At both ends; what is between takes what lies between. The second look-up begins with what the first
-    /// has found, and so takes one iteration less.
+    /// At both ends; the other nodes interpolate linearly. The second look-up starts from the result of the
+    /// first and needs one iteration less.
     Ends,
-    /// At mid-exposure and, beginning with what that has found, at both ends; what is between takes the
-    /// parabola through them.
+    /// At mid-exposure and then, starting from that result, at both ends; the other nodes use the parabola
+    /// through the three.
     Three,
-    /// In each, beginning with what the one before has found.
+    /// At every node, each starting from the result of the one before.
     Each,
 }
 
 impl NodeDepths {
-    /// All of them, in the order of their time.
+    /// All variants, in the order of cost.
     pub const ALL: [Self; 4] = [Self::Mid, Self::Ends, Self::Three, Self::Each];
 }
 
-/// The curve that joins the nodes of an exposure: one polynomial of time through each so many of them, the
-/// last of which is the next one's first. With h from node to node it misses a path p by at most `h^2 |p''| /
-/// 8`, `h^3 |p'''| / 15.6` or `h^5 |p'''''| / 33`.
+/// The curve that joins the nodes of an exposure: polynomials of time, each of which starts at the last node
+/// of the one before. With the step h between nodes, the deviation from a path p is at most `h^2 |p''| / 8`
+/// (straight), `h^3 |p'''| / 15.6` (parabola) or `h^5 |p'''''| / 33` (quartic).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PathStage {
-    /// Two nodes.
+    /// Straight lines through two nodes.
     Straight,
-    /// Three.
+    /// Parabolas through three nodes.
     Parabola,
-    /// Five.
+    /// Quartic polynomials through five nodes.
     Quartic,
 }
 
 impl PathStage {
-    /// All of them, in the order of their degree.
+    /// All variants, in the order of their degree.
     pub const ALL: [Self; 3] = [Self::Straight, Self::Parabola, Self::Quartic];
 
-    /// Steps from node to node along one polynomial: its degree.
+    /// Steps between nodes along one polynomial, which is its degree.
     #[must_use]
     pub fn steps(self) -> u32 {
         match self {

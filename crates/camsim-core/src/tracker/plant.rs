@@ -1,40 +1,40 @@
 //! Controller and plant: two nested square-root loops on a double integrator, for position and for attitude
-//! (paper, section 3).
+//! (section 3 of the paper).
 //!
-//! The outer loop turns the error e into a velocity relative to the target, eq. (2) with a linear zone around
-//! the origin: `p e` for e below `b/p^2`, else `sqrt(2 b (e - b/(2 p^2)))`, both with slope p where they
-//! meet. The target's own velocity is added (feed-forward) and the sum is limited. The inner loop does the
-//! same from velocity error to acceleration; no limit is put on jerk, so its square root is infinitely steep
-//! and what remains is its linear zone, which is everything that one tick can correct, and the acceleration
-//! limit.
+//! The outer loop turns the error e into a velocity relative to the target by eq. (2), with a linear zone
+//! around the origin: `p e` for e below `b/p^2`, else `sqrt(2 b (e - b/(2 p^2)))`; both have the slope p
+//! where they meet. The target's own velocity is added (feed-forward), and the sum is limited. The inner loop
+//! does the same from velocity error to acceleration. Jerk is not limited, so the square root of the inner
+//! loop is infinitely steep: what remains are its linear zone, which is everything that one tick can correct,
+//! and the acceleration limit.
 //!
-//! Errors, speeds and accelerations are vectors and their lengths are limited. The velocity after a tick lies
-//! between the one before and the wanted one, both inside the ball of the speed limit, so all limits hold at
-//! every tick, whatever the log does.
+//! Errors, speeds and accelerations are vectors whose lengths are limited. The velocity after a tick lies
+//! between the one before and the demanded one, both inside the ball of the speed limit, so all limits hold
+//! at every tick, for any log.
 
 use glam::{DQuat, DVec3};
 
-use super::{Hold, Limit, MOST_HOLDS, ResolvedLimits, Saturation, reference::Reference};
+use super::{Limit, MAX_INTERVALS, ResolvedLimits, Saturation, SaturationInterval, reference::Reference};
 use crate::{
     pose::BodyState,
     trajectory::{advance, so3},
 };
 
-/// Gain of the linear zone, 1/s. With braking at 0.8 of the limit a 10 m step is overshoot-free from 50 to
+/// Gain of the linear zone, 1/s. With braking at 0.8 of the limit, a 10 m step has no overshoot from 50 to
 /// 1000 Hz.
 const LINEAR_GAIN_HZ: f64 = 8.0;
-/// Bound on gain times step: at lower control rates the linear zone grows instead of ringing.
+/// Bound on gain times step: at lower control rates the linear zone grows, instead of oscillating.
 const LARGEST_GAIN_STEP: f64 = 0.16;
-/// Share of the acceleration limit that braking counts on; the rest is for the target's own acceleration and
+/// Share of the acceleration limit available for braking; the rest is for the target's own acceleration and
 /// the finite tick.
 const BRAKING_SHARE: f64 = 0.8;
-/// A demand counts as limited beyond this relative excess, which is above rounding.
+/// Relative excess beyond which a demand counts as limited; it is above rounding.
 const EXCESS: f64 = 1e-9;
-/// Accelerations stay below their limit by this share: a difference of velocities, divided by the step, is
+/// Relative margin of accelerations to their limit, because a difference of velocities divided by the step is
 /// rounded.
 const ROUNDING_SHARE: f64 = 1e-10;
 
-/// One channel group (position or attitude): limits on the lengths of its velocity and acceleration.
+/// Loops of position or attitude: limits on the lengths of velocity and acceleration.
 #[derive(Clone, Copy, Debug)]
 struct SqrtLoops {
     step_s: f64,
@@ -44,7 +44,7 @@ struct SqrtLoops {
     max_acceleration: f64,
 }
 
-/// Velocity after one tick, and which limits cut the demand.
+/// Velocity after one tick, and the limits that reduced the demand.
 struct Step {
     velocity: DVec3,
     velocity_limited: bool,
@@ -57,7 +57,7 @@ impl SqrtLoops {
         Self { step_s, gain_hz, braking: BRAKING_SHARE * max_acceleration, max_velocity, max_acceleration }
     }
 
-    /// Closing velocity for an error: along it, with the length of the SQRT gain.
+    /// Closing velocity for an error: in its direction, with the length of the SQRT gain.
     fn closing(&self, error: DVec3) -> DVec3 {
         let distance = error.length();
         let linear_zone = self.braking / (self.gain_hz * self.gain_hz);
@@ -82,23 +82,23 @@ impl SqrtLoops {
     }
 }
 
-/// What following a reference gives.
+/// Result of following a reference.
 #[derive(Debug)]
-pub(crate) struct Followed {
-    /// At each tick, with the accelerations until the next one.
+pub(crate) struct PlantRun {
+    /// State at each tick, with the accelerations until the next one.
     pub(crate) states: Vec<BodyState>,
     pub(crate) saturation: Saturation,
-    /// Seconds from the first tick; the longest first.
-    pub(crate) holds: Vec<Hold>,
+    /// Intervals at a limit in seconds from the first tick, the longest first.
+    pub(crate) saturation_intervals: Vec<SaturationInterval>,
 }
 
-/// Follows the reference from its own first state.
-pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed {
+/// Follows the reference, starting in its first state.
+pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> PlantRun {
     let step_s = reference.step_s;
     let linear = SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2);
     let angular =
         SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
-    let mut saturation = SaturationClock::new(step_s);
+    let mut saturation = SaturationTimer::new(step_s);
     let mut target = reference.target(0);
     let mut state = BodyState {
         position_ned_m: target.position_ned_m,
@@ -112,14 +112,14 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed
     for k in 1..reference.ticks() {
         let next = reference.target(k);
 
-        // The error that would be left if the next tick had exactly the target's velocity.
+        // Error that would remain if the next tick had exactly the target's velocity.
         let reached =
             state.position_ned_m + (state.velocity_ned_m_s + next.velocity_ned_m_s) * (0.5 * step_s);
         let moved = linear.step(state.velocity_ned_m_s, next.position_ned_m - reached, next.velocity_ned_m_s);
         state.acceleration_ned_m_s2 = (moved.velocity - state.velocity_ned_m_s) / step_s;
 
         // The same on the rotation group: the error is a rotation vector in body axes, and the target's rate
-        // is turned into them.
+        // is rotated into them.
         let own_from_target: DQuat = state.ned_from_body.inverse() * target.ned_from_body;
         let target_rate = own_from_target * next.rate_body_rad_s;
         let (rate, mean_rate) = (state.rate_body_rad_s, 0.5 * (state.rate_body_rad_s + target_rate));
@@ -136,7 +136,7 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed
         ]);
         states.push(state);
         state = advance(&state, step_s);
-        // Velocities are copied, not integrated, so that rounding cannot creep over a limit.
+        // Velocities are copied, not integrated, so that rounding cannot exceed a limit.
         state.velocity_ned_m_s = moved.velocity;
         state.rate_body_rad_s = turned.velocity;
         state.ned_from_body = state.ned_from_body.normalize();
@@ -145,22 +145,28 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed
     state.acceleration_ned_m_s2 = DVec3::ZERO;
     state.angular_acceleration_body_rad_s2 = DVec3::ZERO;
     states.push(state);
-    let holds = saturation.finished();
-    Followed { states, saturation: saturation.longest, holds }
+    let saturation_intervals = saturation.finished();
+    PlantRun { states, saturation: saturation.longest, saturation_intervals }
 }
 
-/// Times at each limit.
-struct SaturationClock {
+/// Measures the intervals at each limit.
+struct SaturationTimer {
     step_s: f64,
     ticks: u64,
     running_s: [f64; 4],
     longest: Saturation,
-    holds: Vec<Hold>,
+    saturation_intervals: Vec<SaturationInterval>,
 }
 
-impl SaturationClock {
+impl SaturationTimer {
     fn new(step_s: f64) -> Self {
-        Self { step_s, ticks: 0, running_s: [0.0; 4], longest: Saturation::default(), holds: Vec::new() }
+        Self {
+            step_s,
+            ticks: 0,
+            running_s: [0.0; 4],
+            longest: Saturation::default(),
+            saturation_intervals: Vec::new(),
+        }
     }
 
     fn tick(&mut self, limited: [bool; 4]) {
@@ -187,20 +193,24 @@ impl SaturationClock {
             return;
         }
         let to_s = self.ticks as f64 * self.step_s;
-        self.holds.push(Hold { limit: Limit::ALL[k], from_s: to_s - duration_s, to_s });
-        if self.holds.len() >= 8 * MOST_HOLDS {
+        self.saturation_intervals.push(SaturationInterval {
+            limit: Limit::ALL[k],
+            from_s: to_s - duration_s,
+            to_s,
+        });
+        if self.saturation_intervals.len() >= 8 * MAX_INTERVALS {
             self.keep_longest();
         }
     }
 
     fn keep_longest(&mut self) {
-        self.holds.sort_by(|a, b| b.duration_s().total_cmp(&a.duration_s()));
-        self.holds.truncate(MOST_HOLDS);
+        self.saturation_intervals.sort_by(|a, b| b.duration_s().total_cmp(&a.duration_s()));
+        self.saturation_intervals.truncate(MAX_INTERVALS);
     }
 
-    fn finished(&mut self) -> Vec<Hold> {
+    fn finished(&mut self) -> Vec<SaturationInterval> {
         (0..Limit::ALL.len()).for_each(|k| self.end(k));
         self.keep_longest();
-        std::mem::take(&mut self.holds)
+        std::mem::take(&mut self.saturation_intervals)
     }
 }

@@ -1,29 +1,30 @@
-//! The reference that the plant follows: the log, interpolated, sampled half-way between control ticks and
-//! smoothed without lag.
+//! The reference of the plant: the interpolated log, sampled half-way between control ticks and smoothed
+//! without lag.
 
 use glam::{DQuat, DVec3, DVec4};
 
 use super::at_rank;
 use crate::{flight_log::LogRow, trajectory::so3};
 
-/// The log between its rows: straight lines in position, great circles in attitude. Rows are in order of
+/// Interpolation of the log: straight lines in position, great circles in attitude. Rows are in order of
 /// time.
 #[derive(Clone, Debug)]
-pub(crate) struct Interpolated<'a> {
+pub(crate) struct LogInterpolator<'a> {
     rows: &'a [LogRow],
-    /// Where the last look-up was; look-ups mostly go forward.
+    /// Row of the last look-up; look-ups mostly move forward.
     row: usize,
-    /// The turn from a row to the next one, and that row: many look-ups fall between the same two.
+    /// Index of a row and the rotation to the next one, cached because many look-ups fall between the same
+    /// two.
     turn: Option<(usize, DVec3)>,
 }
 
-impl<'a> Interpolated<'a> {
+impl<'a> LogInterpolator<'a> {
     /// `None` for a log without rows.
     pub(crate) fn new(rows: &'a [LogRow]) -> Option<Self> {
         (!rows.is_empty()).then_some(Self { rows, row: 0, turn: None })
     }
 
-    /// Position and attitude at `t_s`; outside the log the first or last row.
+    /// Position and attitude at `t_s`; outside of the log those of the first or last row.
     pub(crate) fn at(&mut self, t_s: f64) -> (DVec3, DQuat) {
         let later = self.rows.get(self.row + 1).is_some_and(|next| next.t_s <= t_s);
         if later || self.rows[self.row].t_s > t_s {
@@ -46,8 +47,8 @@ impl<'a> Interpolated<'a> {
         (from.position_ned_m.lerp(to.position_ned_m, part), from.ned_from_body * so3::exp(turn * part))
     }
 
-    /// As [`Self::at`], but continued beyond either end by point reflection, which keeps position and
-    /// velocity continuous there.
+    /// As [`Self::at`], but extended beyond either end by point reflection, which keeps position and velocity
+    /// continuous there.
     fn reflected(&mut self, t_s: f64) -> (DVec3, DQuat) {
         let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
         let edge = if t_s < first.t_s {
@@ -65,10 +66,10 @@ impl<'a> Interpolated<'a> {
     }
 }
 
-/// Positions and attitudes at the middles of control intervals, as the coefficients of a uniform quadratic
-/// B-spline: at tick k the position is the mean of coefficients k and k + 1 and the velocity their difference
-/// over the step. A double integrator that starts on such a reference and has accelerations enough stays on
-/// it exactly.
+/// Positions and attitudes at the middles of control intervals, as coefficients of a uniform quadratic
+/// B-spline. At tick k the position is the mean of coefficients k and k + 1, and the velocity their
+/// difference over the step. A double integrator that starts on such a reference, with sufficient
+/// acceleration, stays on it exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct Reference {
     pub(crate) step_s: f64,
@@ -76,7 +77,7 @@ pub(crate) struct Reference {
     pub(crate) ned_from_body: Vec<DQuat>,
 }
 
-/// What the plant should do at one control tick.
+/// Target of the plant at a control tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target {
     pub(crate) position_ned_m: DVec3,
@@ -87,12 +88,12 @@ pub(crate) struct Target {
 
 impl Reference {
     /// The interpolated log at the `count` instants `start_s + (k - 1/2) step_s`.
-    pub(crate) fn sampled(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, count: usize) -> Self {
+    pub(crate) fn sampled(log: &mut LogInterpolator<'_>, start_s: f64, step_s: f64, count: usize) -> Self {
         Self::sampled_from(log, start_s, step_s, 0, count)
     }
 
     fn sampled_from(
-        log: &mut Interpolated<'_>,
+        log: &mut LogInterpolator<'_>,
         start_s: f64,
         step_s: f64,
         before: usize,
@@ -102,8 +103,7 @@ impl Reference {
         let mut previous = DQuat::IDENTITY;
         for k in 0..count {
             let (position, attitude) = log.reflected(start_s + (k as f64 - before as f64 - 0.5) * step_s);
-            // q and -q are one attitude; the nearer of the two is the one that can be averaged with its
-            // neighbour.
+            // q and -q are the same attitude; the one nearer to its neighbour can be averaged with it.
             previous = if k > 0 && previous.dot(attitude) < 0.0 { -attitude } else { attitude };
             position_ned_m.push(position);
             ned_from_body.push(previous);
@@ -111,17 +111,17 @@ impl Reference {
         Self { step_s, position_ned_m, ned_from_body }
     }
 
-    /// The log smoothed by four moving averages in a row, which together are close to a Gaussian of `sigma_s`
-    /// and shift nothing in time.
+    /// The log smoothed by four successive moving averages, which together approximate a Gaussian of
+    /// `sigma_s` without a shift in time.
     pub(crate) fn smoothed(
-        log: &mut Interpolated<'_>,
+        log: &mut LogInterpolator<'_>,
         start_s: f64,
         step_s: f64,
         count: usize,
         sigma_s: f64,
     ) -> Self {
-        // The variance of one average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; four of them add up to
-        // sigma^2.
+        // The variance of a moving average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; those of the four add
+        // up to sigma^2.
         let ticks2 = (sigma_s / step_s).powi(2);
         let half = ((0.25 + 0.75 * ticks2).sqrt() - 0.5).round().max(0.0) as usize;
         let raw = Self::sampled_from(log, start_s, step_s, PASSES * half, count + 2 * PASSES * half);
@@ -138,10 +138,10 @@ impl Reference {
         self.position_ned_m.len() - 1
     }
 
-    /// Lengths of its accelerations, m/s^2 and rad/s^2, at a rank from 0 (the smallest) to 1 (the largest).
+    /// Lengths of the accelerations, m/s^2 and rad/s^2, at a rank from 0 (the smallest) to 1 (the largest).
     pub(crate) fn accelerations(&self, rank: f64) -> [f64; 2] {
         let inner = 1..self.ticks();
-        let stride = inner.len() / MOST_RANKED + 1;
+        let stride = inner.len() / MAX_RANKED + 1;
         let rate = 1.0 / (self.step_s * self.step_s);
         let linear = |k: usize| {
             (self.position_ned_m[k + 1] - 2.0 * self.position_ned_m[k] + self.position_ned_m[k - 1]).length()
@@ -167,15 +167,15 @@ impl Reference {
     }
 }
 
-/// Ticks among which a rank is looked for, at most.
-const MOST_RANKED: usize = 1_000_000;
+/// Most ticks among which a rank is computed.
+const MAX_RANKED: usize = 1_000_000;
 
 /// Number of moving averages: four give a kernel with two continuous derivatives.
 const PASSES: usize = 4;
 
-/// Means over `2 half + 1` values in place of them; there are `2 half` fewer. The running sum carries the
-/// rounding of each step, so values are taken relative to the first one. In place, because of hours of flight
-/// the system takes longer to hand out memory than this takes.
+/// Replaces values by means over `2 half + 1` of them, which shortens the list by `2 half`. The running sum
+/// accumulates rounding, so values are taken relative to the first one. In place, because for hours of flight
+/// allocation takes longer than the computation.
 fn moving_average(values: &mut Vec<DVec3>, half: usize) {
     let width = 2 * half + 1;
     let Some(&base) = values.first() else { return };
@@ -190,9 +190,9 @@ fn moving_average(values: &mut Vec<DVec3>, half: usize) {
     values.truncate(count);
 }
 
-/// Normalised mean quaternions, in place too. Exact for a constant rate, otherwise an error of third order in
-/// the angle that the window spans. Where the log turns so fast that the mean says nothing, the attitude
-/// stays as it is.
+/// Normalised mean quaternions, in place. Exact for a constant rate; otherwise the error is of third order in
+/// the angle spanned by the window. Where the log rotates so fast that the mean is meaningless, the attitude
+/// is kept.
 fn average_attitude(values: &mut Vec<DQuat>, half: usize) {
     let width = 2 * half + 1;
     let components = |q: &DQuat| DVec4::new(q.x, q.y, q.z, q.w);
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn looks_up_forward_backward_and_outside() {
         let rows: Vec<_> = (0..50).map(|i| row(f64::from(i), f64::from(i * i), 0.1 * f64::from(i))).collect();
-        let mut log = Interpolated::new(&rows).unwrap();
+        let mut log = LogInterpolator::new(&rows).unwrap();
         for (t_s, north_m) in [
             (0.5, 0.5),
             (1.5, 2.5),
@@ -242,14 +242,14 @@ mod tests {
             let yaw = 0.1 * t_s.clamp(0.0, 49.0);
             assert!(so3::log(DQuat::from_rotation_z(yaw).inverse() * attitude).length() < 1e-12, "{t_s}");
         }
-        assert!(Interpolated::new(&[]).is_none());
+        assert!(LogInterpolator::new(&[]).is_none());
     }
 
     #[test]
     fn smoothing_keeps_uniform_motion_to_both_ends() {
         let rows: Vec<_> =
             (0..9).map(|i| row(0.5 * f64::from(i), 3.0 * f64::from(i), 0.7 * f64::from(i))).collect();
-        let mut log = Interpolated::new(&rows).unwrap();
+        let mut log = LogInterpolator::new(&rows).unwrap();
         let reference = Reference::smoothed(&mut log, 0.0, 0.01, 402, 0.1);
         for k in [0, 1, 200, 399, 400] {
             let target = reference.target(k);
@@ -262,18 +262,18 @@ mod tests {
     }
 
     #[test]
-    fn kernel_has_the_variance_asked_for() {
-        // A parabola gains sigma^2 times half its second derivative.
+    fn smoothing_kernel_has_the_requested_variance() {
+        // A parabola is shifted by sigma^2 times half its second derivative.
         let rows: Vec<_> =
             (0..4001).map(|i| row(0.001 * f64::from(i), (0.001 * f64::from(i) - 2.0).powi(2), 0.0)).collect();
-        let mut log = Interpolated::new(&rows).unwrap();
+        let mut log = LogInterpolator::new(&rows).unwrap();
         let reference = Reference::smoothed(&mut log, 0.0, 0.001, 4001, 0.1);
         let gained = reference.position_ned_m[2000].x - (2000.0 * 0.001 - 0.0005 - 2.0f64).powi(2);
         // The half width is a whole number of ticks: 1 % at 1 ms.
         assert!((gained - 0.01).abs() < 2e-4, "{gained}");
     }
 
-    /// As the formulas stand, into a new list: the sums in the same order.
+    /// The formulas written out with a new list, with sums in the same order.
     fn averages_written_out(
         positions: &[DVec3],
         attitudes: &[DQuat],
@@ -302,15 +302,17 @@ mod tests {
     }
 
     #[test]
-    fn averages_in_place_are_those_of_a_new_list_to_the_last_bit() {
-        // Slow turns, and turns so fast that a window's mean is next to nothing.
+    fn in_place_averages_match_the_formulas_bitwise() {
+        // Slow rotation, and rotation so fast that a window's mean is close to zero.
         for (rate, half) in [(0.01, 0), (0.01, 7), (0.9, 7), (2.3, 3), (0.01, 150), (0.01, 200)] {
-            let at = |k: i32| f64::from(k);
-            let mut positions: Vec<DVec3> =
-                (0..301).map(|k| DVec3::new(1e5 + at(k).sin(), at(k * k) * 0.37, -at(k).sqrt())).collect();
+            let time = |k: i32| f64::from(k);
+            let mut positions: Vec<DVec3> = (0..301)
+                .map(|k| DVec3::new(1e5 + time(k).sin(), time(k * k) * 0.37, -time(k).sqrt()))
+                .collect();
             let axis = DVec3::new(0.6, -0.48, 0.64);
-            let mut attitudes: Vec<DQuat> =
-                (0..301).map(|k| DQuat::from_axis_angle(axis, rate * at(k) + 0.2 * at(k).cos())).collect();
+            let mut attitudes: Vec<DQuat> = (0..301)
+                .map(|k| DQuat::from_axis_angle(axis, rate * time(k) + 0.2 * time(k).cos()))
+                .collect();
             let expected = averages_written_out(&positions, &attitudes, half);
             moving_average(&mut positions, half);
             average_attitude(&mut attitudes, half);
@@ -322,13 +324,13 @@ mod tests {
     }
 
     #[test]
-    fn a_look_up_does_not_depend_on_the_one_before() {
+    fn look_ups_are_independent_of_their_order() {
         let rows: Vec<_> = (0..20).map(|i| row(f64::from(i), f64::from(i * i), 0.3 * f64::from(i))).collect();
-        let mut log = Interpolated::new(&rows).unwrap();
+        let mut log = LogInterpolator::new(&rows).unwrap();
         for k in 0..400 {
-            // To and fro, often between the same two rows.
+            // Back and forth, often between the same two rows.
             let t_s = 9.5 + 11.0 * (f64::from(k) * 0.05).sin();
-            assert_eq!(log.at(t_s), Interpolated::new(&rows).unwrap().at(t_s), "{t_s}");
+            assert_eq!(log.at(t_s), LogInterpolator::new(&rows).unwrap().at(t_s), "{t_s}");
         }
     }
 }

@@ -1,9 +1,9 @@
-//! How well a trajectory follows its log, and what it demands of the platform.
+//! Accuracy of a trajectory against its log, and the motion that it demands of the platform.
 
 use glam::{DQuat, DVec3};
 use serde::Serialize;
 
-use super::reference::Interpolated;
+use super::reference::LogInterpolator;
 use crate::{
     flight_log::LogRow,
     pose::BodyState,
@@ -19,7 +19,7 @@ pub struct Channels {
     pub east_m: f64,
     /// Down, metres.
     pub down_m: f64,
-    /// Roll, degrees. Roll and yaw mean nothing near pitch +-90; `attitude_deg` always does.
+    /// Roll, degrees. Roll and yaw are meaningless near pitch +-90; `attitude_deg` is always valid.
     pub roll_deg: f64,
     /// Pitch, degrees.
     pub pitch_deg: f64,
@@ -29,7 +29,7 @@ pub struct Channels {
     pub attitude_deg: f64,
 }
 
-/// Largest motion at any control tick. The vectors hold the largest magnitude of each component.
+/// Largest motion over all control ticks. The vectors hold the largest magnitude of each component.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MotionUse {
     /// Length of the velocity, m/s.
@@ -50,7 +50,7 @@ pub struct MotionUse {
     pub angular_acceleration_body_deg_s2: [f64; 3],
 }
 
-/// Errors against the log interpolated between its rows, and the motion used, over control ticks.
+/// Errors against the interpolated log and the motion used, over all control ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TrackReport {
     /// Number of instants compared.
@@ -67,14 +67,14 @@ pub struct TrackReport {
     pub sign_changes_body: [f64; 3],
 }
 
-/// Accelerations below these (m/s^2, rad/s^2) have no sign: they are rounding.
+/// Accelerations below this (m/s^2, rad/s^2) are rounding and have no sign.
 const SIGNLESS_BELOW: f64 = 1e-6;
 
 impl TrackReport {
-    /// Compares at `rate_hz` over the trajectory's span. `None` without rows or for a rate that is not
+    /// Measures over the trajectory's span at `rate_hz`. `None` without rows, or for a rate that is not
     /// positive.
     pub fn measure(trajectory: &Trajectory, rows: &[LogRow], rate_hz: f64) -> Option<Self> {
-        let mut log = Interpolated::new(rows)?;
+        let mut log = LogInterpolator::new(rows)?;
         if !(rate_hz > 0.0 && rate_hz.is_finite()) {
             return None;
         }
@@ -85,7 +85,7 @@ impl TrackReport {
         let mut worst = [0.0f64; 7];
         let mut signs = [SignChanges::default(); 6];
         for k in 0..samples {
-            // A hair inside the segment that begins here, so that rounding cannot pick the one before.
+            // Slightly inside the segment that begins here, so that rounding does not select the one before.
             let t_s = (start_s + (k as f64 + 1e-7) / rate_hz).min(end_s);
             let state = trajectory.state(t_s);
             for ((error, square), worst) in
@@ -139,7 +139,7 @@ impl MotionUse {
     }
 }
 
-/// Counts how often a number changes sign, zeros left out.
+/// Counts the sign changes of a quantity, without zeros.
 #[derive(Clone, Copy, Debug, Default)]
 struct SignChanges {
     before: f64,

@@ -1,32 +1,33 @@
-//! Spline planner: the whole log is known, so the reference can be the closest motion that the plant is able
-//! to follow.
+//! Spline planner. The whole log is known, so the reference can be the closest motion that the plant can
+//! follow.
 //!
-//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can do. Its
-//! coefficients c minimise
+//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can produce.
+//! Its coefficients c minimise
 //!
 //! ```text
 //! sum_k |(c_(k-1) + 6 c_k + c_(k+1))/8 - r_k|^2 + sum_k lambda_k |(c_(k-1) - 2 c_k + c_(k+1))/h^2|^2
 //! ```
 //!
-//! with r the log half-way between ticks. lambda is one constant at first and is raised where the
-//! acceleration exceeds its limit, until none does. The normal equations have five diagonals. Attitude is
-//! done alike with rotation vectors relative to the smoothed log, where they are small.
+//! where r is the log half-way between ticks. lambda starts as a constant and is raised where the
+//! acceleration exceeds its limit, until it does so nowhere. The normal equations have five diagonals.
+//! Attitude is treated in the same way with rotation vectors relative to the smoothed log, where they are
+//! small.
 
 use glam::DVec3;
 
 use super::{ResolvedLimits, reference::Reference};
 use crate::trajectory::so3;
 
-/// Time constant of the unconstrained fit, lambda = tau^4: with it, one position quantum of a GNSS log (0.11
-/// m) stays under 2 g.
+/// Time constant of the unconstrained fit, lambda = tau^4. With it, a position quantum of a GNSS log (0.11 m)
+/// stays below 2 g.
 const TIME_CONSTANT_S: f64 = 0.05;
-/// Share of the acceleration limit planned with; the rest absorbs the coupling of rotation axes.
+/// Share of the acceleration limit used in planning; the rest absorbs the coupling of rotation axes.
 const PLANNED_SHARE: f64 = 0.97;
-/// Passes after which what is left over is cut by the plant.
-const MOST_PASSES: usize = 20;
+/// Most passes; the plant cuts what still exceeds the limits then.
+const MAX_PASSES: usize = 20;
 
-/// Motion near `raw` within the limits, described as a correction of `smoothed`.
-pub(crate) fn planned(raw: &Reference, smoothed: Reference, limits: &ResolvedLimits) -> Reference {
+/// Motion near `raw` within the limits, as a correction of `smoothed`.
+pub(crate) fn plan_spline(raw: &Reference, smoothed: Reference, limits: &ResolvedLimits) -> Reference {
     let h2 = raw.step_s * raw.step_s;
     let position = || {
         let residual: Vec<DVec3> = raw
@@ -75,14 +76,14 @@ fn second_differences<T>(values: &[T], difference: impl Fn(&T, &T) -> DVec3) -> 
     second
 }
 
-/// Corrections d of a smooth base so that base + d is near the log: `residual` = log - base, `second` =
-/// second differences of the base, `limit` on the second differences of the sum.
+/// Corrections d of a smooth base, such that base + d is near the log. `residual` = log - base, `second` =
+/// second differences of the base, `limit` applies to the second differences of the sum.
 fn corrections(residual: &[DVec3], second: &[DVec3], limit: f64, step_s: f64) -> Vec<DVec3> {
     let count = residual.len();
     let mut weights = vec![(TIME_CONSTANT_S / step_s).powi(4); count];
     let mut fit = BandedFit::new(count);
     let planned_limit = PLANNED_SHARE * limit;
-    for _ in 0..MOST_PASSES {
+    for _ in 0..MAX_PASSES {
         fit.solve(residual, second, &weights);
         let mut within = true;
         for k in 1..count.saturating_sub(1) {
@@ -90,8 +91,8 @@ fn corrections(residual: &[DVec3], second: &[DVec3], limit: f64, step_s: f64) ->
             let excess2 = sum.length_squared() / (planned_limit * planned_limit);
             if excess2 > 1.0 {
                 within &= excess2 < (1.0 / (PLANNED_SHARE * PLANNED_SHARE));
-                // Faster growth needs as many passes and smooths more than it has to (0.12 m instead of 0.10
-                // m on a real flight).
+                // A faster growth needs as many passes and smooths more than necessary (0.12 m instead of
+                // 0.10 m on a real flight).
                 weights[k] *= excess2;
             }
         }
@@ -220,7 +221,8 @@ mod tests {
                     moved[k] += axis * step;
                     cost(&moved) - least
                 });
-                // A quadratic rises alike on both sides of its minimum; rounding of a cost of order 100.
+                // A quadratic rises equally on both sides of its minimum, up to rounding of a cost of order
+                // 100.
                 assert!(slope[0] > 0.0 && (slope[0] - slope[1]).abs() < 1e-10, "{k}: {slope:?}");
             }
         }

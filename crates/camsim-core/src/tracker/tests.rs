@@ -57,7 +57,7 @@ fn spec(kind: TrackerKind, rate_hz: f64) -> TrackerSpec {
     TrackerSpec { kind, rate_hz, ..TrackerSpec::default() }
 }
 
-/// Within the limits of the paper's experiments.
+/// The limits of the paper's experiments.
 fn paper_limits(spec: TrackerSpec) -> TrackerSpec {
     TrackerSpec {
         max_acceleration_m_s2: Auto::Value(PAPER_ACCELERATION_M_S2),
@@ -70,8 +70,8 @@ fn row(t_s: f64, position_ned_m: DVec3, ned_from_body: DQuat) -> LogRow {
     LogRow { t_s, position_ned_m, ned_from_body }
 }
 
-/// All four limits at every tick and in between (where lengths are convex), as lengths of vectors.
-fn assert_limits_kept(tracked: &Tracked) {
+/// Checks all four limits, as lengths of vectors, at every tick and in between (where lengths are convex).
+fn assert_limits_kept(tracked: &TrackResult) {
     let limits = &tracked.limits;
     for state in tracked.trajectory.knots() {
         assert!(state.velocity_ned_m_s.length() <= limits.max_speed_m_s * (1.0 + 1e-12));
@@ -81,13 +81,13 @@ fn assert_limits_kept(tracked: &Tracked) {
     }
 }
 
-/// The stored segments join: the end of each is the beginning of the next, in position, velocity, attitude
+/// Checks that segments join: the end of each is the beginning of the next in position, velocity, attitude
 /// and rate.
 fn assert_joined(trajectory: &Trajectory) {
     let knots = trajectory.knots();
     for k in 1..knots.len() {
         let end = crate::trajectory::advance(&knots[k - 1], trajectory.knot_s(k) - trajectory.knot_s(k - 1));
-        // Rounding of km and of 20 minutes of seconds; velocities of up to 1 km/s.
+        // Rounding of kilometres and of 20 minutes of seconds, with velocities of up to 1 km/s.
         assert!((end.position_ned_m - knots[k].position_ned_m).length() < 1e-8, "{k}");
         assert!((end.velocity_ned_m_s - knots[k].velocity_ned_m_s).length() < 1e-9, "{k}");
         assert!(so3::log(end.ned_from_body.inverse() * knots[k].ned_from_body).length() < 1e-9, "{k}");
@@ -98,8 +98,8 @@ fn assert_joined(trajectory: &Trajectory) {
 #[test]
 fn real_flight_is_followed_closer_than_the_reference_program_does() {
     let Some(rows) = lawnmower() else { return };
-    // Largest RMS per channel; the reference program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052
-    // deg. Most of the yaw error is one more corrupted row, 44848 (10 deg off for 24 ms).
+    // Largest RMS per channel. The paper's program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052 deg.
+    // Most of the yaw error is one more corrupted row, 44848 (10 deg off for 24 ms).
     let sqrt = [0.115, 0.07, 0.004, 0.045, 0.039, 0.047];
     let spline = [0.105, 0.062, 0.003, 0.026, 0.019, 0.045];
     for (kind, most, rates) in [
@@ -116,8 +116,8 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
             let channels = [rms.north_m, rms.east_m, rms.down_m, rms.roll_deg, rms.pitch_deg, rms.yaw_deg];
             assert!(channels.into_iter().zip(most).all(|(own, most)| own < most), "{name}");
             for share in report.sign_changes_ned.into_iter().chain(report.sign_changes_body) {
-                // No chatter, which would be 100 %: what is left are the turns of the log's own noise, up to
-                // 7 a second of which `spline` keeps.
+                // No chatter, which would be 100 %. The rest are sign changes of the log's own noise, of
+                // which `spline` keeps up to 7 per second.
                 let most = if kind == TrackerKind::Sqrt { 0.03 } else { 0.03f64.max(7.5 / rate_hz) };
                 assert!(share <= most, "{name}: {share}");
             }
@@ -133,8 +133,8 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
     }
 }
 
-/// Follows a step of 10 m (north) or 30 deg (yaw) that is smoothed so little that the controller has to do
-/// the work.
+/// Response to a step of 10 m (north) or 30 deg (yaw), smoothed so little that the controller limits the
+/// motion.
 fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyState>, ResolvedLimits) {
     let limits = ResolvedLimits {
         max_speed_m_s: 50.0,
@@ -169,7 +169,7 @@ fn a_step_is_taken_without_overshoot_or_chatter() {
         assert!(farthest <= 10.0 + 1e-9, "{rate_hz} Hz: {farthest}");
         let turned = |state: &BodyState| so3::log(state.ned_from_body).z;
         assert!(states.iter().map(turned).fold(0.0, f64::max) <= 0.5 + 1e-9, "{rate_hz} Hz");
-        // The target velocity of the one tick of the jump gives a last push one way, then braking: few
+        // The target velocity in the tick of the jump gives one acceleration, followed by braking: few
         // changes in all.
         assert!(accelerations(|state| state.acceleration_ned_m_s2.x) <= 3, "{rate_hz} Hz");
         assert!(accelerations(|state| state.angular_acceleration_body_rad_s2.z) <= 3, "{rate_hz} Hz");
@@ -178,7 +178,7 @@ fn a_step_is_taken_without_overshoot_or_chatter() {
             (last.position_ned_m.x - 10.0).abs() < 1e-4 && (turned(last) - 0.5).abs() < 1e-4,
             "{rate_hz} Hz: {last:?}"
         );
-        // The optimum is 2 sqrt(10 / 19.6) = 1.43 s; braking at 0.8 of the limit and the linear zone cost the
+        // The optimum is 2 sqrt(10 / 19.6) = 1.43 s; braking at 0.8 of the limit and the linear zone add the
         // rest.
         let settled = states.iter().rposition(|state| (state.position_ned_m.x - 10.0).abs() > 0.1).unwrap()
             as f64
@@ -189,7 +189,7 @@ fn a_step_is_taken_without_overshoot_or_chatter() {
 }
 
 #[test]
-fn yaw_goes_the_short_way_through_180() {
+fn yaw_takes_the_shorter_way_through_180() {
     let rows: Vec<_> = (0..400)
         .map(|i| {
             let t_s = 0.025 * f64::from(i);
@@ -212,7 +212,7 @@ fn yaw_goes_the_short_way_through_180() {
 }
 
 #[test]
-fn a_loop_through_vertical_is_no_trouble() {
+fn loop_through_vertical_is_followed() {
     // One loop in 10 s, then a barrel roll: pitch passes +90 and -90 deg.
     let rows: Vec<_> = (0..800)
         .map(|i| {
@@ -226,14 +226,14 @@ fn a_loop_through_vertical_is_no_trouble() {
         let tracked = track(&rows, &spec(kind, 400.0)).unwrap();
         assert_limits_kept(&tracked);
         let report = tracked.report(&rows).unwrap();
-        // The corner between loop and roll turns the rate vector by 90 deg: a change of 51 deg/s, whose
-        // distance at 60 deg/s^2 is 22 deg; the smoothed reference begins it early.
+        // The corner between loop and roll turns the rate vector by 90 deg, a change of 51 deg/s, which takes
+        // 22 deg at 60 deg/s^2; the smoothed reference begins it early.
         assert!(report.max_error.attitude_deg < 15.0, "{kind:?} {report:?}");
-        // Away from the corner there is nothing to lag behind.
+        // Away from the corner there is no lag.
         for t_s in [1.0, 2.5, 5.0, 7.5, 13.5, 15.0, 18.0] {
             let error = so3::log(
                 tracked.trajectory.state(t_s).ned_from_body.inverse()
-                    * Interpolated::new(&rows).unwrap().at(t_s).1,
+                    * LogInterpolator::new(&rows).unwrap().at(t_s).1,
             );
             assert!(error.length() < 1e-3, "{kind:?} {t_s}: {error}");
         }
@@ -318,7 +318,7 @@ fn limits_hold_on_noise_and_impossible_logs() {
 }
 
 #[test]
-fn a_limit_that_holds_the_platform_back_is_named() {
+fn saturated_limits_are_reported_by_key() {
     let rows: Vec<_> =
         (0..200).map(|i| row(0.1 * f64::from(i), DVec3::X * 3.0 * f64::from(i), DQuat::IDENTITY)).collect();
     let slow = TrackerSpec { max_speed_m_s: Auto::Value(20.0), ..TrackerSpec::default() };
@@ -329,7 +329,7 @@ fn a_limit_that_holds_the_platform_back_is_named() {
     assert!((free.limits.max_speed_m_s - 36.0).abs() < 1e-9);
 }
 
-/// A platform that shakes at 1.5 Hz by 20 degrees: 1777 deg/s^2 at most. After 10 s of rest.
+/// A platform that oscillates at 1.5 Hz by 20 degrees, 1777 deg/s^2 at most, after 10 s of rest.
 fn agile() -> Vec<LogRow> {
     let turn = |t_s: f64| {
         if t_s < 10.0 {
@@ -350,7 +350,7 @@ fn accelerations_come_from_the_log_and_are_at_least_the_papers() {
     for (kind, most_deg) in [(TrackerKind::Sqrt, 5.0), (TrackerKind::Spline, 1.0)] {
         let tracked = track(&rows, &spec(kind, 400.0)).unwrap();
         let limit_deg_s2 = tracked.limits.max_angular_acceleration_rad_s2.to_degrees();
-        // Smoothing leaves exp(-(2 pi 1.5 sigma)^2 / 2) of it, 0.70 for 0.09 s and 0.64 for 0.1 s; times 1.5.
+        // Smoothing leaves exp(-(2 pi 1.5 sigma)^2 / 2) of it: 0.70 for 0.09 s and 0.64 for 0.1 s; times 1.5.
         assert!((1600.0..1950.0).contains(&limit_deg_s2), "{kind:?}: {limit_deg_s2}");
         assert_eq!(tracked.limits.max_acceleration_m_s2, PAPER_ACCELERATION_M_S2);
         let report = tracked.report(&rows).unwrap();
@@ -362,14 +362,14 @@ fn accelerations_come_from_the_log_and_are_at_least_the_papers() {
 }
 
 #[test]
-fn a_limit_is_told_with_the_time_at_which_it_held_the_motion_back() {
+fn saturation_intervals_have_their_times() {
     let rows = agile();
     let tracked = track(&rows, &paper_limits(TrackerSpec::default())).unwrap();
-    let first = tracked.holds.first().copied().unwrap();
+    let first = tracked.saturation_intervals.first().copied().unwrap();
     assert_eq!(first.limit, Limit::MaxAngularAcceleration);
     assert!((first.duration_s() - tracked.saturation.angular_acceleration_s).abs() < 1e-9, "{first:?}");
-    let since = tracked.holds.iter().map(|hold| hold.from_s).fold(f64::INFINITY, f64::min);
-    assert!((9.5..10.3).contains(&since) && tracked.holds.len() <= MOST_HOLDS, "{since}");
+    let since = tracked.saturation_intervals.iter().map(|hold| hold.from_s).fold(f64::INFINITY, f64::min);
+    assert!((9.5..10.3).contains(&since) && tracked.saturation_intervals.len() <= MAX_INTERVALS, "{since}");
     let warning = tracked.distance_warning(&rows).unwrap();
     assert!(warning.contains("deg RMS from the log"), "{warning}");
     let still: Vec<_> =
@@ -378,7 +378,7 @@ fn a_limit_is_told_with_the_time_at_which_it_held_the_motion_back() {
 }
 
 #[test]
-fn faults_are_named() {
+fn invalid_logs_and_settings_are_refused() {
     let good = row(0.0, DVec3::ZERO, DQuat::IDENTITY);
     let default = TrackerSpec::default();
     assert_eq!(track(&[], &default).unwrap_err(), TrackerError::Empty);

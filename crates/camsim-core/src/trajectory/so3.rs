@@ -44,7 +44,7 @@ pub fn log(rotation: DQuat) -> DVec3 {
 ///
 /// `J v' = v' + (1 - cos a)/a^2 v x v' + (a - sin a)/a^3 v x (v x v')`, a = |v| (e.g. Barfoot, State
 /// Estimation for Robotics, 7.77).
-pub fn left_jacobian_times(rotation_vector: DVec3, vector_rate: DVec3) -> DVec3 {
+pub(crate) fn left_jacobian_times(rotation_vector: DVec3, vector_rate: DVec3) -> DVec3 {
     let angle2 = rotation_vector.length_squared();
     let (first, second) = if angle2 < SERIES_BELOW_RAD2 {
         (

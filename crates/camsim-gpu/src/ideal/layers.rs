@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use camsim_core::{
     pose::CameraPose,
-    scene::paint_order::{PaintOrder, back_to_front},
+    scene::{
+        Shape,
+        depth_sort::{DepthOrder, back_to_front},
+    },
 };
 use glam::{DMat3, DVec2, DVec3};
 
@@ -12,7 +15,7 @@ use super::{IdealSlot, pipelines::SurfacePipelines, surfaces::index_buffer};
 use crate::{
     context::{GpuContext, GpuError},
     recorder::Recorder,
-    upload::{MeshBatch, SceneBuffers},
+    upload::SceneBuffers,
 };
 
 const FEWER_TRIANGLES: &str =
@@ -63,16 +66,18 @@ impl Ordered {
         tangents: [f64; 4],
     ) -> Result<(), GpuError> {
         let mut triangles = Vec::new();
-        for (number, (batch, placements)) in
+        for (number, (_, placements)) in
             buffers.batches.iter().zip(drawn).enumerate().filter(|(_, (batch, _))| batch.kind.blends)
         {
             for placement in placements.iter().cloned().flatten() {
-                let place = seen.get(placement as usize).and_then(|&mesh| buffers.placed.get(mesh as usize));
+                let place =
+                    seen.get(placement as usize).and_then(|&mesh| buffers.meshes.placed.get(mesh as usize));
                 let Some(place) = place else { continue };
                 let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
                 let camera_from_shape = camera_from_ned * place.ned_from_shape;
                 let origin_m = camera_from_ned * (place.origin_ned_m - pose.position_ned_m);
-                let of_shape = in_sight(batch, camera_from_shape, origin_m, tangents);
+                let of_shape =
+                    in_sight(&buffers.meshes.batches[number].shape, camera_from_shape, origin_m, tangents);
                 triangles.extend(of_shape.map(|(corners, in_camera_m)| Triangle {
                     batch: number,
                     placement,
@@ -83,10 +88,10 @@ impl Ordered {
         }
         let places: Vec<[DVec3; 3]> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
         let order = back_to_front(&places)
-            .unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), out_of_order: 0 });
+            .unwrap_or_else(|| DepthOrder { indices: mesh_by_mesh(&triangles), out_of_order: 0 });
         self.out_of_order = order.out_of_order;
-        self.draws = runs(&triangles, &order.places);
-        let indices: Vec<u32> = order.places.iter().flat_map(|&k| triangles[k as usize].corners).collect();
+        self.draws = runs(&triangles, &order.indices);
+        let indices: Vec<u32> = order.indices.iter().flat_map(|&k| triangles[k as usize].corners).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&indices);
         gpu.check_storage(
             "the triangles that one frame mixes with what is behind them",
@@ -134,13 +139,13 @@ impl Ordered {
 
 /// Triangles of a batch's shape that may be in view, by their corners.
 fn in_sight(
-    batch: &MeshBatch,
+    shape: &Shape,
     camera_from_shape: DMat3,
     origin_m: DVec3,
     [u_min, u_max, v_min, v_max]: [f64; 4],
 ) -> impl Iterator<Item = ([u32; 3], [DVec3; 3])> {
-    let vertices = &batch.shape.vertices;
-    let corners = batch.shape.indices.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
+    let vertices = &shape.vertices;
+    let corners = shape.indices.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
     corners.filter_map(move |corners| {
         let [a, b, c] = corners.map(|corner| {
             let at = vertices.get(corner as usize)?.position_m;
@@ -224,7 +229,7 @@ mod tests {
         );
         // With an order of their own they take turns.
         let places: Vec<_> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
-        let order = back_to_front(&places).expect("few").places;
+        let order = back_to_front(&places).expect("few").indices;
         assert_eq!(order, [3, 2, 1, 0]);
         assert_eq!(runs(&triangles, &order).len(), 4);
     }

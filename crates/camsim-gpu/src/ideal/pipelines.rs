@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use camsim_plan::SurfaceReads;
+use camsim_plan::PrefilterTaps;
 
 use super::{
     COLOR_FORMAT, FINE_SAMPLES, IdealPass,
@@ -16,12 +16,12 @@ use crate::{
 };
 
 /// What fills the surfaces' slot.
-fn reads_slot(reads: SurfaceReads) -> Slot {
+fn reads_slot(reads: PrefilterTaps) -> Slot {
     let file = match reads {
-        SurfaceReads::One => "ideal/reads/one.wgsl",
-        SurfaceReads::Two => "ideal/reads/two.wgsl",
-        SurfaceReads::Four => "ideal/reads/four.wgsl",
-        SurfaceReads::Grid => "ideal/reads/grid.wgsl",
+        PrefilterTaps::One => "ideal/reads/one.wgsl",
+        PrefilterTaps::Two => "ideal/reads/two.wgsl",
+        PrefilterTaps::Four => "ideal/reads/four.wgsl",
+        PrefilterTaps::Grid => "ideal/reads/grid.wgsl",
     };
     ("reads", file)
 }
@@ -41,12 +41,12 @@ fn covered_slot(samples: u32) -> Slot {
 
 /// What fills the slots of the ground. It goes on beyond its triangles: reads in the middles of their parts
 /// would only blur it.
-pub(crate) fn ground_slots(reads: SurfaceReads, has_tiles: bool, has_fog: bool) -> [Slot; 4] {
+pub(crate) fn ground_slots(reads: PrefilterTaps, has_tiles: bool, has_fog: bool) -> [Slot; 4] {
     [reads_slot(reads), covered_slot(1), picture_slot(has_tiles), fog_slot(has_fog)]
 }
 
 /// What fills the slots of a mesh.
-pub(crate) fn mesh_slots(reads: SurfaceReads, samples: u32, mixed: bool, has_fog: bool) -> [Slot; 5] {
+pub(crate) fn mesh_slots(reads: PrefilterTaps, samples: u32, mixed: bool, has_fog: bool) -> [Slot; 5] {
     let (picture, color) = match mixed {
         false => (picture_slot(false), ("mesh_color", "ideal/mesh_color/whole.wgsl")),
         true => (("picture", "ideal/picture/mixed.wgsl"), ("mesh_color", "ideal/mesh_color/mixed.wgsl")),
@@ -58,11 +58,11 @@ pub(crate) fn mesh_slots(reads: SurfaceReads, samples: u32, mixed: bool, has_fog
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum SurfaceKey {
     /// Colour and depth, one sample a pixel.
-    Plain(SurfaceReads),
+    Plain(PrefilterTaps),
     /// Depth, several samples a pixel.
     FineDepth,
     /// Colour and depth, several samples a pixel.
-    Fine(SurfaceReads),
+    Fine(PrefilterTaps),
 }
 
 /// What draws surfaces to a target of a given number of samples.
@@ -95,7 +95,7 @@ impl IdealPass {
         let (reads, samples, format) = match key {
             SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
             // Nothing is read for depth, but for holes.
-            SurfaceKey::FineDepth => (SurfaceReads::One, FINE_SAMPLES, None),
+            SurfaceKey::FineDepth => (PrefilterTaps::One, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
         let of_ground = ground_slots(reads, self.has_tiles, self.has_fog);

@@ -109,14 +109,14 @@ impl MiddleDepthPass {
                 binding: 0,
                 resource: wgpu::BindingResource::TextureView(&from.depth),
             }];
-            let label = Some("camsim.ideal.middle_depth");
+            let label = Some("camsim.ideal.resolve_depth");
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label,
                 layout: &self.layout,
                 entries: &entries,
             })
         });
-        let mut pass = recorder.render_pass("middle_depth", None, Some(depth));
+        let mut pass = recorder.render_pass("resolve_depth", None, Some(depth));
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, group, &[]);
         pass.draw(0..3, 0..1);

@@ -1,10 +1,8 @@
 //! What draws a key's surfaces: where they stand is written first, once for all passes that draw them.
 
-use std::ops::Range;
-
 use camsim_core::{
     pose::CameraPose,
-    scene::{LevelTolerance, PlacedMesh, in_view},
+    scene::{LodTolerance, PlacedMesh},
 };
 use glam::DVec3;
 
@@ -14,32 +12,11 @@ use crate::{
     layout::MeshPlacement,
     recorder::Recorder,
     tiles::TilePool,
-    upload::{GroundPicture, MeshBatch, SceneBuffers, TerrainBuffers},
+    upload::{GroundPicture, SceneBuffers, TerrainBuffers},
 };
 
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
-
-/// Meshes that may be in view from a key, by their places in [`SceneBuffers::placed`], those of one batch and
-/// level of detail side by side; and which of them each batch draws with each of its levels.
-pub(super) fn see_meshes(
-    buffers: &SceneBuffers,
-    pose: &CameraPose,
-    tolerance: &LevelTolerance,
-) -> (Vec<u32>, Vec<Vec<Range<u32>>>) {
-    let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
-    let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
-    let places: Vec<_> = buffers
-        .batches
-        .iter()
-        .map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end))
-        .collect();
-    let batches = buffers.batches.iter().zip(places);
-    let drawn = batches
-        .map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance))
-        .collect();
-    (seen, drawn)
-}
 
 /// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how
 /// much detail; gives whose place each is.
@@ -48,13 +25,13 @@ pub(super) fn place_meshes(
     slot: &mut IdealSlot,
     buffers: &SceneBuffers,
     pose: &CameraPose,
-    tolerance: &LevelTolerance,
+    tolerance: &LodTolerance,
     base_ned_m: DVec3,
 ) -> Vec<u32> {
-    let (seen, drawn) = see_meshes(buffers, pose, tolerance);
+    let (seen, drawn) = buffers.meshes.in_view(pose, tolerance);
     slot.drawn = drawn;
     let placement = |&i: &u32| {
-        let shape = &buffers.placed[i as usize];
+        let shape = &buffers.meshes.placed[i as usize];
         let origin = (shape.origin_ned_m - base_ned_m).as_vec3();
         let row = |axis: usize| shape.ned_from_shape.row(axis).as_vec3().extend(origin[axis]).to_array();
         MeshPlacement { x: row(0), y: row(1), z: row(2) }
@@ -64,27 +41,6 @@ pub(super) fn place_meshes(
         recorder.write(&slot.placements, 0, bytemuck::cast_slice(&placements));
     }
     seen
-}
-
-/// Sorts those of a batch that are seen by their level of detail; gives the range of each level.
-fn by_level(
-    batch: &MeshBatch,
-    buffers: &SceneBuffers,
-    seen: &mut [u32],
-    first: usize,
-    pose: &CameraPose,
-    tolerance: &LevelTolerance,
-) -> Vec<Range<u32>> {
-    let level = |&i: &u32| match batch.ranges.len() {
-        0 | 1 => 0,
-        _ => batch.levels.within(
-            tolerance.error_m(&buffers.bounds[i as usize], pose) / buffers.placed[i as usize].stretch,
-        ),
-    };
-    seen.sort_by_cached_key(level);
-    let levels: Vec<usize> = seen.iter().map(level).collect();
-    let place = |level: usize| (first + levels.partition_point(|&of| of < level)) as u32;
-    (0..batch.ranges.len()).map(|level| place(level)..place(level + 1)).collect()
 }
 
 /// Draws the meshes, or the depth of those that are mixed with what is behind them.

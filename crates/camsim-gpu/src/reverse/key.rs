@@ -177,7 +177,7 @@ impl PipelineKey {
             keys: match temporal {
                 _ if plan.keys.len() > 1 => KeyKind::Several,
                 TemporalKind::Rotation | TemporalKind::Reproject
-                    if plan.truth && plan.looks_from_elsewhere() =>
+                    if plan.truth && plan.has_displaced_key() =>
                 {
                     KeyKind::Elsewhere
                 }
@@ -378,7 +378,7 @@ impl PipelineKey {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use camsim_plan::SurfaceReads;
+    use camsim_plan::PrefilterTaps;
 
     use super::*;
     use crate::{
@@ -414,7 +414,7 @@ mod tests {
         ];
         let mixed = [("ideal/mesh.wgsl", true), ("ideal/mesh_lit.wgsl", true)];
         let surfaces = surfaces.into_iter().chain(mixed).flat_map(|(file, other)| {
-            SurfaceReads::ALL.into_iter().flat_map(move |reads| {
+            PrefilterTaps::ALL.into_iter().flat_map(move |reads| {
                 [1, 4].map(|samples| {
                     // Of the ground in tiles and on a clear day, of meshes mixed and in fog.
                     let on_ground = crate::ideal::ground_slots(reads, other, !other);

@@ -5,7 +5,7 @@ use std::{
     ops::{Add, Mul},
 };
 
-use camsim_core::scene::{MeshVertex, Shape, light::turned_normal};
+use camsim_core::scene::{MeshVertex, Shape, light::transformed_normal};
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::{
     Semantic,
@@ -142,7 +142,7 @@ impl Making<'_> {
             let matrices = self.blended(primitive, joints, count, DMat3::ZERO, |joint, _| joint.matrix3)?;
             normals.iter_mut().zip(matrices).filter(|(_, (_, weight))| *weight > 0.0).for_each(
                 |(normal, (matrix, _))| {
-                    *normal = turned_normal(&matrix, *normal);
+                    *normal = transformed_normal(&matrix, *normal);
                 },
             );
         }

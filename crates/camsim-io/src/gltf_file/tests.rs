@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use camsim_core::scene::{MeshVertex, light::turned_normal};
+use camsim_core::scene::{MeshVertex, light::transformed_normal};
 use glam::DVec2;
 
 use super::*;
@@ -319,8 +319,9 @@ const WITH_NORMALS: GltfOptions = GltfOptions { normals: true, scene: None, time
 /// Normals of a model's corners as it stands.
 fn standing(model: &Model, heading_rad: f64) -> Vec<DVec3> {
     let of = |mesh: Mesh| {
-        let turned =
-            |normal: &[f32; 3]| turned_normal(&mesh.ned_from_shape, DVec3::from_array(normal.map(f64::from)));
+        let turned = |normal: &[f32; 3]| {
+            transformed_normal(&mesh.ned_from_shape, DVec3::from_array(normal.map(f64::from)))
+        };
         mesh.shape.normals.iter().map(turned).collect::<Vec<_>>()
     };
     model.place(DVec3::ZERO, heading_rad, 2.0).flat_map(of).collect()
@@ -408,7 +409,7 @@ fn normals_of_real_models_look_outwards_wherever_joints_take_them() {
                 let [a, b, c] = [0, 1, 2].map(|k| mesh.position_ned_m(triangle[k]));
                 let face = (b - a).cross(c - a);
                 for &corner in triangle {
-                    let normal = turned_normal(
+                    let normal = transformed_normal(
                         &mesh.ned_from_shape,
                         DVec3::from_array(mesh.shape.normals[corner as usize].map(f64::from)),
                     );

@@ -7,8 +7,8 @@ use camsim_core::{
     geodesy::{Geodetic, GeoidCache},
     scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
     scene::{
-        Encoding, Light, Mesh, Scene, cut_where_blended_cross, linear_from_srgb, ned_from_board,
-        paint_order::MOST_TRIANGLES,
+        Encoding, Light, Mesh, Scene, depth_sort::MAX_TRIANGLES, linear_from_srgb, ned_from_board,
+        split_intersecting_blended,
     },
 };
 use glam::DVec3;
@@ -69,7 +69,7 @@ pub(super) fn load_scene(
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
     }
     notes.extend(too_many_to_order(&scene));
-    let left = cut_where_blended_cross(&mut scene.meshes).left;
+    let left = split_intersecting_blended(&mut scene.meshes).remaining;
     notes.extend((left > 0).then(|| {
         format!("scene.gltf: {left} places where blended triangles pass through each other are not cut, and may be mixed in the wrong order there")
     }));
@@ -83,9 +83,9 @@ pub(super) fn load_scene(
 fn too_many_to_order(scene: &Scene) -> Option<String> {
     let blended = scene.meshes.iter().filter(|mesh| mesh.material.blends);
     let triangles: usize = blended.map(|mesh| mesh.shape.indices.len() / 3).sum();
-    (triangles > MOST_TRIANGLES).then(|| {
+    (triangles > MAX_TRIANGLES).then(|| {
         format!(
-            "scene.gltf: {triangles} triangles are blended; frames with more than {MOST_TRIANGLES} of them in view draw them mesh by mesh by distance, and may \
+            "scene.gltf: {triangles} triangles are blended; frames with more than {MAX_TRIANGLES} of them in view draw them mesh by mesh by distance, and may \
              mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode MASK does without"
         )
     })
@@ -207,11 +207,11 @@ mod tests {
         let note = |mesh: &Mesh, count: usize| {
             too_many_to_order(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() })
         };
-        assert_eq!(note(&pane, MOST_TRIANGLES), None);
+        assert_eq!(note(&pane, MAX_TRIANGLES), None);
         pane.material.blends = true;
-        assert_eq!(note(&pane, MOST_TRIANGLES / 2), None);
+        assert_eq!(note(&pane, MAX_TRIANGLES / 2), None);
         assert!(
-            note(&pane, MOST_TRIANGLES / 2 + 1)
+            note(&pane, MAX_TRIANGLES / 2 + 1)
                 .is_some_and(|note| note.contains("16386 triangles are blended"))
         );
     }

@@ -123,7 +123,7 @@ impl Ortho {
         // What holds the border of the ground holds the ground.
         let holds_ground = dem.border().all(|at| place.is_inside(place.pixel(dem, at)));
         if spec.beyond == Beyond::Grey && !holds_ground {
-            texture = texture.within(MARGIN_PX, [GREY, GREY, GREY, 255]);
+            texture = texture.padded(MARGIN_PX, [GREY, GREY, GREY, 255]);
             place.margin_px = f64::from(MARGIN_PX);
         }
         Ok(Self { texture, place: Some(place), content, holds_ground, notes: with_name(path, notes) })

@@ -396,7 +396,7 @@ fn the_scenes_light_takes_the_place_of_the_shading_of_heights() {
     let linear = |byte: u8| f64::from(linear_from_srgb(f32::from(byte) / 255.0));
     let (bright, dim) = (picture(Some(open)), picture(Some(half)));
     assert_ne!(picture(None), bright);
-    let ratio = half.on(up) / open.on(up);
+    let ratio = half.factor(up) / open.factor(up);
     for (a, b) in bright.chunks_exact(4).zip(dim.chunks_exact(4)) {
         for (a, b) in a[..3].iter().zip(b) {
             // Both are rounded to a byte of sRGB.

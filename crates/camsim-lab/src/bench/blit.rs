@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use camsim_gpu::{GpuContext, GpuError};
+use camsim_engine::{GpuContext, GpuError};
 
 use super::{BenchError, rounds::Times};
 use crate::timing::{ms, processor_ms};

@@ -2,7 +2,7 @@
 //! rounds of each: by chance alone some pairs look as if one were slower. What is suspected is measured once
 //! more, two by two, and only what both measurements say is told.
 
-use camsim_gpu::Engine;
+use camsim_engine::Engine;
 
 use super::{
     BenchError, Violation,

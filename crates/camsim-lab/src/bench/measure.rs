@@ -6,7 +6,7 @@ use camsim_core::{
     scenario::{Channel, Preset},
     sequence::Sequence,
 };
-use camsim_gpu::{Engine, RenderError};
+use camsim_engine::{Engine, RenderError};
 use camsim_plan::{FramePlan, Planner, Predicted};
 
 use super::{
@@ -26,7 +26,7 @@ struct Work {
 
 impl Work {
     fn new(engine: &Engine, sequence: &Arc<Sequence>) -> Result<Self, BenchError> {
-        let planner = Planner::new(sequence.clone(), &[Channel::Color], engine.gpu().max_side_px())
+        let planner = Planner::new(sequence.clone(), &[Channel::Color], engine.max_side_px())
             .map_err(RenderError::from)?;
         let plan = planner.plan(FRAME).map_err(RenderError::from)?;
         Ok(Self { planner, texts: HashMap::from([(FRAME, text(plan.clone()))]), plan })

@@ -16,10 +16,7 @@ use std::{
 };
 
 use camsim_core::{scenario::Channel, sequence::Sequence};
-use camsim_gpu::{
-    Engine,
-    engine::{Finished, Session},
-};
+use camsim_engine::{Engine, Finished, Session};
 
 use super::BenchError;
 use crate::timing::{ms, processor_ms, quantile, quartiles};

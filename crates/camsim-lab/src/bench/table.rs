@@ -19,7 +19,7 @@ const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
 const CYCLES_CASE: &str = "blender-plane";
 
 impl Report {
-    /// The tables, ready to paste into docs/ACCURACY.md.
+    /// The tables, as docs/results/bench-*.md has them.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::new();
@@ -30,7 +30,7 @@ impl Report {
     fn write_markdown(&self, text: &mut String) -> std::fmt::Result {
         writeln!(
             text,
-            "camsim {}, {}, {} processor threads. `camsim bench{}`, {:.0} s.",
+            "camsim {}, {}, {} CPU threads. `camsim bench{}`, {:.0} s.",
             self.version,
             self.adapter,
             self.cpu_threads,
@@ -38,7 +38,7 @@ impl Report {
             self.elapsed_s
         )?;
         if self.cases[0] < self.cases[1] {
-            writeln!(text, "\nNot complete: {} of {} cases.", self.cases[0], self.cases[1])?;
+            writeln!(text, "\nIncomplete: {} of {} cases.", self.cases[0], self.cases[1])?;
         }
         for rows in self.rows.chunk_by(|a, b| a.case == b.case) {
             self.case(text, rows)?;
@@ -87,7 +87,7 @@ impl Report {
         }
         writeln!(
             text,
-            "| method | ms a frame | p99 | processor ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
+            "| method | ms per frame | p99 | CPU ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
         )?;
         writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|---|---|")?;
         for row in rendered {
@@ -129,23 +129,19 @@ impl Report {
         if let Some(row) = worst(|row| row.falsely_valid) {
             writeln!(
                 text,
-                "\nMost pixels with a source that the oracle has none for: {} ({}).",
+                "\nLargest number of falsely valid pixels: {} ({}).",
                 row.falsely_valid, row.knob
             )?;
         }
         if let Some(row) = worst(|row| row.missing) {
-            writeln!(
-                text,
-                "\nMost pixels without a source that the oracle has one for: {} ({}).",
-                row.missing, row.knob
-            )?;
+            writeln!(text, "\nLargest number of missing pixels: {} ({}).", row.missing, row.knob)?;
         }
         Ok(())
     }
 
     fn ablation(&self, text: &mut String) -> std::fmt::Result {
-        writeln!(text, "\n### What each effect costs (case all-effects)\n")?;
-        let columns = "ms a frame | to the whole camera, ms (quartiles) | processor ms";
+        writeln!(text, "\n### Cost of each effect (case all-effects)\n")?;
+        let columns = "ms per frame | difference to the full camera, ms (quartiles) | CPU ms";
         writeln!(text, "| without | {columns} | sampled alike, {columns} |")?;
         writeln!(text, "|---|---|---|---|---|---|---|")?;
         let difference = |quartiles: Option<[f64; 3]>| {
@@ -169,11 +165,11 @@ impl Report {
     }
 
     fn checks(&self, text: &mut String) -> std::fmt::Result {
-        writeln!(text, "\n### No point spends more time for more error\n")?;
+        writeln!(text, "\n### Choices of the planner that another method dominates\n")?;
         if self.violations.is_empty() {
             writeln!(
                 text,
-                "Of the rows that the plan chose, none is beaten by another row of its case in both time and error: by 2 % at least in nine tenths of the rounds, and clearly."
+                "None: no other method of the same case has both a lower time (by at least 2 % in nine tenths of the rounds) and a clearly lower error."
             )?;
         }
         for violation in &self.violations {
@@ -189,7 +185,7 @@ impl Report {
             ];
             writeln!(
                 text,
-                "- {}: {} takes {:.2} times the time of {} for {}",
+                "- {}: {} takes {:.2} times the time of {}, with {}",
                 violation.case,
                 violation.row,
                 violation.time_ratio,
@@ -197,7 +193,7 @@ impl Report {
                 compared.into_iter().flatten().collect::<Vec<_>>().join(", "),
             )?;
         }
-        writeln!(text, "\n### What was promised\n\n| promise | measured | kept |\n|---|---|---|")?;
+        writeln!(text, "\n### Targets\n\n| target | measured | met |\n|---|---|---|")?;
         for promise in self.promises() {
             writeln!(
                 text,
@@ -419,8 +415,8 @@ impl Report {
                 self.version,
                 self.adapter.split(" (").next().unwrap_or_default()
             ),
-            x_label: "ms a frame (median)".into(),
-            y_label: "RMS of the source coordinates, px (geometric means over the cases of a kind)".into(),
+            x_label: "ms per frame (median)".into(),
+            y_label: "RMS source error, px (geometric mean over the cases of a group)".into(),
             log: [true, true],
             series,
         };

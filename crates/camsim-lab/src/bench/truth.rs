@@ -13,7 +13,7 @@ use camsim_core::{
     scenario::Channel,
     sequence::Sequence,
 };
-use camsim_gpu::{Engine, engine::Finished};
+use camsim_engine::{Engine, Finished};
 
 use super::{BenchError, rounds::FRAME};
 use crate::cases::world::hash;

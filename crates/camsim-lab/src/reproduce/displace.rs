@@ -21,7 +21,7 @@ use camsim_core::{
         displacement::{Twist, image_rate, rk2, rk2_steps},
     },
 };
-use camsim_gpu::Engine;
+use camsim_engine::Engine;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 

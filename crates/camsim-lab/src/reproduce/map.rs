@@ -81,7 +81,7 @@ fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError
         let step = (width / 32).max(1) as usize;
         let looks = (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| [x, y]));
         let looks: Vec<bool> =
-            looks.filter_map(|at| view.look(at, DVec2::ZERO, 0.0)).map(|look| look.hit.is_some()).collect();
+            looks.filter_map(|at| view.sample(at, DVec2::ZERO, 0.0)).map(|look| look.hit.is_some()).collect();
         looks.iter().filter(|hit| **hit).count() as f64 / looks.len().max(1) as f64
     };
     let turns = instants
@@ -106,7 +106,7 @@ fn paper_errors(
     let (mut errors, mut outside) = (Vec::new(), 0);
     for y in (0..height).step_by(STEP_PX as usize) {
         for x in (0..width).step_by(STEP_PX as usize) {
-            let Some(look) = view.look([x, y], DVec2::ZERO, phase) else { continue };
+            let Some(look) = view.sample([x, y], DVec2::ZERO, phase) else { continue };
             let found =
                 ideal.source_px(look.uv, look.t_s - sequence.start_s, Model::Rk2(2.5_f64.to_radians()));
             let truth = key.source_px(&look);

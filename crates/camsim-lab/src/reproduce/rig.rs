@@ -18,7 +18,7 @@ use camsim_core::{
     shutter::Shutter,
     trajectory::Trajectory,
 };
-use camsim_gpu::{Engine, engine::Finished};
+use camsim_engine::{Engine, Finished};
 use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -284,7 +284,7 @@ pub fn wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<
     let view = oracle.view(0);
     let wrong = frame.color_rgba.par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
         let at = [*i as u32 % width, *i as u32 / width];
-        let look = view.look(at, DVec2::ZERO, 0.0);
+        let look = view.sample(at, DVec2::ZERO, 0.0);
         look.is_some_and(|look| {
             pixel[3] > 0.0 && if look.hit.is_some() { sky(pixel) > 0.75 } else { sky(pixel) < 0.25 }
         })

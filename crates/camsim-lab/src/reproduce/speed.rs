@@ -6,7 +6,7 @@ use std::{
 };
 
 use camsim_core::scenario::{Auto, CameraSpec, Channel, Preset, ShutterSpec, Silhouettes};
-use camsim_gpu::engine::Session;
+use camsim_engine::Session;
 
 use super::{
     Report, ReproduceError, Setup, Table,
@@ -82,7 +82,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         "Adapter: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, variants in turn. The paper: more than 33 frames/s with 100 samples on a \
          GeForce 940MX. \"Reference program\": its published code, measured at 640x480 with the same scene under Mesa's software adapter on two cores, so only such a \
          machine compares with it. camsim takes as many samples as its tolerance needs, whatever the row says.",
-        setup.engine.gpu().adapter,
+        setup.engine,
         setup.width_px,
         setup.width_px * 3 / 4,
         variants[0].ms.len(),

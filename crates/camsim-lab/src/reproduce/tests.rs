@@ -1,6 +1,6 @@
 //! Every experiment in a small form, without the paper's files.
 
-use camsim_gpu::AdapterChoice;
+use camsim_engine::AdapterChoice;
 
 use super::{displace::Model, *};
 

@@ -3,7 +3,7 @@
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     scenario::{Auto, FlightSpec, LogFormat, TrackerKind, TrackerSpec},
-    tracker::{Channels, TrackReport, Tracked, track},
+    tracker::{Channels, TrackReport, TrackResult, track},
 };
 use camsim_io::{builtin, flight_log::read_flight_log};
 
@@ -25,7 +25,7 @@ pub(super) struct Followed {
     /// `sqrt` or `spline`.
     pub name: &'static str,
     /// Motion.
-    pub tracked: Tracked,
+    pub tracked: TrackResult,
     /// Errors.
     pub report: TrackReport,
 }
@@ -138,7 +138,7 @@ fn motion(followed: &[Followed]) -> Table {
 fn error_plot(log: &FlightLog, followed: &[Followed]) -> Plot {
     let end_s = log.duration_s();
     let [begin_s, last_s] = if end_s > PLOTTED_S[1] { PLOTTED_S } else { [0.0, end_s] };
-    let points = |tracked: &Tracked| {
+    let points = |tracked: &TrackResult| {
         let count = ((last_s - begin_s) / PLOT_STEP_S) as u32;
         (0..=count)
             .map(|k| {

@@ -1,12 +1,12 @@
-//! Renders of the net: on the device and, where it can, on the host; checksums of their channels.
+//! Renders of the net, by the gpu and by the cpu; checksums of their channels.
 
 use std::{collections::BTreeMap, convert::Infallible, fmt::Write};
 
 use camsim_core::frame::RenderedFrame;
-use camsim_gpu::{
-    AdapterChoice, Engine,
-    engine::Finished,
-    reverse::host::{self, ReverseOn},
+use camsim_engine::{AdapterChoice, Engine, Finished};
+use camsim_plan::{
+    Backend,
+    placement::{cpu_rasterises, cpu_vectorises},
 };
 
 use super::subjects::Subject;
@@ -27,22 +27,35 @@ pub struct Kept {
 /// By subject, frame, renderer and channel.
 pub type Checksums = BTreeMap<String, Kept>;
 
-/// An engine with everything on the device, and one with what the host can do on the host.
-pub fn engines(most_picture_px: u32) -> [Engine; 2] {
-    [ReverseOn::Device, ReverseOn::Host].map(|place| {
-        let engine = Engine::new(AdapterChoice::Software);
-        let mut engine = engine.expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
-        engine.limit_pictures(most_picture_px);
-        engine.set_reverse_on(place);
-        engine.set_ideal_on_host(place == ReverseOn::Host);
-        engine
-    })
+/// One engine for each way to place passes.
+pub struct Engines {
+    pub gpu: Engine,
+    cpu: Engine,
+    gpu_then_cpu: Engine,
+}
+
+impl Engines {
+    pub fn new(most_picture_px: u32) -> Self {
+        let open = |backend| {
+            let engine = Engine::new(AdapterChoice::Software);
+            let mut engine =
+                engine.expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+            engine.limit_pictures(most_picture_px);
+            engine.set_backend(backend);
+            engine
+        };
+        Self { gpu: open(Backend::Gpu), cpu: open(Backend::Cpu), gpu_then_cpu: open(Backend::GpuThenCpu) }
+    }
 }
 
 /// What bits of a picture depend on beside camsim: adapter with its driver, and the processor.
 pub fn machine(engine: &Engine) -> String {
     let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
-    format!("# adapter: {}\n# processor: {os} {arch}{}\n", engine.gpu().adapter, features())
+    format!(
+        "# adapter: {}\n# processor: {os} {arch}{}\n",
+        engine.gpu().expect("an adapter").adapter,
+        features()
+    )
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -63,8 +76,9 @@ fn features() -> String {
     String::new()
 }
 
-/// The frames of a subject from the device, and those that the host serves from the host.
-pub fn render(engines: &[Engine; 2], subject: &Subject) -> [Vec<RenderedFrame>; 2] {
+/// The frames of a subject by the gpu, and by the cpu those that it vectorises, from ideal frames of its own
+/// where it can draw them.
+pub fn render(engines: &Engines, subject: &Subject) -> [Vec<RenderedFrame>; 2] {
     let sequence = subject.sequence(Some(SIZE_PX));
     let frames_of = |engine: &Engine, frames: &[u64]| {
         let mut finished = Vec::new();
@@ -77,13 +91,18 @@ pub fn render(engines: &[Engine; 2], subject: &Subject) -> [Vec<RenderedFrame>; 
         session.render::<Infallible>(frames.iter().copied(), &mut keep).expect(&subject.name);
         finished
     };
-    let from_device = frames_of(&engines[0], &subject.frames);
-    let is_served = |done: &&Finished| host::serves(&done.plan);
-    let served: Vec<u64> = from_device.iter().filter(is_served).map(|done| done.frame.index).collect();
-    let from_host = if served.is_empty() { Vec::new() } else { frames_of(&engines[1], &served) };
-    assert!(from_device.iter().all(|done| done.times.reverse_ms.is_none()), "{}: device", subject.name);
-    assert!(from_host.iter().all(|done| done.times.reverse_ms.is_some()), "{}: host", subject.name);
-    [from_device, from_host].map(|finished| finished.into_iter().map(|done| done.frame).collect())
+    let from_gpu = frames_of(&engines.gpu, &subject.frames);
+    let is_served = |done: &&Finished| cpu_vectorises(&done.plan);
+    let served: Vec<u64> = from_gpu.iter().filter(is_served).map(|done| done.frame.index).collect();
+    let max_picture_px = engines.gpu.capabilities().max_picture_px;
+    let by_cpu = match cpu_rasterises(&sequence.scene, max_picture_px) {
+        true => &engines.cpu,
+        false => &engines.gpu_then_cpu,
+    };
+    let from_cpu = if served.is_empty() { Vec::new() } else { frames_of(by_cpu, &served) };
+    assert!(from_gpu.iter().all(|done| done.times.reverse_ms.is_none()), "{}: gpu", subject.name);
+    assert!(from_cpu.iter().all(|done| done.times.reverse_ms.is_some()), "{}: cpu", subject.name);
+    [from_gpu, from_cpu].map(|finished| finished.into_iter().map(|done| done.frame).collect())
 }
 
 /// Adds the channels of a frame, and says what no picture may have.
@@ -114,10 +133,13 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// What the colours of two frames are apart, RMS, 1/255.
-pub fn apart_dn(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
-    let squares = a.color_rgba.iter().zip(&b.color_rgba).map(|(a, b)| f64::from(a - b).powi(2));
-    255.0 * (squares.sum::<f64>() / a.color_rgba.len() as f64).sqrt()
+/// RMS difference of the colours of two frames over the pixels that are valid in both, 1/255; and the number of
+/// pixels that are valid in one alone: the lens inverses round otherwise where the lens folds its image.
+pub fn apart_dn(a: &RenderedFrame, b: &RenderedFrame) -> (f64, usize) {
+    let pixels = a.color_rgba.chunks_exact(4).zip(b.color_rgba.chunks_exact(4));
+    let (valid, other): (Vec<_>, Vec<_>) = pixels.partition(|(a, b)| a[3] == b[3]);
+    let squares = valid.iter().flat_map(|(a, b)| a.iter().zip(*b)).map(|(a, b)| f64::from(a - b).powi(2));
+    (255.0 * (squares.sum::<f64>() / (4 * valid.len()).max(1) as f64).sqrt(), other.len())
 }
 
 /// One line each, below the machine.

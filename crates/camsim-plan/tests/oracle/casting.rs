@@ -31,7 +31,7 @@ fn a_look_takes_microseconds() {
         for y in (0..480).step_by(4) {
             for x in (0..640).step_by(4) {
                 hits += u32::from(
-                    oracle.look(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()),
+                    oracle.sample(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()),
                 );
             }
         }

@@ -82,7 +82,7 @@ fn check(name: &str, scenario: &Scenario, motion: Steady, reach: f64) {
             let t_s = stamp_s
                 + row_mid_s(&camera.shutter, pixel.y, height)
                 + phase * 1e-3 * camera.shutter.exposure_ms;
-            let look = oracle.look(3, [pixel.x as u32, pixel.y as u32], at_px - pixel, phase).unwrap();
+            let look = oracle.sample(3, [pixel.x as u32, pixel.y as u32], at_px - pixel, phase).unwrap();
             let hit = look.hit.unwrap();
 
             let (at, ned_from_camera) = pose(&motion, t_s);
@@ -151,7 +151,7 @@ fn columns_have_their_own_times() {
         let scenario = camera(LensSpec::default(), shutter);
         let oracle = Oracle::new(sequence(scenario, Steady::moving(150.0), plane(9000.0))).unwrap();
         for [x, y] in [[0, 0], [0, 1], [639, 0], [320, 241], [17, 98]] {
-            let look = oracle.look(2, [x, y], DVec2::ZERO, 0.0).unwrap();
+            let look = oracle.sample(2, [x, y], DVec2::ZERO, 0.0).unwrap();
             let column_s = sign * 0.033 * ((f64::from(x) + 0.5) / 640.0 - 0.5) - 0.004;
             let field_s = if y % 2 == 0 { 0.5 / 30.0 } else { 0.0 };
             assert!((look.t_s - (2.0 / 30.0 + column_s - field_s)).abs() < 1e-14, "{readout:?} {x} {y}");
@@ -192,7 +192,7 @@ fn the_folding_lens_is_inverted_up_to_its_fold() {
             if !(pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < 640.0 && pixel.y < 480.0) {
                 continue;
             }
-            let look = oracle.look(0, [pixel.x as u32, pixel.y as u32], at_px - pixel, 0.0);
+            let look = oracle.sample(0, [pixel.x as u32, pixel.y as u32], at_px - pixel, 0.0);
             let found =
                 look.unwrap_or_else(|| panic!("nothing seen at {share} of the fold in direction {spoke}")).uv;
             assert!(found.distance(uv) < 1e-8, "{spoke} {share}: {found} {uv}");
@@ -203,7 +203,7 @@ fn the_folding_lens_is_inverted_up_to_its_fold() {
         let pixel = far_px.round();
         if pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < 640.0 && pixel.y < 480.0 {
             assert_eq!(
-                oracle.look(0, [pixel.x as u32, pixel.y as u32], far_px - pixel, 0.0),
+                oracle.sample(0, [pixel.x as u32, pixel.y as u32], far_px - pixel, 0.0),
                 None,
                 "{spoke}"
             );

@@ -39,7 +39,7 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
                 let phase = (f64::from((u64::from(k) * 5701 % u64::from(count)) as u32) + 0.5)
                     / f64::from(count)
                     - 0.5;
-                let look = view.look([i % width, i / width], place, phase).unwrap();
+                let look = view.sample([i % width, i / width], place, phase).unwrap();
                 oracle.color(look.uv, look.hit.as_ref())
             })
             .sum();

@@ -34,8 +34,8 @@ fn rays_that_are_no_rays_meet_nothing() {
                 {
                     assert!(hit.depth_m > 0.0 && hit.point_ned_m.is_finite(), "{p} {d} {hit:?}");
                 }
-                let _ = oracle.hides(p, d);
-                let _ = oracle.look(0, [3, 4], DVec2::new(x, y), z);
+                let _ = oracle.is_occluded(p, d);
+                let _ = oracle.sample(0, [3, 4], DVec2::new(x, y), z);
             }
         }
     }
@@ -103,7 +103,7 @@ fn far_from_the_origin_nothing_is_lost() {
         Steady { position_ned_m: there + Steady::moving(100.0).position_ned_m, ..Steady::moving(100.0) };
     let oracle = Oracle::new(sequence(scenario(), motion, scene)).unwrap();
     for [x, y] in [[0, 0], [320, 240], [639, 479]] {
-        let look = oracle.look(0, [x, y], DVec2::ZERO, 0.0).unwrap();
+        let look = oracle.sample(0, [x, y], DVec2::ZERO, 0.0).unwrap();
         let seen =
             look.pose.ned_from_camera.inverse() * (look.hit.unwrap().point_ned_m - look.pose.position_ned_m);
         assert!((DVec2::new(seen.x, seen.y) / seen.z - look.uv).length() * 500.0 < 1e-6);
@@ -172,7 +172,7 @@ fn lenses_that_fold_or_burst_show_their_branch_only() {
         for y in (0..480).step_by(8) {
             for x in (0..640).step_by(8) {
                 let px = DVec2::new(f64::from(x), f64::from(y));
-                let found = oracle.look(0, [x, y], DVec2::ZERO, 0.0).map(|look| look.uv);
+                let found = oracle.sample(0, [x, y], DVec2::ZERO, 0.0).map(|look| look.uv);
                 if let Some(uv) = found {
                     seen += 1;
                     assert!((camera.project(uv) - px).length() < 1e-6, "{spec:?} {px}");
@@ -211,7 +211,7 @@ fn a_zoom_lens_is_that_of_its_frame() {
     sequence.zoom_track = vec![(0.0, 1.0), (1.0, 2.0)];
     let oracle = Oracle::new(Arc::new(sequence.clone())).unwrap();
     for (frame, focal, k1) in [(0, 300.0, -0.06), (15, 450.0, -0.045), (60, 600.0, -0.03)] {
-        let uv = oracle.look(frame, [600, 400], DVec2::ZERO, 0.0).unwrap().uv;
+        let uv = oracle.sample(frame, [600, 400], DVec2::ZERO, 0.0).unwrap().uv;
         let image = uv * (1.0 + k1 * uv.length_squared()) * focal + DVec2::new(319.5, 239.5);
         assert!((image - DVec2::new(600.0, 400.0)).length() < 1e-9, "{frame}: {image}");
     }

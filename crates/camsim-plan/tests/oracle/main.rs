@@ -3,12 +3,12 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod blended_layers;
 mod casting;
 mod closed_form;
 mod convergence;
+mod disocclusion;
 mod fixtures;
-mod holes;
 mod hostile;
-mod layers;
 mod measuring;
 mod planted_faults;

@@ -127,12 +127,14 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
     };
     let beside = plan([400.0, 300.0]);
     assert!(
-        beside.predicted.probes == 0 && !beside.predicted.kept && beside.predicted.void_share == 1.0,
+        beside.predicted.probes == 0
+            && !beside.predicted.source_error_kept
+            && beside.predicted.void_share == 1.0,
         "{:?}",
         beside.predicted
     );
     assert!(
-        beside.predicted.in_the_way.as_ref().is_some_and(|cause| cause.contains("ideal frame")),
+        beside.predicted.source_error_obstacle.as_ref().is_some_and(|cause| cause.contains("ideal frame")),
         "{:?}",
         beside.predicted
     );
@@ -140,9 +142,12 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
     assert!(text.contains("nothing predicted") && !text.contains("within the tolerance"), "{text}");
     // Half of it.
     let half = plan([160.0, 59.5]).predicted;
-    assert!(half.void_share > 0.1 && half.probes > 100 && !half.kept && half.total_px < 0.05, "{half:?}");
+    assert!(
+        half.void_share > 0.1 && half.probes > 100 && !half.source_error_kept && half.total_px < 0.05,
+        "{half:?}"
+    );
     let middle = plan([79.5, 59.5]).predicted;
-    assert!(middle.kept && middle.void_share == 0.0, "{middle:?}");
+    assert!(middle.source_error_kept && middle.void_share == 0.0, "{middle:?}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use camsim_core::{
     reference::{CoordErrors, Oracle, coord_errors},
     scenario::{Channel, Scenario},
     sequence::Sequence,
-    temporal::{InverseDepthImage, KeyView, reproject},
+    temporal::{InverseDepthImage, KeyDepth, reproject},
 };
 use camsim_plan::{FramePlan, Planner};
 use glam::{DVec2, DVec3};
@@ -43,7 +43,7 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
     let [width, height] = camera.size_px;
     let mut coords = Vec::new();
     let key =
-        KeyView { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px };
+        KeyDepth { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px };
     let mut color_rgba = Vec::new();
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let mut dt_s = plan.shutter.dt_pixel_s(x, y);
@@ -56,7 +56,7 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
         }
         let source = camera
             .unproject(DVec2::new(f64::from(x), f64::from(y)))
-            .and_then(|uv| Some((uv, reproject(uv, (rotation, shift), 6, &key)?.at_px)));
+            .and_then(|uv| Some((uv, reproject(uv, (rotation, shift), 6, &key)?.position_px)));
         let (uv, at_px) = source.unwrap_or_default();
         coords.push([uv.x, uv.y, at_px.x, at_px.y, dt_s, 0.0, 0.0, 0.0].map(|value| value as f32));
         color_rgba.extend([0.0, 0.0, 0.0, if source.is_some() { 1.0 } else { 0.0 }]);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use camsim_plan::{ErrorMap, PlaceError};
+use camsim_plan::{ErrorMap, SourceError};
 use eframe::egui::{Color32, ColorImage};
 
 use super::picture::{Picture, ramp};
@@ -41,7 +41,7 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
     let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
     // Outer: whether a place lies there at all.
     let mut cells = vec![None::<Option<f64>>; columns * rows];
-    for place in &map.places {
+    for place in &map.pixels {
         let [x, y] = place.pixel.map(|at| at as usize);
         let at = (y * rows / height.max(1)).min(rows - 1) * columns
             + (x * columns / width.max(1)).min(columns - 1);
@@ -49,13 +49,13 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
         let known = cell.flatten();
         *cell = Some(match place.error {
             // A corner of the image is in one cell with another place: what is larger counts.
-            PlaceError::Within(px) => Some(known.map_or(px, |known| known.max(px))),
+            SourceError::Within(px) => Some(known.map_or(px, |known| known.max(px))),
             _ => known,
         });
     }
     // On a border between cells a pixel is in just one of them: the other has what is around.
     let around = |at: usize| {
-        map.around_px(
+        map.near_px(
             [(at % columns * 2 + 1) * width / (2 * columns), (at / columns * 2 + 1) * height / (2 * rows)]
                 .map(|v| v as u32),
         )
@@ -81,21 +81,21 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
 
 #[cfg(test)]
 mod tests {
-    use camsim_plan::ErrorPlace;
+    use camsim_plan::PixelError;
 
     use super::*;
 
     #[test]
     fn each_part_of_the_image_has_the_colour_of_its_place() {
         let image = ColorImage::new([4, 2], [vec![Color32::BLACK; 7], vec![Color32::TRANSPARENT]].concat());
-        let place = |pixel, error| ErrorPlace { pixel, error };
-        let places = vec![
-            place([0, 0], PlaceError::Within(1e-3)),
-            place([2, 1], PlaceError::Within(0.1)),
-            place([3, 0], PlaceError::Silhouette),
-            place([1, 1], PlaceError::NoSource),
+        let place = |pixel, error| PixelError { pixel, error };
+        let pixels = vec![
+            place([0, 0], SourceError::Within(1e-3)),
+            place([2, 1], SourceError::Within(0.1)),
+            place([3, 0], SourceError::Silhouette),
+            place([1, 1], SourceError::NoSource),
         ];
-        let map = ErrorMap { places, everywhere_px: 1.0, grid: [2, 2], reach_px: 2.0 };
+        let map = ErrorMap { pixels, everywhere_px: 1.0, grid: [2, 2], reach_px: 2.0 };
         let tinted = tinted(&image, &map);
         let light = |i: usize| {
             u32::from(tinted.pixels[i].r())

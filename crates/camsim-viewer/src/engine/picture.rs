@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::frame::RenderedFrame;
-use camsim_gpu::engine::FrameTimes;
+use camsim_engine::FrameTimes;
 use camsim_io::write::{srgb_from_linear, srgb8};
 use camsim_plan::FramePlan;
 use eframe::egui::{Color32, ColorImage};

@@ -8,10 +8,7 @@ use std::{
 };
 
 use camsim_core::{mount::CameraPath, scenario::Channel, sequence::Sequence};
-use camsim_gpu::{
-    AdapterChoice, Engine, GpuError, RenderError,
-    engine::{Finished, Session},
-};
+use camsim_engine::{Backend, Engine, Finished, GpuError, RenderError, Session};
 use camsim_plan::PlanError;
 
 use super::{
@@ -53,7 +50,7 @@ impl Fault {
 
 /// Serves requests until the box is closed.
 pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
-    run_on(|| Engine::new(AdapterChoice::Best), mailbox, library, speaker);
+    run_on(|| Engine::open(Backend::Auto), mailbox, library, speaker);
 }
 
 /// The same on what `open` gives: anew after a loss, with the request that met it once more, and with each
@@ -79,7 +76,7 @@ fn run_on(
                 continue;
             }
         };
-        speaker.say(Reply::Adapter(engine.gpu().adapter.to_string()));
+        speaker.say(Reply::Adapter(engine.to_string()));
         let mut worker =
             Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
         loop {

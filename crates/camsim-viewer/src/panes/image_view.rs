@@ -12,7 +12,7 @@ use self::canvas::Placement;
 use super::widgets::waiting;
 use crate::{
     engine::{Size, Stage},
-    heard::Sight,
+    heard::PixelTruth,
     message::{Message, Outbox},
     sheet::Place,
     state::State,
@@ -117,7 +117,7 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
     );
 }
 
-fn progress(state: &State, sight: &Sight<'_>) -> String {
+fn progress(state: &State, sight: &PixelTruth<'_>) -> String {
     if sight.stage == Stage::Oracle {
         return rows_done(state);
     }

@@ -1,7 +1,8 @@
 //! The pixel under the cursor: its value, its instant, its ray, what it sees, and how sure that is.
 
 use camsim_core::{
-    camera::CameraModel, geodesy::LocalFrame, reference::Look, scenario::SceneSpec, temporal::samples_for,
+    camera::CameraModel, geodesy::LocalFrame, reference::RaySample, scenario::SceneSpec,
+    temporal::samples_for,
 };
 use camsim_io::write::srgb8;
 use camsim_plan::FramePlan;
@@ -13,7 +14,7 @@ use super::{
     widgets::{fact, facts, fixed, signed},
 };
 use crate::{
-    heard::Sight,
+    heard::PixelTruth,
     message::{Message, Outbox},
     motion,
     state::State,
@@ -45,7 +46,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 }
 
 /// Values of a picture.
-fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
+fn value(ui: &mut Ui, state: &State, sight: &PixelTruth<'_>, [x, y]: [u32; 2]) {
     let full =
         state.heard.shown.as_ref().map_or(sight.size_px, |shown| shown.reply.wanted.scenario.camera.size_px);
     let factor = if full == sight.size_px { 1 } else { crate::engine::preview_factor(full) };
@@ -89,7 +90,7 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
     let view = looks.view(frame);
     let stamp_s = looks.stamp_s(frame);
     let mid_s = view.mid_s(pixel);
-    let look = view.look(pixel, DVec2::ZERO, 0.0);
+    let look = view.sample(pixel, DVec2::ZERO, 0.0);
     facts(ui, "geometry", |ui| {
         fact(
             ui,
@@ -110,7 +111,7 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
         let full = shown.reply.wanted.size == crate::engine::Size::Full;
         if let (Some(plan), Some(look)) = (plan.filter(|_| full), &look) {
             source(ui, plan, look);
-            samples(ui, plan, |phase| view.look(pixel, DVec2::ZERO, phase));
+            samples(ui, plan, |phase| view.sample(pixel, DVec2::ZERO, phase));
         }
     });
     if let Some(plan) = plan {
@@ -128,7 +129,7 @@ fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
     }
 }
 
-fn ray(ui: &mut Ui, look: &Look) {
+fn ray(ui: &mut Ui, look: &RaySample) {
     fact(
         ui,
         "ray u, v",
@@ -139,7 +140,7 @@ fn ray(ui: &mut Ui, look: &Look) {
     fact(ui, "off axis", format!("{off_axis:.3} deg"), "angle to the optical axis");
 }
 
-fn seen(ui: &mut Ui, state: &State, look: &Look) {
+fn seen(ui: &mut Ui, state: &State, look: &RaySample) {
     let Some(hit) = &look.hit else {
         return fact(ui, "sees", "sky", "no surface along the ray");
     };
@@ -209,12 +210,12 @@ fn moved(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
     fact(ui, "blur", format!("{} px", fixed(length_px, 3)), "length of its way over the exposure t_e");
 }
 
-fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
+fn source(ui: &mut Ui, plan: &FramePlan, look: &RaySample) {
     let key = plan.ideal_view();
     let at = key.source_px(look);
     let [width, height] = plan.ideal.size_px.map(f64::from);
     let inside = at.x > -0.5 && at.y > -0.5 && at.x < width - 0.5 && at.y < height - 0.5;
-    let where_ = if inside || plan.looks_from_elsewhere() { "" } else { " (outside: the pixel is invalid)" };
+    let where_ = if inside || plan.has_displaced_key() { "" } else { " (outside: the pixel is invalid)" };
     fact(
         ui,
         "source",
@@ -225,7 +226,7 @@ fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
 
 /// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the
 /// kernel counts them. For taps it may have more.
-fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
+fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<RaySample>) {
     let Some(blur) = plan.blur else { return };
     let key = plan.ideal_view();
     let pieces = PIECES * blur.stretches();
@@ -250,8 +251,8 @@ fn predicted_here(state: &State, [x, y]: [u32; 2]) -> Option<String> {
     let Some(errors) = shown.reply.errors.first() else {
         return state.shows_errors().then(|| "once the hand rests".to_owned());
     };
-    let around_px = errors.map.around_px([x, y]);
-    Some(around_px.map_or_else(|| "counted apart: silhouettes around".to_owned(), |px| format!("{px:.5} px")))
+    let near_px = errors.map.near_px([x, y]);
+    Some(near_px.map_or_else(|| "counted apart: silhouettes around".to_owned(), |px| format!("{px:.5} px")))
 }
 
 /// That a tolerance is broken, if it is; the plan's page says by what.
@@ -275,13 +276,13 @@ fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
         fact(
             ui,
             "predicted error",
-            format!("{:.4} px{}", predicted.total_px, unless(predicted.kept)),
+            format!("{:.4} px{}", predicted.total_px, unless(predicted.source_error_kept)),
             "of the frame: bound on 99 % of its pixels' source coordinates",
         );
         fact(
             ui,
             "of grey levels",
-            format!("{:.3} of 255{}", predicted.picture_dn(), unless(predicted.levels_kept)),
+            format!("{:.3} of 255{}", predicted.picture_dn(), unless(predicted.picture_error_kept)),
             "expected RMS of the picture, from resampling, blur samples and silhouettes",
         );
         let samples = plan.blur.map_or_else(

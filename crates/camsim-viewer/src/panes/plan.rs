@@ -68,10 +68,10 @@ fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
         );
         return;
     }
-    facts(ui, &format!("errors {}", picture.stage.label()), |ui| sources(ui, picture, has_terrain));
-    verdict(ui, predicted.kept, predicted.in_the_way.as_deref());
-    facts(ui, &format!("levels {}", picture.stage.label()), |ui| levels(ui, predicted));
-    verdict(ui, predicted.levels_kept, predicted.levels_in_the_way.as_deref());
+    facts(ui, &format!("errors {}", picture.stage.label()), |ui| source_error(ui, picture, has_terrain));
+    verdict(ui, predicted.source_error_kept, predicted.source_error_obstacle.as_deref());
+    facts(ui, &format!("levels {}", picture.stage.label()), |ui| picture_error(ui, predicted));
+    verdict(ui, predicted.picture_error_kept, predicted.picture_error_obstacle.as_deref());
     if picture.plan.extrapolated {
         ui.label(
             RichText::new("reaches outside the log: extrapolated at constant velocity")
@@ -89,8 +89,8 @@ fn verdict(ui: &mut Ui, kept: bool, cause: Option<&str>) {
     }
 }
 
-/// Of source coordinates, by cause.
-fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
+/// Source error by cause.
+fn source_error(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let plan = &picture.plan;
     let predicted = &plan.predicted;
     fact(
@@ -104,7 +104,7 @@ fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
         ("temporal", predicted.temporal_px, "model of the motion"),
         ("depth", predicted.depth_px, "depth between pixels of the ideal frame"),
         ("nodes", predicted.nodes_px, "curves between the nodes of the exposure"),
-        ("single precision", predicted.format_px, "poses, depth, coordinates"),
+        ("single precision", predicted.rounding_px, "poses, depth, coordinates"),
     ];
     for (what, px, tip) in parts {
         fact(ui, what, format!("{px:.5} px"), tip);
@@ -126,17 +126,17 @@ fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
             "pixels at a step or fold of depth: no bound on their source coordinates",
         );
     }
-    if let Some(holes) = predicted.holes {
-        let text = format!("{:.4} %, {:.2} px wide", 100.0 * holes.share, holes.width_px);
-        fact(ui, "holes", text, "of the picture that no ideal frame sees, behind silhouettes");
+    if let Some(disocclusion) = predicted.disocclusion {
+        let text = format!("{:.4} %, {:.2} px wide", 100.0 * disocclusion.share, disocclusion.width_px);
+        fact(ui, "disocclusion", text, "of the picture that no ideal frame sees, behind silhouettes");
     }
 }
 
-/// Of grey levels, by cause.
-fn levels(ui: &mut Ui, predicted: &Predicted) {
+/// Picture error by cause.
+fn picture_error(ui: &mut Ui, predicted: &Predicted) {
     fact(
         ui,
-        "grey levels",
+        "picture error",
         format!("{:.3} of 255", predicted.picture_dn()),
         "expected RMS of the picture, all causes together",
     );
@@ -149,12 +149,12 @@ fn levels(ui: &mut Ui, predicted: &Predicted) {
     fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
     fact(
         ui,
-        "beside their place",
-        format!("{:.3}", predicted.displaced_dn),
-        "sources of pixels, away from silhouettes",
+        "misregistration",
+        format!("{:.3}", predicted.misregistration_dn),
+        "by the error of sources, away from silhouettes",
     );
-    if let Some(ground) = predicted.ground {
-        fact(ui, "terrain", format!("{:.3}", ground.error_dn()), "drawn coarser than it is, its borders too");
+    if let Some(terrain) = predicted.terrain {
+        fact(ui, "terrain", format!("{:.3}", terrain.error_dn()), "its level of detail, at silhouettes too");
     }
     if let Some(silhouettes) = predicted.silhouettes {
         fact(
@@ -164,9 +164,9 @@ fn levels(ui: &mut Ui, predicted: &Predicted) {
             "as they are made: by the ideal frame's pixels or by rays",
         );
     }
-    if let Some(layers) = predicted.layers {
-        let text = format!("{:.3}, {:.0} % of the picture", layers.error_dn, 100.0 * layers.share);
-        fact(ui, "mixed light", text, "of several surfaces, which moves with the depth of one");
+    if let Some(blended) = predicted.blended_depth {
+        let text = format!("{:.3}, {:.0} % of the picture", blended.error_dn, 100.0 * blended.share);
+        fact(ui, "blended surfaces", text, "whose light moves with the depth of one");
     }
 }
 

@@ -16,7 +16,7 @@ use glam::{DVec2, DVec3};
 use self::{
     canvas::Canvas,
     scene::{Model, model},
-    sight::Sight,
+    sight::PixelTruth,
 };
 use super::{
     map::chart::{self, Chart},
@@ -80,7 +80,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     if orbit != state.view.orbit {
         out.push(Message::View(View { orbit, ..state.view.clone() }));
     }
-    let sight = Sight::new(ui, state, &loaded.sequence, &pose, model.ball.radius_m);
+    let sight = PixelTruth::new(ui, state, &loaded.sequence, &pose, model.ball.radius_m);
     let eye = Eye::new(&orbit, model.ball, pane);
     draw(ui, rect, &eye, &model, &chart, sight.as_ref(), pose.position_ned_m);
     legend(ui, &chart, sight.as_ref(), pose.position_ned_m, state.timeline.frame);
@@ -168,7 +168,7 @@ fn draw(
     eye: &Eye,
     model: &Model,
     chart: &Chart,
-    sight: Option<&Sight>,
+    sight: Option<&PixelTruth>,
     camera_ned_m: DVec3,
 ) {
     let painter = ui.painter_at(rect);
@@ -227,7 +227,7 @@ fn compass(painter: &eframe::egui::Painter, rect: Rect, eye: &Eye) {
     }
 }
 
-fn legend(ui: &mut Ui, chart: &Chart, sight: Option<&Sight>, camera_ned_m: DVec3, frame: u64) {
+fn legend(ui: &mut Ui, chart: &Chart, sight: Option<&PixelTruth>, camera_ned_m: DVec3, frame: u64) {
     ui.horizontal_wrapped(|ui| {
         for (name, color) in [("log", OF_LOG), ("tracked path", OF_PATH), ("camera", OF_CAMERA)] {
             let (spot, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());

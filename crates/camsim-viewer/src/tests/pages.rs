@@ -32,7 +32,7 @@ fn the_inspector_tells_what_the_pixel_sees() {
     assert!(has(&window, &format!("{:.6}, {:.6}", uv.x, uv.y)), "the ray");
     let shutter = Shutter::from_spec(&scenario.camera.shutter, scenario.camera.fps, scenario.camera.size_px)
         .expect("a shutter");
-    assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_line_s(400))), "the row's time");
+    assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_row_s(400))), "the row's time");
     assert!(has(&window, "terrain"));
     let [r, g, b, a] =
         window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
@@ -45,14 +45,12 @@ fn the_inspector_tells_what_the_pixel_sees() {
     });
     let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
     let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
-    let around_px = map.around_px(pixel).expect("ground");
+    let near_px = map.near_px(pixel).expect("ground");
     // The plan answers for the frames that are made like this one too.
     assert!(
-        around_px > 0.0
-            && around_px <= map.largest_px()
-            && map.largest_px() <= plan.predicted.total_px + 1e-9
+        near_px > 0.0 && near_px <= map.largest_px() && map.largest_px() <= plan.predicted.total_px + 1e-9
     );
-    assert!(has(&window, &format!("{around_px:.5} px")), "what is predicted here");
+    assert!(has(&window, &format!("{near_px:.5} px")), "what is predicted here");
     window.harness.key_press(Key::Escape);
     window.step();
     assert_eq!(window.state().pinned, None);

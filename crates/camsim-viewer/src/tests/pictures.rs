@@ -3,7 +3,7 @@
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::scenario::{CameraSpec, LensModel, LensSpec};
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_engine::{AdapterChoice, Engine};
 use camsim_io::{load::load_sequence, scenario_file::read_scenario, write::write_picture};
 use eframe::egui;
 use egui_kittest::kittest::Queryable;
@@ -32,7 +32,7 @@ fn the_picture_on_show_is_what_render_writes() {
         engine.session::<Infallible>(Arc::clone(&sequence), &scenario.output.channels).expect("a session");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("frame.png");
-    let mut write = |finished: camsim_gpu::engine::Finished| {
+    let mut write = |finished: camsim_engine::Finished| {
         write_picture(&path, &finished.frame, scenario.camera.photometric.output).expect("written");
         Ok(())
     };

@@ -1,10 +1,10 @@
-//! `camsim apply` on many frames: one after the other, into a folder.
+//! `camsim apply` on several frames, into a folder.
 
 use std::{collections::BTreeMap, path::Path};
 
 use anyhow::anyhow;
 use camsim_core::{
-    apply::{Pipeline, UnseenCounts},
+    apply::{NoSourceCounts, Pipeline},
     scenario::{CameraSpec, Channel, ImageFormat, OutputSpec},
     sequence::GrayImage,
     shutter::Shutter,
@@ -18,7 +18,7 @@ use camsim_io::{
 };
 use serde::Serialize;
 
-use super::{Args, in_file, read, settings, tell_unseen};
+use super::{Args, in_file, read, settings, warn_no_source};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -29,7 +29,7 @@ use crate::{
     render_run::{Lock, refuse_others, refuse_unknown},
 };
 
-/// Rows of a trajectory that are farther apart have a gap between them: as in flight logs.
+/// Distance of trajectory rows above which there is a gap, as in flight logs.
 const GAP_S: f64 = 1.0;
 
 /// `--format`.
@@ -41,21 +41,20 @@ pub enum Format {
     Png,
 }
 
-/// What the frames of a folder follow from; `--resume` goes on only with the same. Paths are relative to the
-/// folder.
+/// Inputs of the frames of a folder, which must be equal for `--resume`. Paths are relative to the folder.
 #[derive(Debug, Serialize)]
 struct Inputs {
     camera: CameraSpec,
-    /// FRAME.toml, as it is written.
+    /// Text of FRAME.toml.
     frame_toml: String,
     preset: String,
     solver: Option<String>,
     blur_samples: Option<u32>,
     seed: u64,
     frame_number: u64,
-    /// What is in the files that are the same for all frames.
+    /// Contents of the files shared by all frames.
     files: inputs::Inputs,
-    /// Pictures and stamp of each frame, and when the pictures were changed.
+    /// Images and stamp of each frame, with the modification times of the images.
     pictures: BTreeMap<String, String>,
 }
 
@@ -65,14 +64,14 @@ struct Manifest<'a> {
     version: &'static str,
     paths: &'static str,
     apply: &'a Inputs,
-    /// First and one past the last.
+    /// First frame, and one past the last.
     frames: [u64; 2],
     written: u64,
     skipped: u64,
     finished: bool,
 }
 
-/// All frames that are asked for; nothing is written before all of them are known to have their motion.
+/// Renders the selected frames; nothing is written before the motion of all of them is checked.
 pub(super) fn run(
     args: &Args,
     spec: &CameraSpec,
@@ -103,7 +102,8 @@ pub(super) fn run(
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
         Err(error) => {
             refuse_others(&numbers, &files, &error.what())?;
-            console.warn(format_args!("{} is of other inputs: its frames are replaced", folder.display()));
+            console
+                .warn(format_args!("{} belongs to other inputs: its frames are replaced", folder.display()));
         }
     }
     output::check_folder(folder)?;
@@ -129,33 +129,33 @@ pub(super) fn run(
     let begin = std::time::Instant::now();
     let watch = interrupt::watch();
     let rendered = render(args, spec, set, vignette, &todo, files.clone(), &watch, console);
-    // Rows are of what is there, from whichever run.
+    // Rows list the existing frames, from any run.
     let told = write_table(args, set, &files);
     manifest.written = todo.iter().filter(|&&index| files.exist(number(index))).count() as u64;
     manifest.finished = rendered.is_ok() && !(watch.is_asked() && manifest.written < todo.len() as u64);
     write_manifest(args, &manifest)?;
-    let unseen = rendered?;
+    let no_source = rendered?;
     told?;
     if !manifest.finished {
         let done = manifest.written + manifest.skipped;
         let go_on = console.command_with("--resume");
         return Err(Failure::interrupted(anyhow!(
-            "{done} of {} frames are in {}; to go on: {go_on}",
+            "{done} of {} frames are in {}; to resume: {go_on}",
             frames.len(),
             folder.display()
         )));
     }
     let (elapsed_s, skipped) = (begin.elapsed().as_secs_f64(), manifest.skipped);
-    let skipped = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
+    let skipped = if skipped > 0 { format!(" ({skipped} existed)") } else { String::new() };
     console.note(format_args!("{} frames{skipped} in {elapsed_s:.2} s in {}", todo.len(), folder.display()));
     if set.left_out() > 0 {
         console.warn(format_args!(
-            "{} colour pictures have no depth of about their time, and are left out",
+            "{} colour images have no depth image near their time and are left out",
             set.left_out()
         ));
     }
     let pixels = f64::from(spec.size_px[0]) * f64::from(spec.size_px[1]) * todo.len() as f64;
-    tell_unseen(&unseen, pixels, console);
+    warn_no_source(&no_source, pixels, console);
     Ok(())
 }
 
@@ -164,7 +164,7 @@ fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
     let Some(list) = &args.frames else { return Ok((0..count).collect()) };
     list.resolve(count).map_err(|error| match error {
         FrameListError::Outside { frame, .. } => Failure::bad_input(anyhow!(
-            "--frames asks for frame {frame}, but {} names frames 0 to {}",
+            "--frames: frame {frame} does not exist, {} names frames 0 to {}",
             args.frame.display(),
             count - 1
         )),
@@ -172,7 +172,7 @@ fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
     })
 }
 
-/// A frame's first and last instant, after its stamp.
+/// First and last instant of a frame relative to its stamp.
 fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], Failure> {
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
         .map_err(|error| in_file(args, &error.into()))
@@ -181,7 +181,7 @@ fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], 
     Ok([first_s.min(set.instant_s()), last_s.max(set.instant_s())])
 }
 
-/// Warns of frames that are taken where the trajectory has no rows.
+/// Warns of frames within gaps of the trajectory.
 pub(super) fn tell_gaps(
     args: &Args,
     spec: &CameraSpec,
@@ -198,7 +198,7 @@ pub(super) fn tell_gaps(
     if let Some((frame, _)) = steps.first() {
         let longest_s = steps.iter().fold(0.0_f64, |longest, (_, step_s)| longest.max(*step_s));
         console.warn(format_args!(
-            "{}: {} of {} frames, first frame {frame}, are taken in gaps of the trajectory of up to {longest_s:.1} s, which are joined by a straight line and a constant turn",
+            "{}: {} of {} frames, first frame {frame}, are in gaps of the trajectory of up to {longest_s:.1} s, which are interpolated by a straight line and a constant rotation",
             args.frame.display(),
             steps.len(),
             frames.len()
@@ -207,7 +207,7 @@ pub(super) fn tell_gaps(
     Ok(())
 }
 
-/// Every frame's window must be within the trajectory.
+/// Checks that the window of every frame is within the trajectory.
 fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
     let [first_s, last_s] = window_s(args, spec, set)?;
     let mut covered = Vec::new();
@@ -233,7 +233,7 @@ fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) 
 
 fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Failure> {
     let folder = &args.output;
-    // Pictures are too many to be read for it.
+    // There are too many images to read their contents.
     let text = |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::dated(path));
     let mut camera = spec.clone();
     for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
@@ -300,7 +300,7 @@ fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
     write_atomic(&args.output.join("run.json"), text.as_bytes()).or_failed()
 }
 
-/// `frames.csv` of all frames whose files are there.
+/// Writes `frames.csv` for all existing frames.
 fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Failure> {
     let _lock = Lock::take(&args.output)?;
     let there: Vec<u64> = (0..set.entries().len() as u64)
@@ -309,7 +309,7 @@ fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Fa
     write_atomic(&args.output.join("frames.csv"), &frames_csv(args, set, files, &there)?).or_failed()
 }
 
-/// `frame,stamp_ns,from_color,from_depth`, then the files of each frame; what there is none of is empty.
+/// Columns `frame,stamp_ns,from_color,from_depth`, then the files of each frame; empty if there is none.
 fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let (columns, names) = (["frame", "stamp_ns", "from_color", "from_depth"], files.names(0));
@@ -341,11 +341,11 @@ fn render(
     files: FrameFiles,
     watch: &Watch,
     console: &mut Console<'_>,
-) -> Result<UnseenCounts, Failure> {
-    // A frame is rendered on all cores; one thread beside them writes.
+) -> Result<NoSourceCounts, Failure> {
+    // A frame is rendered on all cores, while another thread writes.
     let writer = FrameWriter::new(files, 1);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
-    let mut unseen = UnseenCounts::default();
+    let mut no_source = NoSourceCounts::default();
     let mut told = Vec::new();
     for &index in todo {
         if watch.is_asked() {
@@ -353,12 +353,12 @@ fn render(
         }
         let file = read(args, set, index as usize, console)?;
         for note in &file.notes {
-            // Of one kind the first is enough: the next is of another file, with another number.
+            // One note of each kind is enough; others differ by file and number only.
             let (file, what) = note.split_once(": ").unwrap_or(("", note));
             let kind =
                 what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
             if !told.contains(&kind) {
-                console.warn(format_args!("{file}: {what} (others like it are not told of)"));
+                console.warn(format_args!("{file}: {what} (similar notes are not shown)"));
                 told.push(kind);
             }
         }
@@ -367,11 +367,11 @@ fn render(
             .map_err(|error| in_file(args, &error))
             .or_bad_input()?;
         let (picture, counts) = pipeline.render_and_count(vignette);
-        unseen += counts;
+        no_source += counts;
         writer.write(picture).or_failed()?;
         bar.inc(1);
     }
     bar.finish_and_clear();
     writer.finish().or_failed()?;
-    Ok(unseen)
+    Ok(no_source)
 }

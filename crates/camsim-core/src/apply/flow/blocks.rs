@@ -1,4 +1,4 @@
-//! A tree of boxes over the cells: from it follows where none of a block's cells can be, so that a look opens
+//! A tree of bounding boxes over the cells of the flow. The bounds exclude most blocks, so that a query opens
 //! few of them.
 
 use std::ops::ControlFlow;
@@ -7,17 +7,17 @@ use glam::{DVec2, Vec2};
 
 use super::grid::Grid;
 
-/// Slack for rounding, pixels.
+/// Tolerance for rounding, pixels.
 const ROUNDING_PX: f64 = 1e-5;
 
-/// What a block of cells holds.
+/// Bounds of a block of cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block {
     low: Vec2,
     high: Vec2,
     /// Largest tear of an edge, pixels of the flow.
     pub(super) tear: f32,
-    /// Largest difference of neighbours.
+    /// Largest difference between neighbours.
     pub(super) steep: f32,
 }
 
@@ -43,61 +43,62 @@ impl Block {
         Self { low: a.min(b).min(c).min(d), high: a.max(b).max(c).max(d), tear, steep }
     }
 
-    /// Whether cells between two corners can be where it is looked for.
-    fn reaches(&self, low_px: DVec2, high_px: DVec2, look: &Look<'_>) -> bool {
+    /// Whether cells between two corners may be at the position of the query.
+    fn reaches(&self, low_px: DVec2, high_px: DVec2, query: &FlowQuery<'_>) -> bool {
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for share in look.shares {
+        for share in query.shares {
             let (a, b) = (*share * self.low.as_dvec2(), *share * self.high.as_dvec2());
             (low, high) = (low.min(a).min(b), high.max(a).max(b));
         }
-        let slack = look.reach_px + ROUNDING_PX;
-        (low_px + low - slack).cmple(look.at_px).all() && (high_px + high + slack).cmpge(look.at_px).all()
+        let slack = query.reach_px + ROUNDING_PX;
+        (low_px + low - slack).cmple(query.position_px).all()
+            && (high_px + high + slack).cmpge(query.position_px).all()
     }
 }
 
-/// One level: blocks of `2^k` cells each way, k = 1 for the first; those of single cells are worked out when
-/// they are asked for.
+/// One level of the tree: blocks of `2^k` cells per side, with k = 1 for the first. Blocks of single cells
+/// are computed on demand.
 #[derive(Clone, Debug)]
-struct Level {
+struct BlockLevel {
     count: [u32; 2],
     blocks: Vec<Block>,
 }
 
-/// All levels, up to one block.
+/// All levels, up to a single block.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
-    /// Cells each way.
+    /// Number of cells per side.
     count: [u32; 2],
-    levels: Vec<Level>,
+    levels: Vec<BlockLevel>,
 }
 
 impl Blocks {
     pub(super) fn new(grid: &Grid) -> Self {
         let count = grid.size_px.map(|side| side + 1);
-        let mut levels = vec![Level::of(count, |cell| Block::of_cell(grid, cell))];
+        let mut levels = vec![BlockLevel::of(count, |cell| Block::of_cell(grid, cell))];
         while let Some(last) = levels.last().filter(|level| level.blocks.len() > 1) {
-            let next = Level::of(last.count, |at| last.block(at));
+            let next = BlockLevel::of(last.count, |at| last.block(at));
             levels.push(next);
         }
         Self { count, levels }
     }
 
-    /// Calls for each cell that can be within `reach_px` of where `look` looks. `left` counts down the boxes
-    /// that may still be opened; at 0 the rest is left out.
+    /// Calls `found` for each cell that may be within `reach_px` of the position of the query. `left` counts
+    /// down the boxes that may still be opened; at 0 the search stops.
     pub(super) fn visit(
         &self,
-        look: &Look<'_>,
+        query: &FlowQuery<'_>,
         left: &mut u32,
         call: &mut impl FnMut([u32; 2], &Block) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        self.open(self.levels.len(), [0, 0], look, left, call)
+        self.open(self.levels.len(), [0, 0], query, left, call)
     }
 
     fn open(
         &self,
         level: usize,
         at @ [x, y]: [u32; 2],
-        look: &Look<'_>,
+        query: &FlowQuery<'_>,
         left: &mut u32,
         call: &mut impl FnMut([u32; 2], &Block) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
@@ -106,33 +107,34 @@ impl Blocks {
             return ControlFlow::Continue(());
         }
         *left -= 1;
-        let block = if level == 0 { Block::of_cell(look.grid, at) } else { self.levels[level - 1].block(at) };
+        let block =
+            if level == 0 { Block::of_cell(query.grid, at) } else { self.levels[level - 1].block(at) };
         let side_px = f64::from(1_u32 << level);
         let low_px = DVec2::new(f64::from(x), f64::from(y)) * side_px - 1.0;
-        if !block.reaches(low_px, low_px + side_px, look) {
+        if !block.reaches(low_px, low_px + side_px, query) {
             return ControlFlow::Continue(());
         }
         if level == 0 {
             return call(at, &block);
         }
         for [dx, dy] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
-            self.open(level - 1, [2 * x + dx, 2 * y + dy], look, left, call)?;
+            self.open(level - 1, [2 * x + dx, 2 * y + dy], query, left, call)?;
         }
         ControlFlow::Continue(())
     }
 }
 
-/// What is looked for.
-pub(super) struct Look<'a> {
+/// A query for the cells at a position.
+pub(super) struct FlowQuery<'a> {
     pub(super) grid: &'a Grid,
-    /// What is at this place at one of `shares` of the interval, or between two of them.
-    pub(super) at_px: DVec2,
+    /// The position at one of `shares` of the interval, or at any time between two of them.
+    pub(super) position_px: DVec2,
     pub(super) shares: &'a [f64],
     pub(super) reach_px: f64,
 }
 
-impl Level {
-    /// Blocks of twice the side of those that `below` gives.
+impl BlockLevel {
+    /// Blocks of twice the side of those of the level below.
     fn of(below_count: [u32; 2], below: impl Fn([u32; 2]) -> Block) -> Self {
         let count = below_count.map(|count| count.div_ceil(2));
         let mut blocks = vec![Block::NONE; count[0] as usize * count[1] as usize];

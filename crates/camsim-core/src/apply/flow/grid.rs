@@ -1,11 +1,12 @@
-//! A flow's pixels, with what is not known filled in, and where neighbours are of two things.
+//! Flow on the pixel grid, with unknown values filled in, and its motion boundaries.
 //!
-//! What tells a border from a slope: along a line of pixels, differences `d` of neighbours. A smooth field's
-//! are between those beside them, however steep it is; a border's is larger than what either side goes on
-//! with. By how much is the tear, in the flow's own pixels: the distance of `d` from the hull of 0 (what is
-//! level is no border) and the differences beside it. The same with those two pixels away, because where a
-//! border is mixed into one pixel, as by antialiasing or a flow of half the size, it is two halves beside
-//! each other. A flow of `a sin(2 pi x / L)` has tears of up to `a (2 pi / L)^3 * 2`.
+//! A boundary is told from a slope by the differences d between neighbours along a line of pixels. In a
+//! smooth field, however steep, each difference lies between those beside it; at a boundary it is larger than
+//! the continuation of either side. The excess is the tear, in pixels of the flow: the distance of d from the
+//! hull of 0 and the differences beside it. (0 is included because a level field has no boundary.) The test
+//! is repeated with the differences two pixels away, because a boundary blended into one pixel, by
+//! antialiasing or by flow of half the resolution, shows as two halves side by side. A flow of `a sin(2 pi x
+//! / L)` has tears of up to `a (2 pi / L)^3 * 2`.
 
 use std::collections::VecDeque;
 
@@ -13,13 +14,13 @@ use glam::DVec2;
 
 use super::{FlowField, cell::Cell};
 
-/// A flow that is known, or made up, everywhere.
+/// Flow that is known, or filled in, everywhere.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub(super) size_px: [u32; 2],
     px: Vec<[f32; 2]>,
     known: Vec<bool>,
-    /// Between a pixel and those right of and below it.
+    /// Tears between a pixel and its neighbours to the right and below.
     tears: Vec<[f32; 2]>,
 }
 
@@ -44,25 +45,25 @@ impl Grid {
         DVec2::new(f64::from(u), f64::from(v))
     }
 
-    fn nearest_index(&self, at_px: DVec2) -> usize {
+    fn nearest_index(&self, position_px: DVec2) -> usize {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
-        let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
-        at.y as usize * self.size_px[0] as usize + at.x as usize
+        let texel = (position_px + 0.5).floor().clamp(DVec2::ZERO, last);
+        texel.y as usize * self.size_px[0] as usize + texel.x as usize
     }
 
-    /// The flow of the nearest pixel.
-    pub(super) fn nearest(&self, at_px: DVec2) -> DVec2 {
-        let [u, v] = self.px[self.nearest_index(at_px)];
+    /// Flow of the nearest pixel.
+    pub(super) fn nearest(&self, position_px: DVec2) -> DVec2 {
+        let [u, v] = self.px[self.nearest_index(position_px)];
         DVec2::new(f64::from(u), f64::from(v))
     }
 
-    /// Whether the nearest pixel's flow is known.
-    pub(super) fn is_known(&self, at_px: DVec2) -> bool {
-        self.known[self.nearest_index(at_px)]
+    /// Whether the flow of the nearest pixel is known.
+    pub(super) fn is_known(&self, position_px: DVec2) -> bool {
+        self.known[self.nearest_index(position_px)]
     }
 
-    /// Cells have pixels' middles for corners; a ring of them around the picture, over which its border's
-    /// slope goes on, makes one more than there are pixels each way. Cell (0, 0) begins at pixel (-1, -1).
+    /// A cell, whose corners are pixel centres. An outer ring of cells extrapolates the slope at the border,
+    /// so there is one cell more than pixels per side. Cell (0, 0) begins at pixel (-1, -1).
     pub(super) fn cell(&self, column: u32, row: u32) -> Cell {
         let [width, height] = self.size_px;
         let (x, y) =
@@ -79,21 +80,21 @@ impl Grid {
         }
     }
 
-    /// Flow at a corner of a cell, `at` counted from (-1, -1), next to or at a pixel.
+    /// Flow at a corner of a cell. `at` counts from (-1, -1), and is at most one pixel outside of the image.
     fn corner(&self, [x, y]: [u32; 2], at: [u32; 2]) -> DVec2 {
         let mut flow = self.texel(x, y);
         for (way, [dx, dy]) in [[1, 0], [0, 1]].into_iter().enumerate() {
             let last = self.size_px[way] - 1;
             let (inner, sign) = match at[way] {
                 0 => ([x, y], -1.0),
-                // Pixel `last` is at `last + 1`.
+                // Pixel `last` has index `last + 1`.
                 k if k > last + 1 => ([x - dx.min(x), y - dy.min(y)], 1.0),
                 _ => continue,
             };
             if last > 0 {
                 let step = self.texel(inner[0] + dx, inner[1] + dy) - self.texel(inner[0], inner[1]);
                 let tear = self.tears[(inner[1] * self.size_px[0] + inner[0]) as usize][way];
-                // What is mostly a border is no slope.
+                // A difference that is mostly a tear is no slope.
                 if f64::from(tear) <= 0.5 * step.abs().max_element() {
                     flow += sign * step;
                 }
@@ -102,17 +103,17 @@ impl Grid {
         flow
     }
 
-    /// The cell around a place, and where in it.
-    pub(super) fn cell_at(&self, at_px: DVec2) -> (Cell, DVec2) {
+    /// The cell around a position, and the position within it.
+    pub(super) fn cell_at(&self, position_px: DVec2) -> (Cell, DVec2) {
         let most = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1]));
-        let index = (at_px.floor() + 1.0).clamp(DVec2::ZERO, most);
+        let index = (position_px.floor() + 1.0).clamp(DVec2::ZERO, most);
         let cell = self.cell(index.x as u32, index.y as u32);
-        (cell, (at_px - cell.place_px).clamp(DVec2::ZERO, DVec2::ONE))
+        (cell, (position_px - cell.place_px).clamp(DVec2::ZERO, DVec2::ONE))
     }
 }
 
-/// How far the difference between pixel `at` of a line of `count` and the next is from what its sides go on
-/// with; 0 behind the last.
+/// Tear between pixel `at` of a line of `count` pixels and the next: the distance of their difference from
+/// the continuation of either side. 0 after the last pixel.
 fn tear(at: i64, count: i64, texel: impl Fn(i64) -> DVec2) -> f32 {
     if at + 1 >= count {
         return 0.0;
@@ -131,7 +132,7 @@ fn tear(at: i64, count: i64, texel: impl Fn(i64) -> DVec2) -> f32 {
     beyond(1).max(beyond(2)).max(0.0) as f32
 }
 
-/// What is not known takes the flow of the nearest pixel, in steps across and down, whose is; 0 if none is.
+/// Fills unknown flow from the nearest known pixel in horizontal and vertical steps; 0 if none is known.
 fn filled(flow: &FlowField, known: &[bool]) -> Vec<[f32; 2]> {
     let [width, height] = flow.size_px.map(|side| side as usize);
     let mut px = flow.px.clone();
@@ -171,9 +172,9 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_is_no_border_however_steep() {
+    fn steep_slopes_have_no_tears() {
         assert_eq!(tears(&[0.0, 3.0, 6.0, 9.0, 12.0, 15.0]), [0.0; 6]);
-        // Where it begins and ends neither.
+        // Nor where a slope begins and ends.
         assert_eq!(tears(&[0.0, 0.0, 0.0, 3.0, 6.0, 9.0, 12.0, 12.0, 12.0]), [0.0; 9]);
         let wave: Vec<f32> =
             (0..64).map(|i| (5.0 * (std::f64::consts::TAU * f64::from(i) / 32.0).sin()) as f32).collect();
@@ -182,20 +183,20 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_a_border_by_all_of_it_beside_thin_things_and_mixed_pixels() {
+    fn steps_are_tears_beside_thin_objects_and_blended_pixels() {
         assert_eq!(tears(&[1.0, 1.0, 1.0, 4.0, 4.0, 4.0]), [0.0, 0.0, 3.0, 0.0, 0.0, 0.0]);
-        // On a slope: the jump alone.
+        // On a slope, the tear is the jump alone.
         assert_eq!(tears(&[0.0, 1.0, 2.0, 6.0, 7.0, 8.0]), [0.0, 0.0, 3.0, 0.0, 0.0, 0.0]);
         assert_eq!(tears(&[0.0, 0.0, 5.0, 0.0, 0.0]), [0.0, 5.0, 5.0, 0.0, 0.0]);
         assert_eq!(tears(&[0.0, 0.0, 5.0, 5.0, 0.0, 0.0]), [0.0, 5.0, 0.0, 5.0, 0.0, 0.0]);
         assert_eq!(tears(&[0.0, 0.0, 5.0, 5.0, 9.0, 9.0]), [0.0, 5.0, 0.0, 4.0, 0.0, 0.0]);
         assert_eq!(tears(&[0.0, 0.0, 2.0, 4.0, 4.0, 4.0]), [0.0, 2.0, 2.0, 0.0, 0.0, 0.0]);
-        // At the very border of the picture.
+        // At the border of the image.
         assert_eq!(tears(&[5.0, 0.0, 0.0, 0.0]), [5.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]
-    fn what_is_not_known_is_as_what_is_beside_it() {
+    fn unknown_flow_takes_the_nearest_known_value() {
         let nan = f32::NAN;
         let field = FlowField {
             size_px: [5, 1],

@@ -1,17 +1,17 @@
-//! Flow in place of the camera's motion.
+//! Flow instead of camera motion.
 
 use super::*;
 
 pub(super) fn of(size_px: [u32; 2], interval_s: f64, flow: impl Fn(DVec2) -> DVec2) -> Motion {
-    let at =
+    let pixel =
         |i: u32| flow(DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0]))).as_vec2().to_array();
-    Motion::Flow(FlowField { size_px, px: (0..size_px[0] * size_px[1]).map(at).collect(), interval_s })
+    Motion::Flow(FlowField { size_px, px: (0..size_px[0] * size_px[1]).map(pixel).collect(), interval_s })
 }
 
-/// A camera that flies sideways over a tilted plane moves every pixel straight on and evenly: then a flow is
-/// the motion.
+/// A camera that flies sideways over a tilted plane moves every pixel uniformly along a straight line, so
+/// flow describes its motion exactly.
 #[test]
-fn the_flow_of_a_flight_gives_the_sources_of_the_flight() {
+fn flow_of_a_flight_gives_the_sources_of_its_poses() {
     let spec = CameraSpec {
         lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.28, 0.07, 1e-3, -5e-4] },
         ..camera(
@@ -24,10 +24,10 @@ fn the_flow_of_a_flight_gives_the_sources_of_the_flight() {
     let flight = Motion::Twist(Twist { velocity_m_s: DVec3::new(6.0, -4.0, 0.0), ..Twist::default() });
     for interval_s in [0.04, -0.1] {
         let geometry = ideal.geometry;
-        let flow = of([400, 320], interval_s, |at_px| {
-            let uv = (at_px - geometry.principal_px) / geometry.focal_px;
+        let flow = of([400, 320], interval_s, |position_px| {
+            let uv = (position_px - geometry.principal_px) / geometry.focal_px;
             let point = uv.extend(1.0) / TILTED.dot(uv.extend(1.0));
-            geometry.px_from_point(point - interval_s * DVec3::new(6.0, -4.0, 0.0)) - at_px
+            geometry.px_from_point(point - interval_s * DVec3::new(6.0, -4.0, 0.0)) - position_px
         });
         let pipeline = Pipeline::new(&spec, &ideal, &flow, &Settings::default()).unwrap();
         let error = worst(&pipeline, |uv, dt_s| on_plane(uv, flight.key_from(dt_s, 0.0), &geometry));
@@ -40,17 +40,18 @@ fn the_flow_of_a_flight_gives_the_sources_of_the_flight() {
     }
 }
 
-/// What accelerates in the picture is off by no more than it says: a turn about the optical axis.
+/// An accelerated image motion, here a rotation about the optical axis, stays within the documented bound.
 #[test]
-fn a_turn_is_off_by_half_its_acceleration() {
+fn flow_error_of_rotation_is_within_its_bound() {
     let spec = camera([120, 120], 100.0, ShutterSpec { readout_ms: 40.0, ..ShutterSpec::default() });
-    // Taken when the first row is.
+    // The ideal frame is at the instant of the first row.
     let ideal = IdealFrame { instant_s: -0.02, ..frame([200, 200], 100.0, |_| (0.0, [0.5; 3])) };
     let rate = 2.0;
     let turn = Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 0.0, rate), ..Twist::default() });
     let centre = ideal.geometry.principal_px;
-    let flow =
-        of([200, 200], 0.04, |at_px| DVec2::from_angle(-rate * 0.04).rotate(at_px - centre) + centre - at_px);
+    let flow = of([200, 200], 0.04, |position_px| {
+        DVec2::from_angle(-rate * 0.04).rotate(position_px - centre) + centre - position_px
+    });
     let pipeline = Pipeline::new(&spec, &ideal, &flow, &Settings::default()).unwrap();
     let at_most = |uv: DVec2| 100.0 * uv.length() * rate * rate / 2.0 * 0.02 * 0.02;
     let mut farthest = 0.0_f64;
@@ -61,9 +62,9 @@ fn a_turn_is_off_by_half_its_acceleration() {
         let error = pipeline
             .source(pixel, 0.0)
             .unwrap()
-            .at_px
+            .position_px
             .distance(ideal.geometry.px_from_point(rotation * uv.extend(1.0)));
-        // What the flow itself shortens of the way is of the next order: a hundredth.
+        // The flow's own shortening of the path is of the next order: one percent.
         assert!(error <= 1.01 * at_most(uv) + 1e-6, "{pixel:?}: {error} {}", at_most(uv));
         farthest = farthest.max(error);
     }
@@ -72,7 +73,8 @@ fn a_turn_is_off_by_half_its_acceleration() {
 
 const BOX_PX: [f64; 2] = [80.0, 110.0];
 
-/// A red square goes 10 px to the right before blue that stands, or goes `back` px.
+/// A red square moves 10 px to the right in front of a blue background, which is at rest or moves by `back`
+/// px.
 fn moving_box(with_depth: bool, back: f64) -> (IdealFrame, Motion) {
     let inside = |x: f64| (BOX_PX[0]..BOX_PX[1]).contains(&x);
     let ideal = frame([200, 60], 100.0, |uv| {
@@ -80,11 +82,16 @@ fn moving_box(with_depth: bool, back: f64) -> (IdealFrame, Motion) {
         let w = if inside(x) { 0.2 } else { 0.05 };
         (if with_depth { w } else { 0.0 }, if inside(x) { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] })
     });
-    (ideal, of([200, 60], 0.1, move |at_px| DVec2::new(if inside(at_px.x) { 10.0 } else { back }, 0.0)))
+    (
+        ideal,
+        of([200, 60], 0.1, move |position_px| {
+            DVec2::new(if inside(position_px.x) { 10.0 } else { back }, 0.0)
+        }),
+    )
 }
 
 #[test]
-fn things_that_move_cover_and_bare_what_is_behind_them() {
+fn moving_objects_occlude_and_disocclude_the_background() {
     // Rows from 0 to 100 ms: each has its own instant of the interval.
     let spec = camera([200, 60], 100.0, ShutterSpec { readout_ms: 100.0, ..ShutterSpec::default() });
     for (with_depth, back) in [(true, 0.0), (false, 0.0), (true, -4.0), (false, -4.0)] {
@@ -97,9 +104,9 @@ fn things_that_move_cover_and_bare_what_is_behind_them() {
             let share = pipeline.shutter.dt_pixel_s(0, y) / 0.1 + 0.5;
             for x in 0..200_u32 {
                 let now = [0, 1].map(|k: usize| BOX_PX[k] - 0.5 + 10.0 * share - f64::from(x));
-                // The spline that is read reaches two pixels, there and in the ideal frame (what is bared has
-                // one pixel's own colour); and what lies on the picture's very border may be on either side
-                // of it.
+                // The spline taps reach two pixels, in the output and in the ideal frame (disoccluded areas
+                // have the colour of one pixel). A source exactly at the border of the image may count as on
+                // either side.
                 let at_rim = (f64::from(x) - share * back - 199.5).abs() < 1e-6;
                 let was = f64::from(x) - share * back;
                 let covered = now[0] < 0.0 && now[1] > 0.0;
@@ -110,7 +117,7 @@ fn things_that_move_cover_and_bare_what_is_behind_them() {
                     continue;
                 }
                 let pixel = &rendered.color_rgba[4 * (y * 200 + x) as usize..][..4];
-                // What comes in from beyond the border is not in the picture.
+                // Content that enters from beyond the border is not in the frame.
                 let beyond = !covered && f64::from(x) - share * back > 199.5;
                 let expected = if covered { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 1.0, 1.0] };
                 let expected = if beyond { [0.0; 4] } else { expected };
@@ -128,8 +135,9 @@ fn things_that_move_cover_and_bare_what_is_behind_them() {
 }
 
 #[test]
-fn a_moving_thing_is_blurred_and_what_stands_is_not() {
-    // All of the interval: the square's borders become ramps of 10 px, from -5 to 5 about the stamp's.
+fn moving_objects_are_blurred_and_static_ones_are_not() {
+    // An exposure over the whole interval: the borders of the square become ramps of 10 px, from -5 to 5
+    // around the stamp.
     let spec = camera([200, 60], 100.0, ShutterSpec { exposure_ms: 100.0, ..ShutterSpec::default() });
     let (ideal, motion) = moving_box(true, 0.0);
     let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render(None);
@@ -137,32 +145,36 @@ fn a_moving_thing_is_blurred_and_what_stands_is_not() {
         let red = f64::from(rendered.color_rgba[4 * (30 * 200 + x) as usize]);
         let ramp = |border: f64| (0.5 + (f64::from(x) - border + 0.5) / 10.0).clamp(0.0, 1.0);
         let expected = ramp(BOX_PX[0]) - ramp(BOX_PX[1]);
-        // Two samples a pixel of path, and a pixel of the border that reads both sides.
+        // Two samples per pixel of path, and a border pixel that reads both sides.
         assert!((red - expected).abs() < 0.08, "{x}: {red} {expected}");
     }
 }
 
 #[test]
-fn what_is_not_known_is_empty_and_what_does_not_fit_is_refused() {
+fn unknown_flow_is_empty_and_mismatched_flow_is_refused() {
     let spec = camera([60, 20], 50.0, ShutterSpec::default());
     let ideal = frame([120, 40], 50.0, |_| (0.1, [0.5; 3]));
     let motion =
-        of([120, 40], 0.1, |at_px| if (55.0..65.0).contains(&at_px.x) { DVec2::NAN } else { DVec2::ZERO });
+        of(
+            [120, 40],
+            0.1,
+            |position_px| if (55.0..65.0).contains(&position_px.x) { DVec2::NAN } else { DVec2::ZERO },
+        );
     let (rendered, counts) =
         Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None);
-    assert_eq!(counts, UnseenCounts { unknown_flow: 10 * 20, ..UnseenCounts::default() });
+    assert_eq!(counts, NoSourceCounts { unknown_flow: 10 * 20, ..NoSourceCounts::default() });
     let alpha: Vec<f32> = (24..36).map(|x| rendered.color_rgba[4 * (60 * 7 + x) + 3]).collect();
     assert_eq!(alpha, [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.]);
     let nowhere = of([120, 40], 0.1, |_| DVec2::NAN);
     let counts =
         Pipeline::new(&spec, &ideal, &nowhere, &Settings::default()).unwrap().render_and_count(None).1;
-    assert_eq!(counts, UnseenCounts { unknown_flow: 60 * 20, ..UnseenCounts::default() });
+    assert_eq!(counts, NoSourceCounts { unknown_flow: 60 * 20, ..NoSourceCounts::default() });
     let error = |motion: &Motion, settings: &Settings| {
         Pipeline::new(&spec, &ideal, motion, settings).unwrap_err().to_string()
     };
     assert!(
         error(&of([60, 20], 0.1, |_| DVec2::ZERO), &Settings::default())
-            .contains("60x20 pixels beside a picture of 120x40")
+            .contains("60x20 pixels and an image of 120x40")
     );
     assert!(error(&of([120, 40], 0.0, |_| DVec2::ZERO), &Settings::default()).contains("over 0 s"));
     for settings in [solver(Solver::Rk2), Settings { preset: Preset::Paper, ..Settings::default() }] {

@@ -1,4 +1,4 @@
-//! What `[scene]` may say.
+//! Range checks of `[scene]`.
 
 use super::Check;
 use crate::{
@@ -20,7 +20,7 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         check.positive(format!("{table}.scale"), model.scale, "1 is as the file has it");
         check.finite(format!("{table}.time_s"), &[model.time_s.unwrap_or(0.0)]);
         check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
-            "needs a terrain to stand on: give scene.terrain, or heights in the places".into()
+            "needs a terrain: give scene.terrain, or heights in the placements".into()
         });
         let twice =
             model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
@@ -32,7 +32,7 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         check.positive(
             "scene.terrain.ortho_white",
             white,
-            "give the stored number that is white, 2047 for 11 bits",
+            "give the stored value of white, 2047 for 11 bits",
         );
     }
     if let Some(board) = &scene.board {
@@ -61,17 +61,17 @@ fn check_light(check: &mut Check, light: &LightSpec) {
     });
     check.require((0.0..=90.0).contains(&light.sun_elevation_deg), "scene.light.sun_elevation_deg", || {
         format!(
-            "must be 0 (on the horizon) to 90 (overhead), not {}; for a night leave the sun out: scene.light.sun = 0",
+            "must be 0 (on the horizon) to 90 (overhead), not {}; for a night set scene.light.sun = 0",
             light.sun_elevation_deg
         )
     });
     for (key, share) in [("scene.light.sun", light.sun), ("scene.light.sky", light.sky)] {
         check.require((0.0..=1.0).contains(&share), key, || {
-            format!("must be 0 to 1 of a colour, not {share}")
+            format!("must be a factor of 0 to 1, not {share}")
         });
     }
-    // Not more than white; a brighter day is the camera's matter. A hair for sums like 0.7 + 0.3.
-    // Each by itself has been told.
+    // The sum must not exceed white; exposure is a matter of the camera. A small tolerance allows sums like
+    // 0.7 + 0.3. Each value by itself has been checked above.
     let both = light.sun + light.sky;
     let each = [light.sun, light.sky].iter().all(|share| (0.0..=1.0).contains(share));
     check.require(!each || both <= 1.0 + 1e-9, "scene.light.sky", || {
@@ -95,7 +95,7 @@ fn check_board(check: &mut Check, board: &BoardSpec) {
     check.finite("scene.board.angles_deg", &board.angles_deg);
 }
 
-/// Where something stands: in local north-east-down or on Earth, not both.
+/// Placement of an object: in local north-east-down or geodetic, not both.
 fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
     if let PatternCentre::Ned(centre) = at {
         check.finite(format!("{table}.at"), &centre);

@@ -1,9 +1,9 @@
-//! What the squares of tags show, by the number of the tag: the published tables of the families.
+//! Codes of tags by their number: the published tables of the families.
 //!
-//! A code is the tag's inside row by row from its top-left square, the first square in the highest bit; 1 is
-//! white.
+//! A code is the tag's interior row by row from its top-left square, with the first square in the highest
+//! bit; 1 is white.
 
-/// AprilTag 36h11, as Kalibr prints it; OpenCV's own table has the same tags turned by half a turn.
+/// AprilTag 36h11, as Kalibr prints it. OpenCV's table has the same tags rotated by 180 degrees.
 pub(super) const APRIL_36H11: [u64; 587] = [
     0xd5d628584, 0xd97f18b49, 0xdd280910e, 0xe479e9c98, 0xebcbca822, 0xf31dab3ac, 0x056a5d085, 0x10652e1d4, 0x22b1dfead, 0x265ad0472,
     0x34fe91b86, 0x3ff962cd5, 0x43a25329a, 0x474b4385f, 0x4e9d243e9, 0x5246149ae, 0x5997f5538, 0x683bb6c4c, 0x6be4a7211, 0x7e3158eea,
@@ -66,8 +66,7 @@ pub(super) const APRIL_36H11: [u64; 587] = [
     0x1f350ed36, 0x18a5e861f, 0x2c35b89c3, 0x3347ac48a, 0x7f23e022e, 0x2459068fb, 0xe83be4b73,
 ];
 
-/// ArUco 4x4: the first 250 of OpenCV's dictionary, of which `DICT_4X4_50` and `DICT_4X4_100` are the
-/// beginning.
+/// ArUco 4x4: the first 250 codes of OpenCV's dictionary. `DICT_4X4_50` and `DICT_4X4_100` are its beginning.
 pub(super) const ARUCO_4X4: [u16; 250] = [
     0xb532, 0x0f9a, 0x332d, 0x9946, 0x549e, 0x79cd, 0x9e2e, 0xc4f2, 0xfeda, 0xcf56, 0xf991, 0x11a7, 0x0eb7, 0x2a0f, 0x24b1, 0x263e,
     0x4665, 0x6600, 0x6c5e, 0x76af, 0x868b, 0xb02b, 0xccd5, 0xdd82, 0xfe47, 0x9471, 0xace4, 0xa554, 0x2123, 0x346f, 0x4415, 0x57b2,
@@ -87,8 +86,7 @@ pub(super) const ARUCO_4X4: [u16; 250] = [
     0x71d3, 0x7b33, 0x646a, 0x66a8, 0x6ea7, 0x6e91, 0x6522, 0x6dcb, 0x678d, 0x6d31,
 ];
 
-/// ArUco 5x5: the first 250 of OpenCV's dictionary, of which `DICT_5X5_50` and `DICT_5X5_100` are the
-/// beginning.
+/// ArUco 5x5: the first 250 codes of OpenCV's dictionary. `DICT_5X5_50` and `DICT_5X5_100` are its beginning.
 pub(super) const ARUCO_5X5: [u32; 250] = [
     0x145b2bc, 0x01c06e6, 0x1af0edd, 0x10395f7, 0x1aeb524, 0x1d4082d, 0x0d3d7ec, 0x0e2146b, 0x10d6132, 0x1313fa5, 0x13cee03, 0x1a2dac0,
     0x1e62b11, 0x05e7166, 0x1fcfca8, 0x051e37f, 0x097a758, 0x0bea26f, 0x0f64dc4, 0x1061de8, 0x12dda75, 0x150e440, 0x16b0ca1, 0x0ba12de,
@@ -113,8 +111,7 @@ pub(super) const ARUCO_5X5: [u32; 250] = [
     0x01a0a30, 0x01bda5f, 0x01acdbc, 0x013e4ec, 0x005a105, 0x004c592, 0x00de752, 0x00dde46, 0x01c7c24, 0x01535bb,
 ];
 
-/// ArUco 6x6: the first 250 of OpenCV's dictionary, of which `DICT_6X6_50` and `DICT_6X6_100` are the
-/// beginning.
+/// ArUco 6x6: the first 250 codes of OpenCV's dictionary. `DICT_6X6_50` and `DICT_6X6_100` are its beginning.
 pub(super) const ARUCO_6X6: [u64; 250] = [
     0x1e3dd82a6, 0x0efba3891, 0x15907eacd, 0xc91b3069e, 0xd607d6e15, 0xd8e8e0e68, 0x4268b41f5, 0x88a50f29a, 0x307d524fd, 0x3c2f34b3c,
     0x45dfc74e3, 0x48d85b257, 0x710558fc6, 0x86dcfad07, 0x8d72a93f6, 0xa2b89dcde, 0x09fd1e9c4, 0x154dbd18f, 0x300a310e2, 0x4807efafd,

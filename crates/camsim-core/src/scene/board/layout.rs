@@ -1,34 +1,34 @@
-//! Where the black shapes of a board are, and the points that are looked for.
+//! Layout of a board: its black shapes, and the points that are detected.
 
 use glam::DVec2;
 
 use super::{BoardPoint, codes};
 use crate::scenario::Dictionary;
 
-/// Black squares around a tag's inside: Kalibr prints AprilTags with two, ArUco markers have one.
+/// Black squares around a tag's interior: Kalibr prints AprilTags with two, ArUco markers have one.
 const APRIL_BORDER: u32 = 2;
 const ARUCO_BORDER: u32 = 1;
 
-/// A black shape, metres right and down from the board's middle.
+/// A black shape, in metres right and down from the centre of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Shape {
-    /// Between two corners.
+pub(super) enum BoardShape {
+    /// A rectangle between two corners.
     Rect { low_m: DVec2, high_m: DVec2 },
-    /// A circle's inside.
+    /// A filled circle.
     Disc { centre_m: DVec2, radius_m: f64 },
 }
 
 /// Shapes and points of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<BoardShape>,
     pub points: Vec<BoardPoint>,
-    /// Corners of what is inside the margin.
+    /// Corners of the area within the margin.
     pub low_m: DVec2,
     pub high_m: DVec2,
-    /// What has a whole number of texels.
+    /// Length that gets a whole number of texels.
     pub unit_m: DVec2,
-    /// Units of what [`super::LEAST_TEXELS`] is about.
+    /// Length that [`super::MIN_TEXELS`] refers to, in units.
     pub units: f64,
     pub usual_margin_m: f64,
 }
@@ -37,14 +37,16 @@ fn count(n: u32) -> f64 {
     f64::from(n)
 }
 
-/// `columns` x `rows` inner corners; the square at the top left is black.
+/// A chessboard with `columns` x `rows` inner corners; the square at the top left is black.
 pub(super) fn chessboard(columns: u32, rows: u32, square_m: DVec2) -> Layout {
     let high_m = 0.5 * square_m * DVec2::new(count(columns + 1), count(rows + 1));
-    let at = |i: u32, j: u32| -high_m + square_m * DVec2::new(count(i), count(j));
+    let corner_m = |i: u32, j: u32| -high_m + square_m * DVec2::new(count(i), count(j));
     let squares =
         (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 0);
-    let shapes = squares.map(|(i, j)| Shape::Rect { low_m: at(i, j), high_m: at(i + 1, j + 1) }).collect();
-    let point = |id: u32| BoardPoint { id, at_m: at(1 + id % columns, 1 + id / columns) };
+    let shapes = squares
+        .map(|(i, j)| BoardShape::Rect { low_m: corner_m(i, j), high_m: corner_m(i + 1, j + 1) })
+        .collect();
+    let point = |id: u32| BoardPoint { id, position_m: corner_m(1 + id % columns, 1 + id / columns) };
     let points = (0..columns * rows).map(point).collect();
     Layout {
         shapes,
@@ -57,8 +59,8 @@ pub(super) fn chessboard(columns: u32, rows: u32, square_m: DVec2) -> Layout {
     }
 }
 
-/// Circles `spacing_m` apart. Asymmetric ones: those of a row are two spacings apart, and every other row is
-/// shifted by one.
+/// Circles `spacing_m` apart. In an asymmetric grid, circles of one row are two spacings apart, and every
+/// other row is shifted by one spacing.
 pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, asymmetric: bool) -> Layout {
     let place = |i: u32, j: u32| match asymmetric {
         true => DVec2::new(count(2 * i + j % 2), count(j)),
@@ -70,11 +72,14 @@ pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, 
     );
     let radius_m = 0.5 * diameter_m;
     let point =
-        |id: u32| BoardPoint { id, at_m: spacing_m * (place(id % columns, id / columns) - 0.5 * last) };
+        |id: u32| BoardPoint { id, position_m: spacing_m * (place(id % columns, id / columns) - 0.5 * last) };
     let points: Vec<BoardPoint> = (0..columns * rows).map(point).collect();
     let high_m = 0.5 * spacing_m * last + radius_m;
     Layout {
-        shapes: points.iter().map(|point| Shape::Disc { centre_m: point.at_m, radius_m }).collect(),
+        shapes: points
+            .iter()
+            .map(|point| BoardShape::Disc { centre_m: point.position_m, radius_m })
+            .collect(),
         points,
         low_m: -high_m,
         high_m,
@@ -84,7 +89,8 @@ pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, 
     }
 }
 
-/// Kalibr's grid of AprilTags 36h11: tag 0 at the bottom left, small squares at the corners of all tags.
+/// Kalibr's grid of AprilTags 36h11, with tag 0 at the bottom left and small squares at the corners of all
+/// tags.
 pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, first_id: u32) -> Layout {
     let pitch_m = (1.0 + spacing) * tag_m;
     let high_m =
@@ -96,16 +102,14 @@ pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, firs
         let code = codes::APRIL_36H11.get((first_id + number) as usize).copied().unwrap_or(0);
         tag(&mut shapes, low_m, tag_m, 6, code, APRIL_BORDER);
         let corners = [DVec2::Y, DVec2::ONE, DVec2::X, DVec2::ZERO];
-        points.extend(
-            (0..).zip(corners).map(|(k, corner)| BoardPoint {
-                id: 4 * (first_id + number) + k,
-                at_m: low_m + tag_m * corner,
-            }),
-        );
+        points.extend((0..).zip(corners).map(|(k, corner)| BoardPoint {
+            id: 4 * (first_id + number) + k,
+            position_m: low_m + tag_m * corner,
+        }));
     }
     for (i, j) in (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))) {
         let low_m = -high_m + pitch_m * DVec2::new(count(i), count(j));
-        shapes.push(Shape::Rect { low_m, high_m: low_m + spacing * tag_m });
+        shapes.push(BoardShape::Rect { low_m, high_m: low_m + spacing * tag_m });
     }
     let cell_m = tag_m / count(6 + 2 * APRIL_BORDER);
     let units = count(6 + 2 * APRIL_BORDER);
@@ -120,8 +124,8 @@ pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, firs
     }
 }
 
-/// OpenCV's ChArUco board of `columns` x `rows` squares: the one at the top left is black, the white ones
-/// have markers, row by row.
+/// OpenCV's ChArUco board of `columns` x `rows` squares. The square at the top left is black; the white
+/// squares have markers, row by row.
 pub(super) fn charuco(
     columns: u32,
     rows: u32,
@@ -141,14 +145,14 @@ pub(super) fn charuco(
 }
 
 /// Black squares of a tag whose top-left corner is at `low_m`.
-fn tag(shapes: &mut Vec<Shape>, low_m: DVec2, tag_m: f64, side: u32, code: u64, border: u32) {
+fn tag(shapes: &mut Vec<BoardShape>, low_m: DVec2, tag_m: f64, side: u32, code: u64, border: u32) {
     let cells = side + 2 * border;
-    let at = |i: u32, j: u32| low_m + tag_m * DVec2::new(count(i), count(j)) / count(cells);
+    let square_m_at = |i: u32, j: u32| low_m + tag_m * DVec2::new(count(i), count(j)) / count(cells);
     for (i, j) in (0..cells).flat_map(|j| (0..cells).map(move |i| (i, j))) {
         let inside = |k: u32| k.checked_sub(border).filter(|&k| k < side);
         let white = matches!((inside(i), inside(j)), (Some(i), Some(j)) if code >> (side * side - 1 - (j * side + i)) & 1 == 1);
         if !white {
-            shapes.push(Shape::Rect { low_m: at(i, j), high_m: at(i + 1, j + 1) });
+            shapes.push(BoardShape::Rect { low_m: square_m_at(i, j), high_m: square_m_at(i + 1, j + 1) });
         }
     }
 }

@@ -1,43 +1,43 @@
-//! A board's picture: how much of each texel is black.
+//! Rasterisation of a board: coverage of each texel by black.
 
 use glam::DVec2;
 
 use super::{
-    AIM_TEXELS, LEAST_TEXELS,
-    layout::{Layout, Shape},
+    AIM_TEXELS, MIN_TEXELS,
+    layout::{BoardShape, Layout},
 };
 use crate::scene::{Encoding, Texture};
 
-/// Lines of a texel along which a circle's border is looked at.
+/// Scan lines per texel along which the coverage by a circle is integrated.
 const LINES: u32 = 32;
-/// An edge this near to the border of a texel lies on it, texels.
+/// Distance from a texel border within which an edge counts as aligned with it, texels.
 const ALIGNED: f64 = 1e-6;
 
-/// Size of a board's texels and of its picture.
+/// Texel size and texture size of a board.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub texel_m: DVec2,
-    /// Columns and rows; whole numbers.
+    /// Columns and rows of the texture; whole numbers.
     pub texels: DVec2,
-    /// Between the picture's border and what is inside the margin; whole numbers.
+    /// Texels between the border of the texture and the area within the margin; whole numbers.
     pub margin_texels: DVec2,
 }
 
 impl Scale {
-    /// The first number of texels a unit, from what the board needs to twice that, at which all edges lie
-    /// between texels; else the first.
+    /// The smallest number of texels per unit, from the least to twice that, at which all edges lie between
+    /// texels; the least if there is none.
     pub fn new(layout: &Layout, margin_m: f64) -> Self {
         let across = ((layout.high_m - layout.low_m) / layout.unit_m).max_element();
-        let least = (LEAST_TEXELS / layout.units).max(AIM_TEXELS / across).ceil() as u32;
+        let least = (MIN_TEXELS / layout.units).max(AIM_TEXELS / across).ceil() as u32;
         let aligned = |&n: &u32| {
             let texel_m = layout.unit_m / f64::from(n);
-            let between = |at_m: DVec2| {
-                let texel = (at_m - layout.low_m) / texel_m;
+            let between = |position_m: DVec2| {
+                let texel = (position_m - layout.low_m) / texel_m;
                 (texel - texel.round()).abs().max_element() < ALIGNED
             };
             layout.shapes.iter().all(|shape| match *shape {
-                Shape::Rect { low_m, high_m } => between(low_m) && between(high_m),
-                Shape::Disc { .. } => true,
+                BoardShape::Rect { low_m, high_m } => between(low_m) && between(high_m),
+                BoardShape::Disc { .. } => true,
             })
         };
         let n = (least..=2 * least).find(aligned).unwrap_or(least);
@@ -47,8 +47,8 @@ impl Scale {
         Self { texel_m, texels: (inside + 2.0 * margin_texels).max(DVec2::ONE), margin_texels }
     }
 
-    fn texel_of(&self, layout: &Layout, at_m: DVec2) -> DVec2 {
-        (at_m - layout.low_m) / self.texel_m + self.margin_texels
+    fn texel_of(&self, layout: &Layout, position_m: DVec2) -> DVec2 {
+        (position_m - layout.low_m) / self.texel_m + self.margin_texels
     }
 }
 
@@ -57,13 +57,13 @@ pub(super) fn draw(layout: &Layout, scale: &Scale) -> Texture {
     let mut black = vec![0.0_f32; size[0] as usize * size[1] as usize];
     for shape in &layout.shapes {
         match *shape {
-            Shape::Rect { low_m, high_m } => {
+            BoardShape::Rect { low_m, high_m } => {
                 let (low, high) = (scale.texel_of(layout, low_m), scale.texel_of(layout, high_m));
                 add(&mut black, size, low, high, |x, y| {
                     overlap(x, low.x, high.x) * overlap(y, low.y, high.y)
                 });
             }
-            Shape::Disc { centre_m, radius_m } => {
+            BoardShape::Disc { centre_m, radius_m } => {
                 let (centre, radii) = (scale.texel_of(layout, centre_m), radius_m / scale.texel_m);
                 add(&mut black, size, centre - radii, centre + radii, |x, y| disc(x, y, centre, radii));
             }
@@ -77,7 +77,7 @@ pub(super) fn draw(layout: &Layout, scale: &Scale) -> Texture {
     }
 }
 
-/// Adds a share to each texel between two corners.
+/// Adds a coverage to each texel between two corners.
 fn add(black: &mut [f32], size: [u32; 2], low: DVec2, high: DVec2, share: impl Fn(f64, f64) -> f64) {
     let range = |low: f64, high: f64, side: u32| {
         (low.floor().max(0.0) as u32)..(high.ceil().clamp(0.0, f64::from(side)) as u32)
@@ -91,12 +91,12 @@ fn add(black: &mut [f32], size: [u32; 2], low: DVec2, high: DVec2, share: impl F
     }
 }
 
-/// Share of the texel that begins at `at`, between two borders.
+/// Overlap of the texel that begins at `at` with an interval.
 fn overlap(at: f64, low: f64, high: f64) -> f64 {
     (high.min(at + 1.0) - low.max(at)).max(0.0)
 }
 
-/// Share of a texel within an ellipse along the axes: the mean over lines, each of them exact.
+/// Coverage of a texel by an axis-aligned ellipse: the mean over scan lines, each of them exact.
 fn disc(x: f64, y: f64, centre: DVec2, radii: DVec2) -> f64 {
     let line = |k: u32| {
         let across = (y + (f64::from(k) + 0.5) / f64::from(LINES) - centre.y) / radii.y;

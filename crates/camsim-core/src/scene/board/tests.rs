@@ -12,10 +12,10 @@ fn spec(kind: BoardKind, columns: u32, rows: u32, size_m: f64) -> BoardSpec {
     }
 }
 
-/// Light of the picture as a mesh shows it, at a place of the board: bilinear, by hand.
-fn light(board: &Board, picture: &Texture, at_m: DVec2) -> f64 {
+/// Light of the texture at a position on the board, interpolated bilinearly by hand.
+fn light(board: &Board, picture: &Texture, position_m: DVec2) -> f64 {
     let scale = board.scale();
-    let texel = (at_m - board.layout.low_m) / scale.texel_m + scale.margin_texels - 0.5;
+    let texel = (position_m - board.layout.low_m) / scale.texel_m + scale.margin_texels - 0.5;
     let read = |x: f64, y: f64| {
         let [x, y] =
             [x.clamp(0.0, scale.texels.x - 1.0) as usize, y.clamp(0.0, scale.texels.y - 1.0) as usize];
@@ -26,7 +26,7 @@ fn light(board: &Board, picture: &Texture, at_m: DVec2) -> f64 {
     row(low.y) * (1.0 - part.y) + row(low.y + 1.0) * part.y
 }
 
-/// Where light is one half between two places of different light, metres from the first.
+/// Position at which light is one half between two positions of different light, metres from the first.
 fn edge_m(board: &Board, picture: &Texture, from_m: DVec2, to_m: DVec2) -> f64 {
     let dark_first = light(board, picture, from_m) < 0.5;
     let (mut low, mut high) = (0.0, 1.0);
@@ -42,7 +42,7 @@ fn edge_m(board: &Board, picture: &Texture, from_m: DVec2, to_m: DVec2) -> f64 {
 }
 
 #[test]
-fn edges_of_squares_are_between_texels() {
+fn edges_of_squares_fall_between_texels() {
     let board =
         Board::from_spec(&BoardSpec { row_size_m: Some(0.041), ..spec(BoardKind::Chessboard, 8, 5, 0.0333) })
             .unwrap();
@@ -53,34 +53,34 @@ fn edges_of_squares_are_between_texels() {
             let across = edge_m(
                 &board,
                 &picture,
-                point.at_m + square * DVec2::new(-0.4, half),
-                point.at_m + square * DVec2::new(0.4, half),
+                point.position_m + square * DVec2::new(-0.4, half),
+                point.position_m + square * DVec2::new(0.4, half),
             );
             let down = edge_m(
                 &board,
                 &picture,
-                point.at_m + square * DVec2::new(half, -0.4),
-                point.at_m + square * DVec2::new(half, 0.4),
+                point.position_m + square * DVec2::new(half, -0.4),
+                point.position_m + square * DVec2::new(half, 0.4),
             );
             let error = DVec2::new(across, down) / square - 0.4;
             assert!(error.abs().max_element() < 1e-9, "{point:?} {half}: {error}");
         }
     }
-    // The first square is black, the margin white.
+    // The first square is black, the margin is white.
     assert_eq!(light(&board, &picture, board.layout.low_m + 0.01), 0.0);
     assert_eq!(light(&board, &picture, board.layout.low_m - 0.01), 1.0);
 }
 
 #[test]
-fn edges_within_texels_are_within_a_thousandth() {
-    // An AprilGrid whose gaps have no common measure with its tags' squares: outer edges of every tag.
+fn unaligned_edges_are_off_by_less_than_a_thousandth() {
+    // An AprilGrid whose gaps have no common measure with the squares of its tags: outer edges of every tag.
     let board =
         Board::from_spec(&BoardSpec { spacing: Some(0.2718), ..spec(BoardKind::Aprilgrid, 4, 3, 0.088) })
             .unwrap();
     let picture = board.picture();
     let mut worst = 0.0_f64;
     for tag in board.points().chunks_exact(4) {
-        let (corner, right) = (tag[3].at_m, tag[2].at_m);
+        let (corner, right) = (tag[3].position_m, tag[2].position_m);
         let gap = 0.2718 * 0.088;
         for share in [0.1, 0.5, 0.9] {
             let left = edge_m(
@@ -102,14 +102,14 @@ fn edges_within_texels_are_within_a_thousandth() {
 }
 
 #[test]
-fn circles_have_their_middle_and_area() {
+fn circles_have_exact_centres_and_areas() {
     for kind in [BoardKind::Circles, BoardKind::AsymmetricCircles] {
         let board =
             Board::from_spec(&BoardSpec { diameter_m: Some(0.031), ..spec(kind, 4, 7, 0.05) }).unwrap();
         let (picture, scale) = (board.picture(), board.scale());
         for point in board.points() {
             let (mut sum, mut first) = (0.0, DVec2::ZERO);
-            let middle = (point.at_m - board.layout.low_m) / scale.texel_m + scale.margin_texels;
+            let middle = (point.position_m - board.layout.low_m) / scale.texel_m + scale.margin_texels;
             let reach = 0.5 * 0.04 / scale.texel_m.x;
             for y in (middle.y - reach) as usize..(middle.y + reach) as usize {
                 for x in (middle.x - reach) as usize..(middle.x + reach) as usize {
@@ -127,24 +127,25 @@ fn circles_have_their_middle_and_area() {
     }
     // OpenCV's order of an asymmetric grid.
     let board = Board::from_spec(&spec(BoardKind::AsymmetricCircles, 4, 11, 0.02)).unwrap();
-    let of = |id: usize| board.points()[id].at_m - board.points()[0].at_m;
+    let offset_m = |id: usize| board.points()[id].position_m - board.points()[0].position_m;
     assert!(
-        (of(1) - DVec2::new(0.04, 0.0)).length() < 1e-12 && (of(4) - DVec2::new(0.02, 0.02)).length() < 1e-12
+        (offset_m(1) - DVec2::new(0.04, 0.0)).length() < 1e-12
+            && (offset_m(4) - DVec2::new(0.02, 0.02)).length() < 1e-12
     );
 }
 
 #[test]
-fn tags_are_numbered_and_turned_as_their_readers_expect() {
+fn tag_numbers_and_orientations_match_their_detectors() {
     let board = Board::from_spec(&spec(BoardKind::Aprilgrid, 6, 6, 0.1)).unwrap();
     let picture = board.picture();
     let of_tag = |tag: usize, i: f64, j: f64| {
-        light(&board, &picture, board.points()[4 * tag + 3].at_m + 0.01 * DVec2::new(i + 0.5, j + 0.5))
+        light(&board, &picture, board.points()[4 * tag + 3].position_m + 0.01 * DVec2::new(i + 0.5, j + 0.5))
     };
     // Code 0 is d5d628584: its first row 110101, the last 000100; two black squares around.
     let row = |j: f64| (2..8).map(|i| of_tag(0, f64::from(i), j) as u32).collect::<Vec<_>>();
     assert_eq!((row(2.0), row(7.0)), (vec![1, 1, 0, 1, 0, 1], vec![0, 0, 0, 1, 0, 0]));
     assert!((0..10).all(|i| of_tag(35, f64::from(i), 1.0) == 0.0 && of_tag(35, 8.0, f64::from(i)) == 0.0));
-    let low = board.points()[0].at_m;
+    let low = board.points()[0].position_m;
     assert!(low.x < 0.0 && low.y > 0.0, "tag 0 is at the bottom left");
     assert_eq!(board.points()[7].id, 7);
     let charuco = Board::from_spec(&spec(BoardKind::Charuco, 5, 7, 0.04)).unwrap();
@@ -160,7 +161,7 @@ fn tags_are_numbered_and_turned_as_their_readers_expect() {
 }
 
 #[test]
-fn a_board_stands_where_its_angles_say() {
+fn board_angles_follow_the_conventions() {
     let (right, down, into) = (DVec3::X, DVec3::Y, DVec3::Z);
     for (angles_deg, expected) in [
         ([0.0, 0.0, 0.0], [DVec3::Y, -DVec3::X, DVec3::Z]),
@@ -175,7 +176,7 @@ fn a_board_stands_where_its_angles_say() {
     let board = Board::from_spec(&spec(BoardKind::Chessboard, 3, 2, 0.1)).unwrap();
     let mesh = board.mesh(DVec3::new(5.0, 6.0, -7.0), ned_from_board([0.0, 90.0, 0.0]));
     let top_left = mesh.shape.vertices.iter().position(|vertex| vertex.uv == [0.0, 0.0]).unwrap();
-    // Four by three squares and one around them.
+    // Four by three squares, and one around them.
     assert!(
         (mesh.position_ned_m(top_left as u32) - DVec3::new(5.0, 5.7, -7.25)).length() < 1e-6,
         "{}",
@@ -184,7 +185,7 @@ fn a_board_stands_where_its_angles_say() {
 }
 
 #[test]
-fn what_makes_no_board_is_named() {
+fn invalid_boards_are_refused() {
     let good = || spec(BoardKind::Chessboard, 9, 6, 0.03);
     for (key, spec) in [
         ("kind", BoardSpec { kind: None, ..good() }),

@@ -1,8 +1,8 @@
-//! Boxes.
+//! Axis-aligned bounding boxes.
 
 use glam::{DMat3, DVec3};
 
-/// A box along the NED axes, metres. Empty if any `min` is above its `max`.
+/// An axis-aligned box in NED, metres. It is empty if any `min` is above its `max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Smallest coordinates.
@@ -12,31 +12,31 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// Whether it holds nothing.
+    /// Whether the box is empty.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Grows to hold a point.
+    /// Extends the box to contain a point.
     pub fn include(&mut self, point: DVec3) {
         self.min = self.min.min(point);
         self.max = self.max.max(point);
     }
 
-    /// The box around both.
+    /// Smallest box that contains both.
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Middle of the box.
+    /// Centre of the box.
     pub fn centre(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// Smallest box around this one, turned and scaled about (0, 0, 0) and then moved.
+    /// Bounding box of this box transformed by `turn` (rotation and scale about the origin) and `shift`.
     pub fn turned(&self, turn: DMat3, shift: DVec3) -> Self {
         if self.is_empty() {
             return *self;
@@ -71,8 +71,8 @@ impl Aabb {
     /// First ray parameter in `0..=t_max` inside the box, for a ray given by its origin and [`inverse`]
     /// direction.
     ///
-    /// The box is taken a nanometre larger, and both ends are widened by some rounding errors: it must never
-    /// hide a hit of a triangle within it, nor one that a ray within the plane of a face meets.
+    /// The box is enlarged by a nanometre, and both ends are widened by a few rounding errors, so that it
+    /// never hides a triangle inside it nor a ray within the plane of one of its faces.
     #[cfg(test)]
     pub(in crate::scene) fn enter(&self, origin: DVec3, inverse_direction: DVec3, t_max: f64) -> Option<f64> {
         const WIDER: f64 = 1e-14;
@@ -85,8 +85,8 @@ impl Aabb {
     }
 }
 
-/// 1 / direction for [`Aabb::enter`]. A component of 0 counts as one too small to matter: its inverse is
-/// finite, and times 0 it is 0.
+/// 1 / direction for [`Aabb::enter`]. A component of 0 is replaced by a tiny one, whose inverse is finite and
+/// gives 0 when multiplied by 0.
 #[cfg(test)]
 pub(in crate::scene) fn inverse(direction: DVec3) -> DVec3 {
     const NONE: f64 = 1e-290;

@@ -1,4 +1,4 @@
-//! From a grid of points to chunks.
+//! Construction of a terrain from a grid of points.
 
 use std::sync::Arc;
 
@@ -14,40 +14,40 @@ use super::{
 };
 use crate::scene::{Encoding, Texture};
 
-/// Coordinates beyond this would not stay exact, metres.
+/// Largest coordinate at which positions stay exact, metres.
 const MAX_COORDINATE_M: f64 = 1e7;
 
-/// Finest grid of vertex positions: 2^-24 m, so that position / quantum stays exact in f64 up to
-/// [`MAX_COORDINATE_M`].
+/// Exponent of the finest grid of vertex positions: 2^-24 m, so that position / quantum stays exact in f64 up
+/// to [`MAX_COORDINATE_M`].
 const MIN_QUANTUM_EXPONENT: i32 = -24;
 
-/// Chunks that tell how positions are rounded.
+/// Number of chunks sampled for the first estimate of the quantum.
 const SOME_CHUNKS: usize = 16;
 
-/// Where the points of a grid lie. They are asked for chunk by chunk, some more than once, by several
-/// threads, and never kept: what computes them needs no memory for all of them.
+/// Points of a grid. They are requested chunk by chunk, some more than once, by several threads, and not
+/// stored: an implementation that computes them needs no memory for all of them.
 pub trait TerrainGrid: Sync {
-    /// NED position of the point in a column (from the west) and row (from the north), metres; not finite for
-    /// a void.
+    /// NED position, in metres, of the point in a column (from the west) and row (from the north); not finite
+    /// for a void.
     fn point_ned_m(&self, at: [u32; 2]) -> DVec3;
-    /// Its texture coordinates.
+    /// Texture coordinates of that point.
     fn uv(&self, at: [u32; 2]) -> [f32; 2];
 }
 
-/// Points in lists, row after row.
-struct Listed<'a> {
+/// A grid of points in lists, row by row.
+struct PointList<'a> {
     cols: u32,
     points: &'a [DVec3],
     uvs: &'a [[f32; 2]],
 }
 
-impl Listed<'_> {
+impl PointList<'_> {
     fn index(&self, [column, row]: [u32; 2]) -> usize {
         row as usize * self.cols as usize + column as usize
     }
 }
 
-impl TerrainGrid for Listed<'_> {
+impl TerrainGrid for PointList<'_> {
     fn point_ned_m(&self, at: [u32; 2]) -> DVec3 {
         self.points[self.index(at)]
     }
@@ -57,42 +57,42 @@ impl TerrainGrid for Listed<'_> {
     }
 }
 
-/// A chunk's place in the grid.
+/// Position of a chunk in the grid.
 #[derive(Clone, Copy)]
-struct Place {
+struct ChunkSpan {
     first_cell: [u32; 2],
     cells: [u32; 2],
     first_vertex: u32,
 }
 
-impl Place {
+impl ChunkSpan {
     fn count(&self) -> usize {
         ((self.cells[0] + 1) * (self.cells[1] + 1)) as usize
     }
 
-    /// Vertices row after row.
+    /// Vertices row by row.
     fn vertices(self) -> impl Iterator<Item = [u32; 2]> {
         let [x, y] = self.first_cell;
         (0..=self.cells[1]).flat_map(move |j| (0..=self.cells[0]).map(move |i| [x + i, y + j]))
     }
 }
 
-/// What is found for each chunk on its own, beside its vertices and errors.
-struct Part {
+/// Results for a single chunk, besides its vertices and errors.
+struct ChunkPart {
     chunk: TerrainChunk,
-    /// Box around its points before they are rounded.
+    /// Bounding box of its points before rounding.
     bounds: Aabb,
     horizontal_m: [f64; NODE_CELLS.len()],
     void_cells: u64,
 }
 
 impl Terrain {
-    /// A terrain from NED positions (metres) of `cols` x `rows` grid points, row after row from the north,
-    /// each from the west; points that are not finite are voids. `uvs` are texture coordinates of the same
-    /// points.
+    /// A terrain from the NED positions (metres) of `cols` x `rows` grid points, row by row from the north,
+    /// each row from the west. Points that are not finite are voids. `uvs` are the texture coordinates of the
+    /// same points.
     ///
-    /// Positions are rounded to [`Terrain::quantum_m`] (at most the chunk's size * 2^-23: half a millimetre
-    /// for cells of 90 m).
+    /// Positions are rounded to [`Terrain::quantum_m`] (at most the size of a chunk * 2^-23, or half a
+    /// millimetre for cells of 90 m).
     ///
     /// # Errors
     ///
@@ -111,16 +111,16 @@ impl Terrain {
         if let Some(&got) = [points.len() as u64, uvs.len() as u64].iter().find(|&&n| n != expected) {
             return Err(TerrainError::Length { cols, rows, expected, got });
         }
-        Self::of_grid(cols, rows, &Listed { cols, points, uvs }, texture)
+        Self::from_grid(cols, rows, &PointList { cols, points, uvs }, texture)
     }
 
-    /// As [`Terrain::new`], of points that are computed when they are asked for: no memory is needed but the
-    /// terrain's own ([`Terrain::host_bytes`]).
+    /// As [`Terrain::new`], for points that are computed on demand: only the memory of the terrain itself is
+    /// needed ([`Terrain::memory_bytes`]).
     ///
     /// # Errors
     ///
     /// As [`Terrain::new`].
-    pub fn of_grid(
+    pub fn from_grid(
         cols: u32,
         rows: u32,
         grid: &dyn TerrainGrid,
@@ -132,15 +132,15 @@ impl Terrain {
         let cells = [cols - 1, rows - 1];
         let chunk_grid = cells.map(|n| n.div_ceil(CHUNK_CELLS));
         let places = places(cells, chunk_grid)?;
-        let mut vertices = vec![TerrainVertex::default(); places.iter().map(Place::count).sum()];
+        let mut vertices = vec![TerrainVertex::default(); places.iter().map(ChunkSpan::count).sum()];
         let mut errors = vec![0; places.len() * errors::PER_CHUNK];
-        // Positions take long to compute. A few chunks nearly always tell how they are rounded; where another
-        // one is larger, it is done again.
+        // Positions are expensive to compute. A few chunks nearly always determine the quantum; if another
+        // chunk needs a larger one, the pass is repeated.
         let some =
             places.iter().step_by(places.len().div_ceil(SOME_CHUNKS)).map(|place| points_of(grid, *place).1);
         let mut quantum_m = quantum(some);
         let parts = loop {
-            let parts: Vec<Part> = places
+            let parts: Vec<ChunkPart> = places
                 .par_iter()
                 .zip(
                     split(&mut vertices, &places)
@@ -195,9 +195,9 @@ impl Terrain {
         Ok(terrain)
     }
 
-    /// Memory that it takes without its picture, bytes: 20 a vertex, 3 for the errors of the hierarchy and 4
-    /// for boxes, or 27 a height.
-    pub fn host_bytes(&self) -> u64 {
+    /// Memory of the terrain without its texture, bytes: per height 20 for the vertex, 3 for the errors of
+    /// the hierarchy and 4 for boxes.
+    pub fn memory_bytes(&self) -> u64 {
         let lists = size_of_val(&*self.vertices)
             + size_of_val(&*self.errors)
             + size_of_val(&*self.chunks)
@@ -205,8 +205,8 @@ impl Terrain {
         (lists + self.tree.bytes()) as u64
     }
 
-    /// A flat-earth terrain about the origin: `heights` (metres, up; NaN = void) at square cells of `cell_m`,
-    /// row after row from the north. The texture (white if none) covers one pixel a height.
+    /// A flat-earth terrain about the origin. `heights` (metres, up; NaN = void) are on square cells of
+    /// `cell_m`, row by row from the north. The texture (white if none) has one pixel per height.
     ///
     /// # Errors
     ///
@@ -263,7 +263,7 @@ impl Terrain {
     }
 }
 
-fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainError> {
+fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<ChunkSpan>, TerrainError> {
     let [cols, rows] = cells.map(|n| n + 1);
     if u64::from(chunk_grid[0]) * u64::from(chunk_grid[1]) > 1 << (u32::BITS - VERTEX_BITS) {
         return Err(TerrainError::TooLarge { cols, rows });
@@ -274,7 +274,7 @@ fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainEr
         for x in 0..chunk_grid[0] {
             let first_cell = [x * CHUNK_CELLS, y * CHUNK_CELLS];
             let size = [0, 1].map(|k: usize| (cells[k] - first_cell[k]).min(CHUNK_CELLS));
-            places.push(Place { first_cell, cells: size, first_vertex });
+            places.push(ChunkSpan { first_cell, cells: size, first_vertex });
             let count = (size[0] + 1) * (size[1] + 1);
             first_vertex = first_vertex.checked_add(count).ok_or(TerrainError::TooLarge { cols, rows })?;
         }
@@ -282,9 +282,9 @@ fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainEr
     Ok(places)
 }
 
-/// The vertices of each chunk, to be written.
-fn split<'a>(mut vertices: &'a mut [TerrainVertex], places: &[Place]) -> Vec<&'a mut [TerrainVertex]> {
-    let first = |place: &Place| {
+/// The vertices of each chunk, as mutable slices.
+fn split<'a>(mut vertices: &'a mut [TerrainVertex], places: &[ChunkSpan]) -> Vec<&'a mut [TerrainVertex]> {
+    let first = |place: &ChunkSpan| {
         let (own, rest) = std::mem::take(&mut vertices).split_at_mut(place.count());
         vertices = rest;
         own
@@ -292,8 +292,8 @@ fn split<'a>(mut vertices: &'a mut [TerrainVertex], places: &[Place]) -> Vec<&'a
     places.iter().map(first).collect()
 }
 
-/// Positions of a chunk's vertices, and a box around them.
-fn points_of(grid: &dyn TerrainGrid, place: Place) -> (Vec<DVec3>, Aabb) {
+/// Positions of a chunk's vertices, and their bounding box.
+fn points_of(grid: &dyn TerrainGrid, place: ChunkSpan) -> (Vec<DVec3>, Aabb) {
     let points: Vec<DVec3> = place.vertices().map(|at| grid.point_ned_m(at)).collect();
     let mut bounds = Aabb::EMPTY;
     points.iter().filter(|point| point.is_finite()).for_each(|&point| bounds.include(point));
@@ -304,7 +304,7 @@ fn chunk_centre(bounds: &Aabb) -> DVec3 {
     if bounds.is_empty() { DVec3::ZERO } else { bounds.centre().round() }
 }
 
-/// The power of two of which offsets are multiples: the largest offset of all chunks still fits 24 bits.
+/// Quantum of the offsets, a power of two: the largest offset of all chunks still fits 24 bits.
 fn quantum(boxes: impl Iterator<Item = Aabb>) -> f64 {
     let largest = boxes
         .filter(|bounds| !bounds.is_empty())
@@ -318,18 +318,18 @@ fn quantum(boxes: impl Iterator<Item = Aabb>) -> f64 {
 
 fn part(
     grid: &dyn TerrainGrid,
-    place: Place,
+    place: ChunkSpan,
     quantum_m: f64,
     vertices: &mut [TerrainVertex],
     errors: &mut [u16],
-) -> Part {
+) -> ChunkPart {
     let (points, bounds) = points_of(grid, place);
     let centre_ned_m = chunk_centre(&bounds);
     let mut exact_bounds = Aabb::EMPTY;
     for ((vertex, point), at) in vertices.iter_mut().zip(points).zip(place.vertices()) {
         let offset_m = if point.is_finite() {
-            // Rounding the position, not the offset, is what makes chunks agree on shared vertices. Both
-            // steps are exact in f64.
+            // The position is rounded, not the offset, so that chunks agree on shared vertices. Both steps
+            // are exact in f64.
             let rounded = (point / quantum_m).round() * quantum_m;
             exact_bounds.include(rounded);
             (rounded - centre_ned_m).as_vec3().to_array()
@@ -348,12 +348,12 @@ fn part(
         has_surface: triangles > 0,
         has_voids: vertices.iter().any(|vertex| vertex.offset_m[0].is_nan()),
     };
-    let found = chunk_errors(&ChunkGrid { cells: place.cells, vertices });
-    errors.copy_from_slice(&found.keys);
-    Part { chunk, bounds, horizontal_m: found.horizontal_m, void_cells }
+    let table = chunk_errors(&ChunkGrid { cells: place.cells, vertices });
+    errors.copy_from_slice(&table.keys);
+    ChunkPart { chunk, bounds, horizontal_m: table.horizontal_m, void_cells }
 }
 
-/// Triangles with three valid corners, and the number of cells that lost one or both.
+/// Number of triangles with three valid corners, and of cells that lost one or both.
 fn count_without_voids(cells: [u32; 2], vertices: &[TerrainVertex]) -> (u64, u64) {
     let (mut triangles, mut void_cells) = (0, 0);
     for b in 0..cells[1] {

@@ -1,4 +1,4 @@
-//! What is drawn of a terrain: complete, without gaps, and where the full surface is.
+//! Tests of the drawn terrain: it is complete, has no gaps, and is within its error of the full surface.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{HashMap, HashSet};
@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{
     query::intersect_triangle,
+    select::VERTEX_BITS,
     tests::{Random, forward, hill_heights, hills, nadir},
     *,
 };
@@ -15,7 +16,7 @@ use crate::pose::CameraPose;
 const TANGENTS: [f64; 4] = [-0.7, 0.9, -0.6, 0.5];
 const FOCAL_PX: f64 = 400.0;
 
-/// From above, along, from afar, and from among the hills.
+/// Views from above, along the ground, from far away and from among the hills.
 fn cameras() -> [CameraPose; 5] {
     [
         nadir(DVec3::new(100.0, 50.0, -900.0)),
@@ -58,7 +59,7 @@ fn full_m(terrain: &Terrain, at: [f64; 2]) -> DVec3 {
     if x > y { nw + x * (ne - nw) + y * (se - ne) } else { nw + y * (sw - nw) + x * (se - sw) }
 }
 
-/// Where a point is seen: x/z, y/z.
+/// Projection of a point: x/z, y/z.
 fn seen(camera: &CameraPose, point: DVec3) -> Option<[f64; 2]> {
     let p = camera.ned_from_camera.inverse() * (point - camera.position_ned_m);
     let [u, v] = [p.x / p.z, p.y / p.z];
@@ -67,15 +68,15 @@ fn seen(camera: &CameraPose, point: DVec3) -> Option<[f64; 2]> {
     is_in_sight.then_some([u, v])
 }
 
-/// Twice the area, in cells; positive as all triangles are turned.
+/// Twice the area in cells; positive, as all triangles have the same orientation.
 fn area2([a, b, c]: [[i64; 2]; 3]) -> i64 {
     (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
 }
 
-/// Two places of each cell, in hundredths: how many triangles hold them within. On an edge, as may be where
-/// triangles are cut, it is none.
+/// Number of triangles that contain each of two points per cell, in hundredths of a cell. Points on an edge,
+/// which may occur where triangles are cut, count as zero.
 fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], u32> {
-    let mut found: HashMap<[i64; 2], u32> = HashMap::new();
+    let mut covers: HashMap<[i64; 2], u32> = HashMap::new();
     for triangle in triangles {
         let [a, b, c] = triangle.map(|p| p.map(|n| 100 * i64::from(n)));
         assert!(area2([a, b, c]) > 0, "{triangle:?}");
@@ -89,18 +90,18 @@ fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], 
                     let p = [100 * i + place[0], 100 * j + place[1]];
                     let least = area2([a, b, p]).min(area2([b, c, p])).min(area2([c, a, p]));
                     if least >= 0 {
-                        *found.entry(p).or_default() += u32::from(least > 0);
+                        *covers.entry(p).or_default() += u32::from(least > 0);
                     }
                 }
             }
         }
     }
-    assert!(found.len() as u64 <= 2 * u64::from(terrain.cells[0]) * u64::from(terrain.cells[1]));
-    found
+    assert!(covers.len() as u64 <= 2 * u64::from(terrain.cells[0]) * u64::from(terrain.cells[1]));
+    covers
 }
 
-/// Triangles meet edge to edge, but where the terrain ends or out of sight; every place in sight is covered,
-/// and none twice.
+/// Checks that triangles meet edge to edge, except at the border of the terrain and out of sight, and that
+/// every point in sight is covered exactly once.
 fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
     let triangles = triangles(terrain, mesh);
     let edges: Vec<[[u32; 2]; 2]> =
@@ -130,8 +131,8 @@ fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
 }
 
 #[test]
-fn nothing_in_sight_is_left_open() {
-    // Whole chunks, and ones that are smaller: to odd numbers, to a single row.
+fn drawn_triangles_cover_everything_in_sight() {
+    // Whole chunks, and smaller ones: with odd sizes, and with a single row.
     for (cols, rows) in [(193, 129), (150, 131), (102, 66)] {
         let terrain = hills(cols, rows, 10.0, 40.0);
         for camera in cameras() {
@@ -142,7 +143,7 @@ fn nothing_in_sight_is_left_open() {
     }
 }
 
-/// Where a ray first meets one of some triangles: the parameter.
+/// Ray parameter of the first intersection with some triangles.
 fn first_met(triangles: &[[DVec3; 3]], origin: DVec3, direction: DVec3) -> Option<f64> {
     let met = triangles
         .iter()
@@ -151,10 +152,10 @@ fn first_met(triangles: &[[DVec3; 3]], origin: DVec3, direction: DVec3) -> Optio
 }
 
 #[test]
-fn what_faces_away_is_never_what_is_seen() {
+fn culled_back_faces_are_never_visible() {
     let mut random = Random(23);
     let (mut away, mut kept, mut met, mut behind) = (0, 0, 0, 0);
-    // Slopes up to 1 and more, so that flat views meet many a slope from behind.
+    // Slopes up to 1 and more, so that rays of flat views hit many slopes from behind.
     for (cols, rows) in [(129, 129), (102, 66)] {
         let terrain = hills(cols, rows, 10.0, 70.0);
         for _ in 0..6 {
@@ -166,13 +167,13 @@ fn what_faces_away_is_never_what_is_seen() {
             );
             let camera = forward(position, random.within(0.0, 0.6));
             let detail = TerrainDetail::new(&terrain, &camera, TANGENTS, FOCAL_PX, random.within(0.1, 2.0));
-            let (all, drawn) = (detail.mesh(), detail.mesh_to_draw());
-            assert_eq!(all.lod.triangles, drawn.lod.triangles + drawn.lod.away);
+            let (all, drawn) = (detail.mesh(), detail.visible_mesh());
+            assert_eq!(all.lod.triangles, drawn.lod.triangles + drawn.lod.back_facing);
             assert_eq!(
-                (all.lod.away, all.lod.max_error_px, &all.chunks),
+                (all.lod.back_facing, all.lod.max_error_px, &all.chunks),
                 (0, drawn.lod.max_error_px, &drawn.chunks)
             );
-            (away, kept) = (away + drawn.lod.away, kept + drawn.lod.triangles);
+            (away, kept) = (away + drawn.lod.back_facing, kept + drawn.lod.triangles);
             let corners = |mesh: &TerrainMesh| -> Vec<[DVec3; 3]> {
                 triangles(&terrain, mesh)
                     .into_iter()
@@ -183,11 +184,11 @@ fn what_faces_away_is_never_what_is_seen() {
             for _ in 0..60 {
                 let uv = [random.within(TANGENTS[0], TANGENTS[1]), random.within(TANGENTS[2], TANGENTS[3])];
                 let direction = camera.ned_from_camera * DVec3::new(uv[0], uv[1], 1.0);
-                let seen = first_met(&all, position, direction);
-                assert_eq!(seen, first_met(&drawn, position, direction));
-                met += usize::from(seen.is_some());
-                // Rays that go on meet what faces away: there is something to be seen wrongly.
-                let on = seen.and_then(|t| first_met(&all, position + (t + 1e-3) * direction, direction));
+                let hit_t = first_met(&all, position, direction);
+                assert_eq!(hit_t, first_met(&drawn, position, direction));
+                met += usize::from(hit_t.is_some());
+                // A continued ray hits back faces, so an error would be visible.
+                let on = hit_t.and_then(|t| first_met(&all, position + (t + 1e-3) * direction, direction));
                 behind += usize::from(on.is_some());
             }
         }
@@ -200,17 +201,17 @@ fn what_faces_away_is_never_what_is_seen() {
 }
 
 #[test]
-fn all_is_drawn_where_an_underside_can_be_seen() {
+fn back_faces_are_drawn_where_they_may_be_visible() {
     let heights = hill_heights(129, 129, 70.0);
     let whole = Terrain::from_heights(129, 129, 10.0, &heights, None).unwrap();
     let drawn = |terrain: &Terrain, position: DVec3| {
         let detail = TerrainDetail::new(terrain, &forward(position, 0.2), TANGENTS, FOCAL_PX, 0.25);
-        (detail.mesh_to_draw().lod, detail.mesh().lod)
+        (detail.visible_mesh().lod, detail.mesh().lod)
     };
     let above = DVec3::new(-300.0, 0.0, whole.down_at(-300.0, 0.0).unwrap() - 20.0);
     let (to_draw, all) = drawn(&whole, above);
-    assert!(to_draw.away > 100 && to_draw.triangles < all.triangles);
-    // Below the ground; beside it, where its end is a cliff with nothing in front.
+    assert!(to_draw.back_facing > 100 && to_draw.triangles < all.triangles);
+    // Below the ground, and beside it, where its border is a cliff with nothing in front.
     for position in [above + DVec3::new(0.0, 0.0, 40.0), DVec3::new(-700.0, 0.0, -20.0)] {
         let (to_draw, all) = drawn(&whole, position);
         assert_eq!(to_draw, all);
@@ -221,15 +222,15 @@ fn all_is_drawn_where_an_underside_can_be_seen() {
     holed[64 * 129 + 64] = f64::NAN;
     let (to_draw, all) = drawn(&Terrain::from_heights(129, 129, 10.0, &holed, None).unwrap(), above);
     assert_eq!(to_draw, all);
-    // A border that bends inwards far away, as a circle of latitude does: a ray along it leaves the ground
+    // A border that bends inwards far away, as a circle of latitude does: a ray along it leaves the terrain
     // and comes back.
     let bent = |bend_m: f64| {
-        let at = |k: usize| [(k % 129) as f64 - 64.0, 64.0 - (k / 129) as f64];
+        let coordinates = |k: usize| [(k % 129) as f64 - 64.0, 64.0 - (k / 129) as f64];
         let points: Vec<_> = heights
             .iter()
             .enumerate()
             .map(|(k, height)| {
-                let [east, north] = at(k);
+                let [east, north] = coordinates(k);
                 DVec3::new(10.0 * north + bend_m * (east / 64.0).powi(2), 10.0 * east, -height)
             })
             .collect();
@@ -239,12 +240,12 @@ fn all_is_drawn_where_an_underside_can_be_seen() {
     let near_border = DVec3::new(635.0, -500.0, -500.0);
     assert!(bent(0.0).is_seen_from_above(near_border));
     assert!(!bent(60.0).is_seen_from_above(near_border));
-    // From the middle no side of that border is seen from outside.
+    // From the middle, no side of that border is seen from outside.
     assert!(bent(60.0).is_seen_from_above(DVec3::new(0.0, 0.0, -500.0)));
 }
 
 #[test]
-fn nothing_is_left_open_from_anywhere() {
+fn drawn_triangles_cover_everything_from_any_camera() {
     let terrain = hills(140, 140, 10.0, 25.0);
     let mut random = Random(17);
     let mut halved = 0;
@@ -263,7 +264,7 @@ fn nothing_is_left_open_from_anywhere() {
 }
 
 #[test]
-fn the_selection_keeps_its_promise() {
+fn displacement_is_within_the_tolerance() {
     let terrain = hills(330, 290, 10.0, 40.0);
     let mut random = Random(5);
     for camera in cameras() {
@@ -278,9 +279,9 @@ fn the_selection_keeps_its_promise() {
                     let [a, b] = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
                     let weights = [1.0 - a - b, a, b];
                     let drawn: DVec3 = (0..3).map(|k| weights[k] * corners[k]).sum();
-                    let at = [0, 1]
+                    let position = [0, 1]
                         .map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(triangle[k][axis])).sum());
-                    let full = full_m(&terrain, at);
+                    let full = full_m(&terrain, position);
                     if let (Some(a), Some(b)) = (seen(&camera, full), seen(&camera, drawn)) {
                         worst = worst.max(FOCAL_PX * (a[0] - b[0]).hypot(a[1] - b[1]));
                         let depth_m = (camera.ned_from_camera.inverse() * (full - camera.position_ned_m)).z;
@@ -291,7 +292,7 @@ fn the_selection_keeps_its_promise() {
             }
             assert!(worst <= mesh.lod.max_error_px + 1e-6, "{worst} > {} px", mesh.lod.max_error_px);
             assert!(worst_from_aside <= max_error_px, "{worst_from_aside} > {max_error_px} px");
-            // Not only bounds.
+            // The error is not only bounded, but reached.
             let worst = worst.max(worst_from_aside);
             assert!(
                 mesh.lod.triangles > 50_000 || worst > 0.3 * max_error_px,
@@ -305,7 +306,7 @@ fn the_selection_keeps_its_promise() {
 }
 
 #[test]
-fn without_any_tolerance_it_is_the_full_surface() {
+fn zero_tolerance_gives_the_full_surface() {
     let terrain = hills(140, 100, 10.0, 40.0);
     let camera = nadir(DVec3::new(0.0, 0.0, -2500.0));
     let mesh = detail(&terrain, &camera, 0.0);
@@ -320,11 +321,11 @@ fn without_any_tolerance_it_is_the_full_surface() {
 }
 
 #[test]
-fn level_ground_needs_two_triangles_a_chunk() {
+fn level_ground_needs_two_triangles_per_chunk() {
     let terrain = Terrain::from_heights(200, 200, 10.0, &vec![0.0; 40_000], None).unwrap();
     let camera = nadir(DVec3::new(0.0, 0.0, -5000.0));
     let lod = detail(&terrain, &camera, 1e-9).lod;
-    // Not 0: barycentric weights of a plane's own points are rounded.
+    // Not 0: the barycentric weights of a plane's own points are rounded.
     assert_eq!((lod.chunks, lod.triangles), (16, 32));
     assert!(lod.max_error_px <= 1e-9);
 }
@@ -339,12 +340,15 @@ fn one_cliff_does_not_refine_its_chunk() {
 }
 
 #[test]
-fn what_lies_beyond_the_view_costs_nothing() {
-    // The same hills in a wider terrain: whole chunks more on each side.
+fn terrain_out_of_view_adds_no_triangles() {
+    // The same hills in a wider terrain, with additional whole chunks on each side.
     let heights = |side: u32| -> Vec<f64> {
-        let at = |index: u32| f64::from(index) - f64::from(side / 2);
+        let coordinate = |index: u32| f64::from(index) - f64::from(side / 2);
         (0..side * side)
-            .map(|k| 20.0 * ((0.3 * at(k % side)).sin() + (0.23 * at(k / side) + 0.1 * at(k % side)).cos()))
+            .map(|k| {
+                20.0 * ((0.3 * coordinate(k % side)).sin()
+                    + (0.23 * coordinate(k / side) + 0.1 * coordinate(k % side)).cos())
+            })
             .collect()
     };
     let camera = nadir(DVec3::new(0.0, 0.0, -1300.0));
@@ -353,7 +357,7 @@ fn what_lies_beyond_the_view_costs_nothing() {
         detail(&terrain, &camera, 0.25).lod
     });
     assert!(small.triangles > 10_000 && small.chunks == large.chunks);
-    // At its end the smaller one does without halves that its continuation would ask for.
+    // At its border the smaller terrain lacks halves that its continuation would require.
     assert!(
         large.triangles.abs_diff(small.triangles) < small.triangles / 100,
         "{} {}",
@@ -369,7 +373,7 @@ fn errors_are_exact() {
         let terrain = hills(cols, rows, 10.0, 30.0);
         let cells = terrain.cells;
         let grid = errors::ChunkGrid { cells, vertices: &terrain.vertices };
-        let found = errors::chunk_errors(&grid).keys;
+        let keys = errors::chunk_errors(&grid).keys;
         let mut random = Random(3);
         let (mut tight, mut asked) = (0, 0);
         let mut level: Vec<[u32; 3]> = lattice::ROOTS.to_vec();
@@ -380,18 +384,18 @@ fn errors_are_exact() {
                     continue;
                 }
                 let points = corners.map(|place| vertex_m(&terrain, place));
-                let limit = found[lattice::halves(triangle).0 as usize];
+                let limit = keys[lattice::halves(triangle).0 as usize];
                 let mut worst = 0.0_f64;
                 for _ in 0..100 {
                     // Multiples of a fraction hit many corners of the overlay exactly.
                     let weights = [random.next(), random.next(), random.next()].map(|w| (6.0 * w).round());
                     let sum = weights.iter().sum::<f64>().max(1e-9);
-                    let at = [0, 1].map(|axis: usize| {
+                    let cell_position = [0, 1].map(|axis: usize| {
                         (0..3).map(|k| weights[k] / sum * f64::from(corners[k][axis])).sum::<f64>()
                     });
                     let coarse: DVec3 = (0..3).map(|k| weights[k] / sum * points[k]).sum();
                     if sum >= 1.0 {
-                        worst = worst.max((full_m(&terrain, at) - coarse).z.abs());
+                        worst = worst.max((full_m(&terrain, cell_position) - coarse).z.abs());
                     }
                 }
                 assert!(errors::key_of_error(worst - 1e-9) <= limit, "{triangle:?} {worst} m");
@@ -400,18 +404,18 @@ fn errors_are_exact() {
             }
             level = level.into_iter().flat_map(|triangle| lattice::halves(triangle).1).collect();
         }
-        // The limit is that of two triangles, and samples are few.
+        // The limit is that of two triangles, and there are few samples.
         assert!(2 * tight > asked, "{tight} of {asked} are near their bound");
     }
 }
 
 #[test]
-fn numbers_of_errors_order_as_errors_do() {
+fn encoded_errors_preserve_order() {
     let mut last = 0;
     for exponent in -200..200 {
         let metres = 1.3f64.powi(exponent);
         let (error, tolerance) = (errors::key_of_error(metres), errors::key_of_tolerance(metres));
-        // An error is within a tolerance only if it really is, and is so if it is below it by 2 %.
+        // An error counts as within a tolerance only if it is, and does so if it is 2 % below it.
         assert!(error > tolerance && error > last);
         assert!(errors::key_of_error(0.98 * metres) <= tolerance, "{metres}");
         last = error;
@@ -444,23 +448,23 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
             let (mut met, mut moved, mut known) = (0, 0.0_f64, [0; 2]);
             for _ in 0..200 {
                 let above = DVec3::new(random.within(-640.0, 640.0), random.within(-640.0, 640.0), -500.0);
-                // Straight down the two surfaces are met in one and the same cell.
+                // Straight down, both surfaces are hit in the same cell.
                 let Some(hit) = terrain.intersect(above, DVec3::Z, f64::INFINITY) else { continue };
                 let exact = drawn
                     .iter()
                     .filter_map(|&t| Some(intersect_triangle(t, above, DVec3::Z, f64::INFINITY)?.0));
                 let exact = exact.min_by(f64::total_cmp).unwrap();
-                let drawn_here = detail.drawn_at(&hit);
-                let found = drawn_here.t(&hit, above, DVec3::Z);
+                let drawn_here = detail.drawn_cell(&hit);
+                let drawn_t = drawn_here.t(&hit, above, DVec3::Z);
                 met += 1;
                 moved = moved.max((exact - hit.t).abs());
-                assert!((found - exact).abs() < 1e-6, "{max_error_px} px: {found} {exact} {}", hit.t);
-                // What is drawn there is known for the same cell, and not for its like in the next chunk.
+                assert!((drawn_t - exact).abs() < 1e-6, "{max_error_px} px: {drawn_t} {exact} {}", hit.t);
+                // The drawn triangles are known for this cell, and not for the same cell of the next chunk.
                 for (of, aside_m) in [1.0, 640.0].into_iter().enumerate() {
                     let beside = above + aside_m * DVec3::Y;
                     let Some(hit) = terrain
                         .intersect(beside, DVec3::Z, f64::INFINITY)
-                        .filter(|hit| drawn_here.is_of(hit))
+                        .filter(|hit| drawn_here.contains(hit))
                     else {
                         continue;
                     };
@@ -476,21 +480,22 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
 }
 
 #[test]
-fn voids_lose_their_triangles_only() {
+fn voids_remove_only_their_triangles() {
     let mut heights = hill_heights(130, 130, 5.0);
     heights[0] = f64::NAN; // north-west corner: the first cell loses both triangles
     heights[130] = f64::INFINITY;
     heights[64] = f64::NAN; // on the border of two chunks
     let terrain = Terrain::from_heights(130, 130, 10.0, &heights, None).unwrap();
     assert_eq!(terrain.chunks.iter().filter(|c| c.has_voids).count(), 2);
-    // Corners: (0,0) touches 1 cell, (0,1) 2 of which one was counted, (64,0) one in each chunk.
+    // Corners: (0,0) touches 1 cell; (0,1) touches 2, one of which was counted; (64,0) touches one in each
+    // chunk.
     assert_eq!(terrain.void_cells, 4);
     let all = 2 * 129 * 129;
     let camera = nadir(DVec3::new(0.0, 0.0, -2000.0));
     let full = detail(&terrain, &camera, 0.0);
-    // (0,0) and (0,1) take both triangles of cell (0,0); (0,1) is also the north-west of cell (0,1): both of
-    // its triangles. (64,0) is the north-east of cell (63,0), one triangle, and the north-west of cell
-    // (64,0), both.
+    // (0,0) and (0,1) remove both triangles of cell (0,0). (0,1) is also the north-west of cell (0,1), with
+    // both triangles. (64,0) is the north-east of cell (63,0), with one triangle, and the north-west of cell
+    // (64,0), with both.
     assert_eq!(full.lod.triangles, all - 7);
     let lost = |mesh: &TerrainMesh| {
         let covered = covered(&terrain, &triangles(&terrain, mesh));
@@ -501,7 +506,7 @@ fn voids_lose_their_triangles_only() {
     let north_west = terrain.intersect(DVec3::new(644.9, -644.9, -100.0), DVec3::Z, 200.0);
     assert_eq!(north_west, None);
     assert!(terrain.down_at(0.0, 0.0).is_some());
-    // With a wide tolerance the same is missing, and only the surroundings are complete.
+    // With a wide tolerance the same triangles are missing, and only the surroundings are at full detail.
     let loose = detail(&terrain, &nadir(DVec3::new(0.0, 0.0, -8000.0)), 100.0);
     assert_eq!(lost(&loose), 7);
     assert!(loose.lod.triangles < 200, "{}", loose.lod.triangles);
@@ -512,7 +517,7 @@ fn voids_lose_their_triangles_only() {
 }
 
 #[test]
-fn where_everything_is_missing_nothing_is_drawn() {
+fn chunks_of_voids_draw_nothing() {
     let heights: Vec<f64> = (0..193 * 65).map(|k| if k % 193 < 70 { f64::NAN } else { 0.0 }).collect();
     let terrain = Terrain::from_heights(193, 65, 10.0, &heights, None).unwrap();
     assert_eq!(terrain.chunks.iter().map(|chunk| chunk.has_surface).collect::<Vec<_>>(), [false, true, true]);
@@ -522,7 +527,7 @@ fn where_everything_is_missing_nothing_is_drawn() {
 }
 
 #[test]
-fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
+fn chunk_search_matches_a_test_of_all_chunks() {
     let terrain = hills(64 * 11 + 9, 64 * 7 + 30, 10.0, 60.0);
     let mut random = Random(31);
     let (mut found, mut hidden) = (0, 0);
@@ -535,15 +540,16 @@ fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
         let camera = forward(position, random.within(0.0, 1.5));
         let mesh = detail(&terrain, &camera, random.within(0.2, 20.0));
         let frustum = Frustum::new(&camera, TANGENTS);
-        let seen: Vec<u32> = (0..terrain.chunks.len() as u32)
+        let in_view: Vec<u32> = (0..terrain.chunks.len() as u32)
             .filter(|&chunk| {
-                let at = [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]].map(i64::from);
-                frustum.may_see(&terrain.tree.square(CHUNK_CELLS, at).unwrap())
+                let chunk_position =
+                    [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]].map(i64::from);
+                frustum.may_see(&terrain.tree.square(CHUNK_CELLS, chunk_position).unwrap())
             })
             .collect();
-        assert_eq!(mesh.chunks, seen);
-        (found, hidden) = (found + seen.len(), hidden + terrain.chunks.len() - seen.len());
-        // Drawn one after the other, the nearest first.
+        assert_eq!(mesh.chunks, in_view);
+        (found, hidden) = (found + in_view.len(), hidden + terrain.chunks.len() - in_view.len());
+        // Chunks are drawn one after the other, the nearest first.
         let mut places: Vec<u32> = mesh.indices.iter().map(|index| index >> VERTEX_BITS).collect();
         places.dedup();
         let distance_m =

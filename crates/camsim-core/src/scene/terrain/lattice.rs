@@ -1,14 +1,15 @@
-//! The vertices of a chunk as a hierarchy: right triangles, each of which may be halved at the middle of its
-//! longest side.
+//! The vertices of a chunk as a hierarchy of right triangles, each of which may be halved at the middle of
+//! its longest side.
 //!
-//! A chunk is a lattice of 65x65 vertices, numbered row after row from the north-west. Two triangles of half
-//! a chunk are halved and halved again, 12 times until every triangle is half a cell. A vertex is the middle
-//! of the longest sides of two triangles that mirror each other, its *diamond*; those of a vertex on the
-//! chunk's border lie in two chunks. Halving both or none leaves no gap, and a triangle is there to be halved
-//! only if the triangles it came from were: a vertex needs those that its diamond's triangles came from.
+//! A chunk is a lattice of 65x65 vertices, numbered row by row from the north-west. Two triangles of half a
+//! chunk are halved repeatedly, 12 times until every triangle is half a cell. A vertex is the middle of the
+//! longest sides of two mirrored triangles, its *diamond*; those of a vertex on the chunk's border lie in two
+//! chunks. Halving both or neither leaves no gap. A triangle exists only if its ancestors were halved: a
+//! vertex needs the vertices at which the ancestors of its diamond were halved.
 //!
-//! Every other cell ends up with a diagonal from north-east to south-west, where the full surface has one
-//! from north-west to south-east. Turning it is one more step of the hierarchy, of the *cell*.
+//! In every other cell the last halving gives a diagonal from north-east to south-west, where the full
+//! surface has one from north-west to south-east. Turning it is one more step of the hierarchy, that of the
+//! *cell*.
 
 use std::{collections::BTreeMap, ops::RangeInclusive, sync::LazyLock};
 
@@ -18,36 +19,36 @@ use super::CHUNK_CELLS;
 pub(super) const SIDE: u32 = CHUNK_CELLS + 1;
 /// Vertices of a chunk.
 pub(super) const VERTICES: usize = (SIDE * SIDE) as usize;
-/// Places for the cells whose diagonal can be turned: by half the number of their north-west vertex, which is
-/// odd.
+/// Slots for the cells whose diagonal can be turned, indexed by half the number of their north-west vertex,
+/// which is odd.
 pub(super) const CELLS: usize = VERTICES / 2;
-/// A triangle halved so many times is half of a cell.
+/// Number of halvings after which a triangle is half a cell.
 pub(super) const DEPTHS: u32 = 12;
-/// Sizes of the squares for which a camera's needs are found, cells along a side.
+/// Sizes of the squares for which tolerances are computed, cells along a side.
 pub(super) const NODE_CELLS: [u32; 4] = [8, 16, 32, 64];
-/// Depth from which on a triangle lies within a square of 8x8 cells.
+/// Depth from which a triangle lies within a square of 8x8 cells.
 pub(super) const BLOCK_DEPTH: u32 = 6;
 
 /// The two triangles of a chunk: ends of the longest side, then the corner of the right angle. All triangles
-/// turn alike.
+/// have the same orientation.
 pub(super) const ROOTS: [[u32; 3]; 2] = {
     let [nw, ne, sw, se] = [0, CHUNK_CELLS, CHUNK_CELLS * SIDE, CHUNK_CELLS * SIDE + CHUNK_CELLS];
     [[se, nw, sw], [nw, se, ne]]
 };
 
-/// Both halves of a triangle and the vertex between them.
+/// The two halves of a triangle, and the vertex between them.
 pub(super) fn halves([a, b, c]: [u32; 3]) -> (u32, [[u32; 3]; 2]) {
     let middle = a.midpoint(b);
     (middle, [[c, a, middle], [b, c, middle]])
 }
 
-/// North-west vertex of the cell that holds a triangle of half a cell, if its diagonal must be turned to be
-/// the full surface's.
+/// North-west vertex of the cell that holds a triangle of half a cell, if its diagonal must be turned to
+/// match the full surface.
 pub(super) fn cell_to_turn([a, b, _]: [u32; 3]) -> Option<u32> {
     (a.abs_diff(b) == CHUNK_CELLS).then(|| a.min(b) - 1)
 }
 
-/// What such a triangle becomes when the diagonal is turned.
+/// Such a triangle after turning the diagonal.
 pub(super) fn turned([_, _, c]: [u32; 3], cell: u32) -> [u32; 3] {
     let south_east = cell + SIDE + 1;
     if c == cell { [cell, cell + SIDE, south_east] } else { [cell, south_east, cell + 1] }
@@ -58,36 +59,36 @@ pub(super) fn place(vertex: u32) -> [u32; 2] {
     [vertex % SIDE, vertex / SIDE]
 }
 
-/// `None` for the corners of the chunk.
+/// Depth of a vertex; `None` for the corners of the chunk.
 pub(super) fn depth_of(vertex: u32) -> Option<u32> {
     let [i, j] = place(vertex);
     let power = (i | j).trailing_zeros();
     let step = CHUNK_CELLS.trailing_zeros().checked_sub(power + 1)?;
-    // In the middle of a square, or of the side of one.
-    let of_square = i.trailing_zeros() == j.trailing_zeros();
-    Some(2 * step + u32::from(!of_square))
+    // At the centre of a square, or of a side of one.
+    let square_tolerance = i.trailing_zeros() == j.trailing_zeros();
+    Some(2 * step + u32::from(!square_tolerance))
 }
 
-/// Cells from a vertex of a depth to where the vertices around it that may need it can have an influence: the
-/// half side of a square that holds its diamond and the squares of all vertices and cells that need it.
+/// Radius, in cells, within which the vertices that may need a vertex of a depth matter: half the side of a
+/// square around its diamond and the squares of all vertices and cells that need it.
 fn reach(depth: u32) -> u32 {
     let step = CHUNK_CELLS >> (depth / 2 + 1);
     if depth.is_multiple_of(2) { 3 * step - 1 } else { 2 * step - 1 }
 }
 
-/// Which of [`NODE_CELLS`] a vertex of a depth is judged by: a square that reaches as far meets three of them
-/// along a side at most.
+/// Index into [`NODE_CELLS`] for vertices of a depth: a square of the vertex's radius overlaps at most three
+/// of these along a side.
 pub(super) fn node_size(depth: u32) -> usize {
     let reach = reach(depth);
     NODE_CELLS.iter().position(|&cells| cells >= reach).unwrap_or(NODE_CELLS.len() - 1)
 }
 
-/// A set of squares: the strictest of them decides about a vertex.
+/// A set of squares, the strictest of which decides about a vertex.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Squares {
-    /// Of [`NODE_CELLS`].
+    /// Index into [`NODE_CELLS`].
     pub size: usize,
-    /// First and last, counted from the chunk's first: -1 is the neighbouring chunk's last.
+    /// First and last column, relative to the chunk's first: -1 is the neighbouring chunk's last.
     pub columns: [i32; 2],
     pub rows: [i32; 2],
 }
@@ -116,13 +117,13 @@ impl Squares {
     }
 }
 
-/// Which squares decide about which vertex and cell: the same for all chunks.
+/// The squares that decide about each vertex and cell; equal for all chunks.
 pub(super) struct Lattice {
-    /// Each set once.
+    /// The distinct sets.
     pub sets: Vec<Squares>,
-    /// The number of each vertex's set. Corners of the chunk are never asked.
+    /// Index of each vertex's set; unused for the corners of the chunk.
     pub set_of_vertex: Vec<u16>,
-    /// The number of each cell's set.
+    /// Index of each cell's set.
     pub set_of_cell: Vec<u16>,
     /// Vertices by depth: middles of the longest sides of triangles halved so many times.
     pub by_depth: [Vec<u32>; DEPTHS as usize],
@@ -145,14 +146,14 @@ impl Lattice {
             (0..VERTICES as u32).map(|vertex| of_vertex(vertex).map_or(0, &mut number)).collect();
         let cell = |half: u32| {
             let [i, j] = place(2 * half + 1);
-            // The last column and row hold no cells.
+            // The last column and row have no cells.
             Squares::of_cell([i.min(CHUNK_CELLS - 1), j.min(CHUNK_CELLS - 1)])
         };
         let set_of_cell = (0..CELLS as u32).map(|half| number(cell(half))).collect();
-        let at = |depth: usize| {
+        let vertices_at = |depth: usize| {
             (0..VERTICES as u32).filter(move |&vertex| depth_of(vertex) == Some(depth as u32)).collect()
         };
-        Self { sets, set_of_vertex, set_of_cell, by_depth: std::array::from_fn(at) }
+        Self { sets, set_of_vertex, set_of_cell, by_depth: std::array::from_fn(vertices_at) }
     }
 }
 
@@ -201,12 +202,12 @@ mod tests {
                 }
             });
         }
-        // Every vertex but the corners, once.
+        // Every vertex but the corners occurs once.
         assert_eq!(LATTICE.by_depth.iter().map(Vec::len).sum::<usize>(), VERTICES - 4);
     }
 
     #[test]
-    fn a_vertex_is_judged_by_more_than_what_needs_it() {
+    fn squares_of_a_vertex_contain_those_of_vertices_that_need_it() {
         let lattice = &*LATTICE;
         let cells = |set: u16| {
             let squares = &lattice.sets[usize::from(set)];
@@ -250,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn chunks_judge_the_vertices_between_them_alike() {
+    fn shared_vertices_have_equal_squares_in_both_chunks() {
         let lattice = &*LATTICE;
         let squares = |vertex: u32| lattice.sets[usize::from(lattice.set_of_vertex[vertex as usize])].clone();
         for j in 1..CHUNK_CELLS {
@@ -258,7 +259,7 @@ mod tests {
             let shift = (CHUNK_CELLS / NODE_CELLS[ours.size]) as i32;
             assert_eq!((ours.size, ours.rows), (theirs.size, theirs.rows));
             assert_eq!(ours.columns, theirs.columns.map(|column| column + shift));
-            // And one chunk's southern border as the other's northern one.
+            // The southern border of one chunk as the northern border of another.
             let (ours, theirs) = (squares(CHUNK_CELLS * SIDE + j), squares(j));
             assert_eq!((ours.columns, ours.rows), (theirs.columns, theirs.rows.map(|row| row + shift)));
         }

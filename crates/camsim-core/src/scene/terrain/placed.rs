@@ -1,27 +1,26 @@
-//! What a device needs of a terrain for one ideal frame: the vertices of the triangles that are drawn, and no
-//! others.
+//! The drawn triangles of a terrain with their vertices, as uploaded for one ideal frame.
 
 use glam::{DVec3, Vec3};
 
-use super::{CHUNK_CELLS, LodSelection, Terrain, TerrainMesh, VERTEX_BITS};
+use super::{CHUNK_CELLS, LodSelection, Terrain, TerrainMesh, select::VERTEX_BITS};
 
-/// Triangles to draw.
+/// Vertices and indices of the triangles to draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedMesh {
-    /// North, east, down from a base in whole metres, and texture coordinates, in the order of their first
-    /// use; one on a chunk's border stands there for each chunk. Positions are the correctly rounded sums of
-    /// two exact numbers, so that these chunks agree in every bit.
+    /// North, east, down from a base in whole metres, and texture coordinates, in the order of first use. A
+    /// vertex on a chunk's border occurs once per chunk. Positions are the correctly rounded sums of two
+    /// exact numbers, so these chunks agree in every bit.
     pub vertices: Vec<[f32; 5]>,
-    /// Three a triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
-    /// Tiles of the ground's picture that they may be read from; none for a picture that is whole.
+    /// Tiles of the texture that the triangles may read; empty for a texture that is not tiled.
     pub tiles: Vec<u32>,
-    /// What that comes to.
+    /// Statistics of the level of detail.
     pub lod: LodSelection,
 }
 
 impl PlacedMesh {
-    /// What the device holds of it: 20 bytes a vertex and 4 an index.
+    /// GPU memory: 20 bytes per vertex and 4 per index.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.vertices) + size_of_val(&*self.indices)) as u64
@@ -29,7 +28,7 @@ impl PlacedMesh {
 }
 
 impl TerrainMesh {
-    /// With the vertices themselves, seen from a base near the camera. The base is in whole metres, as chunk
+    /// Resolves the vertices, relative to a base near the camera. The base is in whole metres, as chunk
     /// centres are.
     #[must_use]
     pub fn placed(&self, terrain: &Terrain, base_ned_m: DVec3) -> PlacedMesh {
@@ -39,7 +38,7 @@ impl TerrainMesh {
             lod: self.lod,
             ..PlacedMesh::default()
         };
-        // A vertex of this chunk, if it was used before, by its number.
+        // New index of each vertex of this chunk, if it was used before.
         let mut known = vec![NONE; ((CHUNK_CELLS + 1) * (CHUNK_CELLS + 1)) as usize];
         for of_chunk in self.indices.chunk_by(|a, b| a >> VERTEX_BITS == b >> VERTEX_BITS) {
             let chunk = &terrain.chunks[self.chunks[(of_chunk[0] >> VERTEX_BITS) as usize] as usize];
@@ -50,9 +49,9 @@ impl TerrainMesh {
                 let number = &mut known[vertex as usize];
                 if *number == NONE {
                     *number = placed.vertices.len() as u32;
-                    let of = &terrain.vertices[(chunk.first_vertex + vertex) as usize];
-                    let [north, east, down] = (centre_from_base_m + Vec3::from(of.offset_m)).to_array();
-                    placed.vertices.push([north, east, down, of.uv[0], of.uv[1]]);
+                    let source = &terrain.vertices[(chunk.first_vertex + vertex) as usize];
+                    let [north, east, down] = (centre_from_base_m + Vec3::from(source.offset_m)).to_array();
+                    placed.vertices.push([north, east, down, source.uv[0], source.uv[1]]);
                 }
                 placed.indices.push(*number);
             }
@@ -74,10 +73,10 @@ mod tests {
     };
 
     #[test]
-    fn every_corner_is_where_the_terrain_has_it() {
+    fn placed_vertices_match_the_terrain() {
         let terrain = hills(200, 150, 10.0, 40.0);
         let camera = forward(DVec3::new(-600.25, 80.5, -150.0), 0.2);
-        let mesh = TerrainDetail::new(&terrain, &camera, [-0.7, 0.7, -0.5, 0.5], 300.0, 0.25).mesh_to_draw();
+        let mesh = TerrainDetail::new(&terrain, &camera, [-0.7, 0.7, -0.5, 0.5], 300.0, 0.25).visible_mesh();
         let base_ned_m = camera.position_ned_m.round();
         let placed = mesh.placed(&terrain, base_ned_m);
         assert!(
@@ -93,7 +92,7 @@ mod tests {
             let [north, east, down, uv @ ..] = placed.vertices[*place as usize];
             assert_eq!(([north, east, down], uv), (exact_m.as_vec3().to_array(), vertex.uv));
         }
-        // Nothing is there twice but what chunks share, and nothing that no triangle uses.
+        // Only vertices on chunk borders occur twice, and every vertex is used.
         let mut used: Vec<u32> = placed.indices.clone();
         used.sort_unstable();
         used.dedup();

@@ -1,31 +1,31 @@
-//! Rays and distances against the full surface, in f64.
+//! Ray and distance queries on the full surface, in f64.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{
     Terrain, cell_triangles,
-    tree::{BLOCK_CELLS, Node},
+    tree::{BLOCK_CELLS, BlockNode},
 };
 use crate::pose::CameraPose;
 
-/// Where a ray meets the ground.
+/// Intersection of a ray with the terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TerrainHit {
     /// Ray parameter: the point is origin + t direction.
     pub t: f64,
-    /// Texture coordinates there.
+    /// Texture coordinates at the point.
     pub uv: [f64; 2],
-    /// Unit normal of the triangle, NED, towards the sky.
+    /// Unit normal of the triangle, NED, upwards.
     pub normal_ned: DVec3,
-    /// Index of its chunk in [`Terrain::chunks`].
+    /// Index of the chunk in [`Terrain::chunks`].
     pub chunk: u32,
-    /// Its cell in the chunk, from the west and from the north.
+    /// Cell in the chunk, from the west and from the north.
     pub cell: [u32; 2],
 }
 
 impl Terrain {
-    /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The
-    /// direction need not have unit length. Rays cannot slip through between triangles.
+    /// First intersection of `origin + t direction`, 0 <= t <= `t_max`, with the full surface, from either
+    /// side. The direction need not have unit length. No ray passes between adjacent triangles.
     pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
         let mut best: Option<TerrainHit> = None;
         let beside = direction_ned.normalize().any_orthonormal_pair();
@@ -37,8 +37,8 @@ impl Terrain {
         best
     }
 
-    /// The full surface at a place of the tangent plane: the down coordinate of the topmost point, `None` off
-    /// the terrain.
+    /// Down coordinate of the topmost point of the full surface at a horizontal position; `None` off the
+    /// terrain.
     pub fn down_at(&self, north_m: f64, east_m: f64) -> Option<f64> {
         let top = self.bounds.min.z - 1.0;
         let hit =
@@ -46,19 +46,16 @@ impl Terrain {
         Some(top + hit.t)
     }
 
-    /// A lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such
-    /// a box.
-    pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
+    /// Lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such a
+    /// box.
+    #[cfg(test)]
+    pub(super) fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
         self.nearest_box_m(position_ned_m, &|_| true)
     }
 
-    /// An upper bound of the distance from a point to any point of the surface.
-    pub fn max_distance_m(&self, position_ned_m: DVec3) -> f64 {
-        self.bounds.farthest_m(position_ned_m)
-    }
-
-    /// As [`Terrain::min_distance_m`], among what the camera sees within `tangents` = [u_min, u_max, v_min,
-    /// v_max] (u = x/z, v = y/z in the optical frame); infinite if the terrain is out of sight.
+    /// Lower bound of the distance from the camera to the part of the surface that it sees within `tangents`
+    /// = [u_min, u_max, v_min, v_max] (u = x/z, v = y/z in camera axes), from boxes around 4x4 cells; 0
+    /// inside such a box, infinite if the terrain is out of sight.
     pub fn min_distance_in_view_m(&self, camera: &CameraPose, tangents: [f64; 4]) -> f64 {
         let frustum = Frustum::new(camera, tangents);
         self.nearest_box_m(camera.position_ned_m, &|bounds| frustum.may_see(bounds))
@@ -70,14 +67,14 @@ impl Terrain {
         while let Some(node) = stack.pop() {
             let bounds = self.tree.bounds(node);
             let distance = bounds.distance_m(position_ned_m);
-            // Written so that a NaN distance goes nowhere.
+            // False for a NaN distance.
             if distance < nearest && accept(&bounds) {
                 if node.level == 0 {
                     nearest = distance;
                 } else {
                     let below = stack.len();
                     stack.extend(self.tree.children(node));
-                    let far = |node: &Node| self.tree.bounds(*node).distance_m(position_ned_m);
+                    let far = |node: &BlockNode| self.tree.bounds(*node).distance_m(position_ned_m);
                     stack[below..].sort_by(|a, b| far(b).total_cmp(&far(a)));
                 }
             }
@@ -85,9 +82,9 @@ impl Terrain {
         nearest
     }
 
-    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point
-    /// of a plane, whose axes are `right` and `up`, and a cell all of whose vertices lie to one side of the
-    /// ray there is missed.
+    /// Intersects a ray with a block. Candidate cells are found first: the vertices are projected along the
+    /// ray onto a plane with axes `right` and `up`, and a cell whose vertices all lie on one side of the ray
+    /// is skipped.
     fn intersect_block(
         &self,
         block: [u32; 2],
@@ -153,8 +150,8 @@ impl Terrain {
 /// Vertices along a side of a block.
 const SIDE: usize = BLOCK_CELLS as usize + 1;
 
-/// Whether a ray may pass a cell whose corners it sees at these places around it. The margin is far above
-/// what rounding moves them by; places that are no numbers count as passed, and are left to the triangles.
+/// Whether a ray may hit a cell with these projected corners. The margin is far above rounding. NaN counts as
+/// a hit and is left to the triangles.
 fn passes(corners: [DVec2; 4]) -> bool {
     const MARGIN: f64 = 0.01;
     let [a, b, c, d] = corners;
@@ -164,20 +161,20 @@ fn passes(corners: [DVec2; 4]) -> bool {
     !(missed && (a + b + c + d).is_finite())
 }
 
-/// Ray parameter in 0..=`t_max` and barycentric weights where a ray meets a triangle, from either side.
-/// Corners that are not finite are never met.
+/// Ray parameter in 0..=`t_max` and barycentric weights of the intersection of a ray with a triangle, from
+/// either side. Triangles with corners that are not finite are never hit.
 ///
-/// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates
-/// its volume in floating point, so two triangles agree on which side of their common edge a ray passes.
-/// Where several edges meet, rounding could still open a gap: triangles are larger by the rounding error of
-/// the volumes (1e-8 m for a cell of 10 m seen from 5 km).
+/// The test uses signed volumes over the edges, seen from the ray's origin. Swapping the ends of an edge
+/// exactly negates its volume in floating point, so two triangles agree on which side of their common edge a
+/// ray passes. Where several edges meet, rounding could still open a gap, so triangles are enlarged by the
+/// rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
 pub fn intersect_triangle(
     points: [DVec3; 3],
     origin: DVec3,
     direction: DVec3,
     t_max: f64,
 ) -> Option<(f64, [f64; 3])> {
-    /// 18 products and sums at most, of eps / 2 each, and some reserve.
+    /// At most 18 products and sums with eps / 2 each, plus a reserve.
     const ROUNDING: f64 = 4e-15;
     let (a, b, c) = (points[0] - origin, points[1] - origin, points[2] - origin);
     let (wa, wb, wc) = (direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a)));
@@ -185,7 +182,7 @@ pub fn intersect_triangle(
     let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
     let slack = ROUNDING * reach * reach * direction.abs().max_element();
     let lowest = if sum > 0.0 { wa.min(wb).min(wc) } else { -wa.max(wb).max(wc) };
-    // Written so that NaN is a miss.
+    // NaN is a miss.
     if !(lowest >= -slack && sum.abs() > 3.0 * slack) {
         return None;
     }
@@ -194,7 +191,7 @@ pub fn intersect_triangle(
     (t >= 0.0 && t <= t_max).then(|| (t, [wa / sum, wb / sum, wc / sum]))
 }
 
-/// Half-spaces that a camera sees.
+/// The half-spaces of a camera's view frustum.
 #[derive(Debug)]
 pub struct Frustum {
     position_ned_m: DVec3,
@@ -203,7 +200,7 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// `tangents`: u_min, u_max, v_min, v_max.
+    /// `tangents` are u_min, u_max, v_min, v_max.
     pub fn new(camera: &CameraPose, tangents: [f64; 4]) -> Self {
         let [u_min, u_max, v_min, v_max] = tangents;
         let in_camera = [

@@ -1,4 +1,5 @@
-//! The terrain as a whole: fit of chunks, bounds, rays. What is drawn of it: `drawn_tests.rs`.
+//! Tests of the terrain as a whole: fit of chunks, bounds, rays. For the drawn triangles see
+//! `drawn_tests.rs`.
 #![allow(clippy::unwrap_used)]
 
 use glam::{DQuat, DVec3, Vec3};
@@ -6,7 +7,7 @@ use glam::{DQuat, DVec3, Vec3};
 use super::{query::intersect_triangle, *};
 use crate::pose::CameraPose;
 
-/// Repeatable numbers in 0..1 without a dependency.
+/// Repeatable pseudo-random numbers in 0..1.
 pub(super) struct Random(pub u64);
 
 impl Random {
@@ -33,14 +34,14 @@ pub(super) fn hill_heights(cols: u32, rows: u32, relief_m: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Looking straight down, image top to the north.
+/// A camera looking straight down, with the image top to the north.
 pub(super) fn nadir(position_ned_m: DVec3) -> CameraPose {
     let x = DVec3::Y;
     let y = -DVec3::X;
     CameraPose { position_ned_m, ned_from_camera: DQuat::from_mat3(&glam::DMat3::from_cols(x, y, DVec3::Z)) }
 }
 
-/// Looking north, `pitch` below the horizon.
+/// A camera looking north, `pitch` below the horizon.
 pub(super) fn forward(position_ned_m: DVec3, pitch: f64) -> CameraPose {
     let z = DVec3::new(pitch.cos(), 0.0, pitch.sin());
     let x = DVec3::Y;
@@ -85,7 +86,7 @@ fn shared_vertices_have_the_same_bits_at_any_distance() {
 }
 
 #[test]
-fn positions_are_kept_within_half_a_quantum() {
+fn positions_are_within_half_a_quantum() {
     let heights = hill_heights(70, 66, 400.0);
     let terrain = Terrain::from_heights(70, 66, 90.0, &heights, None).unwrap();
     assert!(terrain.quantum_m <= 5e-4, "{}", terrain.quantum_m);
@@ -105,7 +106,7 @@ fn positions_are_kept_within_half_a_quantum() {
 }
 
 #[test]
-fn rays_meet_what_a_search_through_all_triangles_meets() {
+fn ray_hits_match_a_search_of_all_triangles() {
     let terrain = hills(140, 75, 10.0, 40.0);
     let mut random = Random(11);
     let mut hits = 0;
@@ -143,7 +144,7 @@ fn rays_meet_what_a_search_through_all_triangles_meets() {
             );
             assert!(hit.normal_ned.z < 0.0);
             let distance = (point - origin).length();
-            assert!(terrain.min_distance_m(origin) <= distance && terrain.max_distance_m(origin) >= distance);
+            assert!(terrain.min_distance_m(origin) <= distance);
         }
     }
     assert!(hits > 50, "{hits}");
@@ -151,7 +152,7 @@ fn rays_meet_what_a_search_through_all_triangles_meets() {
 
 #[test]
 fn no_ray_slips_through_between_triangles() {
-    // Level ground seen from points on its own grid: every ray meets vertices and edges exactly.
+    // Level ground seen from points on its own grid: every ray hits vertices and edges exactly.
     let terrain = Terrain::from_heights(131, 131, 1.0, &vec![0.0; 131 * 131], None).unwrap();
     for j in -65..=65 {
         for i in -65..=65 {
@@ -164,7 +165,7 @@ fn no_ray_slips_through_between_triangles() {
             }
         }
     }
-    // A rough one: rays at its vertices from afar.
+    // A rough terrain: rays at its vertices from afar.
     let rough = hills(70, 70, 7.7, 25.0);
     for (index, chunk) in rough.chunks.iter().enumerate() {
         for n in 0..chunk.cells[0] * chunk.cells[1] {
@@ -190,9 +191,9 @@ fn no_ray_slips_through_between_triangles() {
 }
 
 #[test]
-fn distance_in_view_is_that_of_what_the_camera_sees() {
+fn distance_in_view_matches_the_visible_surface() {
     let terrain = hills(200, 200, 10.0, 1.0);
-    // Low over the southern end, looking up: nothing; looking along: far less than behind.
+    // Low over the southern end, looking up: nothing in sight; looking along: much less than looking back.
     let position = DVec3::new(-900.0, 0.0, -30.0);
     let tangents = [-0.5, 0.5, -0.4, 0.4];
     assert_eq!(terrain.min_distance_in_view_m(&forward(position, -1.0), tangents), f64::INFINITY);
@@ -215,7 +216,7 @@ fn distance_in_view_is_that_of_what_the_camera_sees() {
 }
 
 #[test]
-fn grids_that_are_no_terrain_are_refused() {
+fn invalid_grids_are_refused() {
     assert!(matches!(Terrain::from_heights(0, 0, 1.0, &[], None), Err(TerrainError::TooSmall { .. })));
     assert!(matches!(Terrain::from_heights(1, 1, 1.0, &[0.0], None), Err(TerrainError::TooSmall { .. })));
     assert!(matches!(
@@ -228,7 +229,7 @@ fn grids_that_are_no_terrain_are_refused() {
 }
 
 #[test]
-fn hostile_queries_answer_without_panic() {
+fn non_finite_queries_do_not_panic() {
     let terrain = hills(100, 100, 10.0, 20.0);
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, 1e300, -1e300, f64::MIN_POSITIVE];
     for x in bad {
@@ -236,7 +237,7 @@ fn hostile_queries_answer_without_panic() {
             let (p, d) = (DVec3::new(x, y, x), DVec3::new(y, x, y));
             let _ = terrain.intersect(p, d, 1e9);
             let _ = terrain.intersect(DVec3::new(0.0, 0.0, -100.0), d, x);
-            let _ = (terrain.min_distance_m(p), terrain.max_distance_m(p), terrain.down_at(x, y));
+            let _ = (terrain.min_distance_m(p), terrain.down_at(x, y));
             let camera = CameraPose { position_ned_m: p, ned_from_camera: DQuat::from_xyzw(x, y, x, y) };
             let _ = TerrainDetail::new(&terrain, &camera, [x, y, y, x], y, x).mesh();
             let _ = TerrainDetail::new(
@@ -253,36 +254,36 @@ fn hostile_queries_answer_without_panic() {
 }
 
 #[test]
-fn one_large_chunk_rounds_all_positions() {
-    // 40 x 40 chunks, one of them with a peak higher than any other chunk is wide: not among those that are
-    // looked at first.
+fn largest_chunk_determines_the_quantum() {
+    // 40 x 40 chunks, one of them with a peak higher than any other chunk is wide, and not among the sampled
+    // chunks.
     let side = 64 * 40 + 1;
     let mut heights = vec![0.0; (side * side) as usize];
     let peak = [64 * 17 + 30, 64 * 23 + 11];
     heights[(peak[1] * side + peak[0]) as usize] = 9000.0;
     let terrain = Terrain::from_heights(side, side, 3.0, &heights, None).unwrap();
-    // Half of 9000 m needs 13 bits, of 24.
+    // Half of 9000 m needs 13 of 24 bits.
     assert_eq!(terrain.quantum_m, 2f64.powi(13 - 23));
     let (chunk, [i, j]) = terrain.chunk_of_cell(peak);
-    let at = DVec3::new(
+    let peak_ned_m = DVec3::new(
         (32.0 * 40.0 - f64::from(peak[1])) * 3.0,
         (f64::from(peak[0]) - 32.0 * 40.0) * 3.0,
         -9000.0,
     );
-    assert_eq!(terrain.position_ned_m(chunk, i, j), at);
+    assert_eq!(terrain.position_ned_m(chunk, i, j), peak_ned_m);
     assert!(
-        (25.0..27.0).contains(&(terrain.host_bytes() as f64 / f64::from(side * side))),
+        (25.0..27.0).contains(&(terrain.memory_bytes() as f64 / f64::from(side * side))),
         "{}",
-        terrain.host_bytes()
+        terrain.memory_bytes()
     );
 }
 
 #[test]
-fn parts_of_the_border_tell_what_all_its_sides_do() {
+fn border_parts_match_a_test_of_all_sides() {
     let mut random = Random(37);
-    let mut found = [0, 0];
+    let mut counts = [0, 0];
     for bend_m in [0.0, 40.0, -25.0] {
-        // Sides bulge or cave in; 3 x 2 chunks and some.
+        // Sides bulge or cave in; 3 x 2 chunks and a remainder.
         let (cols, rows) = (64 * 3 + 20, 64 * 2 + 5);
         let uvs = vec![[0.0; 2]; (cols * rows) as usize];
         let points: Vec<DVec3> = (0..cols * rows)
@@ -301,8 +302,8 @@ fn parts_of_the_border_tell_what_all_its_sides_do() {
                 (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
             let all = turns.iter().all(|&turn| turn > 0.0) || turns.iter().all(|&turn| turn < 0.0);
             assert_eq!(terrain.border_faces_away_from(place.extend(-500.0)), all, "{place} {bend_m}");
-            found[usize::from(all)] += 1;
+            counts[usize::from(all)] += 1;
         }
     }
-    assert!(found[0] > 150 && found[1] > 300, "{found:?}");
+    assert!(counts[0] > 150 && counts[1] > 300, "{counts:?}");
 }

@@ -1,23 +1,23 @@
-//! A quadtree of boxes over the grid.
+//! A quadtree of bounding boxes over the grid.
 //!
-//! The four boxes below one are [tested against a ray at once](super::super::quad): they lie together in
-//! memory, relative to the middle of the whole.
+//! The four child boxes of a node are [tested against a ray together](super::super::box4). They are stored
+//! together, relative to the centre of the tree.
 
 use glam::DVec3;
 
 use super::bounds::Aabb;
-use crate::scene::quad::{BoxRay, Quad, down};
+use crate::scene::box4::{Box4, BoxRay, down};
 
 /// Cells along each side of the tree's leaves.
 pub(super) const BLOCK_CELLS: u32 = 4;
-/// Nodes that wait at most: the root, and three on each level of the largest grid that there can be.
-const MOST_WAITING: usize = 3 * 32 + 1;
+/// Most nodes on the stack: the root, and three on each level of the largest possible grid.
+const MAX_WAITING: usize = 3 * 32 + 1;
 
-/// An implicit quadtree: level 0 holds one box for each 4x4 cells, each level above one for 2x2 of the level
-/// below, the last one box.
+/// An implicit quadtree: level 0 has one box per 4x4 cells, each further level one per 2x2 boxes of the level
+/// below, and the last level a single box.
 #[derive(Clone, Debug)]
 pub(super) struct BlockTree {
-    /// All coordinates are relative to it.
+    /// Centre, to which all coordinates are relative.
     middle: DVec3,
     /// Largest coordinate of a box, metres.
     extent_m: f64,
@@ -27,19 +27,19 @@ pub(super) struct BlockTree {
 #[derive(Clone, Debug)]
 struct TreeLevel {
     size: [u32; 2],
-    /// Squares of 2x2 boxes, row after row: the two of one row, and those of the next.
-    quads: Vec<Quad>,
+    /// Groups of 2x2 boxes, row by row: the two of one row, then those of the next.
+    quads: Vec<Box4>,
 }
 
 /// A box of the tree.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Node {
+pub(super) struct BlockNode {
     pub level: u32,
     pub at: [u32; 2],
 }
 
 impl BlockTree {
-    /// `boxes` of the blocks, row after row.
+    /// Builds the tree over the `boxes` of the blocks, row by row.
     pub fn new(size: [u32; 2], boxes: &[Aabb]) -> Self {
         let whole = boxes.iter().fold(Aabb::EMPTY, |all, each| all.union(each));
         let middle = if whole.is_empty() { DVec3::ZERO } else { whole.centre() };
@@ -62,31 +62,32 @@ impl BlockTree {
         Self { middle, extent_m, levels }
     }
 
-    /// Memory that its boxes take.
+    /// Memory of the boxes, bytes.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(&*level.quads)).sum()
     }
 
-    /// The box around everything.
-    pub fn root(&self) -> Node {
-        Node { level: self.levels.len() as u32 - 1, at: [0, 0] }
+    /// The root box.
+    pub fn root(&self) -> BlockNode {
+        BlockNode { level: self.levels.len() as u32 - 1, at: [0, 0] }
     }
 
-    /// Level of boxes around so many cells along a side: a power of two times [`BLOCK_CELLS`].
+    /// Level whose boxes span `cells` cells along a side, a power of two times [`BLOCK_CELLS`].
     fn level_of(cells: u32) -> u32 {
         (cells / BLOCK_CELLS).trailing_zeros()
     }
 
-    /// The box around a square of so many cells, by column and row; `None` beyond the grid. The last one is
-    /// around everything.
+    /// Box of a square of `cells` cells by column and row; `None` beyond the grid. Squares larger than the
+    /// grid get the root box.
     pub fn square(&self, cells: u32, at: [i64; 2]) -> Option<Aabb> {
         let level = Self::level_of(cells).min(self.root().level);
         let size = self.levels[level as usize].size;
         let is_there = (0..2).all(|k| (0..i64::from(size[k])).contains(&at[k]));
-        is_there.then(|| self.bounds(Node { level, at: at.map(|n| n as u32) }))
+        is_there.then(|| self.bounds(BlockNode { level, at: at.map(|n| n as u32) }))
     }
 
-    /// Visits the squares of so many cells along a side whose boxes, and those around them, are accepted.
+    /// Visits the squares of `cells` cells along a side whose boxes, and those of their ancestors, are
+    /// accepted.
     pub fn visit(&self, cells: u32, accept: &dyn Fn(&Aabb) -> bool, found: &mut dyn FnMut([u32; 2])) {
         let level = Self::level_of(cells);
         let mut stack = vec![self.root()];
@@ -102,9 +103,8 @@ impl BlockTree {
         }
     }
 
-    /// Leads a ray to the blocks that it may meet, the nearest first as far as their boxes tell. `block` gets
-    /// the ray parameter up to which anything matters, and returns the one from then on: that of a hit, if it
-    /// has found one.
+    /// Visits the blocks that a ray may hit, approximately front to back. `block` receives the ray parameter
+    /// limit and returns the new one: that of a hit, if it found one.
     pub fn walk(
         &self,
         origin: DVec3,
@@ -114,10 +114,10 @@ impl BlockTree {
     ) {
         let length = direction.length();
         let ray = BoxRay::new(origin - self.middle, direction / length, self.extent_m);
-        // Up to the next number above.
+        // Rounded up to the next single-precision number.
         let metres = |t: f64| -down(-t * length);
         let (mut limit, mut limit_m) = (t_max, metres(t_max));
-        let mut waiting = [(0.0_f32, Node::default()); MOST_WAITING];
+        let mut waiting = [(0.0_f32, BlockNode::default()); MAX_WAITING];
         let root = self.root();
         let (enter, is_met) = self.levels[root.level as usize].quads[0].enter(&ray, limit_m);
         waiting[0] = (enter.x, root);
@@ -136,7 +136,7 @@ impl BlockTree {
             let (enter, is_met) = self.levels[below as usize].quad(node.at).enter(&ray, limit_m);
             let first = count;
             for lane in (0..4).filter(|lane| is_met & (1 << lane) != 0) {
-                // Nearest last, so that it comes off first.
+                // The nearest box is pushed last, so it is popped first.
                 let mut place = count;
                 while place > first && waiting[place - 1].0 < enter[lane as usize] {
                     waiting[place] = waiting[place - 1];
@@ -144,23 +144,23 @@ impl BlockTree {
                 }
                 waiting[place] = (
                     enter[lane as usize],
-                    Node { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] },
+                    BlockNode { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] },
                 );
                 count += 1;
             }
         }
     }
 
-    /// A box, as large as its rounding makes it.
-    pub fn bounds(&self, node: Node) -> Aabb {
+    /// A box, as enlarged by rounding.
+    pub fn bounds(&self, node: BlockNode) -> Aabb {
         let Aabb { min, max } = self.levels[node.level as usize]
             .quad(node.at.map(|n| n / 2))
             .get((node.at[0] % 2 + 2 * (node.at[1] % 2)) as usize);
         Aabb { min: min + self.middle, max: max + self.middle }
     }
 
-    /// Up to four nodes of the level below; none for a leaf.
-    pub fn children(&self, node: Node) -> impl Iterator<Item = Node> {
+    /// Up to four child nodes; none for a leaf.
+    pub fn children(&self, node: BlockNode) -> impl Iterator<Item = BlockNode> {
         let below = node.level.checked_sub(1);
         below.into_iter().flat_map(move |level| {
             let size = self.levels[level as usize].size;
@@ -168,7 +168,7 @@ impl BlockTree {
             let all = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]];
             all.into_iter()
                 .filter(move |c| c[0] < size[0] && c[1] < size[1])
-                .map(move |at| Node { level, at })
+                .map(move |at| BlockNode { level, at })
         })
     }
 }
@@ -176,11 +176,11 @@ impl BlockTree {
 impl TreeLevel {
     fn new(size: [u32; 2]) -> Self {
         let [across, down] = size.map(|n| n.div_ceil(2) as usize);
-        Self { size, quads: vec![Quad::EMPTY; across * down] }
+        Self { size, quads: vec![Box4::EMPTY; across * down] }
     }
 
-    /// The boxes within one of the level above.
-    fn quad(&self, above: [u32; 2]) -> &Quad {
+    /// The four boxes within one of the level above.
+    fn quad(&self, above: [u32; 2]) -> &Box4 {
         &self.quads[self.index(above)]
     }
 
@@ -194,7 +194,7 @@ impl TreeLevel {
     }
 }
 
-/// Columns and rows, row after row.
+/// Columns and rows, row by row.
 fn places(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     (0..size[1]).flat_map(move |y| (0..size[0]).map(move |x| [x, y]))
 }
@@ -203,20 +203,20 @@ fn places(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
 mod tests {
     use super::*;
 
-    /// Boxes in a row and beside each other, some of them empty.
+    /// Boxes in rows and columns, some of them empty.
     fn boxes(size: [u32; 2], away: DVec3) -> Vec<Aabb> {
         let wave = |i: u32| (f64::from(i) * 0.618_033_988_749_895).fract();
-        let of = |[x, y]: [u32; 2]| {
+        let bounds = |[x, y]: [u32; 2]| {
             let n = 31 * x + 17 * y;
             let low = away + DVec3::new(40.0 * f64::from(y), 40.0 * f64::from(x), 300.0 * wave(n));
             let top = low + DVec3::new(40.0, 40.0, 30.0 * wave(n + 5));
             if n % 11 == 3 { Aabb::EMPTY } else { Aabb { min: low, max: top } }
         };
-        places(size).map(of).collect()
+        places(size).map(bounds).collect()
     }
 
     #[test]
-    fn a_ray_is_led_to_every_box_that_it_meets() {
+    fn walk_visits_every_box_that_a_ray_hits() {
         for (size, away) in
             [([1, 1], 0.0), ([5, 3], 10.0), ([37, 22], 1000.0), ([64, 64], -4e5), ([9, 70], 6.4e6)]
         {
@@ -227,22 +227,22 @@ mod tests {
             for i in 0..600 {
                 let part = |step: f64| (f64::from(i) * step).fract();
                 let reach = DVec3::new(40.0 * f64::from(size[1]), 40.0 * f64::from(size[0]), 330.0);
-                let at = away + reach * DVec3::new(part(0.618), part(0.755), part(0.325));
-                // Along the axes and aslant, from inside and from far away.
+                let target = away + reach * DVec3::new(part(0.618), part(0.755), part(0.325));
+                // Along the axes and oblique, from inside and from far away.
                 let aslant = DVec3::new(part(0.57) - 0.5, part(0.31) - 0.5, part(0.83) - 0.5);
                 let along = [DVec3::X, DVec3::Y, -DVec3::Z, aslant][i as usize % 4];
                 let direction = along * [1.0, 1e-12, 3e7][i as usize % 3];
-                let origin = at - direction * [0.0, 1.0, 4e3][i as usize / 4 % 3] / direction.length();
-                let mut found = Vec::new();
+                let origin = target - direction * [0.0, 1.0, 4e3][i as usize / 4 % 3] / direction.length();
+                let mut blocks = Vec::new();
                 tree.walk(origin, direction, f64::INFINITY, &mut |block, limit| {
-                    found.push(block);
+                    blocks.push(block);
                     limit
                 });
                 for (block, each) in places(size).zip(&boxes) {
                     let t =
                         each.enter(origin, crate::scene::terrain::bounds::inverse(direction), f64::INFINITY);
                     met += u32::from(t.is_some());
-                    assert!(t.is_none() || found.contains(&block), "{size:?} {i}: {block:?} at {t:?}");
+                    assert!(t.is_none() || blocks.contains(&block), "{size:?} {i}: {block:?} target {t:?}");
                 }
             }
             assert!(met > 100, "{size:?}: {met}");
@@ -250,16 +250,16 @@ mod tests {
     }
 
     #[test]
-    fn boxes_hold_what_they_were_made_of() {
+    fn stored_boxes_contain_their_input() {
         let size = [37, 22];
         for away in [0.0, 6.4e6] {
             let boxes = boxes(size, DVec3::splat(away));
             let tree = BlockTree::new(size, &boxes);
             for (at, each) in places(size).zip(&boxes) {
-                let found = tree.bounds(Node { level: 0, at });
-                assert_eq!(found.is_empty(), each.is_empty());
+                let stored = tree.bounds(BlockNode { level: 0, at });
+                assert_eq!(stored.is_empty(), each.is_empty());
                 if !each.is_empty() {
-                    let (low, high) = (each.min - found.min, found.max - each.max);
+                    let (low, high) = (each.min - stored.min, stored.max - each.max);
                     assert!(
                         low.min(high).min_element() >= 0.0 && low.max(high).max_element() < 1e-3,
                         "{at:?}: {low} {high}"
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_beyond_a_hit_is_left() {
+    fn walk_stops_at_a_hit() {
         let size = [64, 64];
         let tree = BlockTree::new(size, &boxes(size, DVec3::ZERO));
         let mut visited = 0;

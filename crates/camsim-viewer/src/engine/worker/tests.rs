@@ -70,9 +70,9 @@ fn with_worker(
 /// Devices of which the first so many are lost before anything is made on them; counts them.
 fn losing(first: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuError> + Sync {
     move || {
-        let engine = Engine::new(AdapterChoice::Best)?;
+        let engine = Engine::open(Backend::Gpu)?;
         if opened.fetch_add(1, Ordering::Relaxed) < first {
-            engine.gpu().device.destroy();
+            engine.gpu().expect("an adapter").device.destroy();
         }
         Ok(engine)
     }
@@ -83,8 +83,8 @@ fn losing(first: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuErro
 fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
     let devices = Mutex::new(Vec::new());
     let open = || {
-        let engine = Engine::new(AdapterChoice::Best)?;
-        devices.lock().expect("one at a time").push(engine.gpu().device.clone());
+        let engine = Engine::open(Backend::Gpu)?;
+        devices.lock().expect("one at a time").push(engine.gpu().expect("an adapter").device.clone());
         Ok(engine)
     };
     with_worker(open, |mailbox, replies| {

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::canvas::Placement;
 use crate::{
     engine::{DECADES, Stage},
-    heard::Sight,
+    heard::PixelTruth,
     motion,
     panes::ramp_color,
     state::State,
@@ -24,7 +24,7 @@ const GRID_LINES: i32 = 16;
 const GRID_POINTS: i32 = 96;
 
 /// All that the view asks for.
-pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &Sight<'_>) {
+pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &PixelTruth<'_>) {
     let overlays = state.view.overlays;
     let Some(sequence) = state.heard.sequence() else { return };
     if overlays.grid

@@ -23,7 +23,7 @@ const LONGEST: f64 = 2.5;
 
 /// A frame's sight.
 #[derive(Clone, Debug)]
-pub struct Sight {
+pub struct PixelTruth {
     /// NED metres, all around the picture from a corner on; a quarter of them for each side.
     pub rim: Vec<DVec3>,
     /// The outermost ground that is seen, NED.
@@ -32,7 +32,7 @@ pub struct Sight {
     pub field_deg: [f64; 3],
 }
 
-impl Sight {
+impl PixelTruth {
     /// The last one, or another for another frame; `None` for a camera without rays.
     pub fn new(
         ui: &Ui,
@@ -41,7 +41,7 @@ impl Sight {
         pose: &CameraPose,
         radius_m: f64,
     ) -> Option<Self> {
-        type Kept = (Weak<Sequence>, u64, Option<u64>, Option<Sight>);
+        type Kept = (Weak<Sequence>, u64, Option<u64>, Option<PixelTruth>);
         let frame = state.timeline.frame;
         // Of a zoom lens, the calibration that the frame on show was made with.
         let picture = state.heard.picture().filter(|picture| picture.plan.frame == frame);

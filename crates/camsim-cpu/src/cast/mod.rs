@@ -1,0 +1,370 @@
+//! Ideal frames of any scene by ray casting: for machines without Vulkan, where the rasteriser does not draw
+//! a scene or a plan.
+//!
+//! A ray a sample finds the blended surfaces and the opaque one that the sample shows ([`trace`]). Colours
+//! are those of the triangles' planes, with textures prefiltered over the pixel ([`shade`], [`mips`]).
+//! Terrain and models have full detail.
+
+use std::{collections::HashMap, sync::Arc};
+
+use camsim_core::{
+    scenario::Preset,
+    scene::{Encoding, Scene, Texture, srgb_from_linear},
+    temporal::{SAMPLE_POSITIONS, edge_mask, resolve_depth},
+};
+use camsim_plan::{EdgeStage, FramePlan, KeyFrame, NEAR_M};
+use glam::{DVec2, Vec3};
+use half::f16;
+use rayon::prelude::*;
+
+use crate::general::{FineSamples, IdealImage};
+
+mod mips;
+mod shade;
+#[cfg(test)]
+mod tests;
+mod trace;
+
+use mips::MipChain;
+use shade::{KeyCamera, SurfaceShader};
+use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
+
+/// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
+const FOG_AT_VISIBILITY: f64 = 3.912;
+/// Share of the light from behind blended surfaces below which nothing is seen of it.
+const HIDDEN: f32 = 1e-7;
+/// Samples this far from a mark are read for the border's line, pixels.
+const READ_PX: usize = 5;
+/// Samples of a pixel.
+const SAMPLES: usize = SAMPLE_POSITIONS.len();
+
+/// A scene, prepared for rays.
+#[derive(Debug)]
+pub struct CastScene {
+    scene: Arc<Scene>,
+    trees: SceneTrees,
+    /// Of the terrain, then by mesh; surfaces of one texture have it in common.
+    textures: Vec<Arc<MipChain>>,
+}
+
+impl CastScene {
+    /// Builds trees over all triangles, and the mip levels of all textures.
+    #[must_use]
+    pub fn new(scene: &Arc<Scene>) -> Self {
+        let none = || (Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear)), None);
+        let ground = scene.terrain.as_ref().map(|terrain| (terrain.texture.clone(), terrain.beyond));
+        let textures: Vec<_> = std::iter::once(ground.unwrap_or_else(none))
+            .chain(scene.meshes.iter().map(|mesh| (mesh.material.texture.clone(), None)))
+            .collect();
+        let (mut numbers, mut distinct) = (HashMap::new(), Vec::new());
+        let number = |(texture, border): &(Arc<Texture>, Option<[u8; 4]>)| {
+            *numbers.entry((Arc::as_ptr(texture), *border)).or_insert_with(|| {
+                distinct.push((texture.clone(), *border));
+                distinct.len() - 1
+            })
+        };
+        let numbers: Vec<usize> = textures.iter().map(number).collect();
+        let (trees, distinct) = rayon::join(
+            || SceneTrees::new(scene),
+            || -> Vec<Arc<MipChain>> {
+                let mips = |(texture, border): &_| Arc::new(MipChain::new(texture, *border));
+                distinct.par_iter().map(mips).collect()
+            },
+        );
+        let textures = numbers.into_iter().map(|number| distinct[number].clone()).collect();
+        Self { scene: scene.clone(), trees, textures }
+    }
+
+    /// The ideal frame of a plan's key frame.
+    #[must_use]
+    pub fn draw(&self, plan: &FramePlan, key: &KeyFrame) -> IdealImage {
+        let frame = FrameCaster::new(self, plan, key, 1);
+        let size_px = plan.ideal.size_px;
+        let (mut color_rgba, inverse_depth) = match plan.samples_a_pixel {
+            0 | 1 => frame.middles(size_px),
+            _ => frame.means_of_samples(size_px),
+        };
+        if plan.preset == Preset::Paper {
+            color_rgba.par_iter_mut().for_each(|value| *value = stored(*value));
+        }
+        let fine = match plan.edges {
+            EdgeStage::None => None,
+            EdgeStage::Supersampled { scale, thin, .. } => {
+                Some(self.fine_samples(plan, key, &inverse_depth, (scale, thin)))
+            }
+        };
+        IdealImage { geometry: plan.ideal, color_rgba, inverse_depth, fine }
+    }
+
+    fn fine_samples(
+        &self,
+        plan: &FramePlan,
+        key: &KeyFrame,
+        inverse_depth: &[f32],
+        (scale, thin): (u32, bool),
+    ) -> FineSamples {
+        let size_px = plan.ideal.size_px;
+        let frame = FrameCaster::new(self, plan, key, scale);
+        let (depths, colors) = match (scale, thin) {
+            (1, true) => (frame.sample_depths(size_px, |_| None), Vec::new()),
+            (1, false) => {
+                let read = near_marks(size_px, inverse_depth);
+                let depth = |pixel: usize| (!read[pixel]).then_some([inverse_depth[pixel]; SAMPLES]);
+                (frame.sample_depths(size_px, depth), Vec::new())
+            }
+            _ => frame.samples(size_px.map(|side| side * scale)),
+        };
+        FineSamples::new(size_px, inverse_depth, (scale, thin), depths, colors)
+    }
+}
+
+/// Half floats of linear R G B of a pixel's samples.
+type SampleColors = [[f16; 3]; SAMPLES];
+
+/// A frame in the making.
+#[derive(Debug)]
+struct FrameCaster<'a> {
+    trees: &'a SceneTrees,
+    shader: SurfaceShader<'a>,
+}
+
+/// What a thread needs for a pixel.
+#[derive(Debug, Default)]
+struct PixelScratch {
+    hits: [Hits; SAMPLES],
+    shares: Vec<TriangleShare>,
+}
+
+/// The samples of a pixel that show one triangle.
+#[derive(Clone, Copy, Debug)]
+struct TriangleShare {
+    triangle: Triangle,
+    /// A bit for each sample.
+    samples: u8,
+    /// Linear R G B times alpha, and alpha; once it is needed.
+    color: Option<glam::Vec4>,
+}
+
+impl<'a> FrameCaster<'a> {
+    /// With `scale` pixels along a side of an ideal pixel.
+    fn new(cast: &'a CastScene, plan: &FramePlan, key: &KeyFrame, scale: u32) -> Self {
+        let scene = &*cast.scene;
+        // The paper's fog comes after the gather.
+        let visibility_m = scene.fog_visibility_m.filter(|_| plan.linear_fog.is_none());
+        let shader = SurfaceShader {
+            scene,
+            textures: &cast.textures,
+            camera: KeyCamera::new(&plan.ideal, &key.pose, scale),
+            reads: plan.surface_reads,
+            fog_per_m: visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
+        };
+        Self { trees: &cast.trees, shader }
+    }
+
+    /// Linear R G B A and inverse depth at the middles of all pixels.
+    fn middles(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
+        let (width, height) = (width as usize, height as usize);
+        let mut color = vec![[0.0; 4]; width * height];
+        let mut depth = vec![0.0; width * height];
+        color.par_chunks_mut(width).zip(depth.par_chunks_mut(width)).enumerate().for_each_init(
+            PixelScratch::default,
+            |scratch, (y, (color, depth))| {
+                for (x, (color, depth)) in color.iter_mut().zip(depth).enumerate() {
+                    let linear;
+                    (linear, *depth) = self.middle(DVec2::new(x as f64, y as f64), &mut scratch.hits[0]);
+                    *color = linear.extend(1.0).to_array();
+                }
+            },
+        );
+        (color.into_flattened(), depth)
+    }
+
+    /// Linear R G B A of all pixels as means over their samples, and inverse depth at their middles.
+    fn means_of_samples(&self, size_px: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
+        let [width, height] = size_px.map(|side| side as usize);
+        let mut color = vec![[0.0; 4]; width * height];
+        let mut samples = vec![[0.0; SAMPLES]; width * height];
+        color.par_chunks_mut(width).zip(samples.par_chunks_mut(width)).enumerate().for_each_init(
+            PixelScratch::default,
+            |scratch, (y, (color, depths))| {
+                for (x, (color, depths)) in color.iter_mut().zip(depths).enumerate() {
+                    let colors;
+                    (colors, *depths) = self.pixel_samples(DVec2::new(x as f64, y as f64), scratch);
+                    let [a, b, c, d] = colors;
+                    *color = (0.25 * ((a + d) + (b + c))).extend(1.0).to_array();
+                }
+            },
+        );
+        (color.into_flattened(), middle_depths(size_px, &samples))
+    }
+
+    /// Inverse depths and colours of the samples of all pixels.
+    fn samples(&self, [width, height]: [u32; 2]) -> (Vec<[f32; SAMPLES]>, Vec<SampleColors>) {
+        let (width, height) = (width as usize, height as usize);
+        let mut depths = vec![[0.0; SAMPLES]; width * height];
+        let mut colors = vec![[[f16::ZERO; 3]; SAMPLES]; width * height];
+        depths.par_chunks_mut(width).zip(colors.par_chunks_mut(width)).enumerate().for_each_init(
+            PixelScratch::default,
+            |scratch, (y, (depths, colors))| {
+                for (x, (depths, halves)) in depths.iter_mut().zip(colors).enumerate() {
+                    let colors;
+                    (colors, *depths) = self.pixel_samples(DVec2::new(x as f64, y as f64), scratch);
+                    *halves = colors.map(|color| color.to_array().map(f16::from_f32));
+                }
+            },
+        );
+        (depths, colors)
+    }
+
+    /// Inverse depths of the samples of all pixels whose depths are not known.
+    fn sample_depths(
+        &self,
+        [width, height]: [u32; 2],
+        known: impl Fn(usize) -> Option<[f32; SAMPLES]> + Sync,
+    ) -> Vec<[f32; SAMPLES]> {
+        let (width, height) = (width as usize, height as usize);
+        let mut depths = vec![[0.0; SAMPLES]; width * height];
+        depths.par_chunks_mut(width).enumerate().for_each_init(Hits::default, |hits, (y, depths)| {
+            for (x, depths) in depths.iter_mut().enumerate() {
+                let middle_px = DVec2::new(x as f64, y as f64);
+                *depths = known(y * width + x).unwrap_or_else(|| {
+                    SAMPLE_POSITIONS.map(|place| {
+                        self.trace(middle_px + place, hits);
+                        self.inverse_depth(hits)
+                    })
+                });
+            }
+        });
+        depths
+    }
+
+    fn trace(&self, position_px: DVec2, hits: &mut Hits) {
+        self.trees.trace(self.shader.scene, &self.shader.camera.ray(position_px), NEAR_M, hits);
+    }
+
+    /// 0 of the sky, 1/m.
+    fn inverse_depth(&self, hits: &Hits) -> f32 {
+        hits.depth(self.shader.scene).map_or(0.0, |depth_m| depth_m.recip() as f32)
+    }
+
+    fn opaque_triangle(&self, hits: &Hits, ray: &SceneRay) -> Option<Triangle> {
+        match hits.opaque? {
+            OpaqueHit::Mesh(hit) => Some(hit.triangle()),
+            OpaqueHit::Terrain(hit) => Some(terrain_triangle(self.shader.scene.terrain.as_ref()?, &hit, ray)),
+        }
+    }
+
+    /// Linear R G B and inverse depth (1/m) of the ray of a position.
+    fn middle(&self, position_px: DVec2, hits: &mut Hits) -> (Vec3, f32) {
+        self.trace(position_px, hits);
+        let (mut sum, mut left) = (Vec3::ZERO, 1.0);
+        for hit in &hits.blended {
+            let Some(color) = self.shader.color(&hit.triangle(), position_px) else { continue };
+            sum += left * color.truncate();
+            left *= 1.0 - color.w;
+            if left < HIDDEN {
+                return (sum, self.inverse_depth(hits));
+            }
+        }
+        let opaque = self.opaque_triangle(hits, &self.shader.camera.ray(position_px));
+        let color = opaque.and_then(|triangle| self.shader.color(&triangle, position_px));
+        let behind = color.map_or(self.shader.sky(), |color| color.truncate());
+        (sum + left * behind, self.inverse_depth(hits))
+    }
+
+    /// Linear R G B and inverse depths (1/m) of a pixel's samples. Each triangle is shaded once: at the mean
+    /// place of the samples that show it where its texture ends with it, else at the pixel's middle.
+    fn pixel_samples(
+        &self,
+        middle_px: DVec2,
+        scratch: &mut PixelScratch,
+    ) -> ([Vec3; SAMPLES], [f32; SAMPLES]) {
+        let PixelScratch { hits, shares } = scratch;
+        shares.clear();
+        let mut opaque = [None; SAMPLES];
+        for (k, (hits, place)) in hits.iter_mut().zip(SAMPLE_POSITIONS).enumerate() {
+            self.trace(middle_px + place, hits);
+            opaque[k] = self.opaque_triangle(hits, &self.shader.camera.ray(middle_px + place));
+            for triangle in hits.blended.iter().map(|hit| hit.triangle()).chain(opaque[k]) {
+                match shares.iter_mut().find(|share| share.triangle == triangle) {
+                    Some(share) => share.samples |= 1 << k,
+                    None => shares.push(TriangleShare { triangle, samples: 1 << k, color: None }),
+                }
+            }
+        }
+        let mut color = |triangle: Triangle| {
+            let share = shares.iter_mut().find(|share| share.triangle == triangle)?;
+            if share.color.is_none() {
+                share.color = self.share_color(share, middle_px);
+            }
+            share.color
+        };
+        let colors = [0, 1, 2, 3].map(|k: usize| {
+            let (mut sum, mut left) = (Vec3::ZERO, 1.0);
+            for hit in &hits[k].blended {
+                let Some(color) = color(hit.triangle()) else { continue };
+                sum += left * color.truncate();
+                left *= 1.0 - color.w;
+                if left < HIDDEN {
+                    return sum;
+                }
+            }
+            let color = opaque[k].and_then(&mut color);
+            sum + left * color.map_or(self.shader.sky(), |color| color.truncate())
+        });
+        (colors, [0, 1, 2, 3].map(|k: usize| self.inverse_depth(&hits[k])))
+    }
+
+    fn share_color(&self, share: &TriangleShare, middle_px: DVec2) -> Option<glam::Vec4> {
+        let places = (0..SAMPLES).filter(|k| share.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
+        let mean = places.clone().sum::<DVec2>() / f64::from(share.samples.count_ones());
+        let mesh = share.triangle.surface.checked_sub(1).map(|i| &self.shader.scene.meshes[i as usize]);
+        // The ground, and a picture with holes, go on beyond a triangle.
+        let ends = mesh.is_some_and(|mesh| mesh.material.blends || mesh.material.cutoff.is_none());
+        let shading_px = middle_px + if ends { mean } else { DVec2::ZERO };
+        // Seen at grazing incidence the plane may end before the pixel's middle.
+        let color = self.shader.color(&share.triangle, shading_px);
+        color.or_else(|| {
+            places.clone().find_map(|place| self.shader.color(&share.triangle, middle_px + place))
+        })
+    }
+}
+
+/// Inverse depths at the middles of pixels from those of their samples. Twin of `shaders/ideal/samples.wgsl`.
+fn middle_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
+    let [width, height] = size_px.map(|side| side as usize);
+    let first = |x: usize, y: usize| samples[y * width + x][0];
+    // The smaller one of the changes on both sides: the other one may go over a border.
+    let slope = |before: f32, here: f32, after: f32| {
+        let (left, right) = (here - before, after - here);
+        if left.abs() < right.abs() { left } else { right }
+    };
+    let depth = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let here = samples[i][0];
+        let across = slope(first(x.saturating_sub(1), y), here, first((x + 1).min(width - 1), y));
+        let down = slope(first(x, y.saturating_sub(1)), here, first(x, (y + 1).min(height - 1)));
+        resolve_depth(samples[i], [across, down])
+    };
+    (0..width * height).into_par_iter().map(depth).collect()
+}
+
+/// Pixels within reach of the marks that the depths of pixels' middles make.
+fn near_marks(size_px: [u32; 2], inverse_depth: &[f32]) -> Vec<bool> {
+    let [width, height] = size_px.map(|side| side as usize);
+    let middle = |[x, y]: [i64; 2]| f64::from(inverse_depth[y as usize * width + x as usize]);
+    let is_marked =
+        |i: usize| edge_mask::is_edge([(i % width) as i64, (i / width) as i64], size_px, 1, middle, None);
+    let marked: Vec<bool> = (0..width * height).into_par_iter().map(is_marked).collect();
+    let window =
+        |place: usize, length: usize| place.saturating_sub(READ_PX)..(place + READ_PX + 1).min(length);
+    let in_row = |i: usize| window(i % width, width).any(|x| marked[i / width * width + x]);
+    let rows: Vec<bool> = (0..width * height).into_par_iter().map(in_row).collect();
+    let in_column = |i: usize| window(i / width, height).any(|y| rows[y * width + i % width]);
+    (0..width * height).into_par_iter().map(in_column).collect()
+}
+
+/// What 8 bits of sRGB store of linear light, 0..=1.
+fn stored(linear: f32) -> f32 {
+    (255.0 * srgb_from_linear(linear.clamp(0.0, 1.0))).round() / 255.0
+}

@@ -1,0 +1,207 @@
+//! One sequence on the processor: its scene, its lens map, and the ideal frames drawn last.
+
+use std::sync::Arc;
+
+use camsim_core::{
+    camera::CameraModel,
+    scenario::Preset,
+    scene::{LodTolerance, PlacedMesh, SceneBatches},
+    sequence::Sequence,
+    temporal::IdealGeometry,
+};
+use camsim_plan::{
+    EdgeStage, FramePlan, RayStage,
+    placement::{cpu_rasterises, cpu_vectorises},
+    uniforms::{FrameUniforms, Truth},
+};
+
+use crate::{
+    cast::CastScene,
+    general::{self, FrameInputs, IdealImage, RowTable},
+    ideal::{DrawnFrame, RasterScene, View},
+    reverse::{IdealTexels, Inputs, Kernel, LensMap},
+};
+
+/// Ideal frames that are kept: one for the frame at work, one for the frame after it.
+const BUFFERS: usize = 2;
+
+/// Names ideal frames that the renderer holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdealBuffer(usize);
+
+/// Renders frames of one sequence.
+#[derive(Debug)]
+pub struct CpuRenderer {
+    kernel: Kernel,
+    sequence: Arc<Sequence>,
+    meshes: Arc<SceneBatches>,
+    /// Whether the rasteriser draws the scene.
+    rasterises: bool,
+    /// Made when an ideal frame is first rasterised.
+    raster: Option<RasterScene>,
+    /// Made when an ideal frame is first cast.
+    cast: Option<CastScene>,
+    vignette: Vec<f32>,
+    /// By the bits of its zoom value.
+    lens_map: Option<(u64, LensMap)>,
+    buffers: [Ideal; BUFFERS],
+    last: usize,
+}
+
+/// The ideal frames of one output frame.
+#[derive(Debug, Default)]
+struct Ideal {
+    size_px: [u32; 2],
+    /// The one that was rasterised.
+    drawn: DrawnFrame,
+    /// All key frames, where they were cast.
+    cast: Vec<IdealImage>,
+}
+
+/// What an output frame is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct ReverseInputs<'a> {
+    /// The plan.
+    pub plan: &'a FramePlan,
+    /// Numbers of the frame.
+    pub uniforms: &'a FrameUniforms,
+    /// Poses or times of the rows.
+    pub rows: &'a RowTable,
+}
+
+impl CpuRenderer {
+    /// Prepares for frames of a sequence.
+    #[must_use]
+    pub fn new(sequence: Arc<Sequence>, meshes: Arc<SceneBatches>) -> Self {
+        Self {
+            kernel: Kernel::new(),
+            meshes,
+            rasterises: cpu_rasterises(&sequence.scene, u32::MAX),
+            raster: None,
+            cast: None,
+            vignette: sequence.vignette_weights().1,
+            lens_map: None,
+            buffers: Default::default(),
+            last: 0,
+            sequence,
+        }
+    }
+
+    /// Goes on with another sequence over the same scene.
+    pub fn renew(&mut self, sequence: Arc<Sequence>) {
+        self.lens_map = None;
+        self.vignette = sequence.vignette_weights().1;
+        self.sequence = sequence;
+    }
+
+    /// Draws the ideal frames of a plan: by the rasteriser where it can, else by rays. Those drawn before the
+    /// last are overwritten.
+    pub fn draw_ideal(
+        &mut self,
+        plan: &FramePlan,
+        terrain: Option<&PlacedMesh>,
+        tolerance: &LodTolerance,
+    ) -> IdealBuffer {
+        // The frame in flight may still read the other one.
+        self.last = (self.last + 1) % BUFFERS;
+        let scene = &self.sequence.scene;
+        let ideal = &mut self.buffers[self.last];
+        ideal.size_px = plan.ideal.size_px;
+        ideal.cast.clear();
+        let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
+        if !(self.rasterises && is_plain) {
+            let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
+            ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
+            return IdealBuffer(self.last);
+        }
+        let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
+        let view = View { plan, scene, batches: &self.meshes, terrain, tolerance };
+        raster.draw(view, &mut ideal.drawn);
+        IdealBuffer(self.last)
+    }
+
+    /// The first ideal frame that was drawn here: linear R G B A (with the paper preset values as stored) and
+    /// inverse depth, 1/m, row-major.
+    #[must_use]
+    pub fn ideal_images(&self, IdealBuffer(buffer): IdealBuffer) -> (Vec<f32>, Vec<f32>) {
+        let ideal = &self.buffers[buffer];
+        match ideal.cast.first() {
+            Some(image) => (image.color_rgba.clone(), image.inverse_depth.clone()),
+            None => ideal.drawn.images(ideal.size_px),
+        }
+    }
+
+    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth where
+    /// the plan wants it.
+    pub fn reverse(
+        &mut self,
+        inputs: &ReverseInputs<'_>,
+        IdealBuffer(buffer): IdealBuffer,
+    ) -> (Vec<f32>, Option<Vec<Truth>>) {
+        let plan = inputs.plan;
+        self.fit_lens_map(plan);
+        let ideal = &self.buffers[buffer];
+        match inputs.rows {
+            RowTable::Poses(poses) if cpu_vectorises(plan) => match ideal.cast.first() {
+                None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
+                Some(image) => {
+                    let drawn = DrawnFrame::from_image(image);
+                    self.vectorised(inputs, &poses.entries, drawn.texels())
+                }
+            },
+            _ if ideal.cast.is_empty() => self.general(inputs, &[image_of(&ideal.drawn, &plan.ideal)]),
+            _ => self.general(inputs, &ideal.cast),
+        }
+    }
+
+    /// The same for a [vectorised](cpu_vectorises) plan, from an ideal frame that another renderer has drawn.
+    /// `None` for other plans.
+    pub fn reverse_from(
+        &mut self,
+        inputs: &ReverseInputs<'_>,
+        ideal: IdealTexels<'_>,
+    ) -> Option<(Vec<f32>, Option<Vec<Truth>>)> {
+        self.fit_lens_map(inputs.plan);
+        match inputs.rows {
+            RowTable::Poses(poses) => Some(self.vectorised(inputs, &poses.entries, ideal)),
+            RowTable::Times(_) => None,
+        }
+    }
+
+    fn vectorised(
+        &self,
+        inputs: &ReverseInputs<'_>,
+        poses: &[[[f32; 4]; 3]],
+        ideal: IdealTexels<'_>,
+    ) -> (Vec<f32>, Option<Vec<Truth>>) {
+        let &ReverseInputs { plan, uniforms, .. } = inputs;
+        let map = self.lens_map.as_ref().map(|(_, map)| map);
+        self.kernel.render(plan, &Inputs { frame: uniforms, poses, map, vignette: &self.vignette, ideal })
+    }
+
+    fn general(&self, inputs: &ReverseInputs<'_>, ideal: &[IdealImage]) -> (Vec<f32>, Option<Vec<Truth>>) {
+        let frame = FrameInputs {
+            rows: inputs.rows,
+            lens_map: self.lens_map.as_ref().map_or(&[][..], |(_, map)| map.rays()),
+            vignette: if self.vignette.len() > 1 { &self.vignette } else { &[] },
+            coords_phase: inputs.uniforms.coords_phase,
+        };
+        general::render(inputs.plan, &self.sequence, ideal, &frame)
+    }
+
+    /// Makes the lens map of a plan, unless it is there.
+    fn fit_lens_map(&mut self, plan: &FramePlan) {
+        let bits = plan.zoom.unwrap_or_default().to_bits();
+        let is_there = self.lens_map.as_ref().is_some_and(|(zoom, _)| *zoom == bits);
+        if plan.ray == RayStage::LensMap && !is_there {
+            let camera: &CameraModel = &plan.camera;
+            self.lens_map = Some((bits, LensMap::new(camera)));
+        }
+    }
+}
+
+/// A rasterised ideal frame in the form that the general pass reads.
+fn image_of(drawn: &DrawnFrame, geometry: &IdealGeometry) -> IdealImage {
+    let (color_rgba, inverse_depth) = drawn.images(geometry.size_px);
+    IdealImage { geometry: *geometry, color_rgba, inverse_depth, fine: None }
+}

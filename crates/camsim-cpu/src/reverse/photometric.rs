@@ -1,0 +1,84 @@
+//! Vignette, light, noise and saturation: twin of shaders/reverse/photometric.wgsl and
+//! shaders/common/noise.wgsl.
+
+use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
+
+use crate::simd::lanes::{LANES, Lanes, ZERO, each, within};
+use camsim_plan::uniforms::FrameUniforms;
+
+/// Weights of the luminance.
+const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+/// Gives pixels of a row, from `x` on, what the sensor makes of their colours.
+#[inline(always)]
+pub(super) fn photometric(
+    frame: &FrameUniforms,
+    segments: &[[f32; 2]],
+    [x, y]: [u32; 2],
+    colors: &[[f32; 4]; LANES],
+    weight: &Lanes,
+) -> [Lanes; 3] {
+    // One by one, here and below: what `map` calls may be compiled without the vectors that this is.
+    let mut values = [each(|i| colors[i][0]), each(|i| colors[i][1]), each(|i| colors[i][2])];
+    let is_mono = frame.mono == 1;
+    if is_mono {
+        let [r, g, b] = &values;
+        values = [each(|i| r[i] * LUMINANCE[0] + g[i] * LUMINANCE[1] + b[i] * LUMINANCE[2]); 3];
+    }
+    let mut noise = [ZERO; 3];
+    if frame.noise_sigma > 0.0 {
+        let normals = normals(frame, segments, x, y, if is_mono { 1 } else { 3 });
+        noise = if is_mono { [normals[0]; 3] } else { normals };
+    }
+    for (value, noise) in values.iter_mut().zip(&noise) {
+        *value = each(|i| within(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
+    }
+    values
+}
+
+/// Independent standard normals, for each pixel of a row from `x` on: the first `channels` of three.
+#[inline(always)]
+fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channels: usize) -> [Lanes; 3] {
+    let mut bits = [[0_u32; LANES]; 3];
+    for i in 0..LANES {
+        let place = (x + i as u32) | (y << 16);
+        let words = pcg4d([
+            place,
+            frame.frame_number,
+            frame.seed[0],
+            frame.seed[1] ^ NOISE_STREAM.wrapping_mul(0x9e37_79b9),
+        ]);
+        for channel in 0..3 {
+            bits[channel][i] = words[channel];
+        }
+    }
+    let mut normals = [ZERO; 3];
+    for (normals, bits) in normals.iter_mut().zip(&bits).take(channels) {
+        *normals = of_bits(bits, segments);
+    }
+    normals
+}
+
+/// As `camsim_core::noise::normal_from_bits`; the octave is the exponent of the bits as a number, the place
+/// in it the fraction.
+#[inline(always)]
+fn of_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
+    let mut place = [0_u32; LANES];
+    let mut t = ZERO;
+    for i in 0..LANES {
+        // Odd and below 2^24, so exact.
+        let tail = (((bits[i] >> 7) & 0x00ff_fffe) + 1) as i32 as f32;
+        let number = tail.to_bits();
+        let octave = 23 + 127 - (number >> 23);
+        place[i] = octave * SEGMENTS as u32 + ((number >> 19) & 15);
+        t[i] = (number & 0x0007_ffff) as i32 as f32 * (1.0 / 524_288.0);
+    }
+    let (mut begin, mut adds) = (ZERO, ZERO);
+    for i in 0..LANES {
+        [begin[i], adds[i]] = segments[place[i] as usize];
+    }
+    each(|i| {
+        let value = begin[i] + t[i] * adds[i];
+        f32::from_bits(value.to_bits() ^ (bits[i] & 0x8000_0000))
+    })
+}

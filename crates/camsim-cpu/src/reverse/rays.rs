@@ -1,0 +1,180 @@
+//! Ideal rays of pixels and how they change from pixel to pixel: twin of shaders/reverse/ray.
+
+use camsim_core::camera::{CameraModel, INVALID_UV};
+
+use super::footprint::scaled;
+use crate::large_pages::Large;
+use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, each};
+use camsim_plan::uniforms::FrameUniforms;
+
+/// Above this a lens map says "no pre-image".
+const INVALID_ABOVE: f32 = 0.1 * INVALID_UV;
+
+/// A lens map: ideal (u, v) of pixels, row by row.
+#[derive(Debug)]
+pub struct LensMap {
+    /// Ideal rays, or [`INVALID_UV`] twice.
+    pub(crate) uv: Large<[f32; 2]>,
+}
+
+impl LensMap {
+    /// Of a camera, by its lens's inverse in f64.
+    #[must_use]
+    pub fn new(camera: &CameraModel) -> Self {
+        let rays = camera.lens_inverse();
+        let mut uv = Large::zeros(rays.len());
+        uv.copy_from_slice(&rays);
+        Self { uv }
+    }
+
+    /// Ideal (u, v) of every pixel's centre, row-major.
+    pub fn rays(&self) -> &[[f32; 2]] {
+        &self.uv
+    }
+}
+
+/// Rays of some pixels.
+pub(super) struct Rays {
+    pub uv: Lanes2,
+    /// Whether there are any: 1, else 0.
+    pub valid: Lanes,
+}
+
+/// Of a row from `x` on; places beyond its end have none.
+#[inline(always)]
+pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> Rays {
+    let width = frame.size_px[0];
+    let (mut uv, mut valid) = (Lanes2::ZERO, ZERO);
+    match map {
+        Some(map) => {
+            let row = &map.uv[(y * width + x) as usize..((y + 1) * width) as usize];
+            let mut set = |i: usize, [u, v]: [f32; 2]| {
+                let is_valid = u < INVALID_ABOVE;
+                uv.x[i] = if is_valid { u } else { 0.0 };
+                uv.y[i] = if is_valid { v } else { 0.0 };
+                valid[i] = if is_valid { 1.0 } else { 0.0 };
+            };
+            // Most blocks are whole: a loop of a known length is one of vectors.
+            match row.first_chunk::<LANES>() {
+                Some(row) => {
+                    for i in 0..LANES {
+                        set(i, row[i]);
+                    }
+                }
+                None => row.iter().enumerate().for_each(|(i, &uv)| set(i, uv)),
+            }
+        }
+        None => {
+            let ([cx, cy], [fx, fy]) = (frame.principal_px, frame.focal_px);
+            uv = Lanes2 { x: each(|i| ((x + i as u32) as f32 - cx) / fx), y: each(|_| (y as f32 - cy) / fy) };
+            valid = each(|i| if x + (i as u32) < width { 1.0 } else { 0.0 });
+        }
+    }
+    Rays { uv, valid }
+}
+
+/// Sides of the pixels in the ideal frame.
+#[inline(always)]
+pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> [Lanes2; 2] {
+    let Some(map) = map else {
+        let [fx, fy] = [0, 1].map(|axis| frame.ideal_focal_px[axis] / frame.focal_px[axis]);
+        return [Lanes2 { x: [fx; LANES], y: ZERO }, Lanes2 { x: ZERO, y: [fy; LANES] }];
+    };
+    let mut sides = [Lanes2::ZERO; 2];
+    if !central_differences(frame.size_px, map, [x, y], &mut sides) {
+        for i in 0..LANES.min((frame.size_px[0] - x) as usize) {
+            let pixel = [x + i as u32, y];
+            for (axis, side) in sides.iter_mut().enumerate() {
+                [side.x[i], side.y[i]] = difference(frame.size_px, map, pixel, axis);
+            }
+        }
+    }
+    [scaled(&sides[0], frame.ideal_focal_px), scaled(&sides[1], frame.ideal_focal_px)]
+}
+
+/// Central differences of a whole block; false where one of its pixels, or of those around them, has no ray
+/// or is beyond the map.
+#[inline(always)]
+fn central_differences(size_px: [u32; 2], map: &LensMap, [x, y]: [u32; 2], sides: &mut [Lanes2; 2]) -> bool {
+    let [width, height] = size_px.map(|side| side as usize);
+    let (x, y) = (x as usize, y as usize);
+    if x == 0 || x + LANES >= width || y == 0 || y + 1 >= height {
+        return false;
+    }
+    let row = |y: usize, x: usize| map.uv[y * width + x..].first_chunk::<LANES>();
+    let rows = [row(y - 1, x), row(y + 1, x), row(y, x - 1), row(y, x), row(y, x + 1)];
+    let [Some(above), Some(below), Some(before), Some(here), Some(after)] = rows else { return false };
+    let mut have_rays = true;
+    for i in 0..LANES {
+        for uv in [above, below, before, here, after] {
+            have_rays &= uv[i][0] < INVALID_ABOVE;
+        }
+    }
+    for i in 0..LANES {
+        for k in 0..2 {
+            let [across, down] = &mut *sides;
+            let (across, down) =
+                if k == 0 { (&mut across.x, &mut down.x) } else { (&mut across.y, &mut down.y) };
+            across[i] = 0.5 * (after[i][k] - before[i][k]);
+            down[i] = 0.5 * (below[i][k] - above[i][k]);
+        }
+    }
+    have_rays
+}
+
+/// One-sided or central difference of the map along an axis, over valid texels only.
+fn difference(size_px: [u32; 2], map: &LensMap, pixel: [u32; 2], axis: usize) -> [f32; 2] {
+    let at = |place: u32| {
+        let mut pixel = pixel;
+        pixel[axis] = place;
+        Some(map.uv[(pixel[1] * size_px[0] + pixel[0]) as usize]).filter(|uv| uv[0] < INVALID_ABOVE)
+    };
+    let place = pixel[axis];
+    let after = (place + 1 < size_px[axis]).then(|| at(place + 1)).flatten();
+    let before = place.checked_sub(1).and_then(at);
+    let minus = |a: [f32; 2], b: [f32; 2], factor: f32| [factor * (a[0] - b[0]), factor * (a[1] - b[1])];
+    match (before, at(place), after) {
+        (Some(before), Some(_), Some(after)) => minus(after, before, 0.5),
+        (None, Some(here), Some(after)) => minus(after, here, 1.0),
+        (Some(before), Some(here), None) => minus(here, before, 1.0),
+        _ => [0.0; 2],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_blocks_have_the_differences_of_their_pixels() {
+        let size_px: [u32; 2] = [4 * LANES as u32 + 5, 40];
+        let mut map = LensMap { uv: Large::zeros((size_px[0] * size_px[1]) as usize) };
+        for (uv, i) in map.uv.iter_mut().zip(0..) {
+            let [x, y] = [i % size_px[0], i / size_px[0]].map(|n| n as f32);
+            *uv = [0.01 * x + 1e-4 * x * y, 0.01 * y - 2e-5 * x * x];
+        }
+        // Without a ray: within a block, beside one, and in corners of the picture.
+        for [x, y] in [[40, 20], [95, 30], [31, 10], [0, 0], [132, 39]] {
+            map.uv[(y * size_px[0] + x) as usize] = [INVALID_UV; 2];
+        }
+        let mut whole = 0;
+        for y in 0..size_px[1] {
+            for x in (0..size_px[0]).step_by(LANES) {
+                let mut sides = [Lanes2::ZERO; 2];
+                if !central_differences(size_px, &map, [x, y], &mut sides) {
+                    continue;
+                }
+                whole += 1;
+                for i in 0..LANES {
+                    for (axis, side) in sides.iter().enumerate() {
+                        let exact = difference(size_px, &map, [x + i as u32, y], axis);
+                        assert_eq!([side.x[i], side.y[i]], exact, "{x}+{i}, {y}, {axis}");
+                    }
+                }
+            }
+        }
+        // Of three blocks within the picture in each of 38 rows, all but those with a ray missing above,
+        // below or within, or beside.
+        assert_eq!(whole, 3 * 38 - 3 - (3 + 1) - 1);
+    }
+}

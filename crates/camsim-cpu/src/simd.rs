@@ -1,0 +1,6 @@
+//! Pixels side by side, by the widest vectors that the processor has.
+
+#![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one index in all arrays")]
+
+pub(crate) mod lanes;
+pub(crate) mod vectors;

@@ -1,0 +1,144 @@
+//! The renderers of this machine.
+
+use std::{fmt, sync::Arc};
+
+use camsim_core::{scenario::Channel, sequence::Sequence};
+use camsim_gpu::{AdapterChoice, GpuContext, GpuError};
+use camsim_plan::{AdapterClass, Backend, Capabilities};
+
+use crate::{RenderError, Session};
+
+/// Largest side of an ideal frame where no adapter limits it.
+const CPU_MAX_SIDE_PX: u32 = 16_384;
+
+/// The opened adapter, if there is one, and which renderers may be used.
+#[derive(Debug)]
+pub struct Engine {
+    gpu: Option<GpuContext>,
+    backend: Backend,
+}
+
+impl Engine {
+    /// Opens an adapter and uses it as [`Backend::Auto`] says.
+    ///
+    /// # Errors
+    /// No usable adapter.
+    pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
+        Ok(Self { gpu: Some(GpuContext::new(choice)?), backend: automatic() })
+    }
+
+    /// The cpu alone: no adapter is opened, no driver is loaded.
+    #[must_use]
+    pub fn cpu() -> Self {
+        Self { gpu: None, backend: Backend::Cpu }
+    }
+
+    /// Opens what a backend needs: with [`Backend::Auto`] the best adapter, or the cpu alone where there is
+    /// none.
+    ///
+    /// # Errors
+    /// A backend that needs an adapter where none can be used; an adapter that `CAMSIM_ADAPTER` names and that
+    /// is not there.
+    pub fn open(backend: Backend) -> Result<Self, GpuError> {
+        match backend {
+            Backend::Cpu => Ok(Self::cpu()),
+            Backend::Auto => match Self::new(AdapterChoice::Best) {
+                Err(GpuError::NoAdapter(wanted)) if wanted.is_empty() => Ok(Self::cpu()),
+                opened => opened,
+            },
+            Backend::Gpu | Backend::GpuThenCpu => {
+                Ok(Self { gpu: Some(GpuContext::new(AdapterChoice::Best)?), backend })
+            }
+        }
+    }
+
+    /// The adapter, if one is open.
+    #[must_use]
+    pub fn gpu(&self) -> Option<&GpuContext> {
+        self.gpu.as_ref()
+    }
+
+    /// Holds pictures with longer sides in tiles, as if textures ended there, for sessions to come: for tests,
+    /// and where the memory of a card is short.
+    pub fn limit_pictures(&mut self, max_side_px: u32) {
+        self.gpu.iter_mut().for_each(|gpu| gpu.limit_pictures(max_side_px));
+    }
+
+    /// Pixels of a row that each thread of the gpu's reverse kernel takes ([`GpuContext::set_pixels_a_thread`]),
+    /// for sessions to come.
+    pub fn set_pixels_a_thread(&mut self, pixels: u32) {
+        self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_a_thread(pixels));
+    }
+
+    /// Which renderers sessions to come may use. Without an adapter it is always the cpu.
+    pub fn set_backend(&mut self, backend: Backend) {
+        self.backend = backend;
+    }
+
+    /// What plans depend on.
+    #[must_use]
+    pub fn capabilities(&self) -> Capabilities {
+        let adapter = self.gpu.as_ref().map(|gpu| match gpu.is_software() {
+            true => AdapterClass::Software,
+            false => AdapterClass::Card,
+        });
+        Capabilities {
+            backend: self.backend,
+            adapter,
+            has_vectors: camsim_cpu::suits_processor(),
+            max_picture_px: self.gpu.as_ref().map_or(u32::MAX, GpuContext::max_picture_px),
+        }
+    }
+
+    /// Largest side of an ideal frame.
+    #[must_use]
+    pub fn max_side_px(&self) -> u32 {
+        self.gpu.as_ref().map_or(CPU_MAX_SIDE_PX, GpuContext::max_side_px)
+    }
+
+    /// Most pixels of an output frame with depth and coordinates.
+    #[must_use]
+    pub fn most_pixels_with_truth(&self) -> u64 {
+        self.gpu.as_ref().map_or(u64::MAX, GpuContext::most_pixels_with_truth)
+    }
+
+    /// Whether frames are rendered on the processor that also plans them.
+    pub(crate) fn shares_processor(&self) -> bool {
+        self.gpu.as_ref().is_none_or(GpuContext::is_software)
+    }
+
+    /// Prepares for the frames of a sequence; uploads its scene where an adapter has a part.
+    ///
+    /// # Errors
+    /// What the adapter cannot hold, a camera that cannot be used.
+    pub fn session<E: std::error::Error + 'static>(
+        &self,
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+    ) -> Result<Session<'_>, RenderError<E>> {
+        Session::new(self, sequence, channels).map_err(RenderError::lift)
+    }
+}
+
+/// Shader files that are to be tried run on the gpu.
+fn automatic() -> Backend {
+    match std::env::var_os("CAMSIM_SHADER_DIR") {
+        Some(_) => Backend::Gpu,
+        None => Backend::Auto,
+    }
+}
+
+impl fmt::Display for Engine {
+    /// What renders, for people: the adapter, and the part of the cpu.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let threads = rayon::current_num_threads();
+        match (&self.gpu, self.backend) {
+            (None, _) | (_, Backend::Cpu) => write!(f, "cpu ({threads} threads)"),
+            (Some(gpu), Backend::Auto) if gpu.is_software() && camsim_cpu::suits_processor() => {
+                write!(f, "cpu ({threads} threads); {} for what the cpu does not vectorise", gpu.adapter)
+            }
+            (Some(gpu), Backend::GpuThenCpu) => write!(f, "ideal frames {}, output frames cpu", gpu.adapter),
+            (Some(gpu), _) => write!(f, "{}", gpu.adapter),
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Renders sequences: plans ahead on other threads, keeps two frames in flight, and gives each pass to the
+//! renderer that its plan names.
+//!
+//! ```no_run
+//! use std::{convert::Infallible, sync::Arc};
+//!
+//! use camsim_core::{scenario::Channel, sequence::Sequence};
+//! use camsim_engine::{Engine, RenderError};
+//!
+//! fn brightness(sequence: Arc<Sequence>) -> Result<(), RenderError<Infallible>> {
+//!     let engine = Engine::cpu();
+//!     let mut session = engine.session(sequence, &[Channel::Color])?;
+//!     session.render(0..10, &mut |finished| {
+//!         let frame = finished.frame;
+//!         println!("{}: {}", frame.index, frame.color_rgba.iter().sum::<f32>());
+//!         Ok(())
+//!     })
+//! }
+//! ```
+//!
+//! * [`Engine`]: the renderers of this machine ([`camsim_plan::Backend`]).
+//! * [`Session`]: one sequence.
+//! * [`Finished`]: a frame with its plan and its times.
+
+#![warn(missing_docs)]
+
+mod ahead;
+mod engine;
+mod error;
+mod exact_truth;
+mod finished;
+mod planners;
+mod session;
+
+pub use camsim_gpu::{AdapterChoice, GpuContext, GpuError, IdealImages};
+pub use camsim_plan::Backend;
+pub use engine::Engine;
+pub use error::RenderError;
+pub use finished::{Finished, FrameTimes};
+pub use session::Session;

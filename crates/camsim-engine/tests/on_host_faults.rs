@@ -1,0 +1,122 @@
+//! Frames that the host makes, where the device's part of a frame fails: frames before and after it are as
+//! they are without a fault. Alone in its process, and in a copy of that: it takes shaders away.
+
+mod common;
+
+use std::{
+    convert::Infallible,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use camsim_core::scenario::{
+    Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver,
+};
+use camsim_engine::{Engine, Finished, Session};
+use camsim_plan::Backend;
+use camsim_plan::placement::cpu_vectorises;
+use common::{city, engine, pattern, scenario, sequence, steady};
+use glam::DVec3;
+
+const TEST: &str = "a_frame_that_fails_spoils_no_other";
+
+/// Over ground alone, then over houses 200 m further north.
+fn flight() -> Scenario {
+    let mut scenario = scenario();
+    scenario.camera.size_px = [96, 72];
+    scenario.camera.focal_px = [100.0, 100.0];
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 4.0, ..ShutterSpec::default() };
+    scenario.quality.silhouettes = Silhouettes::Rays;
+    scenario.quality.solver = Auto::Value(Solver::Reproject);
+    scenario
+}
+
+const OVER_GROUND: [u64; 2] = [2, 3];
+const OVER_HOUSES: u64 = 95;
+
+fn session(engine: &Engine) -> Session<'_> {
+    let mut scene = pattern(6000.0);
+    for mut house in city(4).meshes.into_iter().skip(1) {
+        house.origin_ned_m.x += 200.0;
+        scene.meshes.push(house);
+    }
+    let sequence = sequence(flight(), steady(120.0, 0.0, DVec3::new(63.0, 0.0, 0.0), DVec3::ZERO), scene);
+    engine.session::<Infallible>(sequence, &[Channel::Color]).expect("session")
+}
+
+/// What came, and whether all did.
+fn render(session: &mut Session<'_>, frames: &[u64]) -> (Vec<Finished>, bool) {
+    let mut came = Vec::new();
+    let mut keep = |finished: Finished| {
+        came.push(finished);
+        Ok(())
+    };
+    let all = session
+        .render::<Infallible>(frames.iter().copied(), &mut keep)
+        .inspect_err(|fault| eprintln!("{fault}"))
+        .is_ok();
+    (came, all)
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a folder");
+    for entry in std::fs::read_dir(from).expect("shaders").map(|entry| entry.expect("an entry")) {
+        let to = to.join(entry.file_name());
+        match entry.file_type().expect("a kind").is_dir() {
+            true => copy_folder(&entry.path(), &to),
+            false => drop(std::fs::copy(entry.path(), to).expect("a copy")),
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_frame_that_fails_spoils_no_other() {
+    let Some(folder) = std::env::var_os("CAMSIM_SHADER_DIR").map(PathBuf::from) else {
+        let folder = std::env::temp_dir().join(format!("camsim-faults-{}", std::process::id()));
+        copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders"), &folder);
+        let again = Command::new(std::env::current_exe().expect("this program"))
+            .args(["--exact", TEST])
+            .env("CAMSIM_SHADER_DIR", &folder)
+            .output()
+            .expect("it runs");
+        std::fs::remove_dir_all(&folder).expect("the copy goes");
+        let said = String::from_utf8_lossy(&again.stdout);
+        assert!(
+            again.status.success() && said.contains("1 passed"),
+            "{said}{}",
+            String::from_utf8_lossy(&again.stderr)
+        );
+        return;
+    };
+    let mut engine = engine();
+    engine.set_backend(Backend::GpuThenCpu);
+    let mut whole = session(&engine);
+    let (expected, all) = render(&mut whole, &OVER_GROUND);
+    assert!(all && expected.iter().all(|done| cpu_vectorises(&done.plan) && done.times.reverse_ms.is_some()));
+    assert!(!cpu_vectorises(&whole.planner().plan(OVER_HOUSES).expect("a plan")), "rays are the device's");
+    let same =
+        |came: &[Finished]| came.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba);
+
+    let rays = folder.join("reverse/edges/supersampled.wgsl");
+    let text = std::fs::read(&rays).expect("the shader");
+    std::fs::remove_file(&rays).expect("it goes");
+    let mut session = session(&engine);
+    // Each time with a frame in flight, the first time with the lens map on its way.
+    for round in 0..4 {
+        let (came, all) = render(&mut session, &[OVER_GROUND[0], OVER_HOUSES, OVER_GROUND[1]]);
+        assert!(!all && came.len() == 1 && same(&came), "{round}: the frame before it comes, as it is");
+    }
+    // Nor without one.
+    for _ in 0..3 {
+        assert_eq!(render(&mut session, &[OVER_HOUSES]).0.len(), 0);
+    }
+    std::fs::write(&rays, text).expect("it comes back");
+    for round in 0..3 {
+        let (came, all) = render(&mut session, &[OVER_GROUND[0], OVER_GROUND[1], OVER_HOUSES]);
+        assert!(all && came.len() == 3 && same(&came), "{round}: and those after it");
+    }
+}

@@ -1,0 +1,99 @@
+//! Which renderer makes which pass of a frame.
+//!
+//! | machine | ideal frames | output frames |
+//! |---|---|---|
+//! | graphics card | gpu | gpu |
+//! | software adapter | cpu, vectorised, where it can draw the scene; else gpu | cpu, vectorised, where it can make the plan; else gpu |
+//! | no adapter, or `--backend cpu` | cpu | cpu |
+//!
+//! A software adapter runs on the same processor as the cpu renderer, which takes half of its time for the
+//! plans that it vectorises (docs/DECISIONS.md, "Cpu renderer").
+
+use camsim_core::{
+    scenario::Preset,
+    scene::{Scene, is_whole},
+    shutter::RowAxis,
+    temporal::TapStage,
+};
+
+use crate::ir::{
+    frame_plan::FramePlan,
+    placement::{AdapterClass, Backend, Capabilities, Placement, Renderer},
+    stages::{RayStage, TemporalStage},
+};
+
+/// Reads of one grid of taps that the vectorised cpu pass makes, at most.
+pub const MOST_VECTOR_TAPS: u32 = 8;
+/// Pixels of an ideal frame for each pixel of the frames made from it, at most, that are worth a copy from a
+/// software adapter to the cpu renderer.
+const MOST_COPIED: f64 = 12.0;
+
+/// Who makes the passes of a plan; `rasterises`: whether the cpu's rasteriser [draws its
+/// scene](cpu_rasterises).
+pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: bool) -> Placement {
+    let (cpu, gpu) = (Placement::all(Renderer::Cpu), Placement::all(Renderer::Gpu));
+    let gpu_then_cpu = Placement { ideal: Renderer::Gpu, reverse: Renderer::Cpu };
+    match (capabilities.backend, capabilities.adapter) {
+        (Backend::Cpu, _) | (_, None) => cpu,
+        (Backend::Gpu, _) => gpu,
+        (Backend::GpuThenCpu, _) => {
+            if cpu_vectorises(plan) {
+                gpu_then_cpu
+            } else {
+                gpu
+            }
+        }
+        (Backend::Auto, Some(AdapterClass::Card)) => gpu,
+        (Backend::Auto, Some(AdapterClass::Software)) => {
+            if !capabilities.has_vectors || !cpu_vectorises(plan) {
+                gpu
+            } else if rasterises {
+                cpu
+            } else if is_worth_the_copy(plan) {
+                gpu_then_cpu
+            } else {
+                gpu
+            }
+        }
+    }
+}
+
+/// Whether the cpu's vectorised reverse pass makes frames of a plan: from one ideal frame, without silhouette
+/// rays, by a lens that does not zoom, rows that are rows of the picture, a solver that iterates on the depth
+/// or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general pass makes all others.
+#[must_use]
+pub fn cpu_vectorises(plan: &FramePlan) -> bool {
+    let is_plain = plan.keys.len() <= 1 && !plan.edges.has_rays() && plan.preset != Preset::Paper;
+    let solves = matches!(
+        plan.temporal,
+        TemporalStage::Identity | TemporalStage::Rotation | TemporalStage::Reproject { .. }
+    );
+    let keeps_lens = plan.ray == RayStage::Pinhole || (plan.ray == RayStage::LensMap && plan.zoom.is_none());
+    let has_rows = plan.shutter.row_axis() == RowAxis::Rows;
+    let has_few_taps = match plan.taps {
+        TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most <= MOST_VECTOR_TAPS,
+        TapStage::Bilinear | TapStage::Spline | TapStage::Area => true,
+    };
+    let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
+    is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides
+}
+
+/// Whether the cpu's rasteriser draws a scene: pictures that one texture holds, none of them mirrored beyond
+/// its borders or read at the nearest texel, no alpha mask, no blended surface.
+#[must_use]
+pub fn cpu_rasterises(scene: &Scene, max_picture_px: u32) -> bool {
+    let ground = scene.terrain.as_ref().map(|terrain| terrain.texture.size_px);
+    ground.is_none_or(|size_px| is_whole(size_px, max_picture_px))
+        && scene.meshes.iter().all(|mesh| {
+            let material = &mesh.material;
+            material.cutoff.is_none() && !material.blends && material.is_bilinear()
+        })
+}
+
+/// Whether frames of a plan that the cpu vectorises take less time there although their ideal frame has to be
+/// copied from a software adapter.
+fn is_worth_the_copy(plan: &FramePlan) -> bool {
+    let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+    let frames = plan.shared_frames.map_or(1.0, |[first, last]| (last - first + 1) as f64);
+    area(plan.ideal.size_px) <= MOST_COPIED * frames * area(plan.camera.size_px)
+}

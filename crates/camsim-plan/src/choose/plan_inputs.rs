@@ -1,0 +1,185 @@
+//! What plans of a sequence are made from: the sequence, the renderer's limits, and what is known of lens and
+//! scene.
+
+use std::sync::Arc;
+
+use camsim_core::{
+    camera::{CameraModel, ZoomTable},
+    mount::CameraPath,
+    scenario::{Auto, Channel, Preset, QualitySpec, Silhouettes},
+    sequence::Sequence,
+    shutter::Shutter,
+};
+
+use super::recent_cache::RecentCache;
+use crate::{
+    ir::{limits::MAX_IDEAL_PX, plan_error::PlanError},
+    picture_error::texture_spectra::SceneSpectra,
+    view::{
+        lens_reach::LensReach, neighbourhood::Neighbourhoods, scene_outline::SceneOutline, surfaces::Surfaces,
+    },
+};
+
+/// Frames whose neighbourhoods are cached: so many, and more for each group that is planned at once.
+const CACHED_FRAMES: usize = 48;
+const CACHED_FRAMES_A_GROUP: usize = 16;
+/// Threads for each group that is planned at once, and such groups at most.
+const THREADS_A_GROUP: usize = 2;
+const MOST_GROUPS_AT_ONCE: usize = 8;
+
+/// What is known of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct SceneKnowledge {
+    pub outline: Arc<SceneOutline>,
+    pub spectra: Arc<SceneSpectra>,
+    pub surfaces: Arc<Surfaces>,
+}
+
+impl SceneKnowledge {
+    pub fn new(sequence: &Sequence) -> Self {
+        let scene = &sequence.scene;
+        Self {
+            outline: Arc::new(SceneOutline::new(scene)),
+            spectra: Arc::new(SceneSpectra::new(scene)),
+            surfaces: Arc::new(Surfaces::new(scene.clone())),
+        }
+    }
+}
+
+/// What plans of a sequence are made from.
+#[derive(Debug)]
+pub(crate) struct PlanInputs {
+    pub sequence: Arc<Sequence>,
+    pub scene: SceneKnowledge,
+    pub shutter: Shutter,
+    pub zoom: Option<ZoomTable>,
+    /// Reach of a lens that does not zoom.
+    pub fixed: Option<Arc<LensReach>>,
+    /// The fixed lens with half of its probes, for even frames and odd ones of a group.
+    halves: Option<[Arc<LensReach>; 2]>,
+    /// The fixed lens with a quarter of its probes, for every second of the even frames and of the odd ones.
+    quarters: Option<[[Arc<LensReach>; 2]; 2]>,
+    pub truth: bool,
+    pub max_side_px: u32,
+    pub max_ideal_px: u64,
+    /// Neighbourhoods of the probes of recent frames, of all probes and of half of them.
+    pub neighbourhoods: RecentCache<Neighbourhoods>,
+    pub neighbourhoods_of_halves: RecentCache<Neighbourhoods>,
+}
+
+impl PlanInputs {
+    pub fn new(
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+        max_side_px: u32,
+        scene: SceneKnowledge,
+    ) -> Result<Self, PlanError> {
+        let camera = &sequence.scenario.camera;
+        let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
+        let zoom = ZoomTable::from_spec(camera)?;
+        let fixed = match zoom {
+            Some(_) => None,
+            None => Some(Arc::new(
+                LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?,
+            )),
+        };
+        let halves =
+            fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
+        let quarters = halves.as_ref().map(|halves| {
+            halves
+                .each_ref()
+                .map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low))))
+        });
+        let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
+        let cached = CACHED_FRAMES + CACHED_FRAMES_A_GROUP * groups_at_once();
+        Ok(Self {
+            sequence,
+            scene,
+            shutter,
+            zoom,
+            fixed,
+            halves,
+            quarters,
+            truth,
+            max_side_px,
+            max_ideal_px: MAX_IDEAL_PX,
+            neighbourhoods: RecentCache::new(cached),
+            neighbourhoods_of_halves: RecentCache::new(cached),
+        })
+    }
+
+    pub fn quality(&self) -> &QualitySpec {
+        &self.sequence.scenario.quality
+    }
+
+    pub fn path(&self) -> &CameraPath {
+        &self.sequence.path
+    }
+
+    /// Stamp of a frame, path time, seconds.
+    pub fn stamp_s(&self, frame: u64) -> f64 {
+        let camera = &self.sequence.scenario.camera;
+        self.sequence.start_s + (frame as f64 + camera.phase) / camera.fps
+    }
+
+    /// Probes of frames of a group: neighbours in time are nearly alike, and have other probes each.
+    pub fn half_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
+        self.halves
+            .as_ref()
+            .map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
+    }
+
+    /// Probes of dry runs of frames of a group: their neighbours are made the same way, or nearly, from the
+    /// same ideal frame.
+    pub fn quarter_of_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
+        self.quarters
+            .as_ref()
+            .map(|quarters| quarters[(frame % 2) as usize][(frame / 2 % 2) as usize].clone())
+    }
+
+    /// Number of the group of a frame.
+    pub fn group_of(&self, frame: u64) -> u64 {
+        if self.may_share() { frame / u64::from(self.quality().frames_per_ideal) } else { frame }
+    }
+
+    /// Whether the scenario leaves it to the planner which frames share an ideal frame.
+    pub fn may_share(&self) -> bool {
+        self.reason_against_sharing().is_none()
+    }
+
+    /// What in the scenario gives each frame an ideal frame of its own.
+    pub fn reason_against_sharing(&self) -> Option<&'static str> {
+        let quality = self.quality();
+        let reasons = [
+            (quality.preset == Preset::Paper, "quality.preset = \"paper\""),
+            (quality.frames_per_ideal == 1, "quality.frames_per_ideal = 1"),
+            (quality.solver != Auto::Auto, "quality.solver is given"),
+            (quality.key_frames != Auto::Auto, "quality.key_frames is given"),
+            (quality.silhouettes == Silhouettes::Rays, "quality.silhouettes = \"rays\""),
+            (self.zoom.is_some(), "the lens zooms"),
+        ];
+        reasons.into_iter().find_map(|(holds, reason)| holds.then_some(reason))
+    }
+
+    /// Forgets what is cached. Plans stay the same.
+    pub fn forget(&self) {
+        self.neighbourhoods.forget();
+        self.neighbourhoods_of_halves.forget();
+    }
+}
+
+/// Groups that are best planned at once, each by a thread of its own: planning one is parallel in itself, but
+/// not all of it.
+pub(crate) fn groups_at_once() -> usize {
+    (rayon::current_num_threads() / THREADS_A_GROUP).clamp(1, MOST_GROUPS_AT_ONCE)
+}
+
+/// Zoom at a time: linear between the rows of the track, held outside.
+pub(crate) fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
+    let after = track.partition_point(|row| row.0 <= t_s);
+    match (after.checked_sub(1).and_then(|i| track.get(i)), track.get(after)) {
+        (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (t_s - a.0) / (b.0 - a.0),
+        (Some(only), None) | (None, Some(only)) => only.1,
+        (None, None) => 1.0,
+    }
+}

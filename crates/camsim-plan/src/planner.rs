@@ -1,0 +1,271 @@
+//! The planner.
+
+mod steps;
+
+use std::sync::Arc;
+
+use camsim_core::{
+    camera::ZoomTable,
+    frame::RowRecord,
+    scenario::{Channel, Preset},
+    sequence::Sequence,
+    temporal::IdealGeometry,
+};
+use glam::DVec2;
+
+use crate::{
+    choose::{
+        frame_context::{FrameContext, FrameScene},
+        obstacle, picture,
+        placement::{cpu_rasterises, place},
+        plan_inputs::{self, PlanInputs, SceneKnowledge},
+        recent_cache::RecentCache,
+        sharing::{FrameGroup, unshared_reason},
+    },
+    ir::{
+        error_map::ErrorMap, frame_plan::FramePlan, placement::Capabilities, plan_error::PlanError,
+        row_tables::row_records,
+    },
+    source_error::{
+        dry_run::DryRun,
+        error_map::error_map,
+        exact_sources::{ExactSources, phases, terrain_detail},
+        pixel_truth::{PixelTruth, pixel_truth},
+        temporal_method::{TemporalMethod, is_of_twist},
+    },
+};
+use steps::Draft;
+
+/// Groups that are cached, and more for each that is planned at once.
+const CACHED_GROUPS: usize = 2;
+const CACHED_GROUPS_A_GROUP: usize = 2;
+
+/// Plans frames of one sequence; keeps what depends on lens and scene alone.
+#[derive(Debug)]
+pub struct Planner {
+    inputs: PlanInputs,
+    capabilities: Capabilities,
+    /// Whether the cpu's rasteriser draws the scene.
+    rasterises: bool,
+    /// The last groups of frames that were planned.
+    groups: RecentCache<FrameGroup>,
+    /// The last plan of a frame by itself: callers may need it twice.
+    last: RecentCache<FramePlan>,
+}
+
+/// The plan of a frame, step by step.
+fn plan_of(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Result<FramePlan, PlanError> {
+    let picture = picture::choose(context, scene);
+    let mut draft = Draft::new(context, scene, &picture)?;
+    draft.choose_ray();
+    let exposure = draft.choose_exposure_and_edges();
+    let tried = draft.ideal;
+    let mut choice = draft.choose_temporal_inverse(&tried, exposure);
+    draft.fit_ideal_to(&choice)?;
+    draft.choose_key_frames(&mut choice);
+    choice.predicted.picture_error_obstacle =
+        obstacle::to_picture_error(context.quality(), &picture, &choice.predicted);
+    choice.predicted.picture_error_kept = choice.predicted.picture_error_obstacle.is_none();
+    draft.note_static_skips(choice.method.temporal);
+    Ok(draft.finish(choice))
+}
+
+impl Planner {
+    /// Prepares for the frames of `sequence`; `max_side_px` is the largest texture side that the renderer
+    /// has.
+    ///
+    /// # Errors
+    /// A camera or shutter that cannot be used.
+    pub fn new(sequence: Arc<Sequence>, channels: &[Channel], max_side_px: u32) -> Result<Self, PlanError> {
+        let scene = SceneKnowledge::new(&sequence);
+        Self::with_scene(sequence, channels, max_side_px, scene)
+    }
+
+    /// A planner for the frames of another sequence. Where its scene is this one's (the same [`Arc`]), what
+    /// is known of the scene is taken over: finding it anew takes longer than a plan. No plan changes by it.
+    ///
+    /// # Errors
+    /// As [`Planner::new`].
+    pub fn renewed(&self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<Self, PlanError> {
+        let max_side_px = self.inputs.max_side_px;
+        if !Arc::ptr_eq(&self.inputs.sequence.scene, &sequence.scene) {
+            let planner = Self::new(sequence, channels, max_side_px)?;
+            return Ok(planner.with_capabilities(self.capabilities));
+        }
+        let planner = Self::with_scene(sequence, channels, max_side_px, self.inputs.scene.clone())?;
+        Ok(planner.with_capabilities(self.capabilities))
+    }
+
+    fn with_scene(
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+        max_side_px: u32,
+        scene: SceneKnowledge,
+    ) -> Result<Self, PlanError> {
+        let cached_groups = CACHED_GROUPS + CACHED_GROUPS_A_GROUP * Self::groups_at_once();
+        Ok(Self {
+            inputs: PlanInputs::new(sequence, channels, max_side_px, scene)?,
+            capabilities: Capabilities::default(),
+            rasterises: false,
+            groups: RecentCache::new(cached_groups),
+            last: RecentCache::new(1),
+        })
+    }
+
+    /// For renderers that only need the geometry of the ideal frame and never make it: any number of pixels
+    /// will do.
+    #[must_use]
+    pub fn with_ideals_of_any_area(self) -> Self {
+        let mut inputs = self.inputs;
+        inputs.max_ideal_px = u64::MAX;
+        Self { inputs, ..self }
+    }
+
+    /// Plans for a machine with these capabilities; without, for a graphics card.
+    #[must_use]
+    pub fn with_capabilities(self, capabilities: Capabilities) -> Self {
+        let rasterises = cpu_rasterises(&self.inputs.sequence.scene, capabilities.max_picture_px);
+        Self { capabilities, rasterises, ..self }
+    }
+
+    /// The sequence.
+    #[must_use]
+    pub fn sequence(&self) -> &Arc<Sequence> {
+        &self.inputs.sequence
+    }
+
+    /// Whether depth and coordinates are wanted.
+    #[must_use]
+    pub fn wants_truth(&self) -> bool {
+        self.inputs.truth
+    }
+
+    /// Calibration table of a zoom lens.
+    #[must_use]
+    pub fn zoom_table(&self) -> Option<&ZoomTable> {
+        self.inputs.zoom.as_ref()
+    }
+
+    /// Stamp of a frame, path time, seconds: `start + (i + phase) / fps`.
+    #[must_use]
+    pub fn stamp_s(&self, frame: u64) -> f64 {
+        self.inputs.stamp_s(frame)
+    }
+
+    /// The plan of one frame.
+    ///
+    /// # Errors
+    /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
+    pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        let mut plan = self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)?;
+        if plan.shared_frames.is_none() {
+            plan.unshared_reason = Some(unshared_reason(&self.inputs, &plan));
+        }
+        plan.placement = place(&self.capabilities, &plan, self.rasterises);
+        Ok(plan)
+    }
+
+    /// The plan of a frame by itself.
+    fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        let find = || {
+            let context = FrameContext::new(&self.inputs, frame, None)?;
+            plan_of(&context, &context.scene())
+        };
+        self.last.try_get(frame, find).map(|plan| FramePlan::clone(&plan))
+    }
+
+    /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
+    fn shared_plan(&self, frame: u64) -> Option<FramePlan> {
+        if !self.inputs.may_share() || frame >= self.inputs.sequence.frames {
+            return None;
+        }
+        let number = self.group_of(frame);
+        self.groups.get(number, || FrameGroup::new(&self.inputs, plan_of, number)).plan(frame)
+    }
+
+    /// Number of the group of a frame: frames of one are best planned one after the other, by the same
+    /// thread.
+    #[must_use]
+    pub fn group_of(&self, frame: u64) -> u64 {
+        self.inputs.group_of(frame)
+    }
+
+    /// Groups that are best planned at once, each by a thread of its own: planning one is parallel in itself,
+    /// but not all of it.
+    #[must_use]
+    pub fn groups_at_once() -> usize {
+        plan_inputs::groups_at_once()
+    }
+
+    /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames
+    /// over and over.
+    pub fn forget(&self) {
+        self.inputs.forget();
+        self.groups.forget();
+        self.last.forget();
+    }
+
+    /// Time, pose and velocity of each row of a frame.
+    #[must_use]
+    pub fn rows(&self, plan: &FramePlan) -> Vec<RowRecord> {
+        row_records(plan, self.inputs.path(), self.inputs.sequence.epoch_ns)
+    }
+
+    /// What the ray `uv` of a pixel meets, each at its own instant: source at exposure phase `phase` (-0.5 to
+    /// 0.5), point and depth at mid-exposure. The terrain is met at full detail, which what was drawn is
+    /// within [`FramePlan::terrain_error_px`] of.
+    #[must_use]
+    pub fn pixel_truth(&self, plan: &FramePlan, pixel: [u32; 2], uv: DVec2, phase: f64) -> PixelTruth {
+        pixel_truth(self.inputs.path(), &self.inputs.scene.surfaces, plan, pixel, uv, phase)
+    }
+
+    /// The predicted source error of a frame from pixel to pixel, by the dry runs that its plan was chosen
+    /// by. It takes about as long as these: a fraction of a plan.
+    ///
+    /// Frames that share an ideal frame have probes of their own, and may have a finer terrain than each
+    /// alone would: their map is of what is drawn there, and may be below what the plan says, which answers
+    /// for all that are solved in the same way.
+    ///
+    /// # Errors
+    /// As [`Planner::plan`].
+    pub fn error_map(&self, plan: &FramePlan) -> Result<ErrorMap, PlanError> {
+        let inputs = &self.inputs;
+        let context = FrameContext::new(inputs, plan.frame, None)?;
+        let quarter = plan.shared_frames.and_then(|_| inputs.quarter_of_the_probes(plan.frame));
+        let reach = quarter.unwrap_or_else(|| context.reach.clone());
+        let ideal = tried_ideal(&context, plan);
+        // Of several ideal frames the prediction has the one in the middle of the window.
+        let (key_s, key_pose) = match plan.keys.as_slice() {
+            [key] => (key.t_s, key.pose),
+            _ => (plan.key_s, plan.key_pose),
+        };
+        let method = TemporalMethod { temporal: plan.temporal, blur: plan.blur };
+        let dry_run = DryRun {
+            surfaces: &inputs.scene.surfaces,
+            path: inputs.path(),
+            shutter: &inputs.shutter,
+            stamp_s: plan.stamp_s,
+            key_s,
+            key_pose: &key_pose,
+            ideal: &ideal,
+            twist: is_of_twist(method.temporal).then_some(plan.key_twist),
+            nearest_depth: plan.preset == Preset::Paper,
+            plane: plan.plane.seen_from(&key_pose),
+        };
+        let phases = phases(inputs.path(), plan.blur.is_some());
+        let sources = ExactSources::new(&reach, plan.ray, dry_run, phases, 1);
+        let detail = terrain_detail(&inputs.sequence, &key_pose, &ideal, plan.terrain_error_px);
+        Ok(error_map(&sources, detail.as_ref(), method))
+    }
+}
+
+/// The ideal frame that a plan's prediction was made for: its own, but where what was chosen then needed a
+/// larger one.
+fn tried_ideal(context: &FrameContext<'_>, plan: &FramePlan) -> IdealGeometry {
+    let grew = plan.keys.len() > 1 || context.demanded.is_none() && is_of_twist(plan.temporal);
+    if !grew {
+        return plan.ideal;
+    }
+    let scale = plan.ideal.scale(&plan.camera);
+    context.ideal_of(&[context.key()], scale, context.demanded)
+}

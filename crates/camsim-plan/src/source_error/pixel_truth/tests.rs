@@ -1,0 +1,124 @@
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec2};
+
+use glam::DVec3;
+
+use crate::Planner;
+use camsim_core::{
+    mount::CameraPath,
+    pose::BodyState,
+    reference::Oracle,
+    scenario::{Channel, FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver},
+    scene::{Encoding, Mesh, Scene, Terrain, Texture},
+    sequence::Sequence,
+    trajectory::Trajectory,
+};
+
+/// Roofs over hills, seen by a fast camera that turns, with a lens, an exposure and the skyline in view.
+fn sequence(solver: Option<Solver>) -> Arc<Sequence> {
+    // Long because: every part of a sequence is written out.
+    let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+    let roof = |north_m: f64, height_m: f64| {
+        Mesh::level_picture(texture.clone(), DVec3::new(north_m, 10.0, -height_m), 30.0)
+    };
+    let heights: Vec<f64> = (0..65 * 65)
+        .map(|i| 8.0 * (f64::from(i % 65) * 0.6).sin() * (f64::from(i / 65) * 0.4).cos())
+        .collect();
+    let terrain = Terrain::from_heights(65, 65, 10.0, &heights, Some(texture.clone())).unwrap();
+    let scene = Scene {
+        terrain: Some(terrain),
+        meshes: vec![roof(20.0, 25.0), roof(70.0, 35.0)],
+        ..Scene::default()
+    };
+    let mut scenario = Scenario {
+        seed: 1,
+        flight: FlightSpec {
+            log: "in-memory".into(),
+            format: Default::default(),
+            time_unit: Default::default(),
+            angle_unit: Default::default(),
+            angles: Default::default(),
+            attitude: Default::default(),
+            origin: Default::default(),
+            height: Default::default(),
+            window_s: None,
+            speed: 1.0,
+        },
+        tracker: Default::default(),
+        camera: Default::default(),
+        scene: Default::default(),
+        quality: Default::default(),
+        output: Default::default(),
+    };
+    scenario.camera.size_px = [80, 60];
+    scenario.camera.focal_px = [60.0, 62.0];
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.camera.mount = MountSpec { angles_deg: [2.0, -25.0, 0.0], ..MountSpec::default() };
+    scenario.camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 12.0, ..ShutterSpec::default() };
+    scenario.quality.solver = solver.map_or(Default::default(), camsim_core::scenario::Auto::Value);
+    let first = BodyState {
+        position_ned_m: DVec3::new(-100.0, -20.0, -60.0),
+        velocity_ned_m_s: DVec3::new(50.0, 10.0, 0.0),
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: DQuat::IDENTITY,
+        rate_body_rad_s: DVec3::new(0.1, -0.2, 0.3),
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
+    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
+    let scene = Arc::new(scene);
+    Arc::new(Sequence {
+        scenario,
+        path,
+        epoch_ns: 0,
+        start_s: 0.0,
+        frames: 9,
+        scene,
+        vignette: None,
+        zoom_track: Vec::new(),
+    })
+}
+
+#[test]
+fn pixel_truth_is_that_of_the_oracle() {
+    let sequence = sequence(None);
+    let plan = Planner::new(sequence.clone(), &[Channel::Coords], 16_384).unwrap();
+    let (planner, plan) = (&plan, plan.plan(1).unwrap());
+    assert!(plan.has_exact_truth(), "{:?}", plan.temporal);
+    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let view = oracle.view(1);
+    let key = plan.ideal_view();
+    let mut of_surface = [0; 4];
+    for pixel in (0..60).flat_map(|y| (0..80).map(move |x| [x, y])) {
+        for phase in [0.0, -0.5, 0.3] {
+            let [mid, look] = [0.0, phase].map(|phase| view.sample(pixel, DVec2::ZERO, phase).unwrap());
+            let truth = planner.pixel_truth(&plan, pixel, look.uv, phase);
+            let off_px = truth.source_px.distance(key.source_px(&look));
+            assert!(off_px < 1e-8, "{pixel:?} {phase}: {off_px:.1e} px");
+            let off_m = match (truth.hit, mid.hit) {
+                (Some((point_m, depth_m)), Some(hit)) => {
+                    point_m.distance(hit.point_ned_m) + (depth_m - hit.depth_m).abs()
+                }
+                (None, None) => 0.0,
+                (found, _) => panic!("{pixel:?}: {found:?}, not {:?}", mid.hit),
+            };
+            assert!(off_m < 1e-8, "{pixel:?}: {off_m:.1e} m");
+            of_surface[mid.hit.map_or(3, |hit| hit.surface as usize)] += 1;
+        }
+    }
+    assert!(of_surface.iter().all(|&count| count > 100), "terrain, roofs and sky: {of_surface:?}");
+}
+
+#[test]
+fn only_exact_solvers_have_exact_truth() {
+    let looks = |solver: Option<Solver>, channel: Channel| {
+        Planner::new(sequence(solver), &[channel], 16_384).unwrap().plan(1).unwrap().has_exact_truth()
+    };
+    assert!(looks(Some(Solver::Reproject), Channel::Depth));
+    assert!(!looks(Some(Solver::Rk2), Channel::Depth) && !looks(Some(Solver::Linear), Channel::Coords));
+    assert!(!looks(None, Channel::Color), "nothing is wanted");
+}

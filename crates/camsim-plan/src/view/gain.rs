@@ -1,0 +1,19 @@
+//! Value of a pixel for each unit of light that arrives.
+
+use camsim_core::{camera::CameraModel, photometric::vignette_weight, sequence::Sequence};
+
+/// Value of a pixel, of the linear range, for each unit of light that arrives.
+pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2]) -> f64 + Sync {
+    let photometric = &sequence.scenario.camera.photometric;
+    let size_px = camera.size_px;
+    move |[x, y]: [u32; 2]| {
+        let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
+            let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / size_px[k]) as usize);
+            f64::from(vignette_weight(
+                map.values[row * map.size_px[0] as usize + column],
+                photometric.vignette_thresholds,
+            ))
+        });
+        vignette * photometric.light
+    }
+}

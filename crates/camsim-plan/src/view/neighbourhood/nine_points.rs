@@ -1,0 +1,130 @@
+//! Three by three points around a probe, as far apart as pixels at silhouettes are from these.
+
+use camsim_core::{
+    pose::CameraPose,
+    silhouette::{NEAR_PX, may_step, steps},
+};
+use glam::DVec2;
+
+use super::search::{LINES, NeighbourhoodSearch};
+use crate::ir::margins;
+use crate::view::{probes::Probe, surfaces::SurfaceHit};
+
+/// Two of the points.
+pub(super) type Pair = [usize; 2];
+
+/// What the points see at the probe's own instant.
+pub(super) struct NinePoints<'a> {
+    search: &'a NeighbourhoodSearch<'a>,
+    pub probe: &'a Probe,
+    pub mid_s: f64,
+    pub pose: CameraPose,
+    places: [DVec2; 9],
+    hits: [Option<SurfaceHit>; 9],
+    inverse_depth: [f64; 9],
+}
+
+impl<'a> NinePoints<'a> {
+    pub fn new(search: &'a NeighbourhoodSearch<'a>, probe: &'a Probe) -> Self {
+        let [x, y] = probe.pixel;
+        let mid_s = search.stamp_s + search.shutter.dt_pixel_s(x, y);
+        let pose = search.path.pose(mid_s);
+        let places: [DVec2; 9] =
+            std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
+        let mut points =
+            Self { search, probe, mid_s, pose, places, hits: [None; 9], inverse_depth: [0.0; 9] };
+        points.hits = places.map(|place| points.cast(place));
+        points.inverse_depth = points.hits.map(|hit| hit.map_or(0.0, |hit| hit.depth_m.recip()));
+        points
+    }
+
+    fn uv(&self, place: DVec2) -> DVec2 {
+        self.probe.uv + self.probe.uv_from_px * (f64::from(NEAR_PX) * place)
+    }
+
+    fn cast(&self, place: DVec2) -> Option<SurfaceHit> {
+        let ray_ned = self.pose.ned_from_camera * self.uv(place).extend(1.0);
+        self.search.surfaces.first_hit(self.pose.position_ned_m, ray_ned)
+    }
+
+    /// Neighbours along rows, columns and diagonals with a step of depth between them.
+    pub fn steps(&self) -> Vec<Pair> {
+        let step = |a: usize, b: usize| {
+            let between = |share: f64| {
+                let place = self.places[a].lerp(self.places[b], share);
+                self.cast(place).map_or(0.0, |hit| hit.depth_m.recip())
+            };
+            steps(self.inverse_depth[a], self.inverse_depth[b], between).then_some([a, b])
+        };
+        LINES
+            .iter()
+            .filter(|line| may_step(self.along(line)))
+            .flat_map(|&[a, b, c]| [step(a, b), step(b, c)])
+            .flatten()
+            .collect()
+    }
+
+    /// Inverse depths along a line.
+    pub fn along(&self, line: &[usize; 3]) -> [f64; 3] {
+        line.map(|i| self.inverse_depth[i])
+    }
+
+    pub fn inverse_depths(&self, pair: &Pair) -> [f64; 2] {
+        pair.map(|i| self.inverse_depth[i])
+    }
+
+    /// Inverse depth at the probe itself.
+    pub fn middle(&self) -> f64 {
+        self.inverse_depth[4]
+    }
+
+    pub fn is_sky(&self) -> bool {
+        self.hits[4].is_none()
+    }
+
+    pub fn is_between_surfaces(&self, pair: &Pair) -> bool {
+        pair.iter().all(|&i| self.inverse_depth[i] > 0.0)
+    }
+
+    /// Whether a step is the terrain's. What is before the sky is the skyline's.
+    pub fn is_terrain(&self, &[a, b]: &Pair) -> bool {
+        let nearer = if self.inverse_depth[a] > self.inverse_depth[b] { a } else { b };
+        self.hits[nearer].is_some_and(|hit| hit.terrain.is_some())
+            && self.inverse_depth[a].min(self.inverse_depth[b]) > 0.0
+    }
+
+    /// Squared contrast between two points, mean over the channels.
+    pub fn contrast2(&self, &[a, b]: &Pair) -> f64 {
+        let color = |i: usize| {
+            let ray = self.uv(self.places[i]).extend(1.0);
+            let ray_ned = self.pose.ned_from_camera * ray;
+            let origin = self.pose.position_ned_m;
+            self.search.surfaces.light(origin, ray_ned, self.hits[i].as_ref(), ray.length()).color
+        };
+        (color(a) - color(b)).length_squared() / 3.0
+    }
+
+    /// Across the silhouette, towards what is nearer: along it parallax shows the same again.
+    pub fn normal(&self) -> DVec2 {
+        let towards = self
+            .places
+            .iter()
+            .zip(self.inverse_depth)
+            .fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
+        (self.search.reach.camera.focal_px * (self.probe.uv_from_px * towards)).normalize_or_zero()
+    }
+
+    /// Whether models may be seen among the points. Lines through the probe are for models, which may be
+    /// narrower than the distance of the points; where the terrain steps, lines count how often.
+    pub fn may_show_models(&self) -> bool {
+        let rays = self.places.map(|place| self.uv(place));
+        let (low, high) =
+            rays.iter().fold((rays[0], rays[0]), |(low, high), uv| (low.min(*uv), high.max(*uv)));
+        let range_m = |(uv, hit): (&DVec2, &Option<SurfaceHit>)| {
+            hit.map_or(f64::INFINITY, |hit| hit.depth_m * uv.extend(1.0).length())
+        };
+        let farthest_m = rays.iter().zip(&self.hits).map(range_m).fold(0.0, f64::max);
+        let tangents = [low.x, high.x, low.y, high.y];
+        self.search.surfaces.may_show_models(&self.pose, tangents, margins::BEHIND * farthest_m)
+    }
+}
