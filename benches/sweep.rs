@@ -263,12 +263,12 @@ fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         session.render::<Infallible>(32..if is_measuring { 64 } else { 33 }, &mut |finished| {
             let times = &finished.times;
             let host = [
-                ("host: plan", times.plan_ms),
-                ("host: record", times.record_ms),
-                ("host: read", times.read_ms),
+                ("cpu: plan", times.plan_ms),
+                ("cpu: record", times.record_ms),
+                ("cpu: read", times.read_ms),
             ];
-            let device = times.passes.iter().map(|pass| (format!("device: {}", pass.name), pass.ms));
-            let by_host = [("host: ideal", times.ideal_ms), ("host: reverse", times.reverse_ms)];
+            let device = times.passes.iter().map(|pass| (format!("gpu: {}", pass.name), pass.ms));
+            let by_host = [("cpu: ideal", times.ideal_ms), ("cpu: reverse", times.reverse_ms)];
             let by_host = by_host.into_iter().filter_map(|(name, ms)| Some((name, ms?)));
             for (name, ms) in
                 host.into_iter().chain(by_host).map(|(name, ms)| (name.to_owned(), ms)).chain(device)

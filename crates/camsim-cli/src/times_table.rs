@@ -36,19 +36,19 @@ impl TimesTable {
     pub fn add(&mut self, times: &FrameTimes) {
         self.frames += 1;
         for (name, ms) in [
-            ("host: plan", times.plan_ms),
-            ("host: record", times.record_ms),
-            ("host: submit", times.submit_ms),
-            ("host: wait", times.wait_ms),
+            ("cpu: plan", times.plan_ms),
+            ("cpu: record", times.record_ms),
+            ("cpu: submit", times.submit_ms),
+            ("cpu: wait", times.wait_ms),
         ] {
             self.part(name.to_owned(), ms);
         }
-        for (name, ms) in [("host: ideal", times.ideal_ms), ("host: reverse", times.reverse_ms)] {
+        for (name, ms) in [("cpu: ideal", times.ideal_ms), ("cpu: reverse", times.reverse_ms)] {
             ms.into_iter().for_each(|ms| self.part(name.to_owned(), ms));
         }
-        self.part("host: read".to_owned(), times.read_ms);
+        self.part("cpu: read".to_owned(), times.read_ms);
         for pass in &times.passes {
-            self.part(format!("device: {}", pass.name), pass.ms);
+            self.part(format!("gpu: {}", pass.name), pass.ms);
         }
     }
 
@@ -69,7 +69,7 @@ impl TimesTable {
             let (median, largest) = (all[all.len() / 2], all[all.len() - 1]);
             text += &format!("  {name:<22}{median:>10.2}{largest:>10.2}{:>10}\n", all.len());
         }
-        if self.parts.iter().all(|(name, _)| name.starts_with("host")) {
+        if self.parts.iter().all(|(name, _)| name.starts_with("cpu")) {
             text += "  the adapter has no time stamps\n";
         }
         text += "ms before the first frame\n";

@@ -182,7 +182,7 @@ fn timing_runs_write_no_frame() {
     assert!(
         code == 0
             && out.starts_with("ms per frame")
-            && out.contains("host: plan")
+            && out.contains("cpu: plan")
             && out.contains("plan of the first frame")
             && err.is_empty(),
         "{out}{err}"

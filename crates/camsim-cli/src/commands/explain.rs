@@ -131,11 +131,11 @@ struct Models {
 #[derive(Serialize)]
 struct Memory {
     /// Host memory: heights, with the data of the level of detail.
-    heights_on_host: u64,
+    heights_bytes: u64,
     /// Host memory: the texture, with its mip levels if it is tiled.
-    picture_on_host: u64,
+    texture_bytes: u64,
     /// GPU memory: the texture, or the tiles that this frame may read.
-    picture_on_device: u64,
+    texture_gpu_bytes: u64,
     /// For a tiled texture: the number of tiles that this frame may read, and of all tiles.
     tiles: Option<[u64; 2]>,
 }
@@ -290,12 +290,12 @@ fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a
 fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let picture = terrain.texture.rgba8.len() as u64;
-    let heights_on_host = terrain.memory_bytes();
+    let heights_bytes = terrain.memory_bytes();
     if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
         return Some(Memory {
-            heights_on_host,
-            picture_on_host: picture,
-            picture_on_device: 8 * picture / 3,
+            heights_bytes,
+            texture_bytes: picture,
+            texture_gpu_bytes: 8 * picture / 3,
             tiles: None,
         });
     }
@@ -303,18 +303,18 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
     let all = u64::from(ground.grid.count);
     Some(Memory {
-        heights_on_host,
-        picture_on_host: 4 * picture / 3,
-        picture_on_device: tiles * tile_bytes(TexelForm::Light),
+        heights_bytes,
+        texture_bytes: 4 * picture / 3,
+        texture_gpu_bytes: tiles * tile_bytes(TexelForm::Light),
         tiles: Some([tiles, all]),
     })
 }
 
 fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    let (heights, picture) = (mib(memory.heights_on_host), mib(memory.picture_on_host));
-    console.line(format_args!("  host memory: {heights:.1} MiB of heights, {picture:.1} MiB of texture"))?;
-    let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
+    let (heights, picture) = (mib(memory.heights_bytes), mib(memory.texture_bytes));
+    console.line(format_args!("  memory: {heights:.1} MiB of heights, {picture:.1} MiB of texture"))?;
+    let (triangles, picture) = (mib(triangle_bytes), mib(memory.texture_gpu_bytes));
     match memory.tiles {
         None => console.line(format_args!("  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {picture:.1} MiB of texture"))?,
         Some([tiles, all]) => console.line(format_args!(

@@ -69,7 +69,7 @@ pub struct Args {
     /// refused if the folder belongs to another scenario, or one of its input files has changed
     #[arg(long)]
     resume: bool,
-    /// Print the time of each stage at the end: on the host, and by pass on the GPU
+    /// Print the time of each stage at the end: on the cpu, and by pass on the gpu
     #[arg(long)]
     times: bool,
     /// Render only the I-th of N parts, with I from 1

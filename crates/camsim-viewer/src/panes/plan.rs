@@ -45,14 +45,14 @@ fn passes(ui: &mut Ui, picture: &Picture) {
             ui,
             "planned in",
             format!("{:.1} ms", times.plan_ms),
-            "on the host: choice of methods by dry runs, triangles, poses",
+            "on the cpu: choice of methods by dry runs, triangles, poses",
         );
-        fact(ui, "recorded in", format!("{:.1} ms", times.record_ms), "on the host");
+        fact(ui, "recorded in", format!("{:.1} ms", times.record_ms), "on the cpu");
         fact(ui, "submitted in", format!("{:.1} ms", times.submit_ms), "by the driver");
-        fact(ui, "waited", format!("{:.1} ms", times.wait_ms), "for the device");
-        fact(ui, "read in", format!("{:.1} ms", times.read_ms), "from the device");
+        fact(ui, "waited", format!("{:.1} ms", times.wait_ms), "for the gpu");
+        fact(ui, "read in", format!("{:.1} ms", times.read_ms), "from the gpu");
         for pass in &times.passes {
-            fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the device, by its time stamps");
+            fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by its time stamps");
         }
     });
 }
