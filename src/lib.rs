@@ -30,7 +30,8 @@
 //! | [`io`] | files in, files out |
 //! | [`plan`] | what each frame takes, and the error that it leaves |
 //! | [`engine`] | renders sequences, by [`cpu`] and [`gpu`] |
-//! | [`lab`], [`cli`], [`viewer`] | experiments, the command line, the viewer |
+//! | [`cli`] | the command line |
+//! | `lab`, `viewer` | experiments and the viewer, with the features of these names |
 
 pub use camsim_cli as cli;
 pub use camsim_core as core;
@@ -38,8 +39,10 @@ pub use camsim_cpu as cpu;
 pub use camsim_engine as engine;
 pub use camsim_gpu as gpu;
 pub use camsim_io as io;
+#[cfg(feature = "lab")]
 pub use camsim_lab as lab;
 pub use camsim_plan as plan;
+#[cfg(feature = "viewer")]
 pub use camsim_viewer as viewer;
 
 pub mod prelude;

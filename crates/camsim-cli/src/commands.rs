@@ -1,6 +1,7 @@
 //! One file per command, with its arguments, its help and `run`.
 
 pub mod apply;
+#[cfg(feature = "lab")]
 pub mod bench;
 pub mod board;
 pub mod camera;
@@ -11,7 +12,9 @@ pub mod explain;
 pub mod info;
 pub mod lens;
 pub mod render;
+#[cfg(feature = "lab")]
 pub mod reproduce;
 pub mod track;
 pub mod verify;
+#[cfg(feature = "viewer")]
 pub mod viewer;

@@ -74,9 +74,12 @@ enum Command {
     Apply(commands::apply::Args),
     Board(commands::board::Args),
     Compare(commands::compare::Args),
+    #[cfg(feature = "lab")]
     Bench(commands::bench::Args),
+    #[cfg(feature = "lab")]
     Reproduce(commands::reproduce::Args),
     Info(commands::info::Args),
+    #[cfg(feature = "viewer")]
     Viewer(commands::viewer::Args),
     Completions(commands::completions::Args),
 }
@@ -117,9 +120,12 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Apply(args) => commands::apply::run(&args, console),
         Command::Board(args) => commands::board::run(&args, console),
         Command::Compare(args) => commands::compare::run(&args, console),
+        #[cfg(feature = "lab")]
         Command::Bench(args) => commands::bench::run(&args, console),
+        #[cfg(feature = "lab")]
         Command::Reproduce(args) => commands::reproduce::run(&args, console),
         Command::Info(args) => commands::info::run(&args, console),
+        #[cfg(feature = "viewer")]
         Command::Viewer(args) => commands::viewer::run(&args),
         Command::Completions(args) => commands::completions::run::<Cli>(&args, console),
     }

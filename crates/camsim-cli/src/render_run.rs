@@ -236,6 +236,7 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 }
 
 /// Command that renders the missing frames of a folder's scenario.
+#[cfg(feature = "viewer")]
 pub fn go_on(folder: &Path) -> String {
     format!(
         "camsim render {} -o {} --resume",

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use camsim_engine::FrameTimes;
-use camsim_lab::timing::peak_memory_mb;
+use camsim_engine::peak_memory_mb;
 
 use crate::progress::waiting;
 

@@ -29,6 +29,7 @@ mod engine;
 mod error;
 mod exact_truth;
 mod finished;
+mod memory;
 mod planners;
 mod session;
 
@@ -37,4 +38,5 @@ pub use camsim_plan::Backend;
 pub use engine::Engine;
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
+pub use memory::peak_memory_mb;
 pub use session::Session;

@@ -1,5 +1,6 @@
 //! Clock, processor time and memory, and what is said about a set of such times.
 
+pub use camsim_engine::peak_memory_mb;
 use std::time::Duration;
 
 /// Milliseconds.
@@ -20,15 +21,6 @@ pub fn processor_ms() -> Option<f64> {
     }
     #[cfg(not(unix))]
     None
-}
-
-/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there
-/// is no such file.
-#[must_use]
-pub fn peak_memory_mb() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?;
-    Some(1.024e-3 * kib.parse::<f64>().ok()?)
 }
 
 /// The value below which `part` of the values lie, 0..=1, linear between neighbours; NaN without values.

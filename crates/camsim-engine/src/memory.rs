@@ -1,0 +1,10 @@
+//! Memory of the program.
+
+/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there
+/// is no such file.
+#[must_use]
+pub fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?;
+    Some(1.024e-3 * kib.parse::<f64>().ok()?)
+}
