@@ -18,7 +18,7 @@ use camsim_io::{
 };
 
 use crate::{
-    console::{Console, quoted},
+    console::Console,
     failure::{Failure, OrFail},
     frame_list::Shard,
     frame_source::FrameSource,
@@ -238,6 +238,8 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 /// Command that renders the missing frames of a folder's scenario.
 #[cfg(feature = "viewer")]
 pub fn go_on(folder: &Path) -> String {
+    use crate::console::quoted;
+
     format!(
         "camsim render {} -o {} --resume",
         quoted(folder.join("run.json").as_os_str()),
