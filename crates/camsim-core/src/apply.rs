@@ -79,7 +79,7 @@ pub struct Settings {
     pub blur_samples: Option<u32>,
     /// The paper's fog; only with its preset.
     pub fog: Option<paper::LinearFog>,
-    /// Seed of the noise, combined with the camera's name ([`camera_seed`]).
+    /// Seed of the noise, combined with the camera's name (`camera_seed`).
     pub seed: u64,
     /// Frame number, for the noise and the name of the frame.
     pub frame: u64,

@@ -2,8 +2,8 @@
 //! trajectory into the scene. It is slow, exact and independent of the other renderers.
 //!
 //! It shares with them the scenario, the trajectory (with the mount) and the forward model of the lens, and
-//! nothing else. Row times ([`timing`]), lens inverse ([`lens_inverse`]), zoom, ray casting ([`ray`],
-//! [`terrain_pyramid`], [`mesh_bvh`]), colour ([`shading`]) and integration ([`render`]) are implementations
+//! nothing else. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
+//! `terrain_pyramid`, `mesh_bvh`), colour (`shading`) and integration (`render`) are implementations
 //! of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
 //! The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these measurements and by the
 //! predictions of the planner.

@@ -115,7 +115,7 @@ pub struct TrackResult {
     pub limits: ResolvedLimits,
     /// Longest time at each limit; zero for `linear` and `hold`.
     pub saturation: Saturation,
-    /// The longest intervals at a limit, the longest first, at most [`MAX_INTERVALS`].
+    /// The longest intervals at a limit, the longest first, at most `MAX_INTERVALS`.
     pub saturation_intervals: Vec<SaturationInterval>,
     /// Control rate, hertz.
     pub rate_hz: f64,
@@ -155,7 +155,7 @@ impl TrackResult {
         .collect()
     }
 
-    /// A warning if the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`] (RMS).
+    /// A warning if the motion differs from the interpolated log by more than `FAR_M` or `FAR_DEG` (RMS).
     /// The truth of the frames is the motion, not the log.
     #[must_use]
     pub fn distance_warning(&self, rows: &[LogRow]) -> Option<String> {

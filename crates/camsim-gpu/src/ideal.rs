@@ -293,7 +293,7 @@ impl IdealPass {
     /// triangles of it; returns how many blended triangles are out of order.
     ///
     /// # Errors
-    /// Faults of the shader files; [`GpuError::TooLarge`] for triangles that no buffer holds.
+    /// Faults of the shader files; `GpuError::TooLarge` for triangles that no buffer holds.
     pub fn encode(
         &mut self,
         gpu: &GpuContext,

@@ -33,7 +33,7 @@ const WORKGROUP_PX: u32 = 8;
 /// What a dispatch reads and writes.
 #[derive(Debug)]
 pub struct ReverseBindings<'a> {
-    /// [`FrameUniforms`].
+    /// `FrameUniforms`.
     pub frame: &'a wgpu::Buffer,
     /// Normal quantiles, a row an octave.
     pub noise_table: &'a wgpu::TextureView,

@@ -1,6 +1,6 @@
 //! Camera files: CAMERA.toml, and the calibration files of other programs.
 //!
-//! An importer is one file here: it takes its part of a [`Document`] and gives an [`ImportedCamera`], or says
+//! An importer is one file here: it takes its part of a `Document` and gives an [`ImportedCamera`], or says
 //! what it cannot take over. What a camera here cannot express (skew, thin-prism terms, other lens models) is
 //! an error, never left out. Its table of keys says what becomes of each; a number that no table knows is
 //! named in a note.

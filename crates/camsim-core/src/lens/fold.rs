@@ -68,7 +68,7 @@ impl FoldCurve {
         &self.radii
     }
 
-    /// Whether any ray ends at a fold or pole; if not, all end at [`MAX_FIELD_RAD`].
+    /// Whether any ray ends at a fold or pole; if not, all end at `MAX_FIELD_RAD`.
     pub fn folds(&self) -> bool {
         self.folds
     }

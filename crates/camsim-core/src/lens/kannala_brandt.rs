@@ -8,7 +8,7 @@ use super::radial_table::RadialTable;
 /// With `theta = atan(r)`, `r = |(u, v)|`: `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4
 /// theta^8)`, distorted = `(u, v) theta_d / r`.
 ///
-/// Angles off axis range from 0 to 89 degrees ([`MAX_FIELD_RAD`]) or to where theta_d stops growing. An ideal
+/// Angles off axis range from 0 to 89 degrees (`MAX_FIELD_RAD`) or to where theta_d stops growing. An ideal
 /// *plane* holds no more, so points that a wider fisheye images outside have no ideal point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KannalaBrandt {

@@ -18,8 +18,8 @@ const DIVERGED: f64 = 500.0;
 /// Ideal point at which the iteration converges, or `None`.
 ///
 /// Each step is `J^-1 (distorted - F(ideal))`, to which Gauss-Newton's `(J'J)^-1 J'` reduces for a square J.
-/// The iteration fails when the residual grows or exceeds [`DIVERGED`], and has converged when it is below
-/// [`MAX_RESIDUAL`]. The residual is `|(W du, H dv)|`, image size times normalised coordinates, as in the
+/// The iteration fails when the residual grows or exceeds `DIVERGED`, and has converged when it is below
+/// `MAX_RESIDUAL`. The residual is `|(W du, H dv)|`, image size times normalised coordinates, as in the
 /// paper's program: less than a pixel where the focal length is shorter than the image.
 #[must_use]
 pub fn gauss_newton(lens: &Lens, distorted: DVec2, size_px: [u32; 2]) -> Option<DVec2> {

@@ -10,7 +10,7 @@ use super::FieldOr;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSpec {
-    /// Name of the camera. It is part of the seed of its noise ([`crate::noise::camera_seed`]), so that the
+    /// Name of the camera. It is part of the seed of its noise (`crate::noise::camera_seed`), so that the
     /// cameras of one platform have different noise.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,

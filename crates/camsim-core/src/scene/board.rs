@@ -4,7 +4,7 @@
 //! A board has black shapes on white. Its texture holds the exact coverage of each texel by black, at a scale
 //! at which the edges of the shapes fall between texels wherever their sizes have a common measure. There a
 //! bilinear read is half black exactly on the edge. An edge within a texel is displaced by at most 1.5 -
-//! sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least [`MIN_TEXELS`].
+//! sqrt(2) = 0.086 texels, and a square, a tag or a circle's spacing has at least `MIN_TEXELS`.
 
 use std::sync::Arc;
 

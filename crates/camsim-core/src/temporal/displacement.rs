@@ -33,7 +33,7 @@ pub fn linear(uv: DVec2, inverse_depth: f64, twist: &Twist, dt_s: f64) -> DVec2 
 }
 
 /// Number of steps of a time shift with at most `max_step_rad` of rotation each: `floor(|dt| |w| / step) +
-/// 1`, as in the paper's program, at most [`RK2_MAX_STEPS`].
+/// 1`, as in the paper's program, at most `RK2_MAX_STEPS`.
 #[must_use]
 pub fn rk2_steps(twist: &Twist, dt_s: f64, max_step_rad: f64) -> u32 {
     let whole = (dt_s.abs() * twist.rate_rad_s.length() / max_step_rad).floor();

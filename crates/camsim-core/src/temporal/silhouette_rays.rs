@@ -130,7 +130,7 @@ fn first_surface(
     march(place, row_inverse_depth_of, nearest_w, inverse_depth, ideal)
 }
 
-/// [`first_surface`] for any motion: `place(w)` is the projection of the ray's point at inverse depth w into
+/// `first_surface` for any motion: `place(w)` is the projection of the ray's point at inverse depth w into
 /// the ideal frame, `inverse_depth` the depth shown at a position there, and `row_inverse_depth_of` converts
 /// that to the row's camera.
 #[must_use]
