@@ -51,11 +51,15 @@ impl Engines {
 /// What bits of a picture depend on beside camsim: adapter with its driver, and the processor.
 pub fn machine(engine: &Engine) -> String {
     let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
-    format!(
-        "# adapter: {}\n# processor: {os} {arch}{}\n",
-        engine.gpu().expect("an adapter").adapter,
-        features()
-    )
+    let adapter = &engine.gpu().expect("an adapter").adapter;
+    format!("# adapter: {adapter}\n# processor: {os} {arch} {}{}\n", model(), features())
+}
+
+/// Name of the processor, where the system tells it: equal features do not promise equal bits.
+fn model() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    name.map_or_else(|| "unknown".to_owned(), |(_, name)| name.trim().to_owned())
 }
 
 #[cfg(target_arch = "x86_64")]
