@@ -22,7 +22,6 @@ mod renderer;
 mod reverse;
 mod simd;
 
-pub use cast::CastScene;
-pub use general::{FineSamples, IdealImage, RowTable};
+pub use general::RowTable;
 pub use renderer::{CpuRenderer, IdealBuffer, ReverseInputs};
 pub use reverse::{IdealTexels, suits_processor};
