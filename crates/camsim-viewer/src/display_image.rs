@@ -1,9 +1,9 @@
 //! Images drawn on the screen.
 //!
-//! egui draws all rectangles with one shader, which filters in two ways per pixel and blends by vertex colours.
-//! On a software adapter that dominates the time of a pass with a large image. Images therefore have a pipeline
-//! of their own, which reads one texel. egui draws them where the window's format is sRGB, so that codes would
-//! be converted, and where no window is registered, as in most tests.
+//! egui draws all rectangles with one shader, which filters in two ways per pixel and blends by vertex
+//! colours. On a software adapter that dominates the time of a pass with a large image. Images therefore have
+//! a pipeline of their own, which reads one texel. egui draws them where the window's format is sRGB, so that
+//! codes would be converted, and where no window is registered, as in most tests.
 
 mod blit;
 

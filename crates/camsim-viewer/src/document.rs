@@ -210,7 +210,8 @@ impl Document {
         self.render_command(Path::new("frames"), None)
     }
 
-    /// The `camsim render` command for an output folder and frames, given as the first and the one after the last.
+    /// The `camsim render` command for an output folder and frames, given as the first and the one after the
+    /// last.
     pub fn render_command(&self, folder: &Path, frames: Option<[u64; 2]>) -> String {
         let mut words =
             vec!["camsim".to_owned(), "render".to_owned(), shell_quoted(&self.path.display().to_string())];
@@ -298,8 +299,8 @@ fn get_key<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     Some(value)
 }
 
-/// Sets or removes a dotted key. Missing tables are made, and empty ones removed; an index beyond the end of a
-/// list has no effect.
+/// Sets or removes a dotted key. Missing tables are made, and empty ones removed; an index beyond the end of
+/// a list has no effect.
 fn set_key(table: &mut Table, key: &str, value: Option<Value>) {
     match key.split_once('.') {
         None => {

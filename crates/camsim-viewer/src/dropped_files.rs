@@ -47,7 +47,9 @@ pub fn apply_dropped(state: &mut State, path: &Path) {
     }
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     match ending.as_str() {
-        "toml" if is_camera(path) => set_camera(state, read_checked_camera(path).map_err(|error| error.to_string())),
+        "toml" if is_camera(path) => {
+            set_camera(state, read_checked_camera(path).map_err(|error| error.to_string()));
+        }
         "toml" if state.is_unsaved() => state.unsaved_prompt = Some(UnsavedPrompt::Open(path.into())),
         "toml" => state.open(path.into()),
         "yaml" | "yml" if is_target(path) => add_target(state, path),
@@ -70,9 +72,9 @@ pub fn apply_dropped(state: &mut State, path: &Path) {
         "glb" | "gltf" => add_model(state, path),
         "tif" | "tiff" => set_path(state, "scene.terrain.dem", path),
         _ => state.notice(format!(
-            "{}: unknown kind of file; expected a scenario or camera (.toml), a calibration or Kalibr target \
-             (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...), a terrain (.tif) \
-             or a model (.glb, .gltf)",
+            "{}: unknown kind of file; expected a scenario or camera (.toml), a calibration or Kalibr \
+             target (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...), a terrain \
+             (.tif) or a model (.glb, .gltf)",
             path.display()
         )),
     }
@@ -109,8 +111,8 @@ fn floats(values: [f64; 3]) -> Value {
     Value::Array(values.into_iter().map(Value::Float).collect())
 }
 
-/// Adds a calibration board at the point that the pinned pixel sees, or replaces the board of the scenario at its
-/// pose.
+/// Adds a calibration board at the point that the pinned pixel sees, or replaces the board of the scenario at
+/// its pose.
 fn add_target(state: &mut State, path: &Path) {
     let seen = pinned_point_ned_m(state);
     let outcome = match &mut state.document {
@@ -153,8 +155,8 @@ fn add_model(state: &mut State, path: &Path) {
     finish(state, outcome);
 }
 
-/// Imports another program's calibration. Shutter and photometry stay if the file has none, but for the vignette
-/// of the old lens. The notes of the import are shown.
+/// Imports another program's calibration. Shutter and photometry stay if the file has none, but for the
+/// vignette of the old lens. The notes of the import are shown.
 fn import_calibration(state: &mut State, path: &Path) {
     let imported = match import_camera_as(path, None) {
         Ok(imported) => imported,

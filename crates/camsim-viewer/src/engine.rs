@@ -3,8 +3,8 @@
 //! The window never waits for them, except at its end for the frame in progress. Requests go through a
 //! [`Mailbox`], which holds only the latest; [`Reply`]s come back through a channel, each with a repaint
 //! request. Previews, full frames and egui have a device each, because a device has one queue, in order: a
-//! preview must not wait for a full frame, nor the window for either. Pictures are read back to the CPU, as in
-//! `camsim render`. Loaded files are shared.
+//! preview must not wait for a full frame, nor the window for either. Pictures are read back to the CPU, as
+//! in `camsim render`. Loaded files are shared.
 
 mod error_overlay;
 mod mailbox;
@@ -33,8 +33,8 @@ pub use picture::{Difference, Picture, ramp};
 use scenario_cache::ScenarioCache;
 pub use variants::{preview_factor, stage_scenario};
 
-/// Handle of the engine's threads. Dropping it ends them and waits for them: ending the program while a thread
-/// releases its device can crash in a driver that is being unloaded.
+/// Handle of the engine's threads. Dropping it ends them and waits for them: ending the program while a
+/// thread releases its device can crash in a driver that is being unloaded.
 #[derive(Debug)]
 pub struct EngineHandle {
     previews: Arc<Mailbox<FrameRequest>>,
@@ -123,7 +123,8 @@ impl Drop for EngineHandle {
     }
 }
 
-/// A thread that reports a panic and goes on: a fault in one frame must not leave the window without renderer.
+/// A thread that reports a panic and goes on: a fault in one frame must not leave the window without
+/// renderer.
 fn spawn(name: &str, replies: ReplySender, body: impl Fn() + Send + 'static) -> Option<JoinHandle<()>> {
     let thread_replies = replies.clone();
     let body = move || {

@@ -37,8 +37,8 @@ pub struct Progress {
     pub ended: Option<Result<String, String>>,
 }
 
-/// Renders a job, calls [`ExportJob::tick`] after each frame, and stops soon after that returns `false`. Returns a
-/// summary or an error.
+/// Renders a job, calls [`ExportJob::tick`] after each frame, and stops soon after that returns `false`.
+/// Returns a summary or an error.
 pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sync>;
 
 impl ExportJob {
@@ -94,8 +94,8 @@ impl ExportJob {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Estimated remaining time, seconds, from the mean so far; `None` before the second frame, because the first
-    /// includes setup.
+    /// Estimated remaining time, seconds, from the mean so far; `None` before the second frame, because the
+    /// first includes setup.
     pub fn left_s(&self) -> Option<f64> {
         let done = self.progress().done;
         let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;

@@ -1,6 +1,6 @@
-//! Fallback fonts of the system for glyphs that egui's fonts lack, such as Chinese, Japanese and Korean ones. None is
-//! bundled: such fonts are larger than the program. Fonts are read when a character needs them; unreadable ones are
-//! skipped.
+//! Fallback fonts of the system for glyphs that egui's fonts lack, such as Chinese, Japanese and Korean ones.
+//! None is bundled: such fonts are larger than the program. Fonts are read when a character needs them;
+//! unreadable ones are skipped.
 
 use std::{
     path::{Path, PathBuf},

@@ -9,7 +9,8 @@ use crate::state::State;
 /// Time between two printed lines.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Counts passes of egui and requests the next one at once, so that the window is drawn as often as it can be.
+/// Counts passes of egui and requests the next one at once, so that the window is drawn as often as it can
+/// be.
 #[derive(Debug)]
 pub struct FrameRateMonitor {
     report_began: Instant,

@@ -1,5 +1,5 @@
-//! The egui viewer: scrub a flight, compare the stages of the camera's imperfections, and inspect single pixels.
-//! It shows the pixels that `camsim render` writes, by the same planner and renderers.
+//! The egui viewer: scrub a flight, compare the stages of the camera's imperfections, and inspect single
+//! pixels. It shows the pixels that `camsim render` writes, by the same planner and renderers.
 //!
 //! ```no_run
 //! camsim_viewer::run(Some("demo.toml".into()), None)?;

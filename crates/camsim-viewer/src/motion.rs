@@ -68,8 +68,8 @@ pub fn pixel_path(oracle: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelP
     })
 }
 
-/// The model of a camera; `None` if the specification is not legal. The last one is cached, because the domain of
-/// a lens takes milliseconds to find and panes need it in each pass.
+/// The model of a camera; `None` if the specification is not legal. The last one is cached, because the
+/// domain of a lens takes milliseconds to find and panes need it in each pass.
 pub fn camera_model(spec: &CameraSpec) -> Option<Arc<CameraModel>> {
     static CACHE: Mutex<Option<(CameraSpec, Arc<CameraModel>)>> = Mutex::new(None);
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -81,8 +81,8 @@ pub fn camera_model(spec: &CameraSpec) -> Option<Arc<CameraModel>> {
     Some(camera)
 }
 
-/// Image position, from another pose, of what a ray hits; of its direction for the sky. `None` outside the lens's
-/// domain.
+/// Image position, from another pose, of what a ray hits; of its direction for the sky. `None` outside the
+/// lens's domain.
 pub fn project(camera: &CameraModel, pose: &CameraPose, sample: &RaySample) -> Option<DVec2> {
     let ray_ned = match &sample.hit {
         Some(hit) => hit.point_ned_m - pose.position_ned_m,

@@ -26,8 +26,8 @@ pub struct Orbit {
     pub depression_deg: f64,
     /// Zoom: at 1 the bounding sphere fits into the pane.
     pub zoom: f64,
-    /// Point in the middle of the pane: NED from the sphere's centre, in radii. `middle` is its name in stored
-    /// settings.
+    /// Point in the middle of the pane: NED from the sphere's centre, in radii. `middle` is its name in
+    /// stored settings.
     #[serde(rename = "middle")]
     pub target: [f64; 3],
 }
@@ -125,8 +125,8 @@ impl Eye {
         DVec3::from_array(self.axes_ned.map(|axis| axis.dot(ned)))
     }
 
-    /// Whether a face across a NED axis through a point is seen from its outer side (`outward` is 1 along the axis,
-    /// -1 against it).
+    /// Whether a face across a NED axis through a point is seen from its outer side (`outward` is 1 along the
+    /// axis, -1 against it).
     pub fn sees_face(&self, axis: usize, outward: f64, ned_m: DVec3) -> bool {
         (self.position_ned_m[axis] - ned_m[axis]) * outward > 0.0
     }
@@ -136,7 +136,8 @@ impl Eye {
         NEAR_SHARE * self.distance_m
     }
 
-    /// Projects a point in eye axes, beyond [`Eye::near_m`], to points right and down from the middle of the pane.
+    /// Projects a point in eye axes, beyond [`Eye::near_m`], to points right and down from the middle of the
+    /// pane.
     pub fn project(&self, eye_m: DVec3) -> DVec2 {
         self.focal * eye_m.truncate() / eye_m.z
     }

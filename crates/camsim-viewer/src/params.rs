@@ -119,7 +119,8 @@ pub const PARAMS: &[Param] = &[
         "deg",
         [-180.0, 180.0],
         0.1,
-        "roll, pitch, yaw of the camera on the platform; 0 looks along the nose, pitch -90 straight down (eqs. 3-5)",
+        "roll, pitch, yaw of the camera on the platform; 0 looks along the nose, pitch -90 straight down \
+         (eqs. 3-5)",
     ),
     param("camera.mount.offset_m", "m", [-100.0, 100.0], 0.01, "lever arm forward, right, down (eqs. 3-5)"),
     param("camera.mount.vibration", "", ANY, 1.0, "sinusoidal vibration of the mount"),

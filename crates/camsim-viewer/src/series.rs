@@ -305,8 +305,8 @@ fn unwrapped(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points
 }
 
-/// Subtracts the whole turns that the first line has made by `t_s` from all lines. Coarse points over hours do
-/// not tell the number of turns anyway.
+/// Subtracts the whole turns that the first line has made by `t_s` from all lines. Coarse points over hours
+/// do not tell the number of turns anyway.
 fn remove_turns(lines: &mut [(&'static str, Vec<[f64; 2]>)], t_s: f64) {
     let Some((_, first)) = lines.first() else { return };
     let index = first.partition_point(|point| point[0] < t_s).min(first.len().saturating_sub(1));

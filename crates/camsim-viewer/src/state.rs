@@ -157,8 +157,8 @@ impl State {
         }
     }
 
-    /// Whether a reply must be ignored. Previews and full frames come from two threads: an outdated full frame
-    /// must not replace a newer preview, nor a preview the full frame of the same request.
+    /// Whether a reply must be ignored. Previews and full frames come from two threads: an outdated full
+    /// frame must not replace a newer preview, nor a preview the full frame of the same request.
     fn is_outdated(&self, reply: &Reply) -> bool {
         match reply {
             Reply::Loaded(loaded) => {
@@ -210,8 +210,8 @@ impl State {
         self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel
     }
 
-    /// What the oracle should do once a full frame is shown: rays for single pixels, and its picture if that is
-    /// shown.
+    /// What the oracle should do once a full frame is shown: rays for single pixels, and its picture if that
+    /// is shown.
     pub fn oracle_request(&self) -> Option<OracleRequest> {
         let (shown, sequence) = (self.engine.shown.as_ref()?, self.engine.sequence()?);
         let is_full = shown.reply.request.size == Size::Full

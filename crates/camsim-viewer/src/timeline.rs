@@ -71,7 +71,8 @@ impl Timeline {
         self.range.unwrap_or([0, self.last()])
     }
 
-    /// Advances play by `seconds` of real time, skipping frames as necessary. Without a loop, play stops at the end.
+    /// Advances play by `seconds` of real time, skipping frames as necessary. Without a loop, play stops at
+    /// the end.
     pub fn advance(&mut self, seconds: f64) {
         if !self.playing || self.dragged {
             return;

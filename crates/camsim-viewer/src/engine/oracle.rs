@@ -1,5 +1,5 @@
-//! The oracle's thread: prepares exact rays for single pixels, and renders whole frames strip by strip until a
-//! newer request arrives.
+//! The oracle's thread: prepares exact rays for single pixels, and renders whole frames strip by strip until
+//! a newer request arrives.
 
 use std::{
     sync::Arc,

@@ -49,8 +49,8 @@ pub fn srgb_image(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
     ColorImage::from_rgba_unmultiplied(size_px.map(|side| side as usize), &rgba)
 }
 
-/// `a - b` times `gain` about middle grey, in linear values, over the first `rows` rows. `None` for pictures of
-/// different size.
+/// `a - b` times `gain` about middle grey, in linear values, over the first `rows` rows. `None` for pictures
+/// of different size.
 pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32, rows: u32) -> Option<Difference> {
     if a.len() != b.len() || a.len() != 4 * size_px[0] as usize * size_px[1] as usize {
         return None;

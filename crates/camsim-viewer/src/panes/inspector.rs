@@ -284,8 +284,8 @@ fn predicted_errors(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
                 ui,
                 "predicted here",
                 here,
-                "largest source error of the planner's dry runs near this pixel, with a safety factor; about 99 % of \
-                 pixels at mid-exposure are below it",
+                "largest source error of the planner's dry runs near this pixel, with a safety factor; \
+                 about 99 % of pixels at mid-exposure are below it",
             );
         }
         fact(

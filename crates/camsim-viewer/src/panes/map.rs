@@ -1,5 +1,5 @@
-//! Map of the flight: track, terrain, boards and models, the camera and its footprint. A click jumps to the nearest
-//! frame.
+//! Map of the flight: track, terrain, boards and models, the camera and its footprint. A click jumps to the
+//! nearest frame.
 
 pub(super) mod footprint;
 pub(super) mod static_map;

@@ -1,4 +1,5 @@
-//! Number fields to drag or type in, each with a range. Input that is out of range or not a number is reported.
+//! Number fields to drag or type in, each with a range. Input that is out of range or not a number is
+//! reported.
 
 use std::cell::{Cell, RefCell};
 

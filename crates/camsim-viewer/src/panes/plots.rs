@@ -67,9 +67,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
             }
         }
         ui.weak("Ctrl+wheel zooms").with_tooltip(
-            "zooms in time, at the pointer; so does a box drawn with the right button. Drag pans, a double click \
-             shows all. The visible part is refined, with dots at rows of the log if there are few. Summaries \
-             beside the titles are of the whole flight",
+            "zooms in time, at the pointer; so does a box drawn with the right button. Drag pans, a double \
+             click shows all. The visible part is refined, with dots at rows of the log if there are few. \
+             Summaries beside the titles are of the whole flight",
         );
     });
     if view != state.view {
@@ -185,7 +185,8 @@ impl PlotContext<'_> {
         PlotPoints::new(rows[first..end].iter().filter_map(on_line).collect())
     }
 
-    /// Range of the visible values, with a margin. It includes the limit if all is visible or values are near it.
+    /// Range of the visible values, with a margin. It includes the limit if all is visible or values are near
+    /// it.
     fn range(&self, channel: &Channel) -> std::ops::RangeInclusive<f64> {
         let [from_s, to_s] = self.visible_s;
         let errors = channel.error.as_ref().filter(|_| self.errors);

@@ -89,8 +89,8 @@ fn view(state: &State, change: impl FnOnce(&mut View)) -> Option<Message> {
     Some(Message::View(view))
 }
 
-/// Applies the messages of key presses one by one, in order: several may arrive in one pass, and each starts from
-/// the state that the one before left. Text fields and prompts take keys first.
+/// Applies the messages of key presses one by one, in order: several may arrive in one pass, and each starts
+/// from the state that the one before left. Text fields and prompts take keys first.
 pub fn listen(context: &Context, state: &mut State) {
     let mut from = 0;
     while !keys_are_taken(context, state)
@@ -114,8 +114,8 @@ fn keys_are_taken(context: &Context, state: &State) -> bool {
         || state.unsaved_prompt.is_some()
 }
 
-/// Removes the first press of a shortcut's keys from the events, at or after index `from`; returns its index, and
-/// whether a held key repeated it.
+/// Removes the first press of a shortcut's keys from the events, at or after index `from`; returns its index,
+/// and whether a held key repeated it.
 fn take_next(context: &Context, from: usize) -> Option<(usize, &'static Shortcut, bool)> {
     context.input_mut(|input| {
         let press = input.events.iter().enumerate().skip(from).find_map(|(index, event)| match event {

@@ -248,6 +248,8 @@ fn row_times(ui: &mut Ui, state: &State) {
         egui::FontId::proportional(11.0),
         ui.visuals().text_color(),
     );
-    response.with_tooltip("exposure of each row about the frame's stamp (red); grey lines are stamps of other frames; time to the \
-         right");
+    response.with_tooltip(
+        "exposure of each row about the frame's stamp (red); grey lines are stamps of other frames; \
+         time to the right",
+    );
 }

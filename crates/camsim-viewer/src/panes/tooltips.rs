@@ -1,4 +1,5 @@
-//! Tooltips, placed beside the pane or line of their control, so that they cover neither it nor its neighbours.
+//! Tooltips, placed beside the pane or line of their control, so that they cover neither it nor its
+//! neighbours.
 
 use eframe::egui::{
     Context, Id, LayerId, Popup, Rangef, Rect, RectAlign, Response, Tooltip, Ui, WidgetText, accesskit,
@@ -9,7 +10,8 @@ const DELAY_S: f32 = 0.7;
 /// Width of tooltips, points, at most.
 const MAX_WIDTH: f32 = 340.0;
 
-/// Placement of the tooltips of controls that are drawn next. Menus and prompts over the window have egui's own.
+/// Placement of the tooltips of controls that are drawn next. Menus and prompts over the window have egui's
+/// own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TooltipPlacement {
     /// Below lines of controls with this range of heights.

@@ -1,5 +1,6 @@
-//! 3D view of the flight: terrain, boards and models, rows of the log, tracked path, camera frustum and footprint.
-//! Drag rotates, drag with the right button or Shift pans, the wheel zooms, a click jumps to the nearest frame.
+//! 3D view of the flight: terrain, boards and models, rows of the log, tracked path, camera frustum and
+//! footprint. Drag rotates, drag with the right button or Shift pans, the wheel zooms, a click jumps to the
+//! nearest frame.
 
 mod canvas;
 mod frustum;

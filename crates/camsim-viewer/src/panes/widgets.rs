@@ -18,8 +18,8 @@ pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, tooltip: &str
     response
 }
 
-/// Spinner with four steps a second. egui's spinner repaints at full rate, which on a software adapter takes the
-/// processor time that is waited for.
+/// Spinner with four steps a second. egui's spinner repaints at full rate, which on a software adapter takes
+/// the processor time that is waited for.
 pub fn waiting(ui: &mut Ui) -> Response {
     let side = ui.spacing().interact_size.y;
     let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());

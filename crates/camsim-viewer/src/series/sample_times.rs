@@ -21,8 +21,8 @@ pub struct SampleTimes {
 }
 
 impl SampleTimes {
-    /// For a span that has `rows` rows of the log. With `marked_s`, these times are included, and each step has
-    /// one sample.
+    /// For a span that has `rows` rows of the log. With `marked_s`, these times are included, and each step
+    /// has one sample.
     pub fn new(span_s: [f64; 2], rows: usize, marked_s: &[f64]) -> Self {
         if marked_s.is_empty() {
             let per_step = (rows as u64 / POINTS + 1).min(MAX_PER_STEP);

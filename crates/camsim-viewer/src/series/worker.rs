@@ -28,8 +28,9 @@ pub struct SeriesWorker {
 
 impl SeriesWorker {
     /// The best series available for `loaded`, and starts the computation of a better one: refined where only
-    /// a part of the flight is visible (path time). Until that is done it gives a coarser series or one of the
-    /// same log with other parameters; `None` without any. A repaint is requested when the computation ends.
+    /// a part of the flight is visible (path time). Until that is done it gives a coarser series or one of
+    /// the same log with other parameters; `None` without any. A repaint is requested when the computation
+    /// ends.
     pub fn series(
         &mut self,
         loaded: &Arc<Loaded>,

@@ -41,9 +41,12 @@ fn part_files(folder: &Path) -> Vec<(PathBuf, &'static str)> {
             write(
                 folder,
                 "sensor.yaml",
-                "sensor_type: camera\ncamera_model: pinhole\nrate_hz: 20\nresolution: [752, 481]\nintrinsics: [458.654, 457.296, 367.215, 248.375]\n\
-                 distortion_model: radial-tangential\ndistortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n\
-                 T_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n",
+                "sensor_type: camera\ncamera_model: pinhole\nrate_hz: 20\nresolution: [752, 481]\n\
+                 intrinsics: [458.654, 457.296, 367.215, 248.375]\n\
+                 distortion_model: radial-tangential\n\
+                 distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n\
+                 T_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, \
+                 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n",
             ),
             "481",
         ),
@@ -82,7 +85,8 @@ fn a_dropped_target_replaces_the_board_but_not_its_pose() {
     let target = write(
         folder.path(),
         "target.yaml",
-        "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\ncolSpacingMeters: 0.07\n",
+        "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\n\
+         rowSpacingMeters: 0.06\ncolSpacingMeters: 0.07\n",
     );
     for own in [
         "kind = \"chessboard\"\ncolumns = 9\nrows = 6\nsize_m = 2.0\nmargin_m = 1.0",

@@ -35,7 +35,8 @@ pub fn pattern() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
 }
 
-/// Ten hours of circles over the scene of [`pattern`], one row per second with a gap of a minute, in `folder`.
+/// Ten hours of circles over the scene of [`pattern`], one row per second with a gap of a minute, in
+/// `folder`.
 pub fn long_flight(folder: &Path) -> PathBuf {
     camsim_io::builtin::unpack(folder).expect("unpacked");
     let mut log = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
@@ -191,8 +192,8 @@ impl Window {
         self.harness.render().expect("rendered")
     }
 
-    /// Compares a part of the window, without times, paths and noise, with its picture in `tests/snapshots`. Fonts and
-    /// lines may differ slightly between drivers.
+    /// Compares a part of the window, without times, paths and noise, with its picture in `tests/snapshots`.
+    /// Fonts and lines may differ slightly between drivers.
     #[track_caller]
     pub fn snapshot(&mut self, name: &str, part: egui::Rect) {
         self.harness.check_accessibility();

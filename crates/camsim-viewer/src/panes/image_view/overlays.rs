@@ -164,7 +164,8 @@ fn depth_scale(painter: &Painter, range_m: Option<[f32; 2]>) {
     color_scale(painter, ends, "planar depth, logarithmic", |share| 1.0 - share);
 }
 
-/// Draws a colour scale with labels at its ends and a caption, in the lower left corner of the clip rectangle.
+/// Draws a colour scale with labels at its ends and a caption, in the lower left corner of the clip
+/// rectangle.
 fn color_scale(painter: &Painter, ends: [String; 2], caption: &str, color: impl Fn(f64) -> f64) {
     // In a wipe each picture has its own scale, on its side of the line.
     let visible = painter.clip_rect();

@@ -80,7 +80,8 @@ fn shown_zoom() -> egui::Id {
     egui::Id::unique("zoom of the picture as it was shown")
 }
 
-/// Stores the zoom of this pass for the toolbar of the next one: that of a fitted picture depends on its pane.
+/// Stores the zoom of this pass for the toolbar of the next one: that of a fitted picture depends on its
+/// pane.
 pub fn store_zoom(ui: &Ui, viewport: Option<&ImageViewport>) {
     if let Some(viewport) = viewport {
         ui.data_mut(|data| data.insert_temp(shown_zoom(), viewport.zoom()));

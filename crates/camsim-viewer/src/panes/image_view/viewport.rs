@@ -54,8 +54,8 @@ impl ImageViewport {
         Rect::from_min_size(self.origin, vec2(self.size_px[0] as f32, self.size_px[1] as f32) * self.scale)
     }
 
-    /// Rectangle of a picture of `size_px`, which may be a preview. The last pixels of a preview may reach beyond
-    /// the camera's picture.
+    /// Rectangle of a picture of `size_px`, which may be a preview. The last pixels of a preview may reach
+    /// beyond the camera's picture.
     pub fn picture_rect(&self, size_px: [u32; 2]) -> Rect {
         let factor = if size_px == self.size_px { 1 } else { preview_factor(self.size_px) };
         Rect::from_min_size(

@@ -16,9 +16,9 @@ const BISECTIONS: u32 = 9;
 /// Triangles of a flat mesh (pattern or board), at most.
 const FLAT_TRIANGLES: usize = 2;
 
-/// Outline of the visible ground in directions all around the picture, NED; one run if all directions see ground.
-/// Where outer pixels have no ray (beyond the fold of a lens) or hit nothing (beyond the horizon), the outline is
-/// at the last ground towards the border.
+/// Outline of the visible ground in directions all around the picture, NED; one run if all directions see
+/// ground. Where outer pixels have no ray (beyond the fold of a lens) or hit nothing (beyond the horizon),
+/// the outline is at the last ground towards the border.
 pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec3>> {
     let ground_point = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
     let mut runs: Vec<Vec<DVec3>> = vec![Vec::new()];
@@ -34,8 +34,8 @@ pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<
     runs
 }
 
-/// The value of `evaluate` at the ray of the outermost pixel, in a direction from the middle of the picture, for
-/// which it has one.
+/// The value of `evaluate` at the ray of the outermost pixel, in a direction from the middle of the picture,
+/// for which it has one.
 pub fn outermost<T>(
     camera: &CameraModel,
     direction: DVec2,

@@ -94,9 +94,10 @@ pub fn show(ui: &mut Ui, out: &mut Outbox) {
             }
         });
     named(&combo.response, Role::ComboBox, "camera preset");
-    combo
-        .response
-        .with_tooltip("calibration files (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be dropped on the window");
+    combo.response.with_tooltip(
+        "calibration files (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be \
+         dropped on the window",
+    );
 }
 
 #[cfg(test)]

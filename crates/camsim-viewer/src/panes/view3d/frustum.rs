@@ -14,8 +14,8 @@ use crate::{
 
 /// Rays along each side of the picture.
 const RAYS_PER_SIDE: u32 = 10;
-/// Range of the frustum's length, in radii of the scene; within it the length is the distance to the ground in the
-/// middle.
+/// Range of the frustum's length, in radii of the scene; within it the length is the distance to the ground
+/// in the middle.
 const LENGTH_RANGE: [f64; 2] = [0.06, 0.45];
 
 /// Length of a ray at the border in units of the frustum's length, at most.
