@@ -37,6 +37,7 @@ fn viewer_shows_the_bytes_that_render_writes() {
 
 #[test]
 fn invalid_scenario_gives_the_error_of_the_viewer() {
-    let error = camsim_viewer::render_headless(Path::new("no/such/scenario.toml"), 0).unwrap_err().to_string();
+    let error =
+        camsim_viewer::render_headless(Path::new("no/such/scenario.toml"), 0).unwrap_err().to_string();
     assert!(error.contains("no/such/scenario.toml"), "{error}");
 }

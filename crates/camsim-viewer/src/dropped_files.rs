@@ -73,8 +73,8 @@ pub fn apply_dropped(state: &mut State, path: &Path) {
         "tif" | "tiff" => set_path(state, "scene.terrain.dem", path),
         _ => state.notice(format!(
             "{}: unknown kind of file; expected a scenario or camera (.toml), a calibration or Kalibr \
-             target (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...), a terrain \
-             (.tif) or a model (.glb, .gltf)",
+             target (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...), a \
+             terrain (.tif) or a model (.glb, .gltf)",
             path.display()
         )),
     }
@@ -114,16 +114,16 @@ fn floats(values: [f64; 3]) -> Value {
 /// Adds a calibration board at the point that the pinned pixel sees, or replaces the board of the scenario at
 /// its pose.
 fn add_target(state: &mut State, path: &Path) {
-    let seen = pinned_point_ned_m(state);
+    let pinned_ned_m = pinned_point_ned_m(state);
     let outcome = match &mut state.document {
         Some(document) => std::path::absolute(path)
             .map_err(|error| format!("{}: {error}", path.display()))
             .and_then(|file| {
-                let at = seen.filter(|_| document.value("scene.board").is_none());
+                let position = pinned_ned_m.filter(|_| document.value("scene.board").is_none());
                 let mut board =
                     document.value("scene.board").and_then(Value::as_table).cloned().unwrap_or_default();
                 board.retain(|key, _| BOARD_POSE_KEYS.contains(&key));
-                if let Some(point) = at {
+                if let Some(point) = position {
                     board.insert("at".into(), floats(point));
                 }
                 board.insert("target".into(), Value::String(file.display().to_string()));
@@ -136,14 +136,14 @@ fn add_target(state: &mut State, path: &Path) {
 
 /// Adds a model at the point that the pinned pixel sees, or at the origin; on the ground if there is terrain.
 fn add_model(state: &mut State, path: &Path) {
-    let at = pinned_point_ned_m(state).unwrap_or_default();
+    let position_ned_m = pinned_point_ned_m(state).unwrap_or_default();
     let outcome = match &mut state.document {
         Some(document) => std::path::absolute(path)
             .map_err(|error| format!("{}: {error}", path.display()))
             .and_then(|file| {
                 let mut entry = Table::new();
                 entry.insert("file".into(), Value::String(file.display().to_string()));
-                entry.insert("at".into(), floats(at));
+                entry.insert("at".into(), floats(position_ned_m));
                 entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
                 let mut list =
                     document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();

@@ -88,7 +88,7 @@ impl EngineHandle {
         Self { previews, full_frames, oracle, scenarios, replies, threads }
     }
 
-    /// Replaces the request to the renderer. A preview also withdraws a full frame that nobody has begun.
+    /// Replaces the request to the renderer. A preview also withdraws a full frame that has not begun.
     pub fn request_frame(&self, request: FrameRequest) {
         self.scenarios.announce(request.reload_count);
         match request.size {

@@ -96,7 +96,7 @@ impl ExportJob {
 
     /// Estimated remaining time, seconds, from the mean so far; `None` before the second frame, because the
     /// first includes setup.
-    pub fn left_s(&self) -> Option<f64> {
+    pub fn remaining_s(&self) -> Option<f64> {
         let done = self.progress().done;
         let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;
         (done >= 2).then(|| left as f64 * self.began.elapsed().as_secs_f64() / done as f64)

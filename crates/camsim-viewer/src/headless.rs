@@ -24,7 +24,7 @@ pub fn render_headless(scenario: &Path, frame: u64) -> anyhow::Result<HeadlessFr
     let scenario = Arc::new(read_scenario(scenario, &[], None)?);
     let (wake, woken) = std::sync::mpsc::channel();
     let engine = EngineHandle::start(move || {
-        // Replies may follow the picture, when nobody listens any more.
+        // Replies after the picture are ignored.
         let _ = wake.send(());
     });
     engine.request_frame(FrameRequest {

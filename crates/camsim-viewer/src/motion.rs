@@ -28,8 +28,8 @@ pub struct PixelPath {
 
 /// Motion of a grid of pixels over a frame. The last result is cached, since it is drawn in each pass.
 pub fn grid_paths(oracle: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
-    type Cache = Option<(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)>;
-    static CACHE: Mutex<Cache> = Mutex::new(None);
+    type PathCache = Option<(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)>;
+    static CACHE: Mutex<PathCache> = Mutex::new(None);
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
     let is_same = |(cached_oracle, cached_frame, _): &&(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)| {
         *cached_frame == frame && std::ptr::eq(cached_oracle.as_ptr(), Arc::as_ptr(oracle))

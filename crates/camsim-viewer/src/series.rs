@@ -188,29 +188,7 @@ fn channels(loaded: &Loaded, sample_times: &SampleTimes) -> Vec<Channel> {
     };
     let (limits, camera, times_s) = (&loaded.tracked.limits, &sequence.scenario.camera, &sample_times.all_s);
     let state = |t_s: f64| sequence.path.trajectory.state(t_s);
-    let both: Vec<[[f64; 6]; 2]> =
-        times_s.iter().map(|&t_s| [log_values(loaded, t_s), tracker_values(loaded, t_s)]).collect();
-    let axis_channel = |(axis, name): (usize, &'static str)| {
-        let line = |which: usize| {
-            times_s.iter().zip(&both).map(move |(&t_s, both)| [t_s, both[which][axis]]).collect::<Vec<_>>()
-        };
-        let [mut log, mut tracked] = [line(0), line(1)];
-        if is_angle(axis) {
-            log = unwrapped(log);
-            // The turn nearest to the log.
-            for (tracked, log) in tracked.iter_mut().zip(&log) {
-                tracked[1] = log[1] + wrapped_deg(tracked[1] - log[1]);
-            }
-        }
-        Channel {
-            name,
-            note: String::new(),
-            lines: vec![("log", log), ("tracker", tracked)],
-            limit: None,
-            error: None,
-        }
-    };
-    let mut channels: Vec<Channel> = AXES.into_iter().enumerate().map(axis_channel).collect();
+    let mut channels = axis_channels(loaded, times_s);
     // Roll and yaw are singular near pitch +-90 deg; the angle of the error rotation is not.
     let attitude_error_deg = |t_s: f64| {
         so3::log(loaded.log.interpolate(t_s).1.inverse() * state(t_s).ned_from_body).length().to_degrees()
@@ -250,6 +228,33 @@ fn channels(loaded: &Loaded, sample_times: &SampleTimes) -> Vec<Channel> {
         plain(name, image_speed.iter().map(|[t_s, speed]| [*t_s, speed * share_s]).collect(), None);
     }
     channels
+}
+
+/// Log and tracker along each of [`AXES`], without summaries.
+fn axis_channels(loaded: &Loaded, times_s: &[f64]) -> Vec<Channel> {
+    let both: Vec<[[f64; 6]; 2]> =
+        times_s.iter().map(|&t_s| [log_values(loaded, t_s), tracker_values(loaded, t_s)]).collect();
+    let axis_channel = |(axis, name): (usize, &'static str)| {
+        let line = |which: usize| {
+            times_s.iter().zip(&both).map(move |(&t_s, both)| [t_s, both[which][axis]]).collect::<Vec<_>>()
+        };
+        let [mut log, mut tracked] = [line(0), line(1)];
+        if is_angle(axis) {
+            log = unwrapped(log);
+            // The turn nearest to the log.
+            for (tracked, log) in tracked.iter_mut().zip(&log) {
+                tracked[1] = log[1] + wrapped_deg(tracked[1] - log[1]);
+            }
+        }
+        Channel {
+            name,
+            note: String::new(),
+            lines: vec![("log", log), ("tracker", tracked)],
+            limit: None,
+            error: None,
+        }
+    };
+    AXES.into_iter().enumerate().map(axis_channel).collect()
 }
 
 /// Largest speed, acceleration and body rate (deg/s) in a span, from the tracker's ticks in it and its ends.
@@ -306,7 +311,7 @@ fn unwrapped(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 }
 
 /// Subtracts the whole turns that the first line has made by `t_s` from all lines. Coarse points over hours
-/// do not tell the number of turns anyway.
+/// cannot resolve the number of turns.
 fn remove_turns(lines: &mut [(&'static str, Vec<[f64; 2]>)], t_s: f64) {
     let Some((_, first)) = lines.first() else { return };
     let index = first.partition_point(|point| point[0] < t_s).min(first.len().saturating_sub(1));

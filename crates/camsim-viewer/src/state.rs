@@ -233,6 +233,7 @@ impl State {
 
     /// Applies a message of a pane.
     pub fn apply(&mut self, message: Message, context: &egui::Context) {
+        // Long because: one arm per message.
         let is_of_scenario = |rejected: &RejectedInput| {
             self.document.as_ref().is_some_and(|document| document.value(rejected.key()).is_some())
         };

@@ -77,7 +77,7 @@ impl Timeline {
         if !self.playing || self.dragged {
             return;
         }
-        // At most one second: a window that was hidden for long goes on from its frame.
+        // At most one second: a window that was hidden for long continues from its frame.
         self.carry += seconds.clamp(0.0, 1.0) * self.speed.clamp(SPEEDS[0], SPEEDS[1]) * self.fps;
         let whole = self.carry.floor();
         self.carry -= whole;

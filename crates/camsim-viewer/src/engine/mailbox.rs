@@ -22,13 +22,13 @@ impl<T> Default for Mailbox<T> {
 }
 
 impl<T> Mailbox<T> {
-    /// Puts a request in, in place of one that nobody has taken.
+    /// Puts a request in, in place of one that has not been taken.
     pub fn put(&self, request: T) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).request = Some(request);
         self.arrived.notify_one();
     }
 
-    /// Withdraws a request that nobody has taken.
+    /// Withdraws a request that has not been taken.
     pub fn clear(&self) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).request = None;
     }

@@ -144,8 +144,9 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;
-            let left =
-                job.left_s().map_or_else(String::new, |left_s| format!(", about {} left", duration(left_s)));
+            let left = job
+                .remaining_s()
+                .map_or_else(String::new, |remaining_s| format!(", about {} left", duration(remaining_s)));
             ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {

@@ -130,16 +130,18 @@ pub fn cached_footprint(
     camera: &CameraModel,
     pose: &CameraPose,
 ) -> Arc<Vec<Vec<DVec3>>> {
-    type Cache = (Weak<Sequence>, u64, Arc<Vec<Vec<DVec3>>>);
+    type FootprintCache = (Weak<Sequence>, u64, Arc<Vec<Vec<DVec3>>>);
     let id = Id::unique("footprint");
-    let cached = ui.data(|data| data.get_temp::<Cache>(id));
+    let cached = ui.data(|data| data.get_temp::<FootprintCache>(id));
     if let Some((_, _, runs)) = cached.filter(|(cached_sequence, cached_frame, _)| {
         std::ptr::eq(cached_sequence.as_ptr(), Arc::as_ptr(sequence)) && *cached_frame == frame
     }) {
         return runs;
     }
     let runs = Arc::new(footprint::footprint(&sequence.scene, camera, pose));
-    ui.data_mut(|data| data.insert_temp::<Cache>(id, (Arc::downgrade(sequence), frame, runs.clone())));
+    ui.data_mut(|data| {
+        data.insert_temp::<FootprintCache>(id, (Arc::downgrade(sequence), frame, runs.clone()))
+    });
     runs
 }
 

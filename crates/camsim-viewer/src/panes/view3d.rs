@@ -111,6 +111,11 @@ fn controls(ui: &mut Ui, orbit: &mut Orbit, sphere: BoundingSphere, camera_ned_m
             }
         }
     });
+    orbit_fields(ui, orbit, out);
+}
+
+/// Number fields of the viewpoint.
+fn orbit_fields(ui: &mut Ui, orbit: &mut Orbit, out: &mut Outbox) {
     ui.horizontal_wrapped(|ui| {
         let angle = |name, label, range, tip| NumberField {
             name,

@@ -19,8 +19,8 @@ fn image_speed_equals_the_finite_difference_of_the_point_on_the_axis() {
         // Central difference of the ideal coordinates of the fixed point.
         let uv = |t_s: f64| {
             let pose = path.pose(t_s);
-            let seen = pose.ned_from_camera.conjugate() * (point - pose.position_ned_m);
-            seen.truncate() / seen.z
+            let point_camera_m = pose.ned_from_camera.conjugate() * (point - pose.position_ned_m);
+            point_camera_m.truncate() / point_camera_m.z
         };
         let h = 1e-5;
         let exact = 400.0 * (uv(t_s + h) - uv(t_s - h)).length() / (2.0 * h);
@@ -61,6 +61,7 @@ fn unwrapped_angles_have_no_jumps() {
 
 #[test]
 fn a_refined_series_samples_the_trajectory_at_each_row_of_the_log() {
+    // Long because: all checks use one long flight, which takes seconds to load.
     let folder = tempfile::tempdir().expect("a folder");
     let scenario =
         camsim_io::scenario_file::read_scenario(&long_flight(folder.path()), &[], None).expect("legal");

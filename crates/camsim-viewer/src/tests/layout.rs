@@ -42,8 +42,8 @@ fn overlay_buttons_fit_one_line_at_1280_points_and_wrap_below() {
 }
 
 /// Rests the pointer at a position until the tooltip appears; returns its rectangle.
-fn tooltip_rect(window: &mut Window, at: Pos2, begins: &str) -> Rect {
-    window.harness.event(Event::PointerMoved(at));
+fn tooltip_rect(window: &mut Window, position: Pos2, begins: &str) -> Rect {
+    window.harness.event(Event::PointerMoved(position));
     let shown =
         |window: &Window| window.harness.query_all_by_label_contains(begins).next().map(|node| node.rect());
     // 0.02 s per step.
@@ -68,26 +68,26 @@ fn tooltips_cover_neither_their_control_nor_its_neighbours() {
         ("A: ideal", "pinhole with an instant shutter"),
     ];
     for (label, begins) in toolbar_tips {
-        let at = center(&window, label);
-        let shown = tooltip_rect(&mut window, at, begins);
+        let control = center(&window, label);
+        let shown = tooltip_rect(&mut window, control, begins);
         for other in OVERLAYS.into_iter().chain(["single", "1:1", "A: ideal"]) {
             assert!(!shown.intersects(rect(&window, other)), "{label}'s at {shown} lies on {other}");
         }
     }
-    let at = center(&window, "camera.shutter.readout_ms");
-    let shown = tooltip_rect(&mut window, at, "rolling shutter t_r");
+    let control = center(&window, "camera.shutter.readout_ms");
+    let shown = tooltip_rect(&mut window, control, "rolling shutter t_r");
     for other in ["camera.shutter.readout_ms", "camera.shutter.exposure_ms", "camera.shutter.delay_ms"] {
         assert!(shown.left() > rect(&window, other).right(), "{shown} beside the parameters");
     }
-    let at = center(&window, "loop from");
-    let shown = tooltip_rect(&mut window, at, "begin the loop at this frame");
+    let control = center(&window, "loop from");
+    let shown = tooltip_rect(&mut window, control, "begin the loop at this frame");
     assert!(
         shown.bottom() < rect(&window, "loop from").top() && shown.bottom() < rect(&window, "play").top(),
         "{shown} above the timeline"
     );
     window.state_mut().view.tab = Tab::Export;
     (0..2).for_each(|_| window.step());
-    let at = center(&window, "Render");
-    let shown = tooltip_rect(&mut window, at, "render to this folder");
+    let control = center(&window, "Render");
+    let shown = tooltip_rect(&mut window, control, "render to this folder");
     assert!(shown.right() < rect(&window, "folder").left(), "{shown} on the left of the page");
 }

@@ -61,7 +61,7 @@ fn the_inspector_shows_the_geometry_of_the_pixel() {
 fn the_middle_of_each_exposure_path_is_the_pixel() {
     let mut window = Window::open(Some(demo()));
     window.settle_oracle();
-    let oracle = Arc::clone(window.state().engine.current_oracle().expect("looks"));
+    let oracle = Arc::clone(window.state().engine.current_oracle().expect("the oracle"));
     let paths = motion::grid_paths(&oracle, 0);
     assert!(paths.len() > 100, "{}", paths.len());
     for path in paths.iter() {

@@ -89,6 +89,7 @@ fn buttons_and_keys_step_play_and_loop() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn every_key_press_counts_within_one_pass() {
+    // Long because: each step goes on from the state that the one before left.
     let mut window = Window::open(Some(pattern()));
     window.settle();
     let press = |window: &mut Window, key: Key, modifiers: egui::Modifiers, repeat: bool| {

@@ -134,12 +134,12 @@ fn the_view_shows_camera_and_field_of_view_and_a_click_jumps() {
     send(&mut window, Message::View(view));
     (0..2).for_each(|_| window.step());
     let rect = window.harness.get_by_label(PANE).rect();
-    let at = screen_position(&window.harness.ctx, &orbit(&window), rect, target);
-    assert!(rect.contains(at), "{at} in {rect}");
-    window.harness.event(Event::PointerMoved(at));
+    let position = screen_position(&window.harness.ctx, &orbit(&window), rect, target);
+    assert!(rect.contains(position), "{position} in {rect}");
+    window.harness.event(Event::PointerMoved(position));
     window.step();
-    button(&mut window, at, PointerButton::Primary, true);
-    button(&mut window, at, PointerButton::Primary, false);
+    button(&mut window, position, PointerButton::Primary, true);
+    button(&mut window, position, PointerButton::Primary, false);
     (0..2).for_each(|_| window.step());
     let frame = window.state().timeline.frame;
     assert!(frame.abs_diff(last / 2) <= 3, "{frame} of {}", last / 2);

@@ -98,10 +98,11 @@ pub fn interact(
     out: &mut Outbox,
 ) {
     let pointer = response.hover_pos().filter(|_| !is_captured);
-    let under = pointer.and_then(|at| {
-        viewports.iter().find(|viewport| viewport.pane.contains(at)).map(|viewport| (at, viewport))
+    let hovered = pointer.and_then(|position| {
+        let viewport = viewports.iter().find(|viewport| viewport.pane.contains(position))?;
+        Some((position, viewport))
     });
-    let pixel = under.and_then(|(at, viewport)| viewport.pixel(at));
+    let pixel = hovered.and_then(|(position, viewport)| viewport.pixel(position));
     if pixel != state.hovered {
         out.push(Message::Hover(pixel));
     }
@@ -112,7 +113,8 @@ pub fn interact(
     if response.double_clicked() {
         view.zoom = None;
     }
-    let Some((at, viewport)) = under.or_else(|| viewports.first().map(|first| (first.pane.center(), first)))
+    let Some((position, viewport)) =
+        hovered.or_else(|| viewports.first().map(|first| (first.pane.center(), first)))
     else {
         return;
     };
@@ -122,7 +124,7 @@ pub fn interact(
     }
     let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y / 200.0).exp());
     if response.contains_pointer() && (factor - 1.0).abs() > 1e-4 {
-        view = zoomed(&view, viewport, at, factor);
+        view = zoomed(&view, viewport, position, factor);
     }
     if view != state.view {
         out.push(Message::View(view));
@@ -191,12 +193,12 @@ mod tests {
     #[test]
     fn zoom_keeps_the_position_under_the_cursor() {
         let mut view = View::default();
-        let at = pos2(300.0, 200.0);
+        let cursor = pos2(300.0, 200.0);
         for factor in [1.5, 3.0, 0.4] {
             let before = ImageViewport::new(pane(), [64, 48], &view, 1e3);
-            let share = before.share(at);
-            view = zoomed(&view, &before, at, factor);
-            let after = ImageViewport::new(pane(), [64, 48], &view, 1e3).share(at);
+            let share = before.share(cursor);
+            view = zoomed(&view, &before, cursor, factor);
+            let after = ImageViewport::new(pane(), [64, 48], &view, 1e3).share(cursor);
             assert!(
                 (share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4,
                 "{share:?} {after:?}"

@@ -41,14 +41,14 @@ impl ViewFrustum {
         pose: &CameraPose,
         radius_m: f64,
     ) -> Option<Self> {
-        type Cache = (Weak<Sequence>, u64, Option<u64>, Option<ViewFrustum>);
+        type FrustumCache = (Weak<Sequence>, u64, Option<u64>, Option<ViewFrustum>);
         let frame = state.timeline.frame;
         // A zoom lens has the calibration of the shown frame.
         let picture = state.engine.picture().filter(|picture| picture.plan.frame == frame);
         let zoom = picture.and_then(|picture| picture.plan.zoom);
         let id = Id::unique("view frustum");
-        let cache = ui.data(|data| data.get_temp::<Cache>(id));
-        let is_same = |cache: &Cache| {
+        let cache = ui.data(|data| data.get_temp::<FrustumCache>(id));
+        let is_same = |cache: &FrustumCache| {
             std::ptr::eq(cache.0.as_ptr(), Arc::as_ptr(sequence))
                 && cache.1 == frame
                 && cache.2 == zoom.map(f64::to_bits)
@@ -76,7 +76,7 @@ impl ViewFrustum {
             Self { rim: rim.collect(), ground, fov_deg: fov_deg(&camera) }
         });
         ui.data_mut(|data| {
-            data.insert_temp::<Cache>(
+            data.insert_temp::<FrustumCache>(
                 id,
                 (Arc::downgrade(sequence), frame, zoom.map(f64::to_bits), frustum.clone()),
             )
