@@ -1,4 +1,4 @@
-//! The desktop's file dialog, which runs beside the window.
+//! The desktop's file dialog, which runs while the window goes on.
 
 use std::{
     path::{Path, PathBuf},

@@ -191,8 +191,8 @@ fn search(folders: &[PathBuf]) -> Vec<FontFile> {
         |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
     let named: Vec<(String, PathBuf)> = files.into_iter().map(|path| (name(&path), path)).collect();
     let best = |start: &str| {
-        let of_start = named.iter().filter(|(name, _)| name.starts_with(start));
-        of_start.min_by_key(|(name, path)| {
+        let matching = named.iter().filter(|(name, _)| name.starts_with(start));
+        matching.min_by_key(|(name, path)| {
             (STYLES.iter().filter(|style| name[start.len()..].contains(*style)).count(), name.len(), path)
         })
     };

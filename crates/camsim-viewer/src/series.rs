@@ -235,8 +235,8 @@ fn axis_channels(loaded: &Loaded, times_s: &[f64]) -> Vec<Channel> {
     let both: Vec<[[f64; 6]; 2]> =
         times_s.iter().map(|&t_s| [log_values(loaded, t_s), tracker_values(loaded, t_s)]).collect();
     let axis_channel = |(axis, name): (usize, &'static str)| {
-        let line = |which: usize| {
-            times_s.iter().zip(&both).map(move |(&t_s, both)| [t_s, both[which][axis]]).collect::<Vec<_>>()
+        let line = |index: usize| {
+            times_s.iter().zip(&both).map(move |(&t_s, both)| [t_s, both[index][axis]]).collect::<Vec<_>>()
         };
         let [mut log, mut tracked] = [line(0), line(1)];
         if is_angle(axis) {

@@ -19,7 +19,7 @@ use crate::{
     view::Compare,
 };
 
-/// The pane.
+/// Draws the pane.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     toolbar::show(ui, state, out);
     let pane = ui.available_rect_before_wrap();

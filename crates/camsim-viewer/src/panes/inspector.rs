@@ -23,7 +23,7 @@ use crate::{
 /// Chords that measure the length of each stretch of an exposure path.
 const CHORDS: u32 = 4;
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(pixel) = state.pinned.or(state.hovered) else {
         ui.label("Move over the picture; click to pin a pixel.");
@@ -196,9 +196,9 @@ fn surface_name(scene: &SceneSpec, number: u32) -> String {
 
 /// Geodetic coordinates of a point.
 fn geodetic_facts(ui: &mut Ui, frame: &LocalFrame, point: glam::DVec3) {
-    let place = frame.geodetic_from_ned(point);
-    fact(ui, "lat, lon", format!("{:.7}, {:.7} deg", place.lat_deg(), place.lon_deg()), "WGS-84");
-    fact(ui, "height", format!("{:.3} m", place.height_m), "in the scenario's vertical datum");
+    let geodetic = frame.geodetic_from_ned(point);
+    fact(ui, "lat, lon", format!("{:.7}, {:.7} deg", geodetic.lat_deg(), geodetic.lon_deg()), "WGS-84");
+    fact(ui, "height", format!("{:.3} m", geodetic.height_m), "in the scenario's vertical datum");
 }
 
 /// Displacement and blur of a pixel.

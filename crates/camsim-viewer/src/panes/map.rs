@@ -25,7 +25,7 @@ const OBJECT_COLOR: Color32 = Color32::from_rgb(120, 230, 255);
 /// Length of the rays at the picture's left and right border, as a share of the map.
 const VIEW_RAY_SHARE: f64 = 0.08;
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let (Some(loaded), Some(stamp_s)) = (&state.engine.loaded, state.engine.stamp_s(state.timeline.frame))
     else {

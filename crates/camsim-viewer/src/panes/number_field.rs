@@ -96,7 +96,7 @@ fn rejection(
 struct TypedText {
     /// The typed number.
     number: Cell<Option<f64>>,
-    /// TypedText text that is not a number.
+    /// Typed text that is not a number.
     invalid: RefCell<Option<String>>,
     /// The formatted value.
     shown: RefCell<String>,

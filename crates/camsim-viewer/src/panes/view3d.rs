@@ -46,7 +46,7 @@ const CLICK_RADIUS: f32 = 40.0;
 /// Height of the pane as a share of its width.
 const HEIGHT: f32 = 0.95;
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let (Some(loaded), Some(stamp_s)) = (&state.engine.loaded, state.engine.stamp_s(state.timeline.frame))
     else {

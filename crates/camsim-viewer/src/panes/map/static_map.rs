@@ -207,7 +207,7 @@ fn relief(terrain: &Terrain, [low, high]: [DVec2; 2]) -> ColorImage {
         let slope = |other: Option<usize>| {
             other
                 .and_then(|i| heights.get(i).copied().flatten())
-                .map_or(0.0, |there| (height - there) / step_m)
+                .map_or(0.0, |neighbour| (height - neighbour) / step_m)
         };
         let light =
             0.75 + 0.35 * (slope(i.checked_sub(RELIEF_PX)) + slope(i.checked_sub(1))).clamp(-1.0, 1.0);
