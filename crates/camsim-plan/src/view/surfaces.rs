@@ -145,6 +145,24 @@ impl Surfaces {
         self.first_hit_in(&self.deep, origin_ned_m, direction_ned)
     }
 
+    /// First model along `origin + t direction`, 0 <= t <= `limit`.
+    pub fn model_hit(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Option<SurfaceHit> {
+        self.model_hit_in(&self.deep, origin_ned_m, direction_ned, limit)
+    }
+
+    fn model_hit_in(
+        &self,
+        tree: &RayBvh,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+    ) -> Option<SurfaceHit> {
+        let meet = |mesh: u32, limit: f64| {
+            self.mesh_hit(mesh as usize, origin_ned_m, direction_ned, limit).map(|hit| (hit.depth_m, hit))
+        };
+        tree.first(origin_ned_m, direction_ned, limit, meet).map(|(_, hit)| hit)
+    }
+
     pub fn first_hit_in(
         &self,
         tree: &RayBvh,
@@ -154,9 +172,7 @@ impl Surfaces {
         let ground =
             self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
-        let on_mesh = tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
-            self.mesh_hit(mesh as usize, origin_ned_m, direction_ned, limit).map(|hit| (hit.depth_m, hit))
-        });
+        let on_mesh = self.model_hit_in(tree, origin_ned_m, direction_ned, limit);
         let on_ground = || {
             ground.map(|hit| SurfaceHit {
                 depth_m: hit.t,
@@ -166,7 +182,7 @@ impl Surfaces {
                 terrain: Some(hit),
             })
         };
-        on_mesh.map(|(_, hit)| hit).or_else(on_ground)
+        on_mesh.or_else(on_ground)
     }
 
     /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the
