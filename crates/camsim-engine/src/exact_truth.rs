@@ -109,7 +109,7 @@ impl Frame<'_> {
         let hits: Vec<PixelTruth> = pixels.par_iter().map(cast).collect();
         for (&i, hit) in pixels.iter().zip(&hits) {
             set(&mut self.truth[i], hit);
-            self.source[i] = Source::Ray(hit.triangle);
+            self.source[i] = Source::Ray(triangle(hit));
         }
     }
 
@@ -130,7 +130,7 @@ impl Frame<'_> {
                 let walk = walk.filter(|walk| is_near(looked_up[i], walk));
                 let hit = walk.unwrap_or_else(|| rays.cast(pixel, uv));
                 set(&mut truth[x], &hit);
-                source[x] = match (hit.triangle, last) {
+                source[x] = match (triangle(&hit), last) {
                     (Some(triangle), Some((from_x, _))) if walk.is_some() => {
                         if from_x + 1 == x {
                             Source::WalkFromLeft(triangle)
@@ -140,7 +140,7 @@ impl Frame<'_> {
                     }
                     (triangle, _) => Source::Ray(triangle),
                 };
-                last = hit.triangle.map(|triangle| (x, triangle)).or(last);
+                last = triangle(&hit).map(|triangle| (x, triangle)).or(last);
             }
         });
     }
@@ -183,12 +183,16 @@ impl Frame<'_> {
     }
 }
 
+fn triangle(truth: &PixelTruth) -> Option<TerrainTriangle> {
+    truth.hit.and_then(|hit| hit.triangle)
+}
+
 fn uv(truth: &Truth) -> DVec2 {
     DVec2::new(f64::from(truth.uv[0]), f64::from(truth.uv[1]))
 }
 
 fn is_near(looked_up: f32, walk: &PixelTruth) -> bool {
-    walk.hit.is_some_and(|(_, depth_m)| (looked_up * depth_m as f32 - 1.0).abs() <= SAME_SURFACE)
+    walk.hit.is_some_and(|hit| (looked_up * hit.depth_m as f32 - 1.0).abs() <= SAME_SURFACE)
 }
 
 /// 1/m; 0 where nothing is.
@@ -198,6 +202,6 @@ fn inverse_depth(truth: &Truth) -> f32 {
 
 fn set(truth: &mut Truth, hit: &PixelTruth) {
     truth.source_px = hit.source_px.as_vec2().to_array();
-    truth.point_ned_m = hit.hit.map_or([0.0; 3], |(point_ned_m, _)| point_ned_m.as_vec3().to_array());
-    truth.depth_m = hit.hit.map_or(0.0, |(_, depth_m)| depth_m as f32);
+    truth.point_ned_m = hit.hit.map_or([0.0; 3], |hit| hit.point_ned_m.as_vec3().to_array());
+    truth.depth_m = hit.hit.map_or(0.0, |hit| hit.depth_m as f32);
 }

@@ -19,10 +19,31 @@ pub struct PixelTruth {
     /// Source in the mid-window ideal frame, pixels, at the given exposure phase. It may lie beyond the
     /// frame's border, and behind that camera it is mirrored.
     pub source_px: DVec2,
-    /// Point (NED, metres) and planar depth in the row's own camera (metres) at mid-exposure; `None` is sky.
-    pub hit: Option<(DVec3, f64)>,
-    /// Triangle of the terrain that is hit at mid-exposure.
+    /// The surface at mid-exposure; `None` is sky.
+    pub hit: Option<PixelHit>,
+}
+
+/// The surface that the centre of a pixel sees at mid-exposure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelHit {
+    /// The point, NED, metres.
+    pub point_ned_m: DVec3,
+    /// Planar depth in the row's own camera, metres.
+    pub depth_m: f64,
+    /// Unit normal of the triangle, NED, towards the camera.
+    pub normal_ned: DVec3,
+    /// 0 = terrain, 1 + i = mesh i of the scene.
+    pub surface: u32,
+    /// The triangle, on the terrain.
     pub triangle: Option<TerrainTriangle>,
+}
+
+/// A hit along a ray.
+struct RayHit {
+    depth_m: f64,
+    normal_ned: DVec3,
+    surface: u32,
+    triangle: Option<TerrainTriangle>,
 }
 
 /// Rays of the pixels of a frame, each at its own instant. The terrain is met at full detail, which what was
@@ -60,10 +81,13 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {
         let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned);
-        let triangle = self.surfaces.terrain().zip(hit.and_then(|hit| hit.terrain));
-        let triangle = triangle.map(|(terrain, hit)| hit.triangle_of(terrain));
-        self.truth(pixel, uv, hit.map(|hit| hit.depth_m), triangle)
+        let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned).map(|hit| RayHit {
+            depth_m: hit.depth_m,
+            normal_ned: hit.normal_ned,
+            surface: hit.surface as u32,
+            triangle: self.surfaces.terrain().zip(hit.terrain).map(|(terrain, hit)| hit.triangle_of(terrain)),
+        });
+        self.truth(pixel, uv, hit)
     }
 
     /// What the ray `uv` of a pixel meets if that is on the same unfolded patch of the terrain as a triangle
@@ -72,11 +96,14 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn walk(&self, from: TerrainTriangle, pixel: [u32; 2], uv: DVec2, window: f64) -> Option<PixelTruth> {
         let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let (triangle, depth_m) = self.surfaces.terrain()?.walk(from, pose.position_ned_m, ray_ned)?;
+        let terrain = self.surfaces.terrain()?;
+        let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
         let in_front_m = window * depth_m;
         let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
         let is_hidden = self.surfaces.model_hit(start_ned_m, ray_ned, in_front_m).is_some();
-        (!is_hidden).then(|| self.truth(pixel, uv, Some(depth_m), Some(triangle)))
+        let normal_ned = terrain.normal_ned(triangle);
+        let hit = RayHit { depth_m, normal_ned, surface: 0, triangle: Some(triangle) };
+        (!is_hidden).then(|| self.truth(pixel, uv, Some(hit)))
     }
 
     /// Whether a walk from a triangle that a pixel nearby sees ends at the triangle that this pixel sees: no
@@ -94,6 +121,20 @@ impl<'a> FrameRays<'a> {
         })
     }
 
+    /// Camera of a pixel at mid-exposure.
+    #[must_use]
+    pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
+        self.ray(&self.mid, pixel, DVec2::ZERO).0
+    }
+
+    /// Whether a surface lies between a camera and what it sees along a ray at planar depth `depth_m`
+    /// (infinite for the sky), leaving out the last millionth of the way.
+    #[must_use]
+    pub fn is_hidden(&self, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
+        let hit = self.surfaces.first_hit(position_ned_m, ray_ned);
+        hit.is_some_and(|hit| hit.depth_m < (1.0 - LAST_PART) * depth_m)
+    }
+
     fn ray<'b>(&self, poses: &'b [CameraPose], [x, y]: [u32; 2], uv: DVec2) -> (&'b CameraPose, DVec3) {
         let pose = match self.plan.shutter.row_axis() {
             RowAxis::Rows => &poses[y as usize],
@@ -102,23 +143,23 @@ impl<'a> FrameRays<'a> {
         (pose, pose.ned_from_camera * uv.extend(1.0))
     }
 
-    fn truth(
-        &self,
-        pixel: [u32; 2],
-        uv: DVec2,
-        depth_m: Option<f64>,
-        triangle: Option<TerrainTriangle>,
-    ) -> PixelTruth {
+    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>) -> PixelTruth {
         let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
         let source_px = if self.at_phase.is_empty() {
-            self.source_px(pose, ray_ned, depth_m)
+            self.source_px(pose, ray_ned, hit.as_ref().map(|hit| hit.depth_m))
         } else {
             let (pose, ray_ned) = self.ray(&self.at_phase, pixel, uv);
             let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned);
             self.source_px(pose, ray_ned, hit.map(|hit| hit.depth_m))
         };
-        let hit = depth_m.map(|depth_m| (pose.position_ned_m + depth_m * ray_ned, depth_m));
-        PixelTruth { source_px, hit, triangle }
+        let hit = hit.map(|RayHit { depth_m, normal_ned, surface, triangle }| PixelHit {
+            point_ned_m: pose.position_ned_m + depth_m * ray_ned,
+            depth_m,
+            normal_ned: if normal_ned.dot(ray_ned) > 0.0 { -normal_ned } else { normal_ned },
+            surface,
+            triangle,
+        });
+        PixelTruth { source_px, hit }
     }
 
     fn source_px(&self, pose: &CameraPose, ray_ned: DVec3, depth_m: Option<f64>) -> DVec2 {
@@ -130,5 +171,7 @@ impl<'a> FrameRays<'a> {
     }
 }
 
+/// Part of the way to a point that rounding may take for a surface in front of it.
+const LAST_PART: f64 = 1e-6;
 /// Relative difference of the depths that the two triangles of an edge give to a ray that hits it: rounding.
 const ON_AN_EDGE: f64 = 1e-9;

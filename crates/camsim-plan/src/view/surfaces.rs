@@ -49,6 +49,8 @@ pub(crate) struct SurfaceHit {
     pub uv: [f64; 2],
     /// Factor of the texture's colour there, light included.
     pub tint: DVec3,
+    /// Unit normal of the triangle, NED, of either sign.
+    pub normal_ned: DVec3,
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
 }
@@ -179,6 +181,7 @@ impl Surfaces {
                 surface: 0,
                 uv: hit.uv,
                 tint: DVec3::ONE,
+                normal_ned: hit.normal_ned,
                 terrain: Some(hit),
             })
         };
@@ -220,9 +223,11 @@ impl Surfaces {
         let [r, g, b, _] = mesh.tint_at(corners, weights);
         let light =
             self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
+        let points_m = corners.map(|corner| mesh.position_ned_m(corner));
         SurfaceHit {
             depth_m,
             surface: 1 + i,
+            normal_ned: (points_m[1] - points_m[0]).cross(points_m[2] - points_m[0]).normalize_or_zero(),
             uv: mesh.uv_at(corners, weights),
             tint: light * DVec3::new(r, g, b),
             terrain: None,

@@ -67,6 +67,13 @@ impl TerrainHit {
 }
 
 impl Terrain {
+    /// Unit normal of a triangle, NED, upwards.
+    #[must_use]
+    pub fn normal_ned(&self, triangle: TerrainTriangle) -> DVec3 {
+        let [a, b, c] = [0, 1, 2].map(|k| self.corner_m(triangle, k, DVec3::ZERO));
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
     /// Walks from a triangle that a ray nearby hits to the one that `origin + t direction` hits, across
     /// triangles that face the origin. Returns that triangle and t; `None` if the way leads to a triangle
     /// that faces away, to a void or off the terrain, or is long. The hit is on the same unfolded patch as

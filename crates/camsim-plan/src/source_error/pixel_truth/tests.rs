@@ -100,8 +100,9 @@ fn pixel_truth_is_that_of_the_oracle() {
             let off_px = truth.source_px.distance(key.source_px(&look));
             assert!(off_px < 1e-8, "{pixel:?} {phase}: {off_px:.1e} px");
             let off_m = match (truth.hit, mid.hit) {
-                (Some((point_m, depth_m)), Some(hit)) => {
-                    point_m.distance(hit.point_ned_m) + (depth_m - hit.depth_m).abs()
+                (Some(found), Some(hit)) => {
+                    assert_eq!(found.surface, hit.surface, "{pixel:?}");
+                    found.point_ned_m.distance(hit.point_ned_m) + (found.depth_m - hit.depth_m).abs()
                 }
                 (None, None) => 0.0,
                 (found, _) => panic!("{pixel:?}: {found:?}, not {:?}", mid.hit),
