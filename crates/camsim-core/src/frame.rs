@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::pose::CameraPose;
+use crate::{pose::CameraPose, scenario::Channel};
 
 /// Time, pose and velocity of one row of the readout at its mid-exposure. With sideways readout it is a
 /// column.
@@ -49,4 +49,44 @@ pub struct RenderedFrame {
     pub coords: Option<Vec<[f32; COORDS_CHANNELS]>>,
     /// One record per row of the readout.
     pub rows: Vec<RowRecord>,
+    /// The other truth channels ([`Channel::plane`]).
+    pub planes: Vec<Plane>,
+}
+
+/// A truth channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// Which one.
+    pub channel: Channel,
+    /// Its values.
+    pub values: PlaneValues,
+}
+
+/// Values of a plane, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlaneValues {
+    /// All components of a pixel side by side.
+    Float(Vec<f32>),
+    /// One number a pixel.
+    Index(Vec<u32>),
+}
+
+impl RenderedFrame {
+    /// Floats of a channel, the components of a pixel side by side.
+    #[must_use]
+    pub fn floats(&self, channel: Channel) -> Option<&[f32]> {
+        self.planes.iter().find(|plane| plane.channel == channel).and_then(|plane| match &plane.values {
+            PlaneValues::Float(values) => Some(values.as_slice()),
+            PlaneValues::Index(_) => None,
+        })
+    }
+
+    /// Numbers of a channel of indices.
+    #[must_use]
+    pub fn indices(&self, channel: Channel) -> Option<&[u32]> {
+        self.planes.iter().find(|plane| plane.channel == channel).and_then(|plane| match &plane.values {
+            PlaneValues::Index(values) => Some(values.as_slice()),
+            PlaneValues::Float(_) => None,
+        })
+    }
 }

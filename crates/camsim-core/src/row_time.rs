@@ -87,6 +87,24 @@ struct Projection {
     depth_m: f64,
 }
 
+impl CameraModel {
+    /// Pixel coordinates at which a camera shows a point, and its planar depth (infinite for a direction);
+    /// `None` if it is behind the camera or beyond the reach of the lens.
+    #[must_use]
+    pub fn show(&self, pose: &CameraPose, point: WorldPoint) -> Option<(DVec2, f64)> {
+        let camera_from_ned = pose.ned_from_camera.conjugate();
+        let (ray, is_far) = match point {
+            WorldPoint::At(point_ned_m) => (camera_from_ned * (point_ned_m - pose.position_ned_m), false),
+            WorldPoint::Towards(direction_ned) => (camera_from_ned * direction_ned, true),
+        };
+        if ray.z.is_nan() || ray.z <= 0.0 {
+            return None;
+        }
+        let uv = ray.truncate() / ray.z;
+        self.lens.contains(uv).then(|| (self.project(uv), if is_far { f64::INFINITY } else { ray.z }))
+    }
+}
+
 impl FrameCamera {
     /// Camera of the frame with this stamp.
     #[must_use]
@@ -256,19 +274,7 @@ impl FrameCamera {
     }
 
     fn project(&self, pose: &CameraPose, point: WorldPoint) -> Option<Projection> {
-        let camera_from_ned = pose.ned_from_camera.conjugate();
-        let (ray, scale) = match point {
-            WorldPoint::At(point_ned_m) => (camera_from_ned * (point_ned_m - pose.position_ned_m), 1.0),
-            WorldPoint::Towards(direction_ned) => (camera_from_ned * direction_ned, f64::INFINITY),
-        };
-        if ray.z.is_nan() || ray.z <= 0.0 {
-            return None;
-        }
-        let uv = ray.truncate() / ray.z;
-        self.camera.lens.contains(uv).then(|| Projection {
-            px: self.camera.project(uv),
-            depth_m: if scale.is_finite() { ray.z } else { f64::INFINITY },
-        })
+        self.camera.show(pose, point).map(|(px, depth_m)| Projection { px, depth_m })
     }
 
     /// Pixel coordinate across the rows of the readout.

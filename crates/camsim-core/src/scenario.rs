@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 mod auto;
 mod camera;
+mod channel;
 mod scene;
 mod validate;
 
@@ -18,6 +19,7 @@ pub use camera::{
     Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout,
     ShutterSpec, VibrationSpec, ZoomSpec,
 };
+pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
@@ -371,6 +373,10 @@ pub struct OutputSpec {
     pub exr_pixel: ExrPixel,
     /// EXR compression.
     pub exr_compression: ExrCompression,
+    /// Frames from one to the other of `flow` and `flow-back`.
+    pub flow_step: u32,
+    /// Instant of the picture that `flow-global` leads to.
+    pub flow_instant: FlowInstant,
 }
 
 impl Default for OutputSpec {
@@ -382,6 +388,8 @@ impl Default for OutputSpec {
             epoch_ns: 0,
             exr_pixel: ExrPixel::Half,
             exr_compression: ExrCompression::Zip1,
+            flow_step: 1,
+            flow_instant: FlowInstant::Centre,
         }
     }
 }
@@ -409,22 +417,6 @@ impl OutputSpec {
                 .saturating_sub((start_s * 1e9).round() as i64),
         }
     }
-}
-
-/// Channels of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Channel {
-    /// The picture.
-    Color,
-    /// Planar depth at the row's mid-exposure, metres; 0 = nothing.
-    Depth,
-    /// 1 where a ray exists, else 0.
-    Valid,
-    /// `rows.csv`: time, pose and velocity of each row.
-    Rows,
-    /// Ideal ray, source coordinate, time and world point of each pixel.
-    Coords,
 }
 
 /// Image file formats.

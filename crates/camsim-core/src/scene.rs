@@ -49,9 +49,39 @@ pub struct Scene {
     /// Light on meshes whose shapes have normals. On the terrain, light is baked into the texture
     /// ([`Terrain::bake_light`]). Without light, colours are used as they are.
     pub light: Option<Light>,
+    /// Its objects, in the order of their numbers.
+    pub objects: Vec<SceneObject>,
+    /// Number of the terrain's object, counted from 1; 0 = none.
+    pub terrain_object: u32,
+}
+
+/// An object of a scene: what `object` and `class` number.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneObject {
+    /// Name that the scenario or the model gives it.
+    pub name: String,
+    /// Class that the scenario gives it; 0 = none.
+    pub class: u16,
 }
 
 impl Scene {
+    /// Number of the object that a surface belongs to (0 = terrain, 1 + i = mesh i), counted from 1; 0 if the
+    /// surface belongs to none.
+    #[must_use]
+    pub fn object_of_surface(&self, surface: u32) -> u32 {
+        match surface.checked_sub(1) {
+            None => self.terrain_object,
+            Some(mesh) => self.meshes.get(mesh as usize).map_or(0, |mesh| mesh.object),
+        }
+    }
+
+    /// Class of the object that a surface belongs to; 0 = none.
+    #[must_use]
+    pub fn class_of_surface(&self, surface: u32) -> u32 {
+        let object = self.object_of_surface(surface).checked_sub(1);
+        object.and_then(|object| self.objects.get(object as usize)).map_or(0, |object| object.class.into())
+    }
+
     /// Whether any mesh is blended with what is behind it.
     #[must_use]
     pub fn has_blended(&self) -> bool {

@@ -117,6 +117,7 @@ impl Model {
             material: part.material.clone(),
             origin_ned_m: at_ned_m + ned_from_model * part.model_from_shape.translation,
             ned_from_shape: ned_from_model * part.model_from_shape.matrix3,
+            object: 0,
         })
     }
 

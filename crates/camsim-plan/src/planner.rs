@@ -5,9 +5,11 @@ mod steps;
 use std::sync::Arc;
 
 use camsim_core::{
-    camera::ZoomTable,
+    camera::{CameraModel, ZoomTable},
     frame::RowRecord,
-    scenario::{Channel, Preset},
+    mount::CameraPath,
+    row_time::FrameCamera,
+    scenario::{Channel, FlowInstant, Preset},
     sequence::Sequence,
     temporal::IdealGeometry,
 };
@@ -17,7 +19,7 @@ use crate::{
         frame_context::{FrameContext, FrameScene},
         obstacle, picture,
         placement::{cpu_rasterises, place},
-        plan_inputs::{self, PlanInputs, SceneKnowledge},
+        plan_inputs::{self, PlanInputs, SceneKnowledge, zoom_at},
         recent_cache::RecentCache,
         sharing::{FrameGroup, unshared_reason},
     },
@@ -215,6 +217,43 @@ impl Planner {
     #[must_use]
     pub fn frame_rays<'a>(&'a self, plan: &'a FramePlan, phase: f64) -> FrameRays<'a> {
         FrameRays::new(self.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
+    }
+
+    /// The camera of a frame with the poses of its rows, for frames of any number.
+    ///
+    /// # Errors
+    /// A zoom value without a usable camera.
+    pub fn frame_camera(&self, frame: i64) -> Result<FrameCamera, PlanError> {
+        let (path, camera, stamp_s) = self.camera_at(frame)?;
+        Ok(FrameCamera::new(path, camera, &self.inputs.shutter, stamp_s))
+    }
+
+    /// The camera of a frame as a global shutter would expose it at an instant of its readout.
+    ///
+    /// # Errors
+    /// As [`Planner::frame_camera`].
+    pub fn global_camera(&self, frame: i64, instant: FlowInstant) -> Result<FrameCamera, PlanError> {
+        let (path, camera, stamp_s) = self.camera_at(frame)?;
+        let shutter = &self.inputs.shutter;
+        let last = shutter.lines() - 1;
+        let [first_s, last_s] = [shutter.dt_row_s(0), shutter.dt_row_s(last)];
+        let dt_s = match instant {
+            FlowInstant::FirstRow => first_s.min(last_s),
+            FlowInstant::Centre => 0.5 * (first_s + last_s),
+            FlowInstant::LastRow => first_s.max(last_s),
+        };
+        Ok(FrameCamera::global(path, camera, stamp_s + dt_s))
+    }
+
+    fn camera_at(&self, frame: i64) -> Result<(Arc<CameraPath>, Arc<CameraModel>, f64), PlanError> {
+        let inputs = &self.inputs;
+        let stamp_s = inputs.stamp_s_of(frame as f64);
+        let camera = match (&inputs.fixed, &inputs.zoom) {
+            (Some(reach), _) => reach.camera.clone(),
+            (None, Some(table)) => Arc::new(table.at(zoom_at(&inputs.sequence.zoom_track, stamp_s))?),
+            (None, None) => return Err(PlanError::NoRay),
+        };
+        Ok((inputs.sequence.path.clone(), camera, stamp_s))
     }
 
     /// The predicted source error of a frame from pixel to pixel, by the dry runs that its plan was chosen

@@ -161,6 +161,7 @@ impl Oracle {
             depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
             coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
             rows: self.row_records(frame),
+            planes: Vec::new(),
         };
         (rendered, convergence)
     }

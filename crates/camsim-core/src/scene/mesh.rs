@@ -144,6 +144,8 @@ pub struct Mesh {
     /// Matrix from the shape's axes to north-east-down; it may rotate, scale and mirror. Front faces are
     /// anticlockwise in the world, so those of a mirrored shape are clockwise in its own axes.
     pub ned_from_shape: DMat3,
+    /// Number of the object that it belongs to ([`super::Scene::objects`]), counted from 1; 0 = none.
+    pub object: u32,
 }
 
 impl Mesh {
@@ -161,6 +163,7 @@ impl Mesh {
             material: Material::picture(texture, wrap),
             origin_ned_m,
             ned_from_shape: DMat3::IDENTITY,
+            object: 0,
         }
     }
 

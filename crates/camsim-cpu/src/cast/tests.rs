@@ -122,7 +122,7 @@ fn pane(low: f32, high: f32, tint: [[f32; 4]; 2]) -> Arc<Shape> {
 }
 
 fn standing(shape: &Arc<Shape>, material: &Material, origin_ned_m: DVec3, turn: DMat3) -> Mesh {
-    Mesh { shape: shape.clone(), material: material.clone(), origin_ned_m, ned_from_shape: turn }
+    Mesh { shape: shape.clone(), material: material.clone(), origin_ned_m, ned_from_shape: turn, object: 0 }
 }
 
 /// Ground of 138 m a side, with hills of so many times their usual height.

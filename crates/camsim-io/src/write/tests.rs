@@ -32,6 +32,7 @@ fn frame(index: u64) -> RenderedFrame {
             ned_from_camera: DQuat::IDENTITY,
             velocity_ned_m_s: DVec3::X,
         }],
+        planes: Vec::new(),
     }
 }
 

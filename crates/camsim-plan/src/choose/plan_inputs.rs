@@ -90,7 +90,7 @@ impl PlanInputs {
                 .each_ref()
                 .map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low))))
         });
-        let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
+        let truth = channels.iter().any(|channel| channel.needs_truth());
         let cached = CACHED_FRAMES + CACHED_FRAMES_A_GROUP * groups_at_once();
         Ok(Self {
             sequence,
@@ -118,8 +118,13 @@ impl PlanInputs {
 
     /// Stamp of a frame, path time, seconds.
     pub fn stamp_s(&self, frame: u64) -> f64 {
+        self.stamp_s_of(frame as f64)
+    }
+
+    /// Stamp of a frame of any number, beyond the sequence as well.
+    pub fn stamp_s_of(&self, frame: f64) -> f64 {
         let camera = &self.sequence.scenario.camera;
-        self.sequence.start_s + (frame as f64 + camera.phase) / camera.fps
+        self.sequence.start_s + (frame + camera.phase) / camera.fps
     }
 
     /// Probes of frames of a group: neighbours in time are nearly alike, and have other probes each.

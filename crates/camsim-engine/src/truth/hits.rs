@@ -10,7 +10,7 @@ use camsim_core::{
     scene::TerrainTriangle,
     temporal::unreliable_depth::{DepthGrid, changed},
 };
-use camsim_plan::{FramePlan, FrameRays, PixelTruth, Planner, uniforms::Truth};
+use camsim_plan::{FramePlan, FrameRays, PixelHit, PixelTruth, uniforms::Truth};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -50,26 +50,42 @@ impl Source {
 
 /// Casts rays for the pixels whose depth the gpu has left open (below 0), for those whose depth may belong to
 /// no surface or to the wrong one, and from each pixel that a ray has corrected on for its neighbours.
-/// `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
-pub(crate) fn complete(
+/// Pixels are valid where `color_rgba` says so.
+pub(crate) fn complete(truth: &mut [Truth], color_rgba: &[f32], plan: &FramePlan, rays: &FrameRays<'_>) {
+    complete_pixels(truth, color_rgba, plan, rays, None);
+}
+
+/// The surface of every pixel, by a ray of its own; `None` where there is no ray or the ray shows the sky.
+/// Depths and coordinates of `truth` become those of the rays.
+pub(crate) fn of_all_pixels(
     truth: &mut [Truth],
     color_rgba: &[f32],
-    planner: &Planner,
     plan: &FramePlan,
-    phase: f64,
+    rays: &FrameRays<'_>,
+) -> Vec<Option<PixelHit>> {
+    let mut hits = vec![None; truth.len()];
+    complete_pixels(truth, color_rgba, plan, rays, Some(&mut hits));
+    hits
+}
+
+fn complete_pixels(
+    truth: &mut [Truth],
+    color_rgba: &[f32],
+    plan: &FramePlan,
+    rays: &FrameRays<'_>,
+    mut hits: Option<&mut [Option<PixelHit>]>,
 ) {
     let width = plan.camera.size_px[0] as usize;
-    let rays = planner.frame_rays(plan, phase);
     let mut source = vec![Source::LookUp; truth.len()];
     let open: Vec<usize> = (0..truth.len()).filter(|&i| truth[i].depth_m < 0.0).collect();
-    Frame { width, truth, source: &mut source, rays: &rays }.cast(&open);
+    Frame { width, truth, source: &mut source, rays, hits: hits.as_deref_mut() }.cast(&open);
 
     let valid: Vec<bool> = color_rgba.chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let looked_up: Vec<f32> = truth.iter().map(inverse_depth).collect();
     let row_step = if plan.shutter.interlace_s() > 0.0 { 2 } else { 1 };
     let grid = DepthGrid { width, row_step, inverse_depth: &looked_up, valid: &valid };
-    let unreliable = grid.unreliable_pixels();
-    let mut frame = Frame { width, truth, source: &mut source, rays: &rays };
+    let unreliable = if hits.is_some() { valid.clone() } else { grid.unreliable_pixels() };
+    let mut frame = Frame { width, truth, source: &mut source, rays, hits: hits.as_deref_mut() };
     frame.walk_rows(&unreliable, &looked_up);
     let at_silhouettes = frame.at_silhouettes(&unreliable, row_step * width);
     frame.cast(&at_silhouettes);
@@ -85,7 +101,7 @@ pub(crate) fn complete(
             .collect();
         beside.sort_unstable();
         beside.dedup();
-        Frame { width, truth, source: &mut source, rays: &rays }.cast(&beside);
+        Frame { width, truth, source: &mut source, rays, hits: hits.as_deref_mut() }.cast(&beside);
         beside.retain(|&i| changed(looked_up[i], inverse_depth(&truth[i])));
         changed_pixels = beside;
     }
@@ -97,6 +113,8 @@ struct Frame<'a> {
     truth: &'a mut [Truth],
     source: &'a mut [Source],
     rays: &'a FrameRays<'a>,
+    /// The surface of each pixel, where all are wanted.
+    hits: Option<&'a mut [Option<PixelHit>]>,
 }
 
 impl Frame<'_> {
@@ -110,14 +128,22 @@ impl Frame<'_> {
         for (&i, hit) in pixels.iter().zip(&hits) {
             set(&mut self.truth[i], hit);
             self.source[i] = Source::Ray(triangle(hit));
+            if let Some(hits) = &mut self.hits {
+                hits[i] = hit.hit;
+            }
         }
     }
 
     /// Walks along each row from one unreliable pixel to the next, and casts where that fails.
     fn walk_rows(&mut self, unreliable: &[bool], looked_up: &[f32]) {
         let (width, rays) = (self.width, self.rays);
-        let rows = self.truth.par_chunks_mut(width).zip(self.source.par_chunks_mut(width)).enumerate();
-        rows.for_each(|(y, (truth, source))| {
+        let count = self.truth.len() / width;
+        let hits: Vec<Option<&mut [Option<PixelHit>]>> = match &mut self.hits {
+            Some(hits) => hits.chunks_mut(width).map(Some).collect(),
+            None => (0..count).map(|_| None).collect(),
+        };
+        let rows = self.truth.par_chunks_mut(width).zip(self.source.par_chunks_mut(width)).zip(hits);
+        rows.enumerate().for_each(|(y, ((truth, source), mut hits))| {
             let mut last: Option<(usize, TerrainTriangle)> = None;
             for x in 0..width {
                 let i = y * width + x;
@@ -130,6 +156,9 @@ impl Frame<'_> {
                 let walk = walk.filter(|walk| is_near(looked_up[i], walk));
                 let hit = walk.unwrap_or_else(|| rays.cast(pixel, uv));
                 set(&mut truth[x], &hit);
+                if let Some(hits) = &mut hits {
+                    hits[x] = hit.hit;
+                }
                 source[x] = match (triangle(&hit), last) {
                     (Some(triangle), Some((from_x, _))) if walk.is_some() => {
                         if from_x + 1 == x {

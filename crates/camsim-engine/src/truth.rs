@@ -1,0 +1,8 @@
+//! Truth about each pixel of an output frame, by rays in f64: whatever renderer made the picture, the truth is
+//! the same.
+
+mod flow;
+pub(crate) mod hits;
+mod planes;
+
+pub(crate) use planes::planes;

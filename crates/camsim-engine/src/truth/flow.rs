@@ -1,0 +1,92 @@
+//! Optical flow: where another picture shows what a pixel sees.
+
+use camsim_core::{
+    row_time::{FrameCamera, WorldPoint},
+    scenario::FlowState,
+};
+use glam::{DVec2, DVec3};
+
+use super::planes::{FramePixels, Pixel};
+
+/// The picture that a flow leads to.
+pub(super) struct FlowTarget {
+    camera: FrameCamera,
+}
+
+impl FlowTarget {
+    pub fn new(camera: FrameCamera) -> Self {
+        Self { camera }
+    }
+}
+
+/// What a pixel sees, as a point of the world; the sky is infinitely far away.
+fn world_point(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint {
+    match pixel.hit {
+        Some(hit) => WorldPoint::At(hit.point_ned_m),
+        None => WorldPoint::Towards(pixels.rays.pose(pixel.position).ned_from_camera * pixel.uv.extend(1.0)),
+    }
+}
+
+/// Displacement to the target, pixels, and [`FlowState`] of every pixel.
+pub(super) fn flow(pixels: &FramePixels<'_>, target: &FlowTarget) -> Vec<[f32; 3]> {
+    pixels.map(&[0.0; 3], |pixel| {
+        let from_px = DVec2::from_array(pixel.position.map(f64::from));
+        let point = world_point(pixels, pixel);
+        let Some(seen) = target.camera.find(point, from_px) else { return [0.0; 3] };
+        let [dx, dy] = (seen.px - from_px).to_array();
+        let state = if !seen.is_inside {
+            FlowState::Outside
+        } else {
+            let ray_ned = match point {
+                WorldPoint::At(point_ned_m) => (point_ned_m - seen.pose.position_ned_m) / seen.depth_m,
+                WorldPoint::Towards(direction_ned) => direction_ned,
+            };
+            match pixels.rays.is_hidden(seen.pose.position_ned_m, ray_ned, seen.depth_m) {
+                true => FlowState::Occluded,
+                false if seen.solutions > 1 => FlowState::Several,
+                false => FlowState::Visible,
+            }
+        };
+        [dx as f32, dy as f32, f32::from(state as u8)]
+    })
+}
+
+/// Velocity of the image of the point that a pixel sees, pixels a second, at the pixel's own instant:
+///
+/// ```text
+/// X' = -w x X - v,   (u, v)' = (X'.xy - (u, v) X'.z) / X.z,   px' = f J_lens (u, v)'
+/// ```
+///
+/// with the camera's angular rate w and velocity v in its own axes; points of the sky have v / X.z = 0.
+pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
+    let plan = pixels.plan;
+    let path = &pixels.planner.sequence().path;
+    let [x, y] = pixel.position;
+    let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+    let camera_from_ned = pixels.rays.pose(pixel.position).ned_from_camera.conjugate();
+    let inverse_depth = pixel.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
+    let ray = pixel.uv.extend(1.0);
+    let velocity: DVec3 = camera_from_ned * path.velocity_ned(t_s);
+    let ray_rate = -path.rate_camera(t_s).cross(ray) - velocity * inverse_depth;
+    let uv_rate = ray_rate.truncate() - pixel.uv * ray_rate.z;
+    let px_rate = plan.camera.focal_px * (plan.camera.lens.jacobian(pixel.uv) * uv_rate);
+    px_rate.as_vec2().to_array()
+}
+
+/// Displacement of the point that a pixel sees at the begin and at the end of its exposure, pixels; 0 where
+/// the camera of that instant does not show it.
+pub(super) fn blur_path(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 4] {
+    let plan = pixels.plan;
+    let path = &pixels.planner.sequence().path;
+    let [x, y] = pixel.position;
+    let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+    let from_px = DVec2::from_array(pixel.position.map(f64::from));
+    let point = world_point(pixels, pixel);
+    let moved = |phase: f64| {
+        let pose = path.pose(mid_s + phase * plan.shutter.exposure_s());
+        let shown = plan.camera.show(&pose, point);
+        shown.map_or(DVec2::ZERO, |(px, _)| px - from_px).as_vec2().to_array()
+    };
+    let ([x0, y0], [x1, y1]) = (moved(-0.5), moved(0.5));
+    [x0, y0, x1, y1]
+}
