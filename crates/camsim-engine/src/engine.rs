@@ -64,10 +64,10 @@ impl Engine {
         self.gpu.iter_mut().for_each(|gpu| gpu.limit_pictures(max_side_px));
     }
 
-    /// Pixels of a row that each thread of the gpu's reverse kernel takes ([`GpuContext::set_pixels_a_thread`]),
+    /// Pixels of a row that each thread of the gpu's reverse kernel takes ([`GpuContext::set_pixels_per_thread`]),
     /// for sessions to come.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
-        self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_a_thread(pixels));
+        self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_per_thread(pixels));
     }
 
     /// Which renderers sessions to come may use. Without an adapter it is always the cpu.
@@ -99,7 +99,7 @@ impl Engine {
     /// Most pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
-        self.gpu.as_ref().map_or(u64::MAX, GpuContext::most_pixels_with_truth)
+        self.gpu.as_ref().map_or(u64::MAX, GpuContext::max_pixels_with_truth)
     }
 
     /// Whether frames are rendered on the processor that also plans them.

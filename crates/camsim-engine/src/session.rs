@@ -12,7 +12,7 @@ use camsim_core::{
 };
 use camsim_cpu::{CpuRenderer, IdealBuffer, IdealTexels, ReverseInputs};
 use camsim_gpu::{
-    GpuError, GpuJob, GpuSession, IdealImages, Submitted, Wanted,
+    GpuError, GpuJob, GpuSession, IdealImages, Readback, Submitted,
     session::{FRAMES_IN_FLIGHT, IdealCopy},
 };
 use camsim_plan::{
@@ -240,7 +240,7 @@ impl<'a> Session<'a> {
                     models: &key.models,
                     zoom: self.planner.zoom_table(),
                     redraws,
-                    wanted: if makes_output { Wanted::Output } else { Wanted::Ideal },
+                    readback: if makes_output { Readback::Output } else { Readback::Ideal },
                 };
                 let submitted = gpu.submit(&job, slot).inspect_err(|_| self.drawn = None)?;
                 times.record_ms = submitted.record_ms;
@@ -339,19 +339,19 @@ impl<'a> Session<'a> {
     }
 
     /// Triangles of the terrain near marks, which were drawn with several samples a pixel
-    /// ([`GpuSession::triangles_near_marks`]).
+    /// ([`GpuSession::triangles_near_edges`]).
     ///
     /// # Errors
     /// Device faults; `None` before the first frame and without a gpu.
     pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
-        self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_marks)
+        self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_edges)
     }
 
     /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture that
     /// is held whole.
     #[must_use]
     pub fn tiles_held(&self) -> Option<[usize; 2]> {
-        self.gpu.as_ref().and_then(GpuSession::tiles_held)
+        self.gpu.as_ref().and_then(GpuSession::resident_tiles)
     }
 }
 

@@ -330,7 +330,7 @@ impl<'a> FrameCaster<'a> {
     }
 }
 
-/// Inverse depths at the middles of pixels from those of their samples. Twin of `shaders/ideal/samples.wgsl`.
+/// Inverse depths at the middles of pixels from those of their samples. Twin of `shaders/ideal/resolve_depth.wgsl`.
 fn middle_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
     let [width, height] = size_px.map(|side| side as usize);
     let first = |x: usize, y: usize| samples[y * width + x][0];
