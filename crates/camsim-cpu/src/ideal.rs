@@ -15,12 +15,10 @@ use camsim_core::{
     pose::CameraPose,
     scene::{Batch, Light, LodTolerance, PlacedMesh, Scene, SceneBatches, Texture, Wrap},
 };
-use camsim_plan::{FramePlan, NEAR_M};
+use camsim_plan::FramePlan;
 use rayon::prelude::*;
 
-use crate::general::IdealImage;
-use crate::large_pages::Large;
-use crate::reverse::IdealTexels;
+use crate::large_pages::LargeArray;
 use crate::simd::{
     lanes::LANES,
     vectors::{Vectors, widest},
@@ -30,6 +28,7 @@ use camsim_plan::uniforms::{base_ned_m, ideal_camera};
 mod meshes;
 mod multisample;
 mod prefilter;
+mod raster_frame;
 mod rasterise;
 mod sampled_tiles;
 mod shade;
@@ -39,86 +38,24 @@ mod texture;
 mod triangles;
 mod vertices;
 
-use meshes::{Piece, Scratch, TRIANGLES_A_CHUNK};
+use meshes::{Piece, Scratch, TRIANGLES_PER_CHUNK};
 use multisample::{Multisample, SAMPLES_PER_SIDE};
-use rasterise::{Band, PixelCentres, ROW_PADDING, SKY, SamplePattern};
+pub use raster_frame::RasterFrame;
+use rasterise::{Band, PixelCentres, SKY, SamplePattern};
 use shade::{Material, PixelPlanes, Shader};
 use texture::SurfaceTexture;
 use triangles::{BAND_ROWS, Chunk, EXTRA_ATTRIBUTES, TriangleKind};
 use vertices::{Camera, Vertex};
 
 /// Terrain vertices per projection task.
-const CORNERS_A_TASK: usize = 4096;
+const VERTICES_PER_TASK: usize = 4096;
 /// Chunks per pass: a million triangles at most, which bounds their memory and their ids. Scenes with more
 /// are drawn in several passes, each over the one before.
-const CHUNKS_A_ROUND: usize = 256;
+const CHUNKS_PER_PASS: usize = 256;
 /// Index of the terrain's material.
-const GROUND: u32 = 0;
+const TERRAIN_MATERIAL: u32 = 0;
 /// Half floats of a texel: R G B A.
 const CHANNELS: usize = 4;
-
-/// An ideal frame in memory.
-#[derive(Debug, Default)]
-pub struct RasterFrame {
-    /// Linear R G B A, half floats.
-    pub(crate) color: Large<u16>,
-    /// near / z, 0 = infinitely far.
-    pub(crate) depth: Large<f32>,
-    /// Texels from one row to the next, of colour and depth.
-    pub(crate) stride: usize,
-}
-
-impl RasterFrame {
-    /// Sets the size.
-    fn fit(&mut self, size_px: [u32; 2]) {
-        let [width, height] = size_px.map(|side| side as usize);
-        self.stride = (width + ROW_PADDING).next_multiple_of(LANES);
-        self.depth.fit(self.stride * height);
-        self.color.fit(CHANNELS * self.stride * height);
-    }
-
-    /// Converts linear R G B A and inverse depths in single precision.
-    pub(crate) fn from_image(image: &IdealImage) -> Self {
-        let mut frame = Self::default();
-        frame.fit(image.geometry.size_px);
-        let width = image.geometry.size_px[0] as usize;
-        let (stride, near_m) = (frame.stride, NEAR_M as f32);
-        let rows = frame.color.par_chunks_mut(CHANNELS * stride).zip(frame.depth.par_chunks_mut(stride));
-        let values = image.color_rgba.par_chunks(CHANNELS * width).zip(image.inverse_depth.par_chunks(width));
-        rows.zip(values).for_each(|((color, depth), (rgba, inverse_depth))| {
-            color
-                .iter_mut()
-                .zip(rgba)
-                .for_each(|(half, &value)| *half = half::f16::from_f32(value).to_bits());
-            depth
-                .iter_mut()
-                .zip(inverse_depth)
-                .for_each(|(depth, &inverse_depth)| *depth = inverse_depth * near_m);
-        });
-        frame
-    }
-
-    /// The frame as the vectorised pass reads it.
-    pub(crate) fn texels(&self) -> IdealTexels<'_> {
-        let stride = self.stride as u32;
-        IdealTexels { color: &self.color, color_stride: stride, depth: &self.depth, depth_stride: stride }
-    }
-
-    /// Linear R G B A and inverse depth, 1/m, of a frame of this size, row-major.
-    pub fn images(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
-        let (width, height) = (width as usize, height as usize);
-        let color = self
-            .color
-            .chunks_exact(CHANNELS * self.stride)
-            .take(height)
-            .flat_map(|row| &row[..CHANNELS * width]);
-        let depth = self.depth.chunks_exact(self.stride).take(height).flat_map(|row| &row[..width]);
-        (
-            color.map(|&bits| half::f16::from_bits(bits).to_f32()).collect(),
-            depth.map(|depth| depth / NEAR_M as f32).collect(),
-        )
-    }
-}
 
 /// A scene in the form of the rasteriser.
 #[derive(Debug)]
@@ -126,11 +63,11 @@ pub(crate) struct RasterScene {
     /// Materials: of the terrain, then of the mesh batches.
     materials: Vec<Material>,
     /// Meshes by batch.
-    models: Vec<MeshModel>,
+    meshes: Vec<MeshModel>,
     chunks: Vec<Chunk>,
     terrain: Vec<Vertex<2>>,
     /// Visible triangle of each pixel.
-    visible: Large<u32>,
+    visible: LargeArray<u32>,
     /// State for frames with several samples per pixel.
     multisample: Multisample,
 }
@@ -150,7 +87,7 @@ enum DrawPart {
     /// A range of terrain indices.
     Terrain(Range<usize>),
     /// A piece of one level of detail of a batch, for a range of placements in view.
-    Piece { batch: usize, level: usize, piece: usize, places: Range<usize> },
+    Piece { batch: usize, level: usize, piece: usize, placements: Range<usize> },
 }
 
 /// Scratch buffers for meshes without and with per-vertex tint or lighting.
@@ -181,7 +118,7 @@ impl RasterScene {
     /// Prepares a scene that the rasteriser [supports](camsim_plan::placement::cpu_rasterises).
     #[must_use]
     pub fn new(scene: &Scene, batches: &SceneBatches) -> Self {
-        let mut pictures = TextureCache::default();
+        let mut textures = TextureCache::default();
         let ground = match &scene.terrain {
             Some(terrain) => SurfaceTexture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
             None => SurfaceTexture::Uniform([0.0; 4]),
@@ -190,22 +127,23 @@ impl RasterScene {
             texture: Arc::new(ground),
             tint: [1.0; 3],
             emissive: [0.0; 3],
-            has_extra: false,
+            has_extra_attributes: false,
             sky: None,
         }];
-        materials.extend(batches.batches.iter().map(|batch| material(batch, pictures.of(batch))));
-        let model = |batch: &Batch| MeshModel {
+        materials
+            .extend(batches.batches.iter().map(|batch| material(batch, textures.triangles_of_piece(batch))));
+        let mesh_model = |batch: &Batch| MeshModel {
             levels: Piece::of_levels(&batch.shape, &batch.levels),
             one_sided: batch.material.one_sided,
             light: batch.light,
         };
-        let models = batches.batches.iter().map(model).collect();
+        let meshes = batches.batches.iter().map(mesh_model).collect();
         Self {
             materials,
-            models,
+            meshes,
             chunks: Vec::new(),
             terrain: Vec::new(),
-            visible: Large::default(),
+            visible: LargeArray::default(),
             multisample: Multisample::default(),
         }
     }
@@ -221,54 +159,63 @@ impl RasterScene {
             size_px: ideal.size_px,
             sample_offset: 0,
         };
-        let (in_view, drawn) = view.batches.in_view(&key.pose, view.tolerance);
+        let (in_view, level_instances) = view.batches.in_view(&key.pose, view.tolerance);
         let mut parts = terrain_parts(view.terrain);
-        self.add_parts(&drawn, &mut parts);
-        let jobs = jobs(parts);
+        self.add_parts(&level_instances, &mut parts);
+        let chunk_parts = chunk_parts(parts);
         let context = DrawContext { camera, pose: &key.pose, view, in_view: &in_view };
         match view.plan.samples_a_pixel {
-            1 => self.draw_all(PixelCentres, &context, &jobs, into),
-            _ => self.draw_samples(&DrawContext { camera: camera.sample_grid(), ..context }, &jobs, into),
+            1 => self.draw_all(PixelCentres, &context, &chunk_parts, into),
+            _ => self.draw_samples(
+                &DrawContext { camera: camera.sample_grid(), ..context },
+                &chunk_parts,
+                into,
+            ),
         }
     }
 
     /// Draws all chunks, in several passes if there are many.
     fn draw_all<P: SamplePattern>(
         &mut self,
-        places: P,
+        placements: P,
         context: &DrawContext<'_>,
-        jobs: &[Vec<DrawPart>],
+        chunk_parts: &[Vec<DrawPart>],
         into: &mut RasterFrame,
     ) {
         let DrawContext { camera, view, .. } = context;
         into.fit(camera.size_px);
         self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
-            let first = round * CHUNKS_A_ROUND;
-            let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
-            self.collect(context, jobs, |_| {});
-            self.fill(places, camera, view.plan, jobs.len(), round > 0, into);
+        for pass in 0..chunk_parts.len().div_ceil(CHUNKS_PER_PASS).max(1) {
+            let first = pass * CHUNKS_PER_PASS;
+            let chunk_parts = &chunk_parts[first..chunk_parts.len().min(first + CHUNKS_PER_PASS)];
+            self.collect(context, chunk_parts, |_| {});
+            self.fill(placements, camera, view.plan, chunk_parts.len(), pass > 0, into);
         }
     }
 
     /// Draws a frame with several samples per pixel, as seen by the camera of the sample grid.
-    fn draw_samples(&mut self, context: &DrawContext<'_>, jobs: &[Vec<DrawPart>], into: &mut RasterFrame) {
+    fn draw_samples(
+        &mut self,
+        context: &DrawContext<'_>,
+        chunk_parts: &[Vec<DrawPart>],
+        into: &mut RasterFrame,
+    ) {
         let DrawContext { camera, view, .. } = context;
         into.fit(view.plan.ideal.size_px);
-        if jobs.len() > CHUNKS_A_ROUND {
+        if chunk_parts.len() > CHUNKS_PER_PASS {
             // The visible triangle of each sample would have to be kept between passes: instead each sample
             // is drawn and shaded as a pixel.
             let mut samples = RasterFrame::default();
-            self.draw_all(rasterise::SamplePositions, context, jobs, &mut samples);
+            self.draw_all(rasterise::SamplePositions, context, chunk_parts, &mut samples);
             return multisample::resolve_samples(&samples, view.plan.ideal.size_px, into);
         }
         self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
         let mut multisample = std::mem::take(&mut self.multisample);
         multisample.clear(camera.size_px);
-        self.collect(context, jobs, |chunk| multisample.mark(chunk));
-        let chunks = &self.chunks[..jobs.len()];
+        self.collect(context, chunk_parts, |chunk| multisample.add_meshes(chunk));
+        let chunks = &self.chunks[..chunk_parts.len()];
         let shader = Shader {
             camera,
             chunks,
@@ -281,16 +228,16 @@ impl RasterScene {
         self.multisample = multisample;
     }
 
-    fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(DrawPart, usize)>) {
-        for (batch, (model, drawn)) in self.models.iter().zip(drawn).enumerate() {
-            for (level, (pieces, places)) in model.levels.iter().zip(drawn).enumerate() {
-                for (piece, of) in pieces.iter().enumerate() {
-                    let together = (TRIANGLES_A_CHUNK / of.len().max(1)).max(1);
-                    let (begin, end) = (places.start as usize, places.end as usize);
-                    parts.extend((begin..end).step_by(together).map(|first| {
-                        let places = first..(first + together).min(end);
-                        let triangles = of.len() * places.len();
-                        (DrawPart::Piece { batch, level, piece, places }, triangles)
+    fn add_parts(&self, level_instances: &[Vec<Range<u32>>], parts: &mut Vec<(DrawPart, usize)>) {
+        for (batch, (mesh_model, level_instances)) in self.meshes.iter().zip(level_instances).enumerate() {
+            for (level, (pieces, placements)) in mesh_model.levels.iter().zip(level_instances).enumerate() {
+                for (piece, triangles_of_piece) in pieces.iter().enumerate() {
+                    let placements_per_part = (TRIANGLES_PER_CHUNK / triangles_of_piece.len().max(1)).max(1);
+                    let (begin, end) = (placements.start as usize, placements.end as usize);
+                    parts.extend((begin..end).step_by(placements_per_part).map(|first| {
+                        let placements = first..(first + placements_per_part).min(end);
+                        let triangles = triangles_of_piece.len() * placements.len();
+                        (DrawPart::Piece { batch, level, piece, placements }, triangles)
                     }));
                 }
             }
@@ -301,25 +248,33 @@ impl RasterScene {
         let vertices = terrain.map_or(&[][..], |mesh| &mesh.vertices);
         let project = |&[x, y, z, u, v]: &[f32; 5]| camera.project(camera.in_camera_m([x, y, z]), [u, v]);
         self.terrain.resize(vertices.len(), Vertex::UNPROJECTED);
-        let tasks = self.terrain.par_chunks_mut(CORNERS_A_TASK).zip(vertices.par_chunks(CORNERS_A_TASK));
+        let tasks =
+            self.terrain.par_chunks_mut(VERTICES_PER_TASK).zip(vertices.par_chunks(VERTICES_PER_TASK));
         tasks.for_each(|(corners, vertices)| {
-            widest!(_vectors => corners.iter_mut().zip(vertices).for_each(|(corner, vertex)| *corner = project(vertex)));
+            widest!(_vectors => {
+                corners.iter_mut().zip(vertices).for_each(|(projected, vertex)| *projected = project(vertex));
+            });
         });
     }
 
-    /// Sets up the triangles of all jobs and bins them into bands. `show` is called for each chunk as soon as
-    /// its triangles are set up.
-    fn collect(&mut self, context: &DrawContext<'_>, jobs: &[Vec<DrawPart>], show: impl Fn(&Chunk) + Sync) {
+    /// Sets up the triangles of all jobs and bins them into bands. `on_set_up` is called for each chunk as
+    /// soon as its triangles are set up.
+    fn collect(
+        &mut self,
+        context: &DrawContext<'_>,
+        chunk_parts: &[Vec<DrawPart>],
+        on_set_up: impl Fn(&Chunk) + Sync,
+    ) {
         let bands = (context.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
-        if chunks.len() < jobs.len() {
-            chunks.resize_with(jobs.len(), Chunk::default);
+        if chunks.len() < chunk_parts.len() {
+            chunks.resize_with(chunk_parts.len(), Chunk::default);
         }
-        jobs.par_iter().zip(&mut *chunks).for_each(|(parts, chunk)| {
+        chunk_parts.par_iter().zip(&mut *chunks).for_each(|(parts, chunk)| {
             chunk.clear();
-            chunk.is_of_ground = matches!(parts.first(), Some(DrawPart::Terrain(_)));
+            chunk.is_terrain = matches!(parts.first(), Some(DrawPart::Terrain(_)));
             self.triangles_of(context, parts, chunk);
-            show(chunk);
+            on_set_up(chunk);
             chunk.bin(bands);
         });
         self.chunks = chunks;
@@ -345,48 +300,48 @@ impl RasterScene {
     ) {
         let DrawContext { camera, pose, view, in_view } = context;
         match part {
-            DrawPart::Terrain(of) => {
-                let kind = TriangleKind { material: GROUND, one_sided: false, sky: None };
-                let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
+            DrawPart::Terrain(triangles_of_piece) => {
+                let kind = TriangleKind { material: TERRAIN_MATERIAL, one_sided: false, sky: None };
+                let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[triangles_of_piece.clone()]);
                 for triangle in indices.chunks_exact(3) {
-                    let corner = |k: usize| &self.terrain[triangle[k] as usize];
-                    chunk.add(vectors, camera, [corner(0), corner(1), corner(2)], kind);
+                    let vertex = |k: usize| &self.terrain[triangle[k] as usize];
+                    chunk.add(vectors, camera, [vertex(0), vertex(1), vertex(2)], kind);
                 }
             }
-            DrawPart::Piece { batch, level, piece, places } => {
-                let model = &self.models[*batch];
+            DrawPart::Piece { batch, level, piece, placements } => {
+                let mesh_model = &self.meshes[*batch];
                 let material = *batch + 1;
                 let kind = TriangleKind {
                     material: material as u32,
-                    one_sided: model.one_sided,
+                    one_sided: mesh_model.one_sided,
                     sky: self.materials[material].sky,
                 };
-                let piece = &model.levels[*level][*piece];
-                for &place in &in_view[places.clone()] {
-                    let stands = &view.batches.placed[place as usize];
-                    match self.materials[material].has_extra {
-                        true => piece.draw_more(
+                let piece = &mesh_model.levels[*level][*piece];
+                for &placement in &in_view[placements.clone()] {
+                    let placed = &view.batches.placed[placement as usize];
+                    match self.materials[material].has_extra_attributes {
+                        true => piece.draw_with_extra(
                             vectors,
                             camera,
                             pose,
-                            stands,
-                            model.light,
+                            placed,
+                            mesh_model.light,
                             kind,
                             &mut scratch.1,
                             chunk,
                         ),
-                        false => piece.draw(vectors, camera, pose, stands, kind, &mut scratch.0, chunk),
+                        false => piece.draw(vectors, camera, pose, placed, kind, &mut scratch.0, chunk),
                     }
                 }
             }
         }
     }
 
-    /// Computes depth and colour of every pixel; with `is_overlay` only of pixels where something is nearer than
-    /// before.
+    /// Computes depth and colour of every pixel; with `is_overlay` only of pixels where something is nearer
+    /// than before.
     fn fill<P: SamplePattern>(
         &mut self,
-        places: P,
+        placements: P,
         camera: &Camera,
         plan: &FramePlan,
         chunks: usize,
@@ -403,19 +358,19 @@ impl RasterScene {
             pixel_step,
             is_overlay,
         };
-        let of_band = stride * BAND_ROWS;
+        let band_len = stride * BAND_ROWS;
         let bands = into
             .depth
-            .par_chunks_mut(of_band)
-            .zip(into.color.par_chunks_mut(CHANNELS * of_band))
-            .zip(self.visible.par_chunks_mut(of_band));
+            .par_chunks_mut(band_len)
+            .zip(into.color.par_chunks_mut(CHANNELS * band_len))
+            .zip(self.visible.par_chunks_mut(band_len));
         bands.enumerate().for_each(|(band, ((depth, color), visible))| {
             if !is_overlay {
                 depth.fill(0.0);
             }
             visible.fill(SKY);
             let band = Band { number: band, stride, depth, visible };
-            widest!(vectors => fill_band(vectors, places, &shader, band, color))
+            widest!(vectors => fill_band(vectors, placements, &shader, band, color))
         });
     }
 }
@@ -423,13 +378,13 @@ impl RasterScene {
 #[inline(always)]
 fn fill_band(
     vectors: impl Vectors,
-    places: impl SamplePattern,
+    placements: impl SamplePattern,
     shader: &Shader<'_>,
     mut band: Band<'_>,
     color: &mut [u16],
 ) {
     for (number, chunk) in (0..).zip(shader.chunks) {
-        band.draw(vectors, places, chunk, number, |_| true);
+        band.draw(vectors, placements, chunk, number, |_| true);
     }
     let width = shader.camera.size_px[0] as usize;
     let rows = band.visible.chunks_exact(band.stride).zip(color.chunks_exact_mut(CHANNELS * band.stride));
@@ -451,48 +406,50 @@ fn fill_band(
 /// Parts of the terrain, with their numbers of triangles.
 fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(DrawPart, usize)> {
     let count = terrain.map_or(0, |mesh| mesh.indices.len());
-    let step = 3 * TRIANGLES_A_CHUNK;
+    let step = 3 * TRIANGLES_PER_CHUNK;
     (0..count)
         .step_by(step)
         .map(|first| first..(first + step).min(count))
-        .map(|of| (DrawPart::Terrain(of.clone()), of.len() / 3))
+        .map(|triangles_of_piece| {
+            (DrawPart::Terrain(triangles_of_piece.clone()), triangles_of_piece.len() / 3)
+        })
         .collect()
 }
 
-/// Distributes parts to chunks in order: at most [`TRIANGLES_A_CHUNK`] triangles each, few chunks even for
+/// Distributes parts to chunks in order: at most [`TRIANGLES_PER_CHUNK`] triangles each, few chunks even for
 /// many different meshes, and terrain apart from meshes.
-fn jobs(parts: Vec<(DrawPart, usize)>) -> Vec<Vec<DrawPart>> {
-    let mut jobs: Vec<Vec<DrawPart>> = Vec::new();
-    let mut room = 0;
+fn chunk_parts(parts: Vec<(DrawPart, usize)>) -> Vec<Vec<DrawPart>> {
+    let mut chunk_parts: Vec<Vec<DrawPart>> = Vec::new();
+    let mut free_triangles = 0;
     for (part, triangles) in parts {
         let is_terrain = |part: &DrawPart| matches!(part, DrawPart::Terrain(_));
-        let is_alike =
+        let is_same_kind =
             |parts: &[DrawPart]| parts.first().is_some_and(|first| is_terrain(first) == is_terrain(&part));
-        match jobs.last_mut().filter(|parts| triangles <= room && is_alike(parts)) {
+        match chunk_parts.last_mut().filter(|parts| triangles <= free_triangles && is_same_kind(parts)) {
             Some(parts) => parts.push(part),
             None => {
-                jobs.push(vec![part]);
-                room = TRIANGLES_A_CHUNK;
+                chunk_parts.push(vec![part]);
+                free_triangles = TRIANGLES_PER_CHUNK;
             }
         }
-        room -= triangles.min(room);
+        free_triangles -= triangles.min(free_triangles);
     }
-    jobs
+    chunk_parts
 }
 
 fn material(batch: &Batch, texture: Arc<SurfaceTexture>) -> Material {
-    let tint = |corner: usize| {
+    let tint = |vertex: usize| {
         batch
             .shape
             .vertices
-            .get(corner)
+            .get(vertex)
             .map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]])
     };
     let first = tint(0);
-    let has_extra =
-        batch.light.is_some() || (0..batch.shape.vertices.len()).any(|corner| tint(corner) != first);
+    let has_extra_attributes =
+        batch.light.is_some() || (0..batch.shape.vertices.len()).any(|vertex| tint(vertex) != first);
     let sky = batch.light.map(|light| light.sky as f32);
-    Material { texture, tint: first, emissive: batch.material.emissive, has_extra, sky }
+    Material { texture, tint: first, emissive: batch.material.emissive, has_extra_attributes, sky }
 }
 
 /// Textures of the batches; those with the same image and wrap modes are shared.
@@ -500,12 +457,12 @@ fn material(batch: &Batch, texture: Arc<SurfaceTexture>) -> Material {
 struct TextureCache(HashMap<(*const Texture, [u8; 2]), Arc<SurfaceTexture>>);
 
 impl TextureCache {
-    fn of(&mut self, batch: &Batch) -> Arc<SurfaceTexture> {
-        let look = &batch.material;
-        let name = (Arc::as_ptr(&look.texture), look.wrap.map(|wrap| wrap as u8));
+    fn triangles_of_piece(&mut self, batch: &Batch) -> Arc<SurfaceTexture> {
+        let material = &batch.material;
+        let cache_key = (Arc::as_ptr(&material.texture), material.wrap.map(|wrap| wrap as u8));
         self.0
-            .entry(name)
-            .or_insert_with(|| Arc::new(SurfaceTexture::new(&look.texture, look.wrap, None)))
+            .entry(cache_key)
+            .or_insert_with(|| Arc::new(SurfaceTexture::new(&material.texture, material.wrap, None)))
             .clone()
     }
 }

@@ -35,7 +35,7 @@ pub use rays::LensMap;
 use source::LinePose;
 
 /// Rows per task.
-const ROWS_A_TASK: usize = 16;
+const ROWS_PER_TASK: usize = 16;
 
 /// Whether the vectorised passes are fast on this processor: it has fused multiply-add, and on x86-64 vectors
 /// of eight floats and half-float conversion.
@@ -124,13 +124,13 @@ impl Kernel {
         };
         let mut picture = vec![0.0; 4 * width * height];
         let mut truth = vec![Truth::default(); if has_truth { width * height } else { 0 }];
-        let rows = picture.par_chunks_mut(4 * width * ROWS_A_TASK).zip(0_u32..u32::MAX);
-        let of_task = |task: u32| task * ROWS_A_TASK as u32;
+        let rows = picture.par_chunks_mut(4 * width * ROWS_PER_TASK).zip(0_u32..u32::MAX);
+        let first_row = |task: u32| task * ROWS_PER_TASK as u32;
         match has_truth {
             true => rows
-                .zip(truth.par_chunks_mut(width * ROWS_A_TASK))
-                .for_each(|((rows, task), truth)| reads.rows(of_task(task), rows, truth)),
-            false => rows.for_each(|(rows, task)| reads.rows(of_task(task), rows, &mut [])),
+                .zip(truth.par_chunks_mut(width * ROWS_PER_TASK))
+                .for_each(|((rows, task), truth)| reads.rows(first_row(task), rows, truth)),
+            false => rows.for_each(|(rows, task)| reads.rows(first_row(task), rows, &mut [])),
         }
         (picture, has_truth.then_some(truth))
     }

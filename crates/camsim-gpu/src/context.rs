@@ -13,14 +13,14 @@ pub enum GpuError {
     /// No adapter found; holds the setting of `CAMSIM_ADAPTER`, in words.
     #[error(
         "no usable graphics adapter found{0}: install a Vulkan driver (on Debian or Ubuntu without a GPU: \
-         `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's name \
-         from `camsim info`"
+         `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's \
+         name from `camsim info`"
     )]
     NoAdapter(String),
     /// There are adapters, but none with this name.
     #[error(
-        "no adapter has `{wanted_name}` in its name (CAMSIM_ADAPTER): there is {available}; set CAMSIM_ADAPTER \
-         to part of one of these names, or not at all"
+        "no adapter has `{wanted_name}` in its name (CAMSIM_ADAPTER): there is {available}; set \
+         CAMSIM_ADAPTER to part of one of these names, or not at all"
     )]
     UnknownAdapter {
         /// Value of `CAMSIM_ADAPTER`.

@@ -293,8 +293,8 @@ impl IdealPass {
         Ok((base_key, supersampled_key))
     }
 
-    /// Uploads camera, terrain and placements of all key frames. Returns the number of terrain indices of each
-    /// key frame, and how many blended triangles are out of order.
+    /// Uploads camera, terrain and placements of all key frames. Returns the number of terrain indices of
+    /// each key frame, and how many blended triangles are out of order.
     fn upload_keys(
         &self,
         gpu: &GpuContext,

@@ -85,7 +85,8 @@ mod tests {
     }
 
     #[test]
-    fn structs_are_laid_out_as_in_the_shaders() {
+    fn struct_layouts_equal_those_of_the_shaders() {
+        // Long because: one line per field.
         let parse = |text: String| {
             naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)))
         };

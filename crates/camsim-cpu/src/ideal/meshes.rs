@@ -15,7 +15,7 @@ use crate::simd::vectors::Vectors;
 use camsim_core::scene::PlacedShape;
 
 /// Triangles per chunk.
-pub(super) const TRIANGLES_A_CHUNK: usize = 4096;
+pub(super) const TRIANGLES_PER_CHUNK: usize = 4096;
 
 /// Relative rounding error of the back-face test, and more.
 const ROUNDING: f32 = 1e-5;
@@ -27,7 +27,7 @@ const HEIGHT_LOST: f32 = 4.0;
 /// A part of the triangles of a level of detail.
 #[derive(Debug)]
 pub(super) struct Piece {
-    corners: Vec<MeshVertex>,
+    vertices: Vec<MeshVertex>,
     /// Vertex normals, if the mesh is illuminated.
     normals: Vec<[f32; 3]>,
     /// Three indices per triangle.
@@ -40,11 +40,11 @@ pub(super) struct Piece {
 #[derive(Debug, Default)]
 struct FacePlanes {
     normal: [Vec<f32>; 3],
-    along_m: Vec<f32>,
+    offset_m: Vec<f32>,
     /// 1 / (height over the longest side), 1/m.
     per_height: Vec<f32>,
     /// Largest distance of a vertex from the origin of the shape, metres.
-    reach_m: f32,
+    radius_m: f32,
 }
 
 /// Scratch buffers of a piece, reused for each placement.
@@ -54,7 +54,7 @@ pub(super) struct Scratch<const N: usize> {
     may_be_visible: Vec<bool>,
     /// Per vertex: whether a visible triangle uses it.
     is_used: Vec<bool>,
-    corners: Vec<Vertex<N>>,
+    vertices: Vec<Vertex<N>>,
 }
 
 impl Piece {
@@ -62,27 +62,27 @@ impl Piece {
     pub fn of_levels(shape: &Shape, levels: &ShapeLods) -> Vec<Vec<Self>> {
         let canonical = shape.canonical_vertices();
         let pieces = |indices: &[u32]| {
-            indices.chunks(3 * TRIANGLES_A_CHUNK).map(|some| Self::new(shape, &canonical, some)).collect()
+            indices.chunks(3 * TRIANGLES_PER_CHUNK).map(|some| Self::new(shape, &canonical, some)).collect()
         };
         levels.levels().iter().map(|level| pieces(&level.indices)).collect()
     }
 
     /// `canonical` is [`Shape::canonical_vertices`] of the shape.
     fn new(shape: &Shape, canonical: &[u32], indices: &[u32]) -> Self {
-        let mut used: Vec<u32> = indices.iter().map(|&corner| canonical[corner as usize]).collect();
+        let mut used: Vec<u32> = indices.iter().map(|&vertex| canonical[vertex as usize]).collect();
         used.sort_unstable();
         used.dedup();
         let camera_map =
-            |&corner: &u32| used.partition_point(|&used| used < canonical[corner as usize]) as u32;
+            |&vertex: &u32| used.partition_point(|&used| used < canonical[vertex as usize]) as u32;
         let normals = if shape.has_normals() {
-            used.iter().map(|&corner| shape.normals[corner as usize]).collect()
+            used.iter().map(|&vertex| shape.normals[vertex as usize]).collect()
         } else {
             Vec::new()
         };
-        let corners: Vec<MeshVertex> = used.iter().map(|&corner| shape.vertices[corner as usize]).collect();
+        let vertices: Vec<MeshVertex> = used.iter().map(|&vertex| shape.vertices[vertex as usize]).collect();
         let indices: Vec<u32> = indices.iter().map(camera_map).collect();
-        let face_planes = FacePlanes::new(&corners, &indices);
-        Self { corners, normals, indices, face_planes }
+        let face_planes = FacePlanes::new(&vertices, &indices);
+        Self { vertices, normals, indices, face_planes }
     }
 
     /// Number of triangles.
@@ -106,9 +106,9 @@ impl Piece {
         self.cull(camera, &camera_map, kind, scratch);
         // Loops here and below: closures of iterators may be compiled without the enabled vector
         // instructions.
-        for (k, corner) in self.corners.iter().enumerate() {
+        for (k, vertex) in self.vertices.iter().enumerate() {
             if scratch.is_used[k] {
-                scratch.corners[k] = camera.project(camera_map.in_camera_m(corner.position_m), corner.uv);
+                scratch.vertices[k] = camera.project(camera_map.in_camera_m(vertex.position_m), vertex.uv);
             }
         }
         self.add(vectors, camera, scratch, kind, chunk);
@@ -116,7 +116,7 @@ impl Piece {
 
     /// Adds the triangles of a placement with per-vertex tint and illumination.
     #[inline(always)]
-    pub fn draw_more(
+    pub fn draw_with_extra(
         &self,
         vectors: impl Vectors,
         camera: &Camera,
@@ -134,11 +134,11 @@ impl Piece {
             let normal = transformed_normal(&placement.ned_from_shape, Vec3::from(*normal).as_dvec3());
             [(light.sun * normal.dot(light.to_sun_ned)) as f32, normal.z as f32]
         };
-        for (k, corner) in self.corners.iter().enumerate() {
+        for (k, vertex) in self.vertices.iter().enumerate() {
             if scratch.is_used[k] {
-                let ([u, v], [r, g, b, _], [sun, down]) = (corner.uv, corner.tint, extra(k));
-                scratch.corners[k] =
-                    camera.project(camera_map.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down]);
+                let ([u, v], [r, g, b, _], [sun, down]) = (vertex.uv, vertex.tint, extra(k));
+                scratch.vertices[k] =
+                    camera.project(camera_map.in_camera_m(vertex.position_m), [u, v, r, g, b, sun, down]);
             }
         }
         self.add(vectors, camera, scratch, kind, chunk);
@@ -154,8 +154,8 @@ impl Piece {
         scratch: &mut Scratch<N>,
     ) {
         scratch.may_be_visible.resize(self.len(), true);
-        scratch.is_used.resize(self.corners.len(), true);
-        scratch.corners.resize(self.corners.len(), Vertex::UNPROJECTED);
+        scratch.is_used.resize(self.vertices.len(), true);
+        scratch.vertices.resize(self.vertices.len(), Vertex::UNPROJECTED);
         scratch.may_be_visible.fill(true);
         scratch.is_used.fill(!kind.one_sided);
         if kind.one_sided {
@@ -164,7 +164,7 @@ impl Piece {
                 self.indices.as_chunks::<3>().0.iter().zip(&scratch.may_be_visible)
             {
                 if *may_be_visible {
-                    triangle.iter().for_each(|&corner| scratch.is_used[corner as usize] = true);
+                    triangle.iter().for_each(|&vertex| scratch.is_used[vertex as usize] = true);
                 }
             }
         }
@@ -182,8 +182,8 @@ impl Piece {
         for (triangle, may_be_visible) in self.indices.as_chunks::<3>().0.iter().zip(&scratch.may_be_visible)
         {
             if *may_be_visible {
-                let corner = |k: usize| &scratch.corners[triangle[k] as usize];
-                chunk.add(vectors, camera, [corner(0), corner(1), corner(2)], kind);
+                let vertex = |k: usize| &scratch.vertices[triangle[k] as usize];
+                chunk.add(vectors, camera, [vertex(0), vertex(1), vertex(2)], kind);
             }
         }
     }
@@ -191,26 +191,27 @@ impl Piece {
 
 impl<const N: usize> Scratch<N> {
     pub const fn new() -> Self {
-        Self { may_be_visible: Vec::new(), is_used: Vec::new(), corners: Vec::new() }
+        Self { may_be_visible: Vec::new(), is_used: Vec::new(), vertices: Vec::new() }
     }
 }
 
 impl FacePlanes {
-    fn new(corners: &[MeshVertex], indices: &[u32]) -> Self {
+    fn new(vertices: &[MeshVertex], indices: &[u32]) -> Self {
         let mut face_planes = Self::default();
         for triangle in indices.as_chunks::<3>().0 {
-            let [a, b, c] = triangle.map(|corner| Vec3::from(corners[corner as usize].position_m).as_dvec3());
+            let [a, b, c] =
+                triangle.map(|vertex| Vec3::from(vertices[vertex as usize].position_m).as_dvec3());
             // A triangle without area has no height and stays; one with NaN draws nothing.
             let normal = (b - a).cross(c - a).normalize_or_zero();
             for (all, components) in face_planes.normal.iter_mut().zip(normal.as_vec3().to_array()) {
                 all.push(components);
             }
-            face_planes.along_m.push(normal.dot(a) as f32);
+            face_planes.offset_m.push(normal.dot(a) as f32);
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());
             face_planes.per_height.push((longest / (b - a).cross(c - a).length()) as f32);
         }
-        face_planes.reach_m =
-            corners.iter().map(|corner| Vec3::from(corner.position_m).length()).fold(0.0, f32::max);
+        face_planes.radius_m =
+            vertices.iter().map(|vertex| Vec3::from(vertex.position_m).length()).fold(0.0, f32::max);
         face_planes
     }
 
@@ -219,15 +220,15 @@ impl FacePlanes {
     ///
     /// A triangle of area `A` whose plane is `d` in front of the eye, in the axes of the shape, has at least
     /// the area `f^2 det A d / z_far^3` in the image, where `det` is that of the map to the camera's axes,
-    /// and sides of up to `f max_scale L s / z_near`: lengths grow by up to `max_scale`, and off-axis the image
-    /// stretches by up to `s`. Vertices that move by `e` change that area by up to half the sum of the sides
-    /// times `e`. So the visible side is certain from `d = 3 e s max_scale z_far^3 / (f det h z_near)`
+    /// and sides of up to `f max_scale L s / z_near`: lengths grow by up to `max_scale`, and off-axis the
+    /// image stretches by up to `s`. Vertices that move by `e` change that area by up to half the sum of the
+    /// sides times `e`. So the visible side is certain from `d = 3 e s max_scale z_far^3 / (f det h z_near)`
     /// ([`HEIGHT_LOST`] for 3), with the height `h`.
     #[inline(always)]
     fn cull_back_faces(&self, camera: &Camera, camera_map: &CameraMap, may_be_visible: &mut [bool]) {
         let [x, y, z] = camera_map.eye_m;
-        let rounding_m = ROUNDING * ((x * x + y * y + z * z).sqrt() + self.reach_m);
-        let certain_side_m2 = camera_map.certain_side_m2(camera, self.reach_m);
+        let rounding_m = ROUNDING * ((x * x + y * y + z * z).sqrt() + self.radius_m);
+        let certain_side_m2 = camera_map.certain_side_m2(camera, self.radius_m);
         if !certain_side_m2.is_finite() || !rounding_m.is_finite() {
             return;
         }
@@ -235,7 +236,7 @@ impl FacePlanes {
         let front = camera_map.determinant.signum();
         let [normal_x, normal_y, normal_z] = &self.normal;
         let face_planes =
-            normal_x.iter().zip(normal_y).zip(normal_z).zip(&self.along_m).zip(&self.per_height);
+            normal_x.iter().zip(normal_y).zip(normal_z).zip(&self.offset_m).zip(&self.per_height);
         for (((((nx, ny), nz), along), per_height), may_be_visible) in face_planes.zip(may_be_visible) {
             let before_m = front * nx.mul_add(x, ny.mul_add(y, nz.mul_add(z, -along)));
             let nearly_m = certain_side_m2.mul_add(*per_height, rounding_m);
@@ -274,13 +275,13 @@ impl CameraMap {
     }
 
     /// Distance of a triangle's plane from the eye, times its height, from which its visible side is certain,
-    /// in the axes of the shape, m². `reach_m` is the largest distance of a vertex from the origin. Infinite
+    /// in the axes of the shape, m². `radius_m` is the largest distance of a vertex from the origin. Infinite
     /// if part of the shape may be behind the camera or clipped, or if the map is singular.
-    fn certain_side_m2(&self, camera: &Camera, reach_m: f32) -> f32 {
+    fn certain_side_m2(&self, camera: &Camera, radius_m: f32) -> f32 {
         let [x, y, z] = self.from_camera_m;
-        let reach_m = self.max_scale * reach_m;
-        let (near_m, far_m) = (z - reach_m, z + reach_m);
-        let off_axis = ((x * x + y * y).sqrt() + reach_m) / near_m;
+        let radius_m = self.max_scale * radius_m;
+        let (near_m, far_m) = (z - radius_m, z + radius_m);
+        let off_axis = ((x * x + y * y).sqrt() + radius_m) / near_m;
         let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.principal_px);
         // Vertices are displaced by up to half a step of the subpixel grid, plus the single-precision
         // rounding of metres and pixels.
@@ -348,8 +349,8 @@ mod tests {
             let [x, y, z, turn] = random(seed, 10 * k);
             // Many are seen nearly edge-on: they are nearly upright.
             let flat = if turn > 0.0 { 1.0 } else { 0.02 };
-            for corner in 1..4 {
-                let [dx, dy, dz, _] = random(seed, 10 * k + corner);
+            for vertex in 1..4 {
+                let [dx, dy, dz, _] = random(seed, 10 * k + vertex);
                 let position =
                     [20.0 * x + size_m * flat * dx, 20.0 * y + size_m * flat * dy, 20.0 * z + size_m * dz];
                 shape.indices.push(shape.vertices.len() as u32);
@@ -376,8 +377,8 @@ mod tests {
         if all {
             chunk.clear();
             let camera_map = CameraMap::new(pose, &placement);
-            for (k, corner) in piece.corners.iter().enumerate() {
-                scratch.corners[k] = camera.project(camera_map.in_camera_m(corner.position_m), corner.uv);
+            for (k, vertex) in piece.vertices.iter().enumerate() {
+                scratch.vertices[k] = camera.project(camera_map.in_camera_m(vertex.position_m), vertex.uv);
             }
             scratch.may_be_visible.fill(true);
             piece.add(Baseline, camera, &scratch, kind, &mut chunk);
@@ -386,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_are_left_out_only_where_the_picture_shows_their_backs_whatever_rounding_does() {
+    fn culling_never_drops_a_front_face() {
         let mut culled_total = 0;
         for seed in 0..120 {
             let height_m = [15.0, 60.0, 400.0, 3000.0][seed as usize % 4];

@@ -10,13 +10,13 @@ use half::f16;
 use rayon::prelude::*;
 
 use super::{
-    CHANNELS, GROUND, RasterFrame,
+    CHANNELS, RasterFrame, TERRAIN_MATERIAL,
     rasterise::{self, Band, QuadCentres, ROW_PADDING, SKY},
     sampled_tiles::{BandTiles, SampledTiles, TILE_PX},
     shade::{Block, PixelPlanes, Shader},
     triangles::{BAND_ROWS, Chunk},
 };
-use crate::large_pages::Large;
+use crate::large_pages::LargeArray;
 use crate::simd::{
     lanes::{LANES, Lanes2, ZERO, per_lane},
     vectors::{Vectors, widest},
@@ -72,14 +72,14 @@ impl Multisample {
     }
 
     /// Adds the tiles of mesh triangles, which may be thinner than a pixel.
-    pub fn mark(&self, chunk: &Chunk) {
-        if !chunk.is_of_ground {
+    pub fn add_meshes(&self, chunk: &Chunk) {
+        if !chunk.is_terrain {
             self.tiles.add_triangles(&chunk.raster);
         }
     }
 
     /// Computes depth and colour of every pixel.
-    pub fn fill(&mut self, shader: &Shader<'_>, visible: &mut Large<u32>, into: &mut RasterFrame) {
+    pub fn fill(&mut self, shader: &Shader<'_>, visible: &mut LargeArray<u32>, into: &mut RasterFrame) {
         let stride = into.stride;
         let band_len = stride * PIXEL_ROWS;
         let bands = into.depth.par_chunks_mut(band_len).zip(visible.par_chunks_mut(band_len));
@@ -101,12 +101,12 @@ impl Multisample {
             // The tasks of this loop run on rayon's pool, one at a time per thread, so the lock is never
             // contended.
             let scratch_of_thread = thread_scratch.get(rayon::current_thread_index().unwrap_or_default());
-            let Some(mut band_samples) = scratch_of_thread.map(|of| of.lock().unwrap_or_else(PoisonError::into_inner))
-            else {
-                return;
-            };
+            let Some(scratch) = scratch_of_thread else { return };
+            let mut band_samples = scratch.lock().unwrap_or_else(PoisonError::into_inner);
             let tiles = tiles.band(number);
-            widest!(vectors => band_samples.fill(vectors, shader, number, tiles, stride, depth, visible, color))
+            widest!(vectors => {
+                band_samples.fill(vectors, shader, number, tiles, stride, depth, visible, color);
+            })
         });
     }
 }
@@ -114,7 +114,7 @@ impl Multisample {
 /// Draws the terrain at pixel centres; where meshes are, the samples determine everything.
 #[inline(always)]
 fn draw_centres(vectors: impl Vectors, shader: &Shader<'_>, band: &mut Band<'_>) {
-    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.is_of_ground) {
+    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.is_terrain) {
         band.draw(vectors, QuadCentres, chunk, number, |_| true);
     }
 }
@@ -150,9 +150,9 @@ impl BandSamples {
             for (block, ((depth, visible), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
                 let column = block * LANES;
                 let y = ((number * PIXEL_ROWS + row) * SAMPLES_PER_SIDE) as f32 + 0.5;
-                let places =
+                let positions =
                     Lanes2 { x: per_lane(|i| (SAMPLES_PER_SIDE * (column + i)) as f32 + 0.5), y: [y; LANES] };
-                let mut block = Block { visible: *visible, places };
+                let mut block = Block { visible: *visible, positions };
                 for tile in
                     (0..LANES / TILE_PX).filter(|tile| tiles.contains(column / TILE_PX + tile, row / TILE_PX))
                 {
@@ -184,17 +184,17 @@ impl BandSamples {
         self.stride = SAMPLES_PER_SIDE * width.next_multiple_of(LANES) + ROW_PADDING;
         self.depth.resize(self.stride * BAND_ROWS, 0.0);
         self.visible.resize(self.stride * BAND_ROWS, SKY);
-        let of_tile = TILE_PX * SAMPLES_PER_SIDE;
+        let tile_samples = TILE_PX * SAMPLES_PER_SIDE;
         // Up to the end of the blocks: tiles beside a step at the frame's border are in the set too.
         let columns = width.next_multiple_of(LANES) / TILE_PX;
         for (row, column) in
             (0..PIXEL_ROWS / TILE_PX).flat_map(|row| (0..columns).map(move |column| (row, column)))
         {
             if tiles.contains(column, row) {
-                for row in row * of_tile..(row + 1) * of_tile {
-                    let first = row * self.stride + column * of_tile;
-                    self.depth[first..first + of_tile].fill(0.0);
-                    self.visible[first..first + of_tile].fill(SKY);
+                for row in row * tile_samples..(row + 1) * tile_samples {
+                    let first = row * self.stride + column * tile_samples;
+                    self.depth[first..first + tile_samples].fill(0.0);
+                    self.visible[first..first + tile_samples].fill(SKY);
                 }
             }
         }
@@ -202,8 +202,8 @@ impl BandSamples {
             Band { number, stride: self.stride, depth: &mut self.depth, visible: &mut self.visible };
         for (number, chunk) in (0..).zip(shader.chunks) {
             // Tiles with mesh triangles are in the set.
-            band.draw(vectors, rasterise::SamplePositions, chunk, number, |cover| {
-                !chunk.is_of_ground || tiles.has(cover)
+            band.draw(vectors, rasterise::SamplePositions, chunk, number, |triangle| {
+                !chunk.is_terrain || tiles.has(triangle)
             });
         }
     }
@@ -243,7 +243,7 @@ impl BandSamples {
                 block.visible[i] = majority;
             } else {
                 block.visible[i] = SKY;
-                self.add(shader, column + i, [block.places.x[i], block.places.y[i]], &visible);
+                self.add(shader, column + i, [block.positions.x[i], block.positions.y[i]], &visible);
             }
         }
     }
@@ -254,21 +254,21 @@ impl BandSamples {
         let [r, g, b, _] = shader.camera.uniforms.sky;
         let pixel = self.mixed_pixels.len();
         let mut sky = 0.0;
-        for (k, &of) in visible.iter().enumerate() {
-            if of == SKY {
+        for (k, &id) in visible.iter().enumerate() {
+            if id == SKY {
                 sky += 0.25;
-            } else if !visible[..k].contains(&of) {
+            } else if !visible[..k].contains(&id) {
                 let (mut count, mut offset_sum) = (0.0, [0.0; 2]);
-                for (place, _) in SAMPLE_POSITIONS.iter().zip(visible).filter(|(_, other)| **other == of) {
+                for (place, _) in SAMPLE_POSITIONS.iter().zip(visible).filter(|(_, other)| **other == id) {
                     count += 1.0;
                     offset_sum = [offset_sum[0] + place.x as f32, offset_sum[1] + place.y as f32];
                 }
                 let scale = SAMPLES_PER_SIDE as f32 / count;
                 let centroid_px = [scale.mul_add(offset_sum[0], x), scale.mul_add(offset_sum[1], y)];
-                self.parts.push(PixelPart { pixel, visible: of, centroid_px, weight: 0.25 * count });
+                self.parts.push(PixelPart { pixel, visible: id, centroid_px, weight: 0.25 * count });
             }
         }
-        self.mixed_pixels.push((column, [r, g, b, 1.0].map(|of| sky * of)));
+        self.mixed_pixels.push((column, [r, g, b, 1.0].map(|channel| sky * channel)));
     }
 
     /// Shades the parts of a row and writes the pixels that show several surfaces.
@@ -281,10 +281,10 @@ impl BandSamples {
         color: &mut [u16],
     ) {
         for parts in self.parts.chunks(LANES) {
-            let mut block = Block { visible: [SKY; LANES], places: Lanes2 { x: ZERO, y: ZERO } };
+            let mut block = Block { visible: [SKY; LANES], positions: Lanes2 { x: ZERO, y: ZERO } };
             for (i, part) in parts.iter().enumerate() {
                 block.visible[i] = part.visible;
-                [block.places.x[i], block.places.y[i]] = part.centroid_px;
+                [block.positions.x[i], block.positions.y[i]] = part.centroid_px;
             }
             let colors = shader.colors(vectors, &block, planes);
             for (part, color) in parts.iter().zip(&colors) {
@@ -310,25 +310,24 @@ impl BandSamples {
 }
 
 /// Resolves a frame whose samples were drawn as pixels.
-pub(super) fn resolve_samples(band_samples: &RasterFrame, size_px: [u32; 2], into: &mut RasterFrame) {
+pub(super) fn resolve_samples(samples: &RasterFrame, size_px: [u32; 2], into: &mut RasterFrame) {
     let [width, height] = size_px.map(|side| side as usize);
     let stride = into.stride;
     let rows =
         into.depth.par_chunks_mut(stride).zip(into.color.par_chunks_mut(CHANNELS * stride)).take(height);
     rows.enumerate().for_each(|(row, (depth, color))| {
         for column in 0..width {
-            let centroid_px = |k: usize| {
-                (SAMPLES_PER_SIDE * row + k / SAMPLES_PER_SIDE) * band_samples.stride
+            let sample_index = |k: usize| {
+                (SAMPLES_PER_SIDE * row + k / SAMPLES_PER_SIDE) * samples.stride
                     + SAMPLES_PER_SIDE * column
                     + k % SAMPLES_PER_SIDE
             };
-            depth[column] = resolve_depth([0, 1, 2, 3].map(|k| band_samples.depth[centroid_px(k)]), [0.0; 2]);
+            depth[column] = resolve_depth([0, 1, 2, 3].map(|k| samples.depth[sample_index(k)]), [0.0; 2]);
             for channel in 0..CHANNELS {
-                let of = |k: usize| {
-                    f16::from_bits(band_samples.color[CHANNELS * centroid_px(k) + channel]).to_f32()
-                };
+                let value =
+                    |k: usize| f16::from_bits(samples.color[CHANNELS * sample_index(k) + channel]).to_f32();
                 color[CHANNELS * column + channel] =
-                    f16::from_f32(0.25 * ((of(0) + of(3)) + (of(1) + of(2)))).to_bits();
+                    f16::from_f32(0.25 * ((value(0) + value(3)) + (value(1) + value(2)))).to_bits();
             }
         }
     });
@@ -337,10 +336,10 @@ pub(super) fn resolve_samples(band_samples: &RasterFrame, size_px: [u32; 2], int
 /// Whether all samples show terrain without a depth step.
 #[inline(always)]
 fn is_terrain(shader: &Shader<'_>, visible: &PerSample<u32>, depths: &PerSample<f32>) -> bool {
-    let [least, majority] = depths
+    let [least, most] = depths
         .iter()
-        .fold([f32::INFINITY, 0.0_f32], |[least, majority], &of| [least.min(of), majority.max(of)]);
-    least >= (1.0 - STEP) * majority && visible.iter().all(|&of| shader.surface(of).material == GROUND)
+        .fold([f32::INFINITY, 0.0_f32], |[least, most], &depth| [least.min(depth), most.max(depth)]);
+    least >= (1.0 - STEP) * most && visible.iter().all(|&id| shader.surface(id).material == TERRAIN_MATERIAL)
 }
 
 /// The triangle of most samples, or the first of several with as many.

@@ -3,7 +3,7 @@
 
 use camsim_plan::PrefilterTaps;
 
-use super::texture::{MipTexels, NO_SUMS, Sums, colors as sums_of};
+use super::texture::{MipImage, NO_SUMS, Sums, colors as sums_of};
 use crate::simd::{
     lanes::{LANES, Lanes, ZERO, fast_max, fast_min, per_lane},
     vectors::Vectors,
@@ -85,9 +85,9 @@ fn mip_level_for(cell: f32) -> [f32; 2] {
 
 /// Filtered colours of the active pixels.
 #[inline(always)]
-pub(super) fn colors(
+pub(super) fn filtered_colors(
     vectors: impl Vectors,
-    texture: &MipTexels,
+    texture: &MipImage,
     taps: PrefilterTaps,
     tex_coords: &TexCoords,
     is_active: &[bool; LANES],
@@ -133,7 +133,7 @@ pub(super) fn colors(
 #[inline(always)]
 fn add_pair(
     vectors: impl Vectors,
-    texture: &MipTexels,
+    texture: &MipImage,
     tex_coords: &TexCoords,
     footprints: &Footprints,
     [long, short]: [&Lanes; 2],
@@ -156,7 +156,7 @@ fn add_pair(
 #[inline(always)]
 fn add_four(
     vectors: impl Vectors,
-    texture: &MipTexels,
+    texture: &MipImage,
     tex_coords: &TexCoords,
     footprints: &Footprints,
     is_active: &[bool; LANES],
@@ -196,7 +196,7 @@ fn mip_variance(level: f32) -> f32 {
 #[inline(always)]
 fn add_grid(
     vectors: impl Vectors,
-    texture: &MipTexels,
+    texture: &MipImage,
     tex_coords: &TexCoords,
     footprints: &Footprints,
     is_active: &[bool; LANES],
@@ -267,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fog_lets_through_what_the_exponential_says() {
+    fn fog_transmittance_equals_the_exponential() {
         for (density, step_m) in [(2e-4_f32, 0.37_f32), (0.01, 3.1), (1.0, 0.9)] {
             for block in 0..400 {
                 let length = per_lane(|i| step_m * (block * LANES + i) as f32);

@@ -138,11 +138,11 @@ fn add_row_steps([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
             down[1].copy_from_slice(&below[first..first + LANES]);
         } else {
             // The border pixels are repeated beyond the frame.
-            let at = |row: &[f32], x: usize| row[x.min(width - 1)];
-            across = std::array::from_fn(|i| at(here, (first + i).saturating_sub(1)));
+            let clamped_value = |row: &[f32], x: usize| row[x.min(width - 1)];
+            across = std::array::from_fn(|i| clamped_value(here, (first + i).saturating_sub(1)));
             down = [
-                std::array::from_fn(|i| at(above, first + i)),
-                std::array::from_fn(|i| at(below, first + i)),
+                std::array::from_fn(|i| clamped_value(above, first + i)),
+                std::array::from_fn(|i| clamped_value(below, first + i)),
             ];
         }
         let mut bits_found = 0;
@@ -197,7 +197,7 @@ mod tests {
     use camsim_core::noise::pcg4d;
 
     use super::*;
-    use crate::large_pages::Large;
+    use crate::large_pages::LargeArray;
 
     /// Tiles with a step inside or beside them, by the definition.
     fn marked(depth: &[f32], stride: usize, [width, height]: [usize; 2]) -> Vec<[usize; 2]> {
@@ -223,13 +223,13 @@ mod tests {
     }
 
     #[test]
-    fn tiles_with_steps_in_them_or_beside_them_are_marked() {
+    fn tiles_with_depth_steps_inside_or_beside_are_in_the_set() {
         for (size_px, step) in
             [([100, 70], 7919), ([513, 40], 12_289), ([64, 9], 31), ([1105, 33], 24_593), ([2, 2], 1)]
         {
             let [width, height] = size_px;
             let stride = width + 9;
-            let mut depth: Large<f32> = Large::zeros(stride * height);
+            let mut depth: LargeArray<f32> = LargeArray::zeros(stride * height);
             // A slope with occluders here and there.
             for (i, clamped) in depth.iter_mut().enumerate() {
                 *clamped = 0.01 + 1e-5 * (i % stride) as f32;

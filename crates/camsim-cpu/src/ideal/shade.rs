@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc};
 use camsim_plan::PrefilterTaps;
 
 use super::{
-    prefilter::{Colors, TexCoords, colors, fog_transmittance},
+    prefilter::{Colors, TexCoords, filtered_colors, fog_transmittance},
     rasterise::{CHUNK_BITS, SKY},
     texture::SurfaceTexture,
     triangles::{Chunk, FLAT, Plane, SMALL, Surface, TriangleKind},
@@ -24,7 +24,7 @@ pub(super) struct Material {
     pub tint: [f32; 3],
     pub emissive: [f32; 3],
     /// Whether triangles have their own tint or illumination.
-    pub has_extra: bool,
+    pub has_extra_attributes: bool,
     /// Strength of the sky's light, if the surface is illuminated.
     pub sky: Option<f32>,
 }
@@ -65,7 +65,7 @@ pub(super) struct PixelPlanes {
     /// Texture coordinates times near / z.
     uv: [Padded<f32>; 2],
     /// Derivatives along x and y of both texture coordinates and of near / z.
-    changes: [[Padded<f32>; 2]; 3],
+    derivatives: [[Padded<f32>; 2]; 3],
 }
 
 impl PixelPlanes {
@@ -75,7 +75,7 @@ impl PixelPlanes {
             material: [SKY; LANES + RUN_LANES],
             inverse_depth: zero,
             uv: [zero; 2],
-            changes: [[zero; 2]; 3],
+            derivatives: [[zero; 2]; 3],
         }
     }
 
@@ -83,25 +83,25 @@ impl PixelPlanes {
     /// between them. It also writes to the padding after the run.
     #[inline(always)]
     fn write(&mut self, surface: &Surface, [x, y]: [f32; 2], step: f32, pixels: Range<usize>) {
-        let Surface { first: [left, top], u, v, inverse_depth, .. } = surface;
-        let down_px = y - top;
-        let offsets = [
-            u[2].mul_add(down_px, u[0]),
-            v[2].mul_add(down_px, v[0]),
-            inverse_depth[2].mul_add(down_px, inverse_depth[0]),
+        let Surface { first: [remaining, top], u, v, inverse_depth, .. } = surface;
+        let dy_px = y - top;
+        let row_start = [
+            u[2].mul_add(dy_px, u[0]),
+            v[2].mul_add(dy_px, v[0]),
+            inverse_depth[2].mul_add(dy_px, inverse_depth[0]),
         ];
         let mut first = pixels.start;
         while first < pixels.end {
-            let from_px = step.mul_add((first - pixels.start) as f32, x - left);
+            let x0_px = step.mul_add((first - pixels.start) as f32, x - remaining);
             for i in 0..RUN_LANES {
-                let across_px = step.mul_add(i as f32, from_px);
+                let dx_px = step.mul_add(i as f32, x0_px);
                 self.material[first + i] = surface.material;
-                self.inverse_depth[first + i] = inverse_depth[1].mul_add(across_px, offsets[2]);
-                self.uv[0][first + i] = u[1].mul_add(across_px, offsets[0]);
-                self.uv[1][first + i] = v[1].mul_add(across_px, offsets[1]);
-                (self.changes[0][0][first + i], self.changes[0][1][first + i]) = (u[1], u[2]);
-                (self.changes[1][0][first + i], self.changes[1][1][first + i]) = (v[1], v[2]);
-                (self.changes[2][0][first + i], self.changes[2][1][first + i]) =
+                self.inverse_depth[first + i] = inverse_depth[1].mul_add(dx_px, row_start[2]);
+                self.uv[0][first + i] = u[1].mul_add(dx_px, row_start[0]);
+                self.uv[1][first + i] = v[1].mul_add(dx_px, row_start[1]);
+                (self.derivatives[0][0][first + i], self.derivatives[0][1][first + i]) = (u[1], u[2]);
+                (self.derivatives[1][0][first + i], self.derivatives[1][1][first + i]) = (v[1], v[2]);
+                (self.derivatives[2][0][first + i], self.derivatives[2][1][first + i]) =
                     (inverse_depth[1], inverse_depth[2]);
             }
             first += RUN_LANES;
@@ -114,16 +114,16 @@ impl PixelPlanes {
         &mut self,
         [inverse_depth, u, v]: &[[f64; 3]; 3],
         first_px: [f32; 2],
-        places: &Lanes2,
+        positions: &Lanes2,
         pixels: Range<usize>,
     ) {
         for i in pixels {
-            let [across_px, down_px] =
-                [f64::from(places.x[i] - first_px[0]), f64::from(places.y[i] - first_px[1])];
-            let at = |plane: &[f64; 3]| plane[0] + plane[1] * across_px + plane[2] * down_px;
-            self.inverse_depth[i] = at(inverse_depth) as f32;
-            let times = f64::from(self.inverse_depth[i]) / at(inverse_depth);
-            (self.uv[0][i], self.uv[1][i]) = ((at(u) * times) as f32, (at(v) * times) as f32);
+            let [dx_px, dy_px] =
+                [f64::from(positions.x[i] - first_px[0]), f64::from(positions.y[i] - first_px[1])];
+            let value_of = |plane: &[f64; 3]| plane[0] + plane[1] * dx_px + plane[2] * dy_px;
+            self.inverse_depth[i] = value_of(inverse_depth) as f32;
+            let scale = f64::from(self.inverse_depth[i]) / value_of(inverse_depth);
+            (self.uv[0][i], self.uv[1][i]) = ((value_of(u) * scale) as f32, (value_of(v) * scale) as f32);
         }
     }
 }
@@ -133,7 +133,7 @@ pub(super) struct Block {
     /// Visible triangle of each pixel; [`SKY`] for pixels that are not shaded.
     pub visible: [u32; LANES],
     /// Position of each pixel, in pixels of the triangle grid.
-    pub places: Lanes2,
+    pub positions: Lanes2,
 }
 
 /// Surface attributes of a block.
@@ -171,8 +171,8 @@ impl Shader<'_> {
         if is_empty && self.is_overlay {
             return;
         }
-        let places = Lanes2 { x: per_lane(|i| (x + i) as f32), y: [y as f32; LANES] };
-        let colors = self.colors(vectors, &Block { visible: *visible, places }, planes);
+        let positions = Lanes2 { x: per_lane(|i| (x + i) as f32), y: [y as f32; LANES] };
+        let colors = self.colors(vectors, &Block { visible: *visible, positions }, planes);
         let pairs = out.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
         for (pair, (out, pixels)) in pairs.enumerate() {
             let halves = vectors.halves_from_floats(*pixels);
@@ -195,12 +195,12 @@ impl Shader<'_> {
         let mut colors = [[r, g, b, 1.0]; LANES];
         if block.visible.iter().any(|&visible| visible != SKY) {
             let attributes = self.attributes(block, planes);
-            let mut left = attributes.material;
-            while let Some(&material) = left.iter().find(|&&material| material != SKY) {
+            let mut remaining = attributes.material;
+            while let Some(&material) = remaining.iter().find(|&&material| material != SKY) {
                 let mut is_active = [false; LANES];
                 for i in 0..LANES {
                     is_active[i] = attributes.material[i] == material;
-                    left[i] = if is_active[i] { SKY } else { left[i] };
+                    remaining[i] = if is_active[i] { SKY } else { remaining[i] };
                 }
                 self.material(
                     vectors,
@@ -217,46 +217,46 @@ impl Shader<'_> {
     }
 
     #[inline(always)]
-    fn attributes(&self, Block { visible, places }: &Block, planes: &mut PixelPlanes) -> BlockAttributes {
+    fn attributes(&self, Block { visible, positions }: &Block, planes: &mut PixelPlanes) -> BlockAttributes {
         // Neighbouring pixels mostly show the same triangle. Values written beyond the end of a run are
         // overwritten by the next one.
         const { assert!(LANES == u32::BITS as usize) };
         let step = self.pixel_step;
-        let mut offsets = 0_u32;
+        let mut run_starts = 0_u32;
         for i in 1..LANES {
-            let goes_on = (visible[i] == visible[i - 1])
-                & (places.x[i] - places.x[i - 1] == step)
-                & (places.y[i] == places.y[i - 1]);
-            offsets |= u32::from(!goes_on) << i;
+            let continues_run = (visible[i] == visible[i - 1])
+                & (positions.x[i] - positions.x[i - 1] == step)
+                & (positions.y[i] == positions.y[i - 1]);
+            run_starts |= u32::from(!continues_run) << i;
         }
         let mut begin = 0;
         while begin < LANES {
-            let end = offsets.trailing_zeros() as usize;
-            offsets &= offsets.wrapping_sub(1);
+            let end = run_starts.trailing_zeros() as usize;
+            run_starts &= run_starts.wrapping_sub(1);
             let surface = self.surface(visible[begin]);
-            planes.write(surface, [places.x[begin], places.y[begin]], step, begin..end);
+            planes.write(surface, [positions.x[begin], positions.y[begin]], step, begin..end);
             if surface.large != SMALL {
                 let large = &self.chunk(visible[begin]).large[surface.large as usize];
-                planes.write_large_triangle(large, surface.first, places, begin..end);
+                planes.write_large_triangle(large, surface.first, positions, begin..end);
             }
             begin = end;
         }
         let PixelPlanes {
-            material: all,
+            material: run_material,
             inverse_depth,
             uv: [u, v],
-            changes: [[u_across, u_down], [v_across, v_down], [inverse_across, inverse_down]],
+            derivatives: [[u_across, u_down], [v_across, v_down], [inverse_across, inverse_down]],
         } = planes;
         let mut material = [SKY; LANES];
-        material.copy_from_slice(&all[..LANES]);
+        material.copy_from_slice(&run_material[..LANES]);
         // Without a surface the value does not matter.
         let z = per_lane(|i| 1.0 / if inverse_depth[i] > 0.0 { inverse_depth[i] } else { 1.0 });
         let (u, v) = (per_lane(|i| u[i] * z[i]), per_lane(|i| v[i] * z[i]));
-        let change = |place: &Lanes, of: &Padded<f32>, inverse_depth: &Padded<f32>| {
-            per_lane(|i| step * (of[i] - place[i] * inverse_depth[i]) * z[i])
+        let derivative = |coordinate: &Lanes, slope: &Padded<f32>, inverse_depth: &Padded<f32>| {
+            per_lane(|i| step * (slope[i] - coordinate[i] * inverse_depth[i]) * z[i])
         };
-        let across = [change(&u, u_across, inverse_across), change(&v, v_across, inverse_across)];
-        let down = [change(&u, u_down, inverse_down), change(&v, v_down, inverse_down)];
+        let across = [derivative(&u, u_across, inverse_across), derivative(&v, v_across, inverse_across)];
+        let down = [derivative(&u, u_down, inverse_down), derivative(&v, v_down, inverse_down)];
         BlockAttributes { material, coordinates: TexCoords { uv: [u, v], across, down }, z }
     }
 
@@ -268,60 +268,63 @@ impl Shader<'_> {
         block: &Block,
         attributes: &BlockAttributes,
         is_active: &[bool; LANES],
-        into: &mut Colors,
+        colors: &mut Colors,
     ) {
-        let read = match &*material.texture {
+        let texture_colors = match &*material.texture {
             SurfaceTexture::Uniform(color) => [*color; LANES],
-            SurfaceTexture::MipTexels(texels) => {
-                colors(vectors, texels, self.taps, &attributes.coordinates, is_active)
+            SurfaceTexture::MipImage(texels) => {
+                filtered_colors(vectors, texels, self.taps, &attributes.coordinates, is_active)
             }
         };
         for i in 0..LANES {
             if !is_active[i] {
                 continue;
             }
-            let tint = if material.has_extra {
+            let tint = if material.has_extra_attributes {
                 self.tint(material, block, i, attributes.z[i])
             } else {
                 material.tint
             };
             for k in 0..3 {
-                into[i][k] = read[i][k].mul_add(tint[k], material.emissive[k]);
+                colors[i][k] = texture_colors[i][k].mul_add(tint[k], material.emissive[k]);
             }
         }
     }
 
     /// Tint of a triangle with its own tint, times its illumination.
     #[inline(always)]
-    fn tint(&self, material: &Material, Block { visible, places }: &Block, i: usize, z: f32) -> [f32; 3] {
+    fn tint(&self, material: &Material, Block { visible, positions }: &Block, i: usize, z: f32) -> [f32; 3] {
         let surface = self.surface(visible[i]);
         let chunk = self.chunk(visible[i]);
         if surface.extra & FLAT != 0 {
             return chunk.flat_tints[(surface.extra & !FLAT) as usize];
         }
         let [r, g, b, sun, down] = &chunk.extra[surface.extra as usize];
-        let offset_px = [places.x[i] - surface.first[0], places.y[i] - surface.first[1]];
-        let of = |plane: &Plane| at(*plane, offset_px) * z;
-        TriangleKind::lit(material.sky, [of(r), of(g), of(b), of(sun), of(down)])
+        let offset_px = [positions.x[i] - surface.first[0], positions.y[i] - surface.first[1]];
+        let attribute = |plane: &Plane| at(*plane, offset_px) * z;
+        TriangleKind::illuminated(
+            material.sky,
+            [attribute(r), attribute(g), attribute(b), attribute(sun), attribute(down)],
+        )
     }
 
     /// Applies fog. Twin of shaders/ideal/fog. Pixels without a surface have the colour of the sky, which fog
     /// does not change.
     #[inline(always)]
-    fn fog(&self, Block { places, .. }: &Block, attributes: &BlockAttributes, colors: &mut Colors) {
+    fn fog(&self, Block { positions, .. }: &Block, attributes: &BlockAttributes, colors: &mut Colors) {
         let Camera { uniforms, focal_px, principal_px, .. } = self.camera;
         let [r, g, b, density] = uniforms.sky;
         let sky = [r, g, b];
         if density > 0.0 {
             let length = per_lane(|i| {
-                let u = (places.x[i] - principal_px[0]) / focal_px[0];
-                let v = (places.y[i] - principal_px[1]) / focal_px[1];
+                let u = (positions.x[i] - principal_px[0]) / focal_px[0];
+                let v = (positions.y[i] - principal_px[1]) / focal_px[1];
                 uniforms.near_m * attributes.z[i] * (u * u + v * v + 1.0).sqrt()
             });
-            let share = fog_transmittance(density, &length);
+            let transmittance = fog_transmittance(density, &length);
             for i in 0..LANES {
                 for k in 0..3 {
-                    colors[i][k] = share[i].mul_add(colors[i][k] - sky[k], sky[k]);
+                    colors[i][k] = transmittance[i].mul_add(colors[i][k] - sky[k], sky[k]);
                 }
             }
         }

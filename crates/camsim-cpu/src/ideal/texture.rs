@@ -2,7 +2,7 @@
 
 use camsim_core::scene::{TexelForm, Texture, Wrap};
 
-use crate::large_pages::Large;
+use crate::large_pages::LargeArray;
 use crate::simd::{
     lanes::{LANES, Lanes, clamp_to, fast_min, per_lane, to_index},
     vectors::Vectors,
@@ -19,14 +19,14 @@ pub(super) enum SurfaceTexture {
     /// One colour, as exact as its bytes.
     Uniform([f32; CHANNELS]),
     /// An image.
-    MipTexels(Box<MipTexels>),
+    MipImage(Box<MipImage>),
 }
 
 /// An image and its mip levels, finest first, row by row. Each row and each level is padded by the texel or
 /// row that follows it.
 #[derive(Debug)]
-pub(super) struct MipTexels {
-    values: Large<u16>,
+pub(super) struct MipImage {
+    values: LargeArray<u16>,
     /// Index of each level's first half float.
     offsets: [u32; MAX_LEVELS],
     strides: [u32; MAX_LEVELS],
@@ -45,7 +45,7 @@ impl SurfaceTexture {
     pub fn new(texture: &Texture, wrap: [Wrap; 2], border: Option<[u8; 4]>) -> Self {
         match texture.size_px {
             [1, 1] => Self::Uniform(texture.linear_at([0, 0])),
-            _ => Self::MipTexels(Box::new(MipTexels::new(
+            _ => Self::MipImage(Box::new(MipImage::new(
                 texture,
                 wrap.map(|wrap| wrap == Wrap::Repeat),
                 border,
@@ -54,10 +54,10 @@ impl SurfaceTexture {
     }
 }
 
-impl MipTexels {
+impl MipImage {
     fn new(texture: &Texture, repeats: [bool; 2], border: Option<[u8; 4]>) -> Self {
         let mut texels = Self {
-            values: Large::default(),
+            values: LargeArray::default(),
             offsets: [0; MAX_LEVELS],
             strides: [0; MAX_LEVELS],
             widths: [1.0; MAX_LEVELS],
@@ -150,8 +150,8 @@ impl MipTexels {
             }
         }
         let halves = &*self.values;
-        let (x, across) = along(u, &width, self.repeats[0]);
-        let (y, down) = along(v, &height, self.repeats[1]);
+        let (x, across) = texel_and_weight(u, &width, self.repeats[0]);
+        let (y, down) = texel_and_weight(v, &height, self.repeats[1]);
         let mut first = [0; LANES];
         for i in 0..LANES {
             first[i] = begin[i] + to_index(y[i]) * stride[i] + CHANNELS as u32 * to_index(x[i]);
@@ -161,10 +161,10 @@ impl MipTexels {
                 continue;
             }
             let (first, span) = (first[i] as usize, stride[i] as usize + 2 * CHANNELS);
-            let of = halves
+            let rows = halves
                 .get(first..first + span)
                 .and_then(|halves| Some((*halves.first_chunk()?, *halves.last_chunk()?)));
-            let Some((top, bottom)) = of else { continue };
+            let Some((top, bottom)) = rows else { continue };
             let (top, bottom) = (vectors.floats_from_halves(top), vectors.floats_from_halves(bottom));
             for k in 0..2 * CHANNELS {
                 let between = down[i].mul_add(bottom[k] - top[k], top[k]);
@@ -183,7 +183,7 @@ fn padded_len([width, height]: [u32; 2]) -> usize {
 
 /// Texel before a position along an axis, and interpolation weight.
 #[inline(always)]
-fn along(coordinate: &Lanes, size: &Lanes, repeats: bool) -> (Lanes, Lanes) {
+fn texel_and_weight(coordinate: &Lanes, size: &Lanes, repeats: bool) -> (Lanes, Lanes) {
     let mut position = per_lane(|i| coordinate[i] * size[i] - 0.5);
     if repeats {
         position = per_lane(|i| clamp_to(position[i] - (position[i] / size[i]).floor() * size[i], size[i]));

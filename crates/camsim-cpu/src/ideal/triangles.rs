@@ -1,7 +1,7 @@
 //! Triangle setup: coverage, and attributes as planes over the image.
 
 use super::{
-    GROUND,
+    TERRAIN_MATERIAL,
     rasterise::{self, PixelCentres, SMALL_PX, SamplePositions},
     vertices::{Camera, SUBPIXEL_BITS, SUBPIXELS, Vertex},
 };
@@ -76,7 +76,7 @@ pub(super) struct TriangleKind {
 impl TriangleKind {
     /// Tint times illumination, from the [`EXTRA_ATTRIBUTES`] attributes. Twin of shaders/ideal/light.wgsl.
     #[inline(always)]
-    pub fn lit(sky: Option<f32>, [r, g, b, sun, down]: [f32; EXTRA_ATTRIBUTES]) -> [f32; 3] {
+    pub fn illuminated(sky: Option<f32>, [r, g, b, sun, down]: [f32; EXTRA_ATTRIBUTES]) -> [f32; 3] {
         let Some(sky) = sky else { return [r, g, b] };
         let light = fast_min(fast_max(fast_max(sun, 0.0) + sky * 0.5 * (1.0 - down), 0.0), 1.0);
         [r * light, g * light, b * light]
@@ -87,7 +87,7 @@ impl TriangleKind {
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
     /// Whether they belong to the terrain, not to meshes.
-    pub is_of_ground: bool,
+    pub is_terrain: bool,
     pub raster: Vec<RasterTriangle>,
     pub surfaces: Vec<Surface>,
     /// Planes of large triangles in double precision, near / z and texture coordinates: towards a horizon
@@ -151,13 +151,13 @@ impl Chunk {
         &mut self,
         vectors: impl Vectors,
         camera: &Camera,
-        corners: [&Vertex<N>; 3],
+        vertices: [&Vertex<N>; 3],
         kind: TriangleKind,
     ) {
-        if corners.iter().all(|corner| corner.is_inside) {
-            return self.set_up(vectors, camera, corners, kind);
+        if vertices.iter().all(|vertex| vertex.is_inside) {
+            return self.set_up(vectors, camera, vertices, kind);
         }
-        self.add_clipped(vectors, camera, corners, kind);
+        self.add_clipped(vectors, camera, vertices, kind);
     }
 
     #[cold]
@@ -165,13 +165,13 @@ impl Chunk {
         &mut self,
         vectors: impl Vectors,
         camera: &Camera,
-        corners: [&Vertex<N>; 3],
+        vertices: [&Vertex<N>; 3],
         kind: TriangleKind,
     ) {
-        if corners.iter().all(|corner| corner.in_camera_m[2] < camera.uniforms.near_m) {
+        if vertices.iter().all(|vertex| vertex.in_camera_m[2] < camera.uniforms.near_m) {
             return;
         }
-        let polygon = camera.clip(corners);
+        let polygon = camera.clip(vertices);
         for pair in polygon.windows(2).skip(1) {
             self.set_up(vectors, camera, [&polygon[0], &pair[0], &pair[1]], kind);
         }
@@ -182,10 +182,11 @@ impl Chunk {
         &mut self,
         vectors: impl Vectors,
         camera: &Camera,
-        corners: [&Vertex<N>; 3],
+        vertices: [&Vertex<N>; 3],
         kind: TriangleKind,
     ) {
-        let [a, b, c] = corners;
+        // Long because: one straight computation in the hot path, whose parts share most of their values.
+        let [a, b, c] = vertices;
         let [ax, ay, bx, by, cx, cy] =
             [a.snapped[0], a.snapped[1], b.snapped[0], b.snapped[1], c.snapped[0], c.snapped[1]];
         let (min_x, max_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
@@ -205,11 +206,11 @@ impl Chunk {
         }
         let (is_front, b, c) = if area2 < 0 { (true, c, b) } else { (false, b, c) };
         let from = [first[0] << SUBPIXEL_BITS, first[1] << SUBPIXEL_BITS];
-        let relative = |corner: &Vertex<N>| [corner.snapped[0] - from[0], corner.snapped[1] - from[1]];
+        let relative = |vertex: &Vertex<N>| [vertex.snapped[0] - from[0], vertex.snapped[1] - from[1]];
         let snapped = [relative(a), relative(b), relative(c)];
         let fits_32_bits = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
         let is_small = fits_32_bits(snapped[0]) & fits_32_bits(snapped[1]) & fits_32_bits(snapped[2]);
-        if kind.material != GROUND
+        if kind.material != TERRAIN_MATERIAL
             && is_small
             && area2.abs() < SMALLER_STEPS2
             && !covers_any_position(vectors, camera, snapped, first, last)
@@ -219,31 +220,31 @@ impl Chunk {
         // Coverage follows the snapped vertices, but attributes follow the exact ones: half a step of the
         // subpixel grid matters towards a horizon. Not for thin triangles, where attributes would extrapolate
         // far beyond the values at the vertices.
-        let reach = |to: &Vertex<N>| {
+        let manhattan = |to: &Vertex<N>| {
             i64::from((to.snapped[0] - a.snapped[0]).abs() + (to.snapped[1] - a.snapped[1]).abs())
         };
-        let is_thin = area2.abs() < THIN_STEPS * (reach(b) + reach(c));
+        let is_thin = area2.abs() < THIN_STEPS * (manhattan(b) + manhattan(c));
         const PX: f32 = 1.0 / SUBPIXELS as f32;
         let first_px = [first[0] as f32, first[1] as f32];
-        let [px, b_px, c_px] = match is_thin {
+        let [a_px, b_px, c_px] = match is_thin {
             true => snapped.map(|[x, y]| [x as f32 * PX, y as f32 * PX]),
             false => [a, b, c]
-                .map(|corner| [corner.position_px[0] - first_px[0], corner.position_px[1] - first_px[1]]),
+                .map(|vertex| [vertex.position_px[0] - first_px[0], vertex.position_px[1] - first_px[1]]),
         };
         let large = if is_small {
             SMALL
         } else {
             self.add_large(camera, [a, b, c], is_thin.then_some(&snapped), first_px)
         };
-        let (to_b, to_c) = ([b_px[0] - px[0], b_px[1] - px[1]], [c_px[0] - px[0], c_px[1] - px[1]]);
+        let (to_b, to_c) = ([b_px[0] - a_px[0], b_px[1] - a_px[1]], [c_px[0] - a_px[0], c_px[1] - a_px[1]]);
         let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
-        let plane = |of_a: f32, of_b: f32, of_c: f32| -> Plane {
-            let (of_b, of_c) = (of_b - of_a, of_c - of_a);
-            let across = (of_b * to_c[1] - of_c * to_b[1]) * per_area;
-            let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
-            [of_a - across * px[0] - down * px[1], across, down]
+        let plane = |value_a: f32, value_b: f32, value_c: f32| -> Plane {
+            let (value_b, value_c) = (value_b - value_a, value_c - value_a);
+            let across = (value_b * to_c[1] - value_c * to_b[1]) * per_area;
+            let down = (value_c * to_b[0] - value_b * to_c[0]) * per_area;
+            [value_a - across * a_px[0] - down * a_px[1], across, down]
         };
-        let times_inverse = |k: usize| {
+        let over_z = |k: usize| {
             plane(
                 a.attributes[k] * a.inverse_depth,
                 b.attributes[k] * b.inverse_depth,
@@ -252,17 +253,14 @@ impl Chunk {
         };
         let inverse_depth = plane(a.inverse_depth, b.inverse_depth, c.inverse_depth);
         let [first, last] = [[first[0] as u16, first[1] as u16], [last[0] as u16, last[1] as u16]];
-        let extra = if N == 2 + EXTRA_ATTRIBUTES {
-            self.add_extra([a, b, c], kind.sky, is_front, times_inverse)
-        } else {
-            0
-        };
+        let extra =
+            if N == 2 + EXTRA_ATTRIBUTES { self.add_extra([a, b, c], kind.sky, is_front, over_z) } else { 0 };
         self.raster.push(RasterTriangle { first, last, snapped, inverse_depth, large });
         self.surfaces.push(Surface {
             first: [f32::from(first[0]), f32::from(first[1])],
             material: kind.material,
-            u: times_inverse(0),
-            v: times_inverse(1),
+            u: over_z(0),
+            v: over_z(1),
             inverse_depth,
             extra,
             large,
@@ -273,19 +271,19 @@ impl Chunk {
     #[inline(always)]
     fn add_extra<const N: usize>(
         &mut self,
-        corners: [&Vertex<N>; 3],
+        vertices: [&Vertex<N>; 3],
         sky: Option<f32>,
         is_front: bool,
         plane: impl Fn(usize) -> Plane,
     ) -> u32 {
         // The back side has the opposite normal.
         let sign = if is_front { 1.0 } else { -1.0 };
-        let [a, b, c] = corners;
+        let [a, b, c] = vertices;
         if a.attributes[2..] == b.attributes[2..] && a.attributes[2..] == c.attributes[2..] {
-            let bands_of = |k: usize| if k < 3 { a.attributes[2 + k] } else { sign * a.attributes[2 + k] };
-            self.flat_tints.push(TriangleKind::lit(
+            let attribute = |k: usize| if k < 3 { a.attributes[2 + k] } else { sign * a.attributes[2 + k] };
+            self.flat_tints.push(TriangleKind::illuminated(
                 sky,
-                [bands_of(0), bands_of(1), bands_of(2), bands_of(3), bands_of(4)],
+                [attribute(0), attribute(1), attribute(2), attribute(3), attribute(4)],
             ));
             return FLAT | (self.flat_tints.len() as u32 - 1);
         }
@@ -303,36 +301,36 @@ impl Chunk {
     fn add_large<const N: usize>(
         &mut self,
         camera: &Camera,
-        corners: [&Vertex<N>; 3],
-        on_grid: Option<&[[i32; 2]; 3]>,
+        vertices: [&Vertex<N>; 3],
+        snapped: Option<&[[i32; 2]; 3]>,
         first_px: [f32; 2],
     ) -> u32 {
-        let [px, b, c] = match on_grid {
+        let [a_px, b, c] = match snapped {
             Some(snapped) => {
-                snapped.map(|snapped| snapped.map(|snapped| f64::from(snapped) / f64::from(SUBPIXELS)))
+                snapped.map(|vertex| vertex.map(|steps| f64::from(steps) / f64::from(SUBPIXELS)))
             }
-            None => corners.map(|corner| {
-                let [x, y] = camera.exact_position_px(corner);
+            None => vertices.map(|vertex| {
+                let [x, y] = camera.exact_position_px(vertex);
                 [x - f64::from(first_px[0]), y - f64::from(first_px[1])]
             }),
         };
-        let [to_b, to_c] = [b, c].map(|to| [to[0] - px[0], to[1] - px[1]]);
+        let [to_b, to_c] = [b, c].map(|to| [to[0] - a_px[0], to[1] - a_px[1]]);
         let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
-        let plane = |bands_of: [f64; 3]| {
-            let (of_b, of_c) = (bands_of[1] - bands_of[0], bands_of[2] - bands_of[0]);
-            let across = (of_b * to_c[1] - of_c * to_b[1]) * per_area;
-            let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
-            [bands_of[0] - across * px[0] - down * px[1], across, down]
+        let plane = |values: [f64; 3]| {
+            let (value_b, value_c) = (values[1] - values[0], values[2] - values[0]);
+            let across = (value_b * to_c[1] - value_c * to_b[1]) * per_area;
+            let down = (value_c * to_b[0] - value_b * to_c[0]) * per_area;
+            [values[0] - across * a_px[0] - down * a_px[1], across, down]
         };
         let inverse_depth =
-            corners.map(|corner| f64::from(camera.uniforms.near_m) / f64::from(corner.in_camera_m[2]));
-        let times_inverse = |k: usize| {
+            vertices.map(|vertex| f64::from(camera.uniforms.near_m) / f64::from(vertex.in_camera_m[2]));
+        let over_z = |k: usize| {
             plane(
                 [0, 1, 2]
-                    .map(|corner: usize| f64::from(corners[corner].attributes[k]) * inverse_depth[corner]),
+                    .map(|vertex: usize| f64::from(vertices[vertex].attributes[k]) * inverse_depth[vertex]),
             )
         };
-        self.large.push([plane(inverse_depth), times_inverse(0), times_inverse(1)]);
+        self.large.push([plane(inverse_depth), over_z(0), over_z(1)]);
         self.large.len() as u32 - 1
     }
 }

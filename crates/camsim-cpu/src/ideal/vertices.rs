@@ -94,22 +94,27 @@ impl Camera {
 
     /// Position in the image, pixels, in double precision: far outside of the image [`Vertex::position_px`]
     /// has few digits.
-    pub fn exact_position_px<const N: usize>(&self, corner: &Vertex<N>) -> [f64; 2] {
-        let [x, y, z] = corner.in_camera_m.map(f64::from);
-        let along =
+    pub fn exact_position_px<const N: usize>(&self, vertex: &Vertex<N>) -> [f64; 2] {
+        let [x, y, z] = vertex.in_camera_m.map(f64::from);
+        let coordinate =
             |side: f64, k: usize| side / z * f64::from(self.focal_px[k]) + f64::from(self.principal_px[k]);
-        [along(x, 0), along(y, 1)]
+        [coordinate(x, 0), coordinate(y, 1)]
     }
 
     /// Transforms a position relative to the base, metres, as `key_camera_from_base` of
     /// shaders/ideal/camera.wgsl.
     #[inline(always)]
     pub fn in_camera_m(&self, from_base_m: [f32; 3]) -> [f32; 3] {
-        let of = &self.uniforms;
-        let from = &of.camera_from_base_m;
-        let d = [from_base_m[0] - from[0], from_base_m[1] - from[1], from_base_m[2] - from[2]];
-        let along = |row: &[f32; 4]| row[0].mul_add(d[0], row[1].mul_add(d[1], row[2] * d[2]));
-        [along(&of.camera_from_ned_x), along(&of.camera_from_ned_y), along(&of.camera_from_ned_z)]
+        let uniforms = &self.uniforms;
+        let from = &uniforms.camera_from_base_m;
+        let offset_m = [from_base_m[0] - from[0], from_base_m[1] - from[1], from_base_m[2] - from[2]];
+        let coordinate =
+            |row: &[f32; 4]| row[0].mul_add(offset_m[0], row[1].mul_add(offset_m[1], row[2] * offset_m[2]));
+        [
+            coordinate(&uniforms.camera_from_ned_x),
+            coordinate(&uniforms.camera_from_ned_y),
+            coordinate(&uniforms.camera_from_ned_z),
+        ]
     }
 
     /// Signed distances from the clipping planes; positive is inside.
@@ -130,16 +135,25 @@ impl Camera {
         let mut polygon: Vec<Vertex<N>> = triangle.into_iter().copied().collect();
         for plane in 0..5 {
             let mut clipped = Vec::with_capacity(polygon.len() + 1);
-            for (k, corner) in polygon.iter().enumerate() {
+            for (k, vertex) in polygon.iter().enumerate() {
                 let next = &polygon[(k + 1) % polygon.len()];
-                let [here, there] = [corner, next].map(|corner| self.distances(corner.in_camera_m)[plane]);
-                if here >= 0.0 {
-                    clipped.push(*corner);
+                let [inside_distance, outside_distance] =
+                    [vertex, next].map(|vertex| self.distances(vertex.in_camera_m)[plane]);
+                if inside_distance >= 0.0 {
+                    clipped.push(*vertex);
                 }
                 // Always from inside to outside: two triangles that share the edge get the same point.
-                match (here >= 0.0, there >= 0.0) {
-                    (true, false) => clipped.push(self.clip_point(corner, next, here / (here - there))),
-                    (false, true) => clipped.push(self.clip_point(next, corner, there / (there - here))),
+                match (inside_distance >= 0.0, outside_distance >= 0.0) {
+                    (true, false) => clipped.push(self.clip_point(
+                        vertex,
+                        next,
+                        inside_distance / (inside_distance - outside_distance),
+                    )),
+                    (false, true) => clipped.push(self.clip_point(
+                        next,
+                        vertex,
+                        outside_distance / (outside_distance - inside_distance),
+                    )),
                     _ => {}
                 }
             }
@@ -148,7 +162,7 @@ impl Camera {
                 break;
             }
         }
-        polygon.retain(|corner| corner.is_inside);
+        polygon.retain(|vertex| vertex.is_inside);
         polygon
     }
 

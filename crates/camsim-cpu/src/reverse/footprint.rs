@@ -278,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_of_every_grid_come_in_their_order_over_and_over() {
+    fn taps_of_every_grid_follow_their_order_cyclically() {
         let grid_taps = GridTaps::new();
         // The number of taps follows from the side in ideal pixels; lanes share a grid, or have one each.
         let side = |length: &dyn Fn(usize) -> u32| per_lane(|i| length(i) as f32 + 0.05);
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn areas_and_splines_are_their_twins() {
+    fn areas_and_splines_equal_their_twins() {
         use camsim_core::temporal::{Footprint as Twin, Kernel, TapStage};
         use glam::DVec2;
         let grid_taps = GridTaps::new();

@@ -130,9 +130,9 @@ impl Stages<'_> {
         let mut nodes = Nodes::new(self, uv, poses, blur.depths);
         let mut source = nodes.next(0, &poses[0]);
         let mut inside = source.inside;
-        let mut taken = ZERO;
+        let mut samples_taken = ZERO;
         let mut at_phase_px = Lanes2::ZERO;
-        let gone = (self.frame.coords_phase + 0.5).clamp(0.0, 1.0) * segments as f32;
+        let segment_position = (self.frame.coords_phase + 0.5).clamp(0.0, 1.0) * segments as f32;
         for segment in 0..segments {
             let steps = blur.path.steps() as usize;
             let curve = BlockCurve::new(
@@ -146,11 +146,11 @@ impl Stages<'_> {
             inside = per_lane(|i| inside[i] * curve.inside[i]);
             let samples = self.samples(&curve.length_px, &at_least);
             let count = per_lane(|i| samples[i] * inside[i] * wanted[i]);
-            self.add_mean(vectors, &curve, &count, area, &taken, &mut sum);
-            taken = per_lane(|i| taken[i] + samples[i]);
+            self.add_mean(vectors, &curve, &count, area, &samples_taken, &mut sum);
+            samples_taken = per_lane(|i| samples_taken[i] + samples[i]);
             source = curve.end;
-            if self.frame_of_truth.is_some() && segment == (gone as u32).min(segments - 1) {
-                at_phase_px = curve.along(&[(gone - segment as f32) * steps as f32; LANES]);
+            if self.frame_of_truth.is_some() && segment == (segment_position as u32).min(segments - 1) {
+                at_phase_px = curve.along(&[(segment_position - segment as f32) * steps as f32; LANES]);
             }
         }
         if self.frame_of_truth.is_some() && self.frame.coords_phase == 0.0 {
@@ -165,15 +165,15 @@ impl Stages<'_> {
     /// Number of samples for a path of this length.
     #[inline(always)]
     fn samples(&self, length_px: &Lanes, at_least: &Lanes) -> Lanes {
-        let (per_px, most) = (self.frame.samples_per_px, self.frame.max_samples as f32);
+        let (per_px, max_count) = (self.frame.samples_per_px, self.frame.max_samples as f32);
         per_lane(|i| {
             let wanted = (per_px * length_px[i]).min(length_px[i] + 16.0).ceil();
-            let capped = if wanted < most { wanted } else { most };
+            let capped = if wanted < max_count { wanted } else { max_count };
             if capped > at_least[i] { capped } else { at_least[i] }
         })
     }
 
-    /// Adds the mean of `count` samples along a curve; `taken` samples precede them.
+    /// Adds the mean of `count` samples along a curve; `samples_taken` samples precede them.
     #[inline(always)]
     fn add_mean(
         &self,
@@ -181,23 +181,23 @@ impl Stages<'_> {
         curve: &BlockCurve,
         count: &Lanes,
         area: &Footprint<'_>,
-        taken: &Lanes,
+        samples_taken: &Lanes,
         sum: &mut [[f32; 4]; LANES],
     ) {
         let steps = curve.path.steps() as f32;
         let share = per_lane(|i| 1.0 / count[i].max(1.0));
-        let most = count.iter().fold(0.0, |most: f32, &count| most.max(count));
-        let mut of_curve = [[0.0; 8]; LANES];
+        let max_count = count.iter().fold(0.0, |max_count: f32, &count| max_count.max(count));
+        let mut curve_sum = [[0.0; 8]; LANES];
         let mut sample = 0.0;
-        while sample < most {
+        while sample < max_count {
             let step = per_lane(|i| steps * share[i] * (sample + 0.5));
-            let tap = per_lane(|i| taken[i] + sample);
-            self.add_sample(vectors, &curve.along(&step), area, &tap, |i| count[i] > sample, &mut of_curve);
+            let tap = per_lane(|i| samples_taken[i] + sample);
+            self.add_sample(vectors, &curve.along(&step), area, &tap, |i| count[i] > sample, &mut curve_sum);
             sample += 1.0;
         }
         for i in 0..LANES {
             for k in 0..4 {
-                sum[i][k] += (of_curve[i][k] + of_curve[i][k + 4]) * share[i];
+                sum[i][k] += (curve_sum[i][k] + curve_sum[i][k + 4]) * share[i];
             }
         }
     }

@@ -51,17 +51,17 @@ struct TexelNeighbourhoods {
 #[inline(always)]
 fn texel_neighbourhoods(frame: &FrameUniforms, position_px: &Lanes2, stride: u32) -> TexelNeighbourhoods {
     let last = frame.ideal_size_px.map(|size| (size - 1) as f32);
-    let at = Lanes2 {
+    let clamped = Lanes2 {
         x: per_lane(|i| clamp_to(position_px.x[i], last[0])),
         y: per_lane(|i| clamp_to(position_px.y[i], last[1])),
     };
-    let x = per_lane(|i| clamp_to(at.x[i].floor(), last[0] - 1.0));
-    let y = per_lane(|i| clamp_to(at.y[i].floor(), last[1] - 1.0));
+    let x = per_lane(|i| clamp_to(clamped.x[i].floor(), last[0] - 1.0));
+    let y = per_lane(|i| clamp_to(clamped.y[i].floor(), last[1] - 1.0));
     let mut first = [0; LANES];
     for i in 0..LANES {
         first[i] = to_index(y[i]) * stride + to_index(x[i]);
     }
-    TexelNeighbourhoods { first, t: at.minus(&Lanes2 { x, y }) }
+    TexelNeighbourhoods { first, t: clamped.minus(&Lanes2 { x, y }) }
 }
 
 impl IdealTexels<'_> {
@@ -197,15 +197,15 @@ impl IdealTexels<'_> {
         let share = per_lane(|i| 1.0 / (sides_px.x[i] * sides_px.y[i]));
         let [right, bottom] =
             [(0, COLUMNS), (1, ROWS)].map(|(k, texels)| frame.ideal_size_px[k] as f32 - texels as f32);
-        let mut is_within = true;
+        let mut is_inside_frame = true;
         for i in 0..LANES {
             let is_inside = (columns.first[i] >= 0.0)
                 & (columns.first[i] <= right)
                 & (rows.first[i] >= 0.0)
                 & (rows.first[i] <= bottom);
-            is_within &= !is_taken(i) | is_inside;
+            is_inside_frame &= !is_taken(i) | is_inside;
         }
-        if !is_within {
+        if !is_inside_frame {
             return self.add_pairs(vectors, frame, &columns, &rows, &share, is_taken, sum);
         }
         let stride = CHANNELS * self.color_stride as usize;
@@ -219,12 +219,12 @@ impl IdealTexels<'_> {
                 continue;
             };
             for pair in 0..COLUMNS / 2 {
-                let mut of_pair = [0.0; 2 * CHANNELS];
+                let mut pair_sum = [0.0; 2 * CHANNELS];
                 for row in 0..ROWS {
-                    let numbers =
-                        vectors.floats_from_halves(pair_at(texels, row * stride + 2 * CHANNELS * pair));
+                    let texels_of_row =
+                        vectors.floats_from_halves(texel_pair(texels, row * stride + 2 * CHANNELS * pair));
                     for k in 0..2 * CHANNELS {
-                        of_pair[k] = rows.weights[row][i].mul_add(numbers[k], of_pair[k]);
+                        pair_sum[k] = rows.weights[row][i].mul_add(texels_of_row[k], pair_sum[k]);
                     }
                 }
                 for k in 0..2 * CHANNELS {
@@ -235,7 +235,7 @@ impl IdealTexels<'_> {
                         } else {
                             columns.weights[2 * pair + 1][i]
                         };
-                    sum[i][k] = weight.mul_add(of_pair[k], sum[i][k]);
+                    sum[i][k] = weight.mul_add(pair_sum[k], sum[i][k]);
                 }
             }
         }
@@ -282,12 +282,12 @@ impl IdealTexels<'_> {
     ) {
         let BlockSpline { base, columns, rows } = spline;
         let [right, bottom] = frame.ideal_size_px.map(|size| size as f32 - 3.0);
-        let mut is_within = true;
+        let mut is_inside_frame = true;
         for i in 0..LANES {
-            is_within &= !is_taken(i)
+            is_inside_frame &= !is_taken(i)
                 | ((base.x[i] >= 1.0) & (base.x[i] <= right) & (base.y[i] >= 1.0) & (base.y[i] <= bottom));
         }
-        if !is_within {
+        if !is_inside_frame {
             // Beyond the frame the border texels are repeated: bilinear reads clamp.
             for read in SPLINE_READS {
                 let (position_px, weight) = spline.read(read);
@@ -304,7 +304,7 @@ impl IdealTexels<'_> {
                 (to_index(base.y[i]) - 1) as usize * stride + CHANNELS * (to_index(base.x[i]) - 1) as usize;
             let Some(texels) = self.color.get(first..first + 3 * stride + 4 * CHANNELS) else { continue };
             let pair = |row: usize, column: usize| {
-                vectors.floats_from_halves(pair_at(texels, row * stride + CHANNELS * column))
+                vectors.floats_from_halves(texel_pair(texels, row * stride + CHANNELS * column))
             };
             let middle = [pair(0, 1), pair(3, 1)];
             let (left, right) = ([pair(1, 0), pair(2, 0)], [pair(1, 2), pair(2, 2)]);
@@ -314,9 +314,9 @@ impl IdealTexels<'_> {
                 let of =
                     |column: usize| if k < CHANNELS { columns[column][i] } else { columns[column + 1][i] };
                 let outer = w3.mul_add(middle[1][k], w0 * middle[0][k]);
-                let of_left = w2.mul_add(left[1][k], w1 * left[0][k]);
-                let of_right = w2.mul_add(right[1][k], w1 * right[0][k]);
-                sum[i][k] += of(2).mul_add(of_right, of(0).mul_add(of_left, of(1) * outer));
+                let left_sum = w2.mul_add(left[1][k], w1 * left[0][k]);
+                let right_sum = w2.mul_add(right[1][k], w1 * right[0][k]);
+                sum[i][k] += of(2).mul_add(right_sum, of(0).mul_add(left_sum, of(1) * outer));
             }
         }
     }
@@ -356,135 +356,23 @@ impl<const TEXELS: usize> TexelSpan<TEXELS> {
 
 /// Two adjacent texels.
 #[inline(always)]
-fn pair_at(values: &[u16], at: usize) -> [u16; 2 * CHANNELS] {
-    values.get(at..).and_then(|values| values.first_chunk()).copied().unwrap_or_default()
+fn texel_pair(values: &[u16], clamped: usize) -> [u16; 2 * CHANNELS] {
+    values.get(clamped..).and_then(|values| values.first_chunk()).copied().unwrap_or_default()
 }
 
 /// The first and last `N` of `span` values from an index; zeros beyond the end, which no position within the
 /// frame reaches.
 #[inline(always)]
-fn first_and_last<T: Copy + Default, const N: usize>(values: &[T], at: usize, span: usize) -> [[T; N]; 2] {
-    let of =
-        values.get(at..at + span).and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
+fn first_and_last<T: Copy + Default, const N: usize>(
+    values: &[T],
+    clamped: usize,
+    span: usize,
+) -> [[T; N]; 2] {
+    let of = values
+        .get(clamped..clamped + span)
+        .and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
     of.unwrap_or([[T::default(); N]; 2])
 }
 
 #[cfg(test)]
-mod tests {
-    use bytemuck::Zeroable;
-    use camsim_core::temporal::ColorImage;
-    use glam::{DVec2, DVec3};
-
-    use super::*;
-    use crate::simd::vectors::widest;
-
-    #[test]
-    fn splines_are_the_five_reads_that_they_stand_for() {
-        let (width, height, stride) = (70, 45, 75);
-        let value = |i: usize| half::f16::from_f32((i as f32 * 0.618_034).fract() + 0.1).to_bits();
-        let color: Vec<u16> = (0..CHANNELS * stride * height).map(value).collect();
-        let ideal = IdealTexels { color: &color, color_stride: stride as u32, depth: &[], depth_stride: 0 };
-        let frame = FrameUniforms { ideal_size_px: [width, height as u32], ..Zeroable::zeroed() };
-        let part = |i: usize, step: f32| (i as f32 * step).fract();
-        let (mut inside_count, mut outside_count) = (0, 0);
-        for block in 0..400 {
-            // Positions inside and outside of the frame.
-            let place = |i: usize| block * LANES + i;
-            let position_px = Lanes2 {
-                x: per_lane(|i| {
-                    if block.is_multiple_of(2) {
-                        1.0 + 66.9 * part(place(i), 0.754_878)
-                    } else {
-                        -4.0 + 78.0 * part(place(i), 0.754_878)
-                    }
-                }),
-                y: per_lane(|i| {
-                    if block.is_multiple_of(2) {
-                        1.0 + 41.9 * part(place(i), 0.569_84)
-                    } else {
-                        -4.0 + 53.0 * part(place(i), 0.569_84)
-                    }
-                }),
-            };
-            let softness = Lanes2 {
-                x: per_lane(|i| part(place(i), 0.324_718)),
-                y: per_lane(|i| part(place(i), 0.220_744)),
-            };
-            let spline = BlockSpline::texel_neighbourhoods(&position_px, &softness);
-            let is_taken = |i: usize| !(block + i).is_multiple_of(7);
-            let (mut found, mut exact) = ([[0.0; 8]; LANES], [[0.0; 8]; LANES]);
-            widest!(vectors => {
-                ideal.add_spline(vectors, &frame, &spline, is_taken, &mut found);
-                for read in SPLINE_READS {
-                    let (position_px, weight) = spline.read(read);
-                    ideal.add_color(vectors, &frame, &position_px, is_taken, |i| weight[i], &mut exact);
-                }
-            });
-            for i in 0..LANES {
-                for k in 0..CHANNELS {
-                    let [found, exact] = [found[i], exact[i]].map(|of| of[k] + of[k + CHANNELS]);
-                    // Some twenty roundings of numbers of about 1.
-                    assert!((found - exact).abs() < 2e-6, "{block} {i} {k}: {found} {exact}");
-                    assert_eq!(found == 0.0, !is_taken(i));
-                }
-            }
-            let is_within = (0..LANES).all(|i| {
-                position_px.x[i] >= 1.0
-                    && position_px.x[i] < 68.0
-                    && position_px.y[i] >= 1.0
-                    && position_px.y[i] < 43.0
-            });
-            (inside_count, outside_count) =
-                if is_within { (inside_count + 1, outside_count) } else { (inside_count, outside_count + 1) };
-        }
-        assert!(inside_count >= 200 && outside_count >= 100, "{inside_count} {outside_count}");
-    }
-
-    #[test]
-    fn areas_have_the_means_of_their_twin_within_the_frame_and_beyond_it() {
-        let (width, height, stride) = (70, 45, 75);
-        let number = |i: usize| half::f16::from_f32((i as f32 * 0.618_034).fract());
-        let color: Vec<u16> = (0..CHANNELS * stride * height).map(|i| number(i).to_bits()).collect();
-        let ideal = IdealTexels { color: &color, color_stride: stride as u32, depth: &[], depth_stride: 0 };
-        let frame = FrameUniforms { ideal_size_px: [width, height as u32], ..Zeroable::zeroed() };
-        let of_row = |y: usize| {
-            (CHANNELS * stride * y..CHANNELS * (stride * y + width as usize)).map(|i| number(i).to_f32())
-        };
-        let rgba: Vec<f32> = (0..height).flat_map(of_row).collect();
-        let twin = ColorImage { size_px: frame.ideal_size_px, rgba: &rgba };
-        let part = |i: usize, step: f32| (i as f32 * step).fract();
-        // One to six texels along each axis; pixels of a block alike, or each with sides of its own.
-        for (block, most) in (0..600).flat_map(|block| [1.0, 1.9, 2.9, 3.9, 5.0].map(|most| (block, most))) {
-            let place = |i: usize| block * LANES + i;
-            let is_within = !block.is_multiple_of(3);
-            let at = |i: usize, step: f32, size: f32| {
-                if is_within {
-                    4.0 + (size - 9.0) * part(place(i), step)
-                } else {
-                    -6.0 + (size + 12.0) * part(place(i), step)
-                }
-            };
-            let position_px =
-                Lanes2 { x: per_lane(|i| at(i, 0.754_878, 70.0)), y: per_lane(|i| at(i, 0.569_84, 45.0)) };
-            let side = |i: usize, step: f32| {
-                1.0 + (most - 1.0)
-                    * if block.is_multiple_of(2) { part(block, step) } else { part(place(i), step) }
-            };
-            let sides_px =
-                Lanes2 { x: per_lane(|i| side(i, 0.324_718)), y: per_lane(|i| side(i, 0.220_744)) };
-            let is_taken = |i: usize| !(block + i).is_multiple_of(7);
-            let mut found = [[0.0; 8]; LANES];
-            widest!(vectors => ideal.add_area(vectors, &frame, &position_px, &sides_px, is_taken, &mut found));
-            for i in 0..LANES {
-                let [at, sides] =
-                    [&position_px, &sides_px].map(|of| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i])));
-                let exact = if is_taken(i) { twin.over_area(at, sides) } else { DVec3::ZERO };
-                let found = DVec3::from_array(
-                    [0, 1, 2].map(|k: usize| f64::from(found[i][k] + found[i][k + CHANNELS])),
-                );
-                // Positions up to 70 are known to the last bit, and weights likewise.
-                assert!(found.distance(exact) < 2e-5, "{block} {i}, {at}, {sides}: {found} {exact}");
-            }
-        }
-    }
-}
+mod tests;

@@ -3,7 +3,7 @@
 use camsim_core::camera::{CameraModel, INVALID_UV};
 
 use super::footprint::scaled;
-use crate::large_pages::Large;
+use crate::large_pages::LargeArray;
 use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
 
@@ -14,7 +14,7 @@ const INVALID_ABOVE: f32 = 0.1 * INVALID_UV;
 #[derive(Debug)]
 pub struct LensMap {
     /// Ideal (u, v) of each pixel, or [`INVALID_UV`] twice.
-    pub(crate) uv: Large<[f32; 2]>,
+    pub(crate) uv: LargeArray<[f32; 2]>,
 }
 
 impl LensMap {
@@ -22,7 +22,7 @@ impl LensMap {
     #[must_use]
     pub fn new(camera: &CameraModel) -> Self {
         let rays = camera.lens_inverse();
-        let mut uv = Large::zeros(rays.len());
+        let mut uv = LargeArray::zeros(rays.len());
         uv.copy_from_slice(&rays);
         Self { uv }
     }
@@ -149,9 +149,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_blocks_have_the_differences_of_their_pixels() {
+    fn block_differences_equal_pixel_differences() {
         let size_px: [u32; 2] = [4 * LANES as u32 + 5, 40];
-        let mut map = LensMap { uv: Large::zeros((size_px[0] * size_px[1]) as usize) };
+        let mut map = LensMap { uv: LargeArray::zeros((size_px[0] * size_px[1]) as usize) };
         for (uv, i) in map.uv.iter_mut().zip(0..) {
             let [x, y] = [i % size_px[0], i / size_px[0]].map(|n| n as f32);
             *uv = [0.01 * x + 1e-4 * x * y, 0.01 * y - 2e-5 * x * x];

@@ -73,10 +73,15 @@ impl Stages<'_> {
     /// Inverse depth on the line's ray of a surface with this inverse depth in the key frame. At or behind
     /// the image plane of the line's camera `guess` is returned.
     #[inline(always)]
-    fn row_inverse_depth(direction: &Lanes3, shift: [f32; 3], found: &Lanes, guess: &Lanes) -> Lanes {
+    fn row_inverse_depth(
+        direction: &Lanes3,
+        shift: [f32; 3],
+        key_inverse_depth: &Lanes,
+        guess: &Lanes,
+    ) -> Lanes {
         per_lane(|i| {
-            let scale = found[i].mul_add(-shift[2], 1.0);
-            if scale > 1e-3 { found[i] * direction.z[i] / scale } else { guess[i] }
+            let scale = key_inverse_depth[i].mul_add(-shift[2], 1.0);
+            if scale > 1e-3 { key_inverse_depth[i] * direction.z[i] / scale } else { guess[i] }
         })
     }
 
@@ -84,30 +89,30 @@ impl Stages<'_> {
     /// in the key frame, and on the line's ray.
     #[inline(always)]
     fn look_ups(&self, direction: &Lanes3, shift: [f32; 3], guess: &Lanes, count: u32) -> (Lanes, Lanes) {
-        let (mut in_key, mut on_line) = (ZERO, *guess);
+        let (mut key_inverse_depth, mut on_line) = (ZERO, *guess);
         for look_up in 1..=count {
             let x = per_lane(|i| on_line[i].mul_add(shift[0], direction.x[i]));
             let y = per_lane(|i| on_line[i].mul_add(shift[1], direction.y[i]));
             let position_px = self.ideal_px(&x, &y, |i| 1.0 / on_line[i].mul_add(shift[2], direction.z[i]));
-            in_key = if look_up < count {
+            key_inverse_depth = if look_up < count {
                 self.ideal.inverse_depth(self.frame, &position_px)
             } else {
                 self.ideal.surface_at(self.frame, &position_px)
             };
-            on_line = Self::row_inverse_depth(direction, shift, &in_key, &on_line);
+            on_line = Self::row_inverse_depth(direction, shift, &key_inverse_depth, &on_line);
         }
-        (in_key, on_line)
+        (key_inverse_depth, on_line)
     }
 
     /// Depth look-ups from the key frame's plane.
     #[inline(always)]
     fn iterate_depth(&self, direction: &Lanes3, shift: [f32; 3]) -> (Lanes, Lanes) {
         let [a, b, c, _] = self.frame.planes[0];
-        let before = 1.0 - (a * shift[0] + b * shift[1] + c * shift[2]);
-        let guess = match before > 1e-3 {
-            true => {
-                per_lane(|i| (a * direction.x[i] + b * direction.y[i] + c * direction.z[i]).max(0.0) / before)
-            }
+        let distance_ratio = 1.0 - (a * shift[0] + b * shift[1] + c * shift[2]);
+        let guess = match distance_ratio > 1e-3 {
+            true => per_lane(|i| {
+                (a * direction.x[i] + b * direction.y[i] + c * direction.z[i]).max(0.0) / distance_ratio
+            }),
             false => ZERO,
         };
         self.look_ups(direction, shift, &guess, self.frame.iterations)
@@ -127,17 +132,26 @@ impl Stages<'_> {
 
     /// Sources of surfaces with this inverse depth in the key frame.
     #[inline(always)]
-    fn source_of_depth(&self, uv: &Lanes2, pose: &LinePose, found: impl Fn(usize) -> f32) -> BlockSources {
+    fn source_of_depth(
+        &self,
+        uv: &Lanes2,
+        pose: &LinePose,
+        key_inverse_depth: impl Fn(usize) -> f32,
+    ) -> BlockSources {
         let (direction, shift) = (rotate(pose, uv), translation(pose));
         let ([fx, fy], [cx, cy]) = (self.frame.ideal_focal_px, self.frame.ideal_principal_px);
-        let found = per_lane(found);
-        let scale = per_lane(|i| found[i].mul_add(-shift[2], 1.0));
+        let key_inverse_depth = per_lane(key_inverse_depth);
+        let scale = per_lane(|i| key_inverse_depth[i].mul_add(-shift[2], 1.0));
         let per_z = per_lane(|i| 1.0 / direction.z[i]);
         let place =
             |far: f32, scale: f32, moved: f32| if scale > 1e-3 { scale.mul_add(far, moved) } else { far };
         let position_px = Lanes2 {
-            x: per_lane(|i| place(direction.x[i] * per_z[i], scale[i], found[i] * shift[0]).mul_add(fx, cx)),
-            y: per_lane(|i| place(direction.y[i] * per_z[i], scale[i], found[i] * shift[1]).mul_add(fy, cy)),
+            x: per_lane(|i| {
+                place(direction.x[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[0]).mul_add(fx, cx)
+            }),
+            y: per_lane(|i| {
+                place(direction.y[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[1]).mul_add(fy, cy)
+            }),
         };
         BlockSources { inside: self.inside(&position_px, &direction.z), position_px }
     }
@@ -151,9 +165,10 @@ impl Stages<'_> {
                 BlockSources { inside: self.inside(&position_px, &[1.0; LANES]), position_px }
             }
             TemporalStage::Rotation => {
-                let in_key = rotate(pose, uv);
-                let position_px = self.ideal_px(&in_key.x, &in_key.y, |i| 1.0 / in_key.z[i]);
-                BlockSources { inside: self.inside(&position_px, &in_key.z), position_px }
+                let key_inverse_depth = rotate(pose, uv);
+                let position_px = self
+                    .ideal_px(&key_inverse_depth.x, &key_inverse_depth.y, |i| 1.0 / key_inverse_depth.z[i]);
+                BlockSources { inside: self.inside(&position_px, &key_inverse_depth.z), position_px }
             }
             _ => {
                 let (direction, shift) = (rotate(pose, uv), translation(pose));
@@ -207,11 +222,11 @@ impl<'a> Nodes<'a> {
     pub fn next(&mut self, node: usize, pose: &LinePose) -> BlockSources {
         match &mut self.depths {
             NodeInverseDepths::Solved => self.reads.solve(self.uv, pose),
-            NodeInverseDepths::Each(found) => {
+            NodeInverseDepths::Each(key_inverse_depth) => {
                 if node > 0 {
-                    *found = self.reads.iterated_depth_from(found, self.uv, pose);
+                    *key_inverse_depth = self.reads.iterated_depth_from(key_inverse_depth, self.uv, pose);
                 }
-                self.reads.source_of_depth(self.uv, pose, |i| found[i])
+                self.reads.source_of_depth(self.uv, pose, |i| key_inverse_depth[i])
             }
             NodeInverseDepths::BlockCurve { begin, slope, bend } => {
                 let share = node as f32 * self.node_share;

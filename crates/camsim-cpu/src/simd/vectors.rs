@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn the_widest_vectors_show_what_any_processor_shows() {
+    fn avx2_equals_the_fallback() {
         let Some(avx2) = Avx2::find() else { return eprintln!("skipped: this processor has no AVX2") };
         let mut counts = [0; 9];
         for seed in 0..20_000 {

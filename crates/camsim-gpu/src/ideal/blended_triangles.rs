@@ -101,7 +101,16 @@ impl BlendedTriangles {
         self.out_of_order = order.out_of_order;
         self.draws = merge_draws(&triangles, &order.indices);
         let indices: Vec<u32> = order.indices.iter().flat_map(|&k| triangles[k as usize].corners).collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&indices);
+        self.upload(gpu, recorder, &indices)
+    }
+
+    fn upload(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        indices: &[u32],
+    ) -> Result<(), GpuError> {
+        let bytes: &[u8] = bytemuck::cast_slice(indices);
         gpu.check_storage(
             "the triangles that one frame mixes with what is behind them",
             bytes.len() as u64,
@@ -228,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn meshes_within_each_other_are_drawn_one_after_the_other() {
+    fn fallback_order_draws_interleaved_meshes_one_by_one() {
         // The centres of the two meshes are 10.5 and 11 m away.
         let triangles =
             [triangle(0, 3, 10.0), triangle(1, 4, 10.5), triangle(0, 3, 11.0), triangle(1, 4, 11.5)];

@@ -91,6 +91,7 @@ impl IdealPass {
         key: SurfaceKey,
         batches: &[MeshBatch],
     ) -> Result<SurfacePipelines, ComposeError> {
+        // Long because: one pipeline per kind of surface.
         let mesh_vertices = wgpu::VertexBufferLayout {
             array_stride: size_of::<MeshVertexData>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,

@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn every_variant_is_valid_without_any_capability() {
+    fn all_variants_are_valid_without_optional_capabilities() {
         for (model, start) in VARIANTS {
             let module = parsed(model, start);
             let mut validator = naga::valid::Validator::new(
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn the_uniform_is_laid_out_as_in_the_shader() {
+    fn uniform_layout_equals_that_of_the_shader() {
         let module = parsed(LensModel::BrownConrady, Start::Cold);
         let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("LensUniform")).unwrap();
         let naga::TypeInner::Struct { members, span } = &ty.inner else {
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shaders_constants_are_those_of_the_core() {
+    fn shader_constants_equal_those_of_camsim_core() {
         let source = shader_source(LensModel::BrownConrady, Start::Cold);
         assert!(source.contains(&format!("const FOLD_RAYS: u32 = {}u;", camsim_core::lens::FOLD_RAYS)));
         assert!(

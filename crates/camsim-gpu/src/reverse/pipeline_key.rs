@@ -193,6 +193,7 @@ impl PipelineKey {
     /// All keys that a plan can have.
     #[must_use]
     pub fn all() -> Vec<Self> {
+        // Long because: one loop per stage.
         use TemporalKind::{Identity, Linear, Reproject, Rk2, Rotation};
         let mut keys = Vec::new();
         for ray in [RayStage::Pinhole, RayStage::LensMap] {
@@ -287,6 +288,7 @@ impl PipelineKey {
     /// Files that fill the slots of the kernel.
     #[must_use]
     pub fn slots(&self) -> [ShaderSlot; 16] {
+        // Long because: one match per slot.
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/lens_map.wgsl",
@@ -390,12 +392,13 @@ mod tests {
     };
 
     #[test]
-    fn every_variant_is_valid_without_any_capability() {
+    fn all_variants_are_valid_without_optional_capabilities() {
+        // Long because: one list per kind of shader.
         // The files of `look_ups` and `segments` do not depend on lens map and taps: one of each is enough
         // for the unrolled variants.
         let is_representative = |key: &PipelineKey| {
-            let unrolled = key.look_ups == LookUps::Several && key.segments == Segments::Several;
-            unrolled || key.ray == RayStage::LensMap && key.tap == TapKind::Spline
+            let has_loops = key.look_ups == LookUps::Several && key.segments == Segments::Several;
+            has_loops || key.ray == RayStage::LensMap && key.tap == TapKind::Spline
         };
         let texts = PipelineKey::all().into_iter().filter(is_representative).flat_map(|key| {
             let files = if key.edges == EdgeKind::None {

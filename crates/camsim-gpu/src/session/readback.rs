@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn large_pictures_are_copied_whole_by_several_threads() {
+    fn large_images_are_copied_completely_by_several_threads() {
         for values in [0, 1, 5_000_017, 2 * BYTES_PER_THREAD] {
             let all: Vec<u32> = (0..values as u32).map(|i| i.wrapping_mul(2_654_435_761)).collect();
             let bytes = [bytemuck::cast_slice(&all), &[1, 2, 3][..]].concat();
