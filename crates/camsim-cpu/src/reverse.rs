@@ -83,7 +83,7 @@ struct Stages<'a> {
     reference_pose: Option<LinePose>,
     /// Uniforms for the truth, if it is output: without the sky-reach rule, since the sky is at its own
     /// position, whatever surface is beside it.
-    frame_of_truth: Option<&'a FrameUniforms>,
+    truth_frame: Option<&'a FrameUniforms>,
     /// Position of the first output pixel in the ideal frame, if output pixels are ideal pixels.
     copied_from: Option<[u32; 2]>,
     segments: &'a [[f32; 2]],
@@ -103,10 +103,10 @@ impl Kernel {
         let has_truth = plan.truth;
         let KernelInputs { frame, poses, map, vignette, ideal } = *inputs;
         let [width, height] = frame.size_px.map(|side| side as usize);
-        let frame_of_truth = FrameUniforms { sky_reach_px: 0.0, ..*frame };
-        let reads = Stages {
+        let truth_frame = FrameUniforms { sky_reach_px: 0.0, ..*frame };
+        let stages = Stages {
             frame,
-            frame_of_truth: Some(&frame_of_truth).filter(|_| has_truth),
+            truth_frame: Some(&truth_frame).filter(|_| has_truth),
             ideal,
             temporal: plan.temporal,
             blur: plan.blur,
@@ -117,27 +117,27 @@ impl Kernel {
             reference_pose: poses
                 .get(height * poses_per_line(frame))
                 .copied()
-                .filter(|_| has_other_pose(plan)),
+                .filter(|_| has_reference_pose(plan)),
             copied_from: plan.copied_from(),
             segments: &self.segments,
             grid_taps: &self.grid_taps,
         };
-        let mut picture = vec![0.0; 4 * width * height];
+        let mut image = vec![0.0; 4 * width * height];
         let mut truth = vec![Truth::default(); if has_truth { width * height } else { 0 }];
-        let rows = picture.par_chunks_mut(4 * width * ROWS_PER_TASK).zip(0_u32..u32::MAX);
+        let rows = image.par_chunks_mut(4 * width * ROWS_PER_TASK).zip(0_u32..u32::MAX);
         let first_row = |task: u32| task * ROWS_PER_TASK as u32;
         match has_truth {
             true => rows
                 .zip(truth.par_chunks_mut(width * ROWS_PER_TASK))
-                .for_each(|((rows, task), truth)| reads.rows(first_row(task), rows, truth)),
-            false => rows.for_each(|(rows, task)| reads.rows(first_row(task), rows, &mut [])),
+                .for_each(|((rows, task), truth)| stages.rows(first_row(task), rows, truth)),
+            false => rows.for_each(|(rows, task)| stages.rows(first_row(task), rows, &mut [])),
         }
-        (picture, has_truth.then_some(truth))
+        (image, has_truth.then_some(truth))
     }
 }
 
 /// Whether coordinates must be transformed from the key camera to the mid-window camera.
-fn has_other_pose(plan: &FramePlan) -> bool {
+fn has_reference_pose(plan: &FramePlan) -> bool {
     let moves = matches!(plan.temporal, TemporalStage::Rotation | TemporalStage::Reproject { .. });
     moves && plan.truth && plan.has_displaced_key()
 }
@@ -161,7 +161,7 @@ impl Stages<'_> {
 
     #[inline(always)]
     fn rows_by(&self, vectors: impl Vectors, first: u32, rows: &mut [f32], truth: &mut [Truth]) {
-        if let Some(from) = self.copied_from.filter(|_| self.frame_of_truth.is_none()) {
+        if let Some(from) = self.copied_from.filter(|_| self.truth_frame.is_none()) {
             return self.copied_rows(vectors, from, first, rows);
         }
         let width = self.frame.size_px[0] as usize;
@@ -169,11 +169,8 @@ impl Stages<'_> {
         for x in (0..width).step_by(LANES) {
             let end = width.min(x + LANES);
             for (number, row) in rows.chunks_exact_mut(4 * width).enumerate() {
-                let truth = if self.frame_of_truth.is_some() {
-                    &mut truth[number * width..][x..end]
-                } else {
-                    &mut []
-                };
+                let truth =
+                    if self.truth_frame.is_some() { &mut truth[number * width..][x..end] } else { &mut [] };
                 self.block(vectors, [x as u32, first + number as u32], &mut row[4 * x..4 * end], truth);
             }
         }
@@ -189,26 +186,26 @@ impl Stages<'_> {
     fn block(&self, vectors: impl Vectors, [x, y]: [u32; 2], block: &mut [f32], truth: &mut [Truth]) {
         let rays = rays::rays(self.frame, self.map, x, y);
         let weight = self.weights(x, y);
-        let wanted = per_lane(|i| if weight[i] > 0.0 { rays.valid[i] } else { 0.0 });
+        let is_wanted = per_lane(|i| if weight[i] > 0.0 { rays.valid[i] } else { 0.0 });
         let (mut colors, mut inside) = ([[0.0; 4]; LANES], rays.valid);
-        let is_asked = if self.frame_of_truth.is_some() { &rays.valid } else { &wanted };
-        if let Some(mid) = self.poses_of(y).last().filter(|_| is_asked.iter().any(|&asked| asked > 0.0)) {
+        let is_needed = if self.truth_frame.is_some() { &rays.valid } else { &is_wanted };
+        if let Some(mid) = self.poses_of(y).last().filter(|_| is_needed.iter().any(|&asked| asked > 0.0)) {
             let sides = || rays::sides(self.frame, self.map, x, y);
-            let area = Footprint::new(self.grid_taps, self.tap, sides, self.frame.max_taps);
+            let footprint = Footprint::new(self.grid_taps, self.tap, sides, self.frame.max_taps);
             // Colour first, then truth, in one loop: the inlined code exists once.
-            for (frame, is_truth) in [(Some(self.frame), false), (self.frame_of_truth, true)] {
+            for (frame, is_truth) in [(Some(self.frame), false), (self.truth_frame, true)] {
                 let Some(frame) = frame else { continue };
-                let reads = Stages { frame, ..*self };
-                let gathered = reads.gather(
+                let stages = Stages { frame, ..*self };
+                let gathered = stages.gather(
                     vectors,
                     &rays.uv,
-                    &area,
+                    &footprint,
                     self.poses_of(y),
                     mid,
-                    if is_truth { &ZERO } else { &wanted },
+                    if is_truth { &ZERO } else { &is_wanted },
                 );
                 if is_truth {
-                    reads.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
+                    stages.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
                 } else {
                     colors = self
                         .copied_from

@@ -72,7 +72,7 @@ impl Piece {
         let mut used: Vec<u32> = indices.iter().map(|&vertex| canonical[vertex as usize]).collect();
         used.sort_unstable();
         used.dedup();
-        let camera_map =
+        let renumbered =
             |&vertex: &u32| used.partition_point(|&used| used < canonical[vertex as usize]) as u32;
         let normals = if shape.has_normals() {
             used.iter().map(|&vertex| shape.normals[vertex as usize]).collect()
@@ -80,7 +80,7 @@ impl Piece {
             Vec::new()
         };
         let vertices: Vec<MeshVertex> = used.iter().map(|&vertex| shape.vertices[vertex as usize]).collect();
-        let indices: Vec<u32> = indices.iter().map(camera_map).collect();
+        let indices: Vec<u32> = indices.iter().map(renumbered).collect();
         let face_planes = FacePlanes::new(&vertices, &indices);
         Self { vertices, normals, indices, face_planes }
     }

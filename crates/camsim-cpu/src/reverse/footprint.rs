@@ -55,13 +55,13 @@ struct Grid<'a> {
 }
 
 impl<'a> Footprint<'a> {
-    /// Footprints of pixels with these sides, ideal pixels, with up to `most` taps along each side.
+    /// Footprints of pixels with these sides, ideal pixels, with up to `max_taps` taps along each side.
     #[inline(always)]
     pub fn new(
         grid_taps: &'a GridTaps,
         tap: TapStage,
         sides: impl FnOnce() -> [Lanes2; 2],
-        most: u32,
+        max_taps: u32,
     ) -> Self {
         if tap == TapStage::Bilinear {
             return Self { grid: None, softness: None, area: None };
@@ -74,7 +74,7 @@ impl<'a> Footprint<'a> {
             None
         };
         let grid = if matches!(tap, TapStage::Grid { .. } | TapStage::SplineOrGrid { .. }) {
-            Some(Grid::new(grid_taps, &sides, most))
+            Some(Grid::new(grid_taps, &sides, max_taps))
         } else {
             None
         };
@@ -86,22 +86,22 @@ impl<'a> Footprint<'a> {
     #[inline(always)]
     pub fn is_wide(&self, i: usize) -> bool {
         self.area.as_ref().map_or_else(
-            || self.reads(i) > 1.0,
+            || self.tap_count(i) > 1.0,
             |sides| (sides.x[i] > NARROW_AREA_PX) | (sides.y[i] > NARROW_AREA_PX),
         )
     }
 
     /// Number of taps that cover a pixel.
     #[inline(always)]
-    pub fn reads(&self, i: usize) -> f32 {
+    pub fn tap_count(&self, i: usize) -> f32 {
         self.grid.as_ref().map_or(1.0, |grid| grid.count[i])
     }
 
     /// Position of tap `tap` (cyclic) of each pixel.
     #[inline(always)]
-    pub fn moved(&self, position_px: &Lanes2, tap: &Lanes) -> Lanes2 {
+    pub fn tap_position_px(&self, position_px: &Lanes2, tap: &Lanes) -> Lanes2 {
         let Some(grid) = &self.grid else { return *position_px };
-        let Lanes2 { x: across, y: down } = grid.shares_of(tap);
+        let Lanes2 { x: across, y: down } = grid.tap_offsets_at(tap);
         let Grid { dx, dy, .. } = grid;
         Lanes2 {
             x: per_lane(|i| position_px.x[i] + dx.x[i] * across[i] + dy.x[i] * down[i]),
@@ -112,10 +112,10 @@ impl<'a> Footprint<'a> {
 
 impl<'a> Grid<'a> {
     #[inline(always)]
-    fn new(grid_taps: &'a GridTaps, sides: &[Lanes2; 2], most: u32) -> Self {
-        let most = most.clamp(1, MAX_GRID_TAPS) as f32;
-        let (dx, across) = spread(&sides[0], most);
-        let (dy, down) = spread(&sides[1], most);
+    fn new(grid_taps: &'a GridTaps, sides: &[Lanes2; 2], max_taps: u32) -> Self {
+        let max_taps = max_taps.clamp(1, MAX_GRID_TAPS) as f32;
+        let (dx, across) = grid_extent(&sides[0], max_taps);
+        let (dy, down) = grid_extent(&sides[1], max_taps);
         let mut begin = [0; LANES];
         for i in 0..LANES {
             begin[i] = grid_taps.first_offsets[(to_index(down[i]) * MAX_GRID_TAPS + to_index(across[i])
@@ -136,19 +136,19 @@ impl<'a> Grid<'a> {
 
     /// Offset of tap `tap` (cyclic) of each pixel, as shares of the sides.
     #[inline(always)]
-    fn shares_of(&self, tap: &Lanes) -> Lanes2 {
+    fn tap_offsets_at(&self, tap: &Lanes) -> Lanes2 {
         // With half a tap added, rounding cannot move the quotient past a whole number.
-        let turn = per_lane(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
-        let share = |i: usize| {
-            self.offsets.get((self.begin[i] + to_index(turn[i])) as usize).copied().unwrap_or_default()
+        let tap_in_grid = per_lane(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
+        let offset_at = |i: usize| {
+            self.offsets.get((self.begin[i] + to_index(tap_in_grid[i])) as usize).copied().unwrap_or_default()
         };
-        if self.is_common && turn.iter().all(|&of| of == turn[0]) {
-            let [across, down] = share(0);
+        if self.is_common && tap_in_grid.iter().all(|&of| of == tap_in_grid[0]) {
+            let [across, down] = offset_at(0);
             return Lanes2 { x: [across; LANES], y: [down; LANES] };
         }
         let mut offsets = Lanes2::ZERO;
         for i in 0..LANES {
-            [offsets.x[i], offsets.y[i]] = share(i);
+            [offsets.x[i], offsets.y[i]] = offset_at(i);
         }
         offsets
     }
@@ -156,19 +156,20 @@ impl<'a> Grid<'a> {
 
 /// Sides of the grids, and number of taps along them.
 #[inline(always)]
-fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
-    let segment = side.length();
+fn grid_extent(side: &Lanes2, max_taps: f32) -> (Lanes2, Lanes) {
+    let length_px = side.length();
     let taps = per_lane(|i| {
-        if segment[i] > WIDEST_SPLINE_PX {
-            fast_min(fast_max((segment[i] - 0.1).ceil(), 1.0), most)
+        if length_px[i] > WIDEST_SPLINE_PX {
+            fast_min(fast_max((length_px[i] - 0.1).ceil(), 1.0), max_taps)
         } else {
             1.0
         }
     });
     // The taps have variance of their own, which the grid need not have.
     let factor = per_lane(|i| {
-        let wide = (fast_max(segment[i] * segment[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i]))).sqrt()
-            / segment[i];
+        let wide = (fast_max(length_px[i] * length_px[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i])))
+            .sqrt()
+            / length_px[i];
         if taps[i] > 1.0 { wide } else { 0.0 }
     });
     (Lanes2 { x: per_lane(|i| side.x[i] * factor[i]), y: per_lane(|i| side.y[i] * factor[i]) }, taps)
@@ -294,7 +295,7 @@ mod tests {
                 assert_eq!(of.is_common, own == 0);
                 let orders = [0, 1, 2, 3].map(|i| tap_offsets(taps(i)));
                 for tap in 0..1000 {
-                    let found = of.shares_of(&[tap as f32; LANES]);
+                    let found = of.tap_offsets_at(&[tap as f32; LANES]);
                     for (i, order) in orders.iter().enumerate() {
                         assert_eq!(of.count[i], order.len() as f32);
                         assert_eq!([found.x[i], found.y[i]], order[tap % order.len()], "{:?} {tap}", taps(i));
@@ -317,20 +318,20 @@ mod tests {
                     * (((block * LANES + i) as f32 * 0.618_034).fract()
                         * if i.is_multiple_of(3) { 5.0 } else { 1.3 })
             };
-            let turn = |i: usize| (block * LANES + i) as f32 * 0.754_878;
+            let tap_in_grid = |i: usize| (block * LANES + i) as f32 * 0.754_878;
             let across = Lanes2 {
-                x: per_lane(|i| width(i) * turn(i).cos()),
-                y: per_lane(|i| width(i) * turn(i).sin()),
+                x: per_lane(|i| width(i) * tap_in_grid(i).cos()),
+                y: per_lane(|i| width(i) * tap_in_grid(i).sin()),
             };
             let down = Lanes2 {
-                x: per_lane(|i| 0.9 * width(i) * turn(i).sin()),
-                y: per_lane(|i| -0.9 * width(i) * turn(i).cos()),
+                x: per_lane(|i| 0.9 * width(i) * tap_in_grid(i).sin()),
+                y: per_lane(|i| -0.9 * width(i) * tap_in_grid(i).cos()),
             };
             let found = Footprint::new(&grid_taps, TapStage::Area, || [across, down], 1);
             let [sides, softness] = [found.area, found.softness].map(|of| of.expect("both are known"));
             for i in 0..LANES {
                 let at = |of: &Lanes2| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i]));
-                assert_eq!(found.reads(i), 1.0);
+                assert_eq!(found.tap_count(i), 1.0);
                 match Twin::new(at(&across), at(&down), TapStage::Area).kernel {
                     Kernel::Area(exact) => {
                         areas += 1;

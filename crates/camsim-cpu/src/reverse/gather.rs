@@ -106,27 +106,27 @@ fn along(path: PathStage, steps: &Lanes, begin: &Lanes, [d1, d2, d3, d4]: [&Lane
 
 impl Stages<'_> {
     /// Gathers pixels of a line. `poses` are at the nodes, then at mid-exposure. Colours are gathered only
-    /// for pixels with `wanted` 1 (else 0).
+    /// for pixels with `is_wanted` 1 (else 0).
     #[inline(always)]
     pub(super) fn gather(
         &self,
         vectors: impl Vectors,
         uv: &Lanes2,
-        area: &Footprint<'_>,
+        footprint: &Footprint<'_>,
         poses: &[LinePose],
         mid: &LinePose,
-        wanted: &Lanes,
+        is_wanted: &Lanes,
     ) -> BlockGather {
         let mut sum = [[0.0; 4]; LANES];
         let Some(blur) = self.blur else {
             let curve = BlockCurve::point(self.solve(uv, mid));
-            let count = per_lane(|i| area.reads(i) * wanted[i] * curve.inside[i]);
-            self.add_mean(vectors, &curve, &count, area, &ZERO, &mut sum);
+            let count = per_lane(|i| footprint.tap_count(i) * is_wanted[i] * curve.inside[i]);
+            self.add_mean(vectors, &curve, &count, footprint, &ZERO, &mut sum);
             return BlockGather { color: sum, inside: curve.inside, at_phase_px: curve.begin_px };
         };
         let segments = blur.stretches();
         let per_segment = 1.0 / segments as f32;
-        let at_least = per_lane(|i| (area.reads(i) * per_segment).ceil());
+        let min_samples = per_lane(|i| (footprint.tap_count(i) * per_segment).ceil());
         let mut nodes = Nodes::new(self, uv, poses, blur.depths);
         let mut source = nodes.next(0, &poses[0]);
         let mut inside = source.inside;
@@ -144,16 +144,16 @@ impl Stages<'_> {
                 poses,
             );
             inside = per_lane(|i| inside[i] * curve.inside[i]);
-            let samples = self.samples(&curve.length_px, &at_least);
-            let count = per_lane(|i| samples[i] * inside[i] * wanted[i]);
-            self.add_mean(vectors, &curve, &count, area, &samples_taken, &mut sum);
+            let samples = self.samples(&curve.length_px, &min_samples);
+            let count = per_lane(|i| samples[i] * inside[i] * is_wanted[i]);
+            self.add_mean(vectors, &curve, &count, footprint, &samples_taken, &mut sum);
             samples_taken = per_lane(|i| samples_taken[i] + samples[i]);
             source = curve.end;
-            if self.frame_of_truth.is_some() && segment == (segment_position as u32).min(segments - 1) {
+            if self.truth_frame.is_some() && segment == (segment_position as u32).min(segments - 1) {
                 at_phase_px = curve.along(&[(segment_position - segment as f32) * steps as f32; LANES]);
             }
         }
-        if self.frame_of_truth.is_some() && self.frame.coords_phase == 0.0 {
+        if self.truth_frame.is_some() && self.frame.coords_phase == 0.0 {
             at_phase_px = self.solve(uv, mid).position_px;
         }
         for part in sum.as_flattened_mut() {
@@ -164,12 +164,12 @@ impl Stages<'_> {
 
     /// Number of samples for a path of this length.
     #[inline(always)]
-    fn samples(&self, length_px: &Lanes, at_least: &Lanes) -> Lanes {
-        let (per_px, max_count) = (self.frame.samples_per_px, self.frame.max_samples as f32);
+    fn samples(&self, length_px: &Lanes, min_samples: &Lanes) -> Lanes {
+        let (samples_per_px, max_count) = (self.frame.samples_per_px, self.frame.max_samples as f32);
         per_lane(|i| {
-            let wanted = (per_px * length_px[i]).min(length_px[i] + 16.0).ceil();
-            let capped = if wanted < max_count { wanted } else { max_count };
-            if capped > at_least[i] { capped } else { at_least[i] }
+            let requested = (samples_per_px * length_px[i]).min(length_px[i] + 16.0).ceil();
+            let capped = if requested < max_count { requested } else { max_count };
+            if capped > min_samples[i] { capped } else { min_samples[i] }
         })
     }
 
@@ -180,7 +180,7 @@ impl Stages<'_> {
         vectors: impl Vectors,
         curve: &BlockCurve,
         count: &Lanes,
-        area: &Footprint<'_>,
+        footprint: &Footprint<'_>,
         samples_taken: &Lanes,
         sum: &mut [[f32; 4]; LANES],
     ) {
@@ -192,7 +192,14 @@ impl Stages<'_> {
         while sample < max_count {
             let step = per_lane(|i| steps * share[i] * (sample + 0.5));
             let tap = per_lane(|i| samples_taken[i] + sample);
-            self.add_sample(vectors, &curve.along(&step), area, &tap, |i| count[i] > sample, &mut curve_sum);
+            self.add_sample(
+                vectors,
+                &curve.along(&step),
+                footprint,
+                &tap,
+                |i| count[i] > sample,
+                &mut curve_sum,
+            );
             sample += 1.0;
         }
         for i in 0..LANES {
@@ -208,32 +215,32 @@ impl Stages<'_> {
         &self,
         vectors: impl Vectors,
         position_px: &Lanes2,
-        area: &Footprint<'_>,
+        footprint: &Footprint<'_>,
         tap: &Lanes,
         is_taken: impl Fn(usize) -> bool,
         sum: &mut [HalfSums; LANES],
     ) {
-        let Some(softness) = &area.softness else {
+        let Some(softness) = &footprint.softness else {
             return self.ideal.add_color(
                 vectors,
                 self.frame,
-                &area.moved(position_px, tap),
+                &footprint.tap_position_px(position_px, tap),
                 is_taken,
                 |_| 1.0,
                 sum,
             );
         };
-        let wide = indicator(|i| area.is_wide(i));
+        let wide = indicator(|i| footprint.is_wide(i));
         if wide.contains(&1.0) {
             let is_taken = |i: usize| is_taken(i) && wide[i] > 0.0;
-            match &area.area {
+            match &footprint.area {
                 Some(sides_px) => {
                     self.ideal.add_area(vectors, self.frame, position_px, sides_px, is_taken, sum)
                 }
                 None => self.ideal.add_color(
                     vectors,
                     self.frame,
-                    &area.moved(position_px, tap),
+                    &footprint.tap_position_px(position_px, tap),
                     is_taken,
                     |_| 1.0,
                     sum,

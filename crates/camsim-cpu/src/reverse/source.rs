@@ -31,7 +31,7 @@ enum NodeInverseDepths {
 
 /// Iterates over the nodes of an exposure.
 pub(super) struct Nodes<'a> {
-    reads: &'a Stages<'a>,
+    stages: &'a Stages<'a>,
     uv: &'a Lanes2,
     depths: NodeInverseDepths,
     node_share: f32,
@@ -186,26 +186,26 @@ impl Stages<'_> {
 impl<'a> Nodes<'a> {
     /// Nodes of a line: `poses` are at the nodes, then at mid-exposure.
     #[inline(always)]
-    pub fn new(reads: &'a Stages<'a>, uv: &'a Lanes2, poses: &[LinePose], depths: NodeDepths) -> Self {
+    pub fn new(stages: &'a Stages<'a>, uv: &'a Lanes2, poses: &[LinePose], depths: NodeDepths) -> Self {
         let last = poses.len() - 2;
-        let depths = match (reads.temporal, depths) {
+        let depths = match (stages.temporal, depths) {
             (TemporalStage::Reproject { .. }, NodeDepths::Each) => {
-                NodeInverseDepths::Each(reads.iterated_depth(uv, &poses[0]))
+                NodeInverseDepths::Each(stages.iterated_depth(uv, &poses[0]))
             }
             (TemporalStage::Reproject { .. }, NodeDepths::Mid) => NodeInverseDepths::BlockCurve {
-                begin: reads.iterated_depth(uv, &poses[last + 1]),
+                begin: stages.iterated_depth(uv, &poses[last + 1]),
                 slope: ZERO,
                 bend: ZERO,
             },
             (TemporalStage::Reproject { .. }, NodeDepths::Ends) => {
-                let begin = reads.iterated_depth(uv, &poses[0]);
-                let end = reads.iterated_depth_from(&begin, uv, &poses[last]);
+                let begin = stages.iterated_depth(uv, &poses[0]);
+                let end = stages.iterated_depth_from(&begin, uv, &poses[last]);
                 NodeInverseDepths::BlockCurve { begin, slope: per_lane(|i| end[i] - begin[i]), bend: ZERO }
             }
             (TemporalStage::Reproject { .. }, NodeDepths::Three) => {
-                let middle = reads.iterated_depth(uv, &poses[last + 1]);
-                let begin = reads.iterated_depth_from(&middle, uv, &poses[0]);
-                let end = reads.iterated_depth_from(&middle, uv, &poses[last]);
+                let middle = stages.iterated_depth(uv, &poses[last + 1]);
+                let begin = stages.iterated_depth_from(&middle, uv, &poses[0]);
+                let end = stages.iterated_depth_from(&middle, uv, &poses[last]);
                 NodeInverseDepths::BlockCurve {
                     begin,
                     slope: per_lane(|i| 4.0 * middle[i] - 3.0 * begin[i] - end[i]),
@@ -214,23 +214,23 @@ impl<'a> Nodes<'a> {
             }
             _ => NodeInverseDepths::Solved,
         };
-        Self { reads, uv, depths, node_share: 1.0 / last as f32 }
+        Self { stages, uv, depths, node_share: 1.0 / last as f32 }
     }
 
     /// Source of the next node, by its number (the first is 0) and pose.
     #[inline(always)]
     pub fn next(&mut self, node: usize, pose: &LinePose) -> BlockSources {
         match &mut self.depths {
-            NodeInverseDepths::Solved => self.reads.solve(self.uv, pose),
+            NodeInverseDepths::Solved => self.stages.solve(self.uv, pose),
             NodeInverseDepths::Each(key_inverse_depth) => {
                 if node > 0 {
-                    *key_inverse_depth = self.reads.iterated_depth_from(key_inverse_depth, self.uv, pose);
+                    *key_inverse_depth = self.stages.iterated_depth_from(key_inverse_depth, self.uv, pose);
                 }
-                self.reads.source_of_depth(self.uv, pose, |i| key_inverse_depth[i])
+                self.stages.source_of_depth(self.uv, pose, |i| key_inverse_depth[i])
             }
             NodeInverseDepths::BlockCurve { begin, slope, bend } => {
                 let share = node as f32 * self.node_share;
-                self.reads.source_of_depth(self.uv, pose, |i| {
+                self.stages.source_of_depth(self.uv, pose, |i| {
                     bend[i].mul_add(share, slope[i]).mul_add(share, begin[i])
                 })
             }
