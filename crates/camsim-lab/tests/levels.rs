@@ -12,7 +12,7 @@ use camsim_core::{
 };
 use camsim_engine::{AdapterChoice, Engine, Finished};
 use camsim_lab::{
-    bench::{knobs::resize, rounds::FRAME, truth::Truth},
+    bench::{methods::resize, rounds::FRAME, truth::Truth},
     cases::cases,
 };
 use camsim_plan::{EdgeStage, FramePlan, Planner};

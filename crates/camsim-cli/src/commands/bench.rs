@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_lab::bench::{BenchError, Options, Report, Step, run as measure};
+use camsim_lab::bench::{BenchError, BenchReport, Options, Step, run as measure};
 
 use crate::{
     backend::BackendArgs,
@@ -58,7 +58,7 @@ pub struct Args {
 
 /// Measures and prints.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let options = Options { cases: args.cases.clone(), quick: args.quick };
+    let options = Options { cases: args.cases.clone(), quick: args.quick, ..Options::default() };
     check_files(args)?;
     let engine = args.backend.open()?;
     console.note(format_args!("rendering on {engine}"));
@@ -101,7 +101,7 @@ fn check_files(args: &Args) -> Result<(), Failure> {
 }
 
 /// Writes the requested files.
-fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), Failure> {
+fn files(args: &Args, report: &BenchReport, console: &mut Console<'_>) -> Result<(), Failure> {
     let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     if let Some(path) = beside("bench.md") {
         write(&path, &report.markdown(), console)?;
@@ -118,7 +118,7 @@ fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), 
     Ok(())
 }
 
-fn json(report: &Report) -> Result<String, Failure> {
+fn json(report: &BenchReport) -> Result<String, Failure> {
     let mut text = serde_json::to_string_pretty(report).or_failed()?;
     text.push('\n');
     Ok(text)
