@@ -4,8 +4,8 @@
 //! what is out of sight differs. `CAMSIM_TERRAIN_SIDES` sets their sides ("513 1025 4097"; 16385 takes 10 GB
 //! of memory and some minutes to make).
 //!
-//! Each table has the cpu renderer, the gpu renderer and the paper's preset side by side, measured in the same
-//! rounds. `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+//! Each table has the cpu renderer, the gpu renderer and the paper's preset side by side, measured in the
+//! same rounds. `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 

@@ -1,6 +1,6 @@
 //! Frame rates of `benches/all_effects.toml` by frame size, blur, effect and file format; the cost of the
-//! houses of `benches/houses.toml`; and the planner's cost model beside measured times. Each table has the cpu
-//! renderer, the gpu renderer and the paper's preset side by side, measured in the same rounds.
+//! houses of `benches/houses.toml`; and the planner's cost model beside measured times. Each table has the
+//! cpu renderer, the gpu renderer and the paper's preset side by side, measured in the same rounds.
 //!
 //! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two
 //! (`renderers`, `size`, `blur`, `effects`, `alike`, `passes`, `houses`, `costs`, `files`).

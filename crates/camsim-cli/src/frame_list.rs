@@ -37,7 +37,8 @@ impl fmt::Display for FrameListError {
             Self::Syntax(part) => {
                 write!(
                     f,
-                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"
+                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several \
+                     of them with commas"
                 )
             }
             Self::Empty(part) => write!(f, "`{part}` is empty: the end must be above the start"),
@@ -45,7 +46,8 @@ impl fmt::Display for FrameListError {
                 let last = frames.saturating_sub(1);
                 write!(
                     f,
-                    "{asked_by}: frame {frame} does not exist, the last one is {last}; widen flight.window_s or raise camera.fps"
+                    "{asked_by}: frame {frame} does not exist, the last one is {last}; widen flight.window_s \
+                     or raise camera.fps"
                 )
             }
         }

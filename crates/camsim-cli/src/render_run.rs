@@ -219,12 +219,16 @@ fn finish(
 /// Warns of frames that see only sky, and of frames without a valid pixel.
 fn validity_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
     let blind = (blind > 0).then(|| {
-        format!("{blind} of {frames} frames see only sky: check camera.mount, flight.height and the position of the scene")
+        format!(
+            "{blind} of {frames} frames see only sky: check camera.mount, flight.height and the position \
+                 of the scene"
+        )
     });
     let empty = (empty > 0).then(|| {
         format!(
-            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, or the lens has none; check \
-             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain SCENARIO.toml`"
+            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, \
+             or the lens has none; check camera.principal_point_px and camera.focal_px against \
+             camera.size_px, and see `camsim explain SCENARIO.toml`"
         )
     });
     blind.into_iter().chain(empty)

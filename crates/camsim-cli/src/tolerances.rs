@@ -70,7 +70,8 @@ impl Broken {
             "too many pixels have no source".to_owned()
         };
         Some(format!(
-            "{frames} of {of} frames exceed {key} = {tolerance}: in the worst, frame {frame}, {expected}; see `camsim explain SCENARIO.toml --frame {frame}`"
+            "{frames} of {of} frames exceed {key} = {tolerance}: in the worst, frame {frame}, {expected}; \
+             see `camsim explain SCENARIO.toml --frame {frame}`"
         ))
     }
 }
@@ -99,8 +100,9 @@ impl OverlapCycles {
         let (most, frame) = self.worst?;
         let frames = self.frames;
         Some(format!(
-            "in {frames} of {of} frames blended triangles overlap in cycles, so that up to {most} (frame {frame}) are blended in the wrong \
-             order, which is not predicted; `camsim verify SCENARIO.toml --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
+            "in {frames} of {of} frames blended triangles overlap in cycles, so that up to {most} (frame \
+             {frame}) are blended in the wrong order, which is not predicted; `camsim verify SCENARIO.toml \
+             --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
         ))
     }
 }
@@ -131,8 +133,8 @@ mod tests {
             tolerances.px.add(frame, kept, px);
         }
         let said: Vec<String> = tolerances.warnings().collect();
-        let wanted = "3 of 4 frames exceed quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
-                      see `camsim explain SCENARIO.toml --frame 5`";
+        let wanted = "3 of 4 frames exceed quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are \
+                      predicted; see `camsim explain SCENARIO.toml --frame 5`";
         assert_eq!(said, [wanted]);
     }
 
@@ -145,7 +147,10 @@ mod tests {
             .for_each(|(frame, count)| cycles.add(frame, count));
         let said = cycles.warning(5).unwrap();
         assert!(
-            said.starts_with("in 4 of 5 frames blended triangles overlap in cycles, so that up to 7 (frame 5) are blended in the wrong order"),
+            said.starts_with(
+                "in 4 of 5 frames blended triangles overlap in cycles, so that up to 7 (frame \
+                              5) are blended in the wrong order"
+            ),
             "{said}"
         );
     }

@@ -145,8 +145,9 @@ fn pixels_without_a_ray_are_invalid_and_points_beyond_the_fold_are_counted() {
 fn calibrations_of_other_programs_are_imported() {
     let folder = tempfile::tempdir().unwrap();
     let (kalibr, camera) = (folder.path().join("camchain.yaml"), folder.path().join("CAMERA.toml"));
-    let chain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
-                 intrinsics: [458.6, 457.3, 367.2, 248.4]\n  resolution: [752, 480]\n";
+    let chain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  \
+                 distortion_model: radtan\n  intrinsics: [458.6, 457.3, 367.2, 248.4]\n  resolution: [752, \
+                 480]\n";
     fs::write(&kalibr, chain).unwrap();
     let (code, _, err) = camsim(["camera", "import", text(&kalibr), "-o", text(&camera)]);
     assert!(code == 0 && err.contains("kalibr"), "{err}");
@@ -312,7 +313,8 @@ fn files_that_are_no_scenario_are_recognised() {
     for (file, wanted) in [
         (
             "demo_flight.csv",
-            "log = \"demo_flight.csv\"\n    [scene]\n    terrain = { dem = \"dem.tif\", ortho = \"ortho.tif\" }",
+            "log = \"demo_flight.csv\"\n    [scene]\n    terrain = \
+             { dem = \"dem.tif\", ortho = \"ortho.tif\" }",
         ),
         ("demo_camera.toml", "demo_camera.toml is a camera file, not a scenario: name it in one:"),
         ("acircles.png", "acircles.png is a picture (PNG), not a scenario"),
@@ -641,9 +643,14 @@ fn apply_renders_a_folder_of_images() {
         fs::copy(assets().join("acircles.png"), file(&format!("rgb/{i}.5.png"))).unwrap();
     }
     let (camera, frames, out) = (file("CAMERA.toml"), file("FRAMES.toml"), file("out"));
-    fs::write(&camera, "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = 33.0\n[photometric]\nnoise_sigma = 0.01\n")
-        .unwrap();
-    let twist = "color = \"rgb/*.png\"\nname_unit = \"s\"\nfocal_px = [300.0, 300.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 1.0]\n";
+    fs::write(
+        &camera,
+        "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = \
+                        33.0\n[photometric]\nnoise_sigma = 0.01\n",
+    )
+    .unwrap();
+    let twist = "color = \"rgb/*.png\"\nname_unit = \"s\"\nfocal_px = [300.0, \
+                 300.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 1.0]\n";
     fs::write(&frames, twist).unwrap();
     let apply = |more: &[&str]| {
         camsim(["apply", text(&camera), text(&frames), "-o", text(&out)].iter().chain(more).copied())

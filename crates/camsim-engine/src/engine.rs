@@ -37,8 +37,8 @@ impl Engine {
     /// none.
     ///
     /// # Errors
-    /// A backend that needs an adapter where none can be used; an adapter that `CAMSIM_ADAPTER` names and that
-    /// is not there.
+    /// A backend that needs an adapter where none can be used; an adapter that `CAMSIM_ADAPTER` names and
+    /// that is not there.
     pub fn open(backend: Backend) -> Result<Self, GpuError> {
         match backend {
             Backend::Cpu => Ok(Self::cpu()),
@@ -58,14 +58,14 @@ impl Engine {
         self.gpu.as_ref()
     }
 
-    /// Holds pictures with longer sides in tiles, as if textures ended there, for sessions to come: for tests,
-    /// and where the memory of a card is short.
+    /// Holds pictures with longer sides in tiles, as if textures ended there, for sessions to come: for
+    /// tests, and where the memory of a card is short.
     pub fn limit_pictures(&mut self, max_side_px: u32) {
         self.gpu.iter_mut().for_each(|gpu| gpu.limit_pictures(max_side_px));
     }
 
-    /// Pixels of a row that each thread of the gpu's reverse kernel takes ([`GpuContext::set_pixels_a_thread`]),
-    /// for sessions to come.
+    /// Pixels of a row that each thread of the gpu's reverse kernel takes
+    /// ([`GpuContext::set_pixels_a_thread`]), for sessions to come.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
         self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_a_thread(pixels));
     }

@@ -34,7 +34,8 @@ pub struct FrameTimes {
     /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what
     /// pixels at silhouettes see.
     pub read_ms: f64,
-    /// What ran on the device, if asked for ([`crate::Session::time_passes`]) and if the adapter has time stamps.
+    /// What ran on the device, if asked for ([`crate::Session::time_passes`]) and if the adapter has time
+    /// stamps.
     pub passes: Vec<PassTime>,
 }
 

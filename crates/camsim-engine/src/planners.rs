@@ -10,9 +10,10 @@ use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 const NICE: i32 = 5;
 
 /// Runs `work` with a scope whose tasks plan. Where frames are rendered on the same processor
-/// (`shares_processor`), they are threads of their own that stand back: every frame waits for the device's passes, but plans are made ahead, and while
-/// a pass has one thread there is room for them. A single frame, as the viewer asks for, waits for its plan:
-/// that goes first. Whoever calls from a pool of rayon's has the work done there.
+/// (`shares_processor`), they are threads of their own that stand back: every frame waits for the device's
+/// passes, but plans are made ahead, and while a pass has one thread there is room for them. A single frame,
+/// as the viewer asks for, waits for its plan: that goes first. Whoever calls from a pool of rayon's has the
+/// work done there.
 pub(super) fn scope<'scope, R>(
     shares_processor: bool,
     is_single: bool,

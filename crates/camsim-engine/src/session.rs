@@ -98,9 +98,9 @@ impl<'a> Session<'a> {
         Ok(Self { engine, planner, cpu, gpu, drawn: None, coords_phase: 0.0 })
     }
 
-    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the last
-    /// bit. Fast where its scene is the one of this session (the same [`Arc`]) and its preset too: kernels and
-    /// the scene's pictures stay. Otherwise everything is made anew.
+    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the
+    /// last bit. Fast where its scene is the one of this session (the same [`Arc`]) and its preset too:
+    /// kernels and the scene's pictures stay. Otherwise everything is made anew.
     ///
     /// # Errors
     /// As [`Engine::session`]; the session then stays as it was.
@@ -136,8 +136,8 @@ impl<'a> Session<'a> {
         self.coords_phase = phase;
     }
 
-    /// Measures from now on how long each pass takes on the gpu; `false` without one, and where it has no time
-    /// stamps.
+    /// Measures from now on how long each pass takes on the gpu; `false` without one, and where it has no
+    /// time stamps.
     pub fn time_passes(&mut self) -> bool {
         self.gpu.as_mut().is_some_and(GpuSession::time_passes)
     }
@@ -347,8 +347,8 @@ impl<'a> Session<'a> {
         self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_marks)
     }
 
-    /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture that
-    /// is held whole.
+    /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture
+    /// that is held whole.
     #[must_use]
     pub fn tiles_held(&self) -> Option<[usize; 2]> {
         self.gpu.as_ref().and_then(GpuSession::tiles_held)

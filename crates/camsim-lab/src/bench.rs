@@ -1,8 +1,8 @@
 //! Run time against error: every case with every method, in one table (`camsim bench`).
 //!
 //! Time is that of frames rendered and read back, measured in interleaved rounds ([`rounds`]). Errors are
-//! against the reference renderer ([`truth`]): source error in pixels of the ideal frame, and picture error as
-//! PSNR of linear values with peak 1.
+//! against the reference renderer ([`truth`]): source error in pixels of the ideal frame, and picture error
+//! as PSNR of linear values with peak 1.
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 

@@ -131,7 +131,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let is_picture = ends_as_picture(args);
     if !is_picture && args.output.extension().is_some() && !args.output.is_dir() {
         return Err(Failure::bad_input(anyhow!(
-            "-o {}: the name must end in .exr or .png, which selects the format; for several frames it is a folder, whose name has no ending",
+            "-o {}: the name must end in .exr or .png, which selects the format; for several frames it is a \
+             folder, whose name has no ending",
             args.output.display()
         )));
     }
@@ -206,8 +207,10 @@ fn read(args: &Args, set: &FrameSet, index: usize, console: &mut Console<'_>) ->
     let file = set.read(index).or_bad_input()?;
     if file.without_depth == 1.0 && file.motion.translates() {
         let frame = args.frame.display();
-        console
-            .warn(format_args!("{frame}: no pixel has a depth: everything is taken as infinitely far, and the camera's velocity has no effect"));
+        console.warn(format_args!(
+            "{frame}: no pixel has a depth: everything is taken as infinitely far, and \
+                                the camera's velocity has no effect"
+        ));
     }
     Ok(file)
 }
@@ -263,8 +266,8 @@ fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
     if first.abs().max(last.abs()) > 1.0 + 1e-9 {
         let frame = args.frame.display();
         console.warn(format_args!(
-            "{frame}: {reach}: the flow is extrapolated by more than its own interval; check instant_ms and flow_interval_ms, or use a flow \
-             over a longer interval"
+            "{frame}: {reach}: the flow is extrapolated by more than its own interval; check instant_ms and \
+             flow_interval_ms, or use a flow over a longer interval"
         ));
     } else {
         let beyond = if first < 0.0 || last > 1.0 { ": outside of it the flow is extrapolated" } else { "" };

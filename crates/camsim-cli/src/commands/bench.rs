@@ -78,7 +78,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.note(report.summary());
     match report.violations.len() {
         beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow!(
-            "{beaten} choices of the planner have a higher time and a higher error than another method; the table lists them"
+            "{beaten} choices of the planner have a higher time and a higher error than another method; the \
+             table lists them"
         ))),
         _ => Ok(()),
     }

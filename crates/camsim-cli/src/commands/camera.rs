@@ -78,7 +78,8 @@ fn keep_vignette_in_reach(imported: &mut ImportedCamera, calibration: &Path) {
     match calibration.parent().unwrap_or(Path::new("")).join(&vignette).canonicalize() {
         Ok(found) => *vignette = found,
         Err(_) => imported.notes.push(format!(
-            "the vignette map {} is not beside the calibration: put it there, or correct photometric.vignette",
+            "the vignette map {} is not beside the calibration: put it there, or correct \
+             photometric.vignette",
             vignette.display()
         )),
     }

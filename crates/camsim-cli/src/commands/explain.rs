@@ -165,8 +165,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         }));
     }
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        console
-            .warn("quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan of the default solver");
+        console.warn(
+            "quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan \
+                   of the default solver",
+        );
     }
     let engine = args.backend.open()?;
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, engine.max_side_px())
@@ -227,7 +229,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     {
         console.line("terrain in this frame")?;
         console.line(format_args!(
-            "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance {tolerance_px:.3})"
+            "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance \
+             {tolerance_px:.3})"
         ))?;
         console.line(format_args!(
             "  seen from straight above, depth is off by at most {depth_share:.1e} of itself"
@@ -242,7 +245,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if let Some(Models { detail: ModelLod { meshes, triangles, finest_triangles }, tolerance_px }) = models {
         console.line("models in this frame")?;
         console.line(format_args!(
-            "  {meshes} meshes with {triangles} triangles, displaced by at most {tolerance_px:.3} output px; {finest_triangles} triangles at the finest level"
+            "  {meshes} meshes with {triangles} triangles, displaced by at most {tolerance_px:.3} output px; \
+             {finest_triangles} triangles at the finest level"
         ))?;
     }
     Ok(())
@@ -316,9 +320,14 @@ fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>)
     console.line(format_args!("  memory: {heights:.1} MiB of heights, {picture:.1} MiB of texture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.texture_gpu_bytes));
     match memory.tiles {
-        None => console.line(format_args!("  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {picture:.1} MiB of texture"))?,
+        None => console.line(format_args!(
+            "  GPU memory, if the GPU draws it: {triangles:.1} MiB of \
+                                           triangles, {picture:.1} MiB of texture"
+        ))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {tiles} of {all} texture tiles in {picture:.1} MiB (the cache holds at most twice the largest need of a frame, plus 32 MiB)"
+            "  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {tiles} of {all} texture \
+             tiles in {picture:.1} MiB (the cache holds at most twice the largest need of a frame, plus 32 \
+             MiB)"
         ))?,
     }
     Ok(())
@@ -357,11 +366,13 @@ fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) ->
         ..
     } = source;
     console.line(format_args!(
-        "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
+        "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal \
+         length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
     ))?;
     let ([n, e, d], [w, x, y, z]) = (source.ideal_ned_m, source.ideal_q_wxyz);
     console.line(format_args!(
-        "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z {z:.9}, stamp {ideal_t_ns} ns"
+        "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z \
+         {z:.9}, stamp {ideal_t_ns} ns"
     ))?;
     if plan.shared_frames.is_some() {
         console.line("  this is the frame's own geometry, although several frames share one ideal frame")?;
@@ -374,7 +385,8 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
     let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
     let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
     let from = format!(
-        "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky {sky}"
+        "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky \
+         {sky}"
     );
     let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
         (Some(summary), Some(terrain)) => {
@@ -384,7 +396,8 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
                 times => format!(", upsampled {times} times"),
             };
             format!(
-                "; baked into the terrain texture of {width}x{height} px{finer}, in steps of 8 bits that are not in the predicted error"
+                "; baked into the terrain texture of {width}x{height} px{finer}, in steps of 8 bits that are \
+                 not in the predicted error"
             )
         }
         _ => String::new(),

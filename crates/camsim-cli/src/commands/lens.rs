@@ -97,7 +97,8 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
     })?;
     if beyond > 0 {
         console.warn(format_args!(
-            "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but no real lens images them there",
+            "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but \
+             no real lens images them there",
             points.len()
         ));
     }

@@ -203,8 +203,8 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
     let oracle = Auto::Value(Solver::Oracle);
     let refused = |what: &str| {
         Err(Failure::bad_input(anyhow!(
-            "{what} cannot be combined with --backend reference, which always casts exact rays: leave --backend out, or use the default \
-             preset and solver (--preset default --set quality.solver=auto)"
+            "{what} cannot be combined with --backend reference, which always casts exact rays: leave \
+             --backend out, or use the default preset and solver (--preset default --set quality.solver=auto)"
         )))
     };
     match backend {
@@ -227,7 +227,8 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
         }
         Some(Backend::Cpu | Backend::Gpu) if scenario.quality.solver == oracle => {
             return Err(Failure::bad_input(anyhow!(
-                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or change the solver (--set quality.solver=auto)"
+                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or \
+                 change the solver (--set quality.solver=auto)"
             )));
         }
         _ => {}

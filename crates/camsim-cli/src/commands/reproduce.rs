@@ -107,7 +107,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.note(format_args!("rendering on {engine}"));
     if data.is_none() {
         console.note(format_args!(
-            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"
+            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on \
+             built-in substitutes"
         ));
     }
     let scratch = args.output.join("inputs");
@@ -174,8 +175,8 @@ fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
         return Ok(Some(folder));
     }
     Err(Failure::bad_input(anyhow!(
-        "{named_by}: {} has no folder camsim/ with the paper's inputs (path_lawnmower.csv and others); name the folder above it, or leave \
-         {named_by} out to run on built-in substitutes",
+        "{named_by}: {} has no folder camsim/ with the paper's inputs (path_lawnmower.csv and others); name \
+         the folder above it, or leave {named_by} out to run on built-in substitutes",
         folder.display()
     )))
 }

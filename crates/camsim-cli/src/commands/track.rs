@@ -130,7 +130,8 @@ fn warn_of_few(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
     let vibration_hz = path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
-            "{rate_hz} rows per second are too few for the mount's vibration of {vibration_hz} Hz: use --rate {:.0} or more",
+            "{rate_hz} rows per second are too few for the mount's vibration of {vibration_hz} Hz: use \
+             --rate {:.0} or more",
             8.0 * vibration_hz
         ));
     }

@@ -175,7 +175,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         return Err(Failure::bad_input(anyhow!(
-            "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set quality.solver=auto"
+            "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set \
+             quality.solver=auto"
         )));
     }
     let loaded = inputs::load(&scenario, console)?;
@@ -198,7 +199,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             "source errors in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"
         ))?;
         console.line(format_args!(
-            "terrain LOD: bound on the displacement by the terrain's level of detail, output px; quality.max_terrain_error_px = {allowed_px}"
+            "terrain LOD: bound on the displacement by the terrain's level of detail, output px; \
+             quality.max_terrain_error_px = {allowed_px}"
         ))?;
         console.line(HEADER)?;
     }
@@ -254,8 +256,9 @@ fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::bad_input(anyhow!(
-        "camera.size_px = [{width}, {height}] is {} pixels, and this adapter can measure at most {most} in one frame: make camera.size_px smaller, \
-         and camera.focal_px and camera.principal_point_px in proportion",
+        "camera.size_px = [{width}, {height}] is {} pixels, and this adapter can measure at most {most} in \
+         one frame: make camera.size_px smaller, and camera.focal_px and camera.principal_point_px in \
+         proportion",
         width * height
     )))
 }
@@ -401,7 +404,8 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
 /// `judged_by` of a frame without a percentile.
 const VOID: &str = "nothing";
 
-const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain LOD |";
+const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        \
+                      max | falsely valid  missing | terrain LOD |";
 
 fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
@@ -419,8 +423,14 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         _ => String::new(),
     };
     console.line(format_args!(
-        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
-        predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
+        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | \
+         {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
+        predicted.total_px,
+        smooth.p99_px,
+        smooth.rms_px,
+        smooth.max_px,
+        silhouettes.rms_px,
+        silhouettes.max_px
     ))?;
     let Predicted {
         resampling_dn, blur_dn, misregistration_dn, terrain, blended_depth, disocclusion, ..
@@ -444,7 +454,8 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
         console.line(format_args!(
-            "       | picture: PSNR {all}, away from silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
+            "       | picture: PSNR {all}, away from silhouettes {smooth}, at silhouettes {silhouettes}, \
+             largest difference {max:.3}"
         ))?;
         let verdict = match (*kept, *predicted_dn > tolerance_dn) {
             (true, _) => "kept",
@@ -452,8 +463,11 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
             (false, false) => "EXCEEDED, not predicted",
         };
         console.line(format_args!(
-            "       | picture error {rms_dn:.3} DN (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; away from silhouettes, predicted {}",
-            estimate(resampling_dn.hypot(*blur_dn).hypot(*misregistration_dn).hypot(surface_dn).hypot(blended_dn))
+            "       | picture error {rms_dn:.3} DN (RMS), predicted {predicted_dn:.3}: quality.max_error_dn \
+             = {tolerance_dn} is {verdict}; away from silhouettes, predicted {}",
+            estimate(
+                resampling_dn.hypot(*blur_dn).hypot(*misregistration_dn).hypot(surface_dn).hypot(blended_dn)
+            )
         ))?;
         for cause in &verified.not_in_the_picture {
             console.line(format_args!("       | not predicted: {cause}"))?;
@@ -470,7 +484,9 @@ fn describe_truth(truth: &Truth) -> String {
     };
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
-        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and {point_faults}: {}",
+        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error \
+         {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and \
+         {point_faults}: {}",
         largest(depth_max),
         largest(point_max),
         if *kept { "kept" } else { "FAULTS" }

@@ -86,7 +86,8 @@ pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<()
     let Some(first) = others.first() else { return Ok(()) };
     let count = others.len();
     Err(Failure::bad_input(anyhow!(
-        "{why}, and {count} files of other frames would remain ({first} is the first): choose another folder with -o, or remove that one"
+        "{why}, and {count} files of other frames would remain ({first} is the first): choose another folder \
+         with -o, or remove that one"
     )))
 }
 
@@ -111,7 +112,8 @@ fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
         check_resume_of(job.folder, "adapter", "by another adapter", &adapter)
     {
         console.warn(format_args!(
-            "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from new ones by rounding",
+            "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from \
+             new ones by rounding",
             path.display()
         ));
     }

@@ -1,6 +1,6 @@
-//! Cost of each effect of a camera: each is left out alone, and one after the other until none is left. This is
-//! done with the variants' own plans, and with the sampling plan of the full camera. The two differ because an
-//! effect can hide errors: without blur, vignette or lens a frame needs finer sampling to keep
+//! Cost of each effect of a camera: each is left out alone, and one after the other until none is left. This
+//! is done with the variants' own plans, and with the sampling plan of the full camera. The two differ
+//! because an effect can hide errors: without blur, vignette or lens a frame needs finer sampling to keep
 //! `quality.max_error_dn`, so it may take longer. With the same sampling the difference is the cost of the
 //! effect itself.
 
@@ -142,8 +142,8 @@ pub struct AblationRow {
     pub ms_per_frame_p50: f64,
     /// Processor milliseconds a frame, median of the rounds; null where it is not known.
     pub cpu_ms_per_frame: Option<f64>,
-    /// Quartiles of the differences to the full camera in the same rounds, ms; null for the picture copy, which
-    /// is measured separately.
+    /// Quartiles of the differences to the full camera in the same rounds, ms; null for the picture copy,
+    /// which is measured separately.
     pub to_full_ms: Option<[f64; 3]>,
     /// Milliseconds a frame with the full camera's sampling, median of the rounds.
     pub alike_ms_per_frame_p50: Option<f64>,
@@ -153,8 +153,8 @@ pub struct AblationRow {
     pub alike_to_full_ms: Option<[f64; 3]>,
 }
 
-/// Measures a camera without each effect, without more and more of them, without any over a fixed ideal frame,
-/// and the copy of a picture.
+/// Measures a camera without each effect, without more and more of them, without any over a fixed ideal
+/// frame, and the copy of a picture.
 ///
 /// # Errors
 /// Any error of rendering.

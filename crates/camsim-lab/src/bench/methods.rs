@@ -71,8 +71,8 @@ pub fn methods(case: &Case, quick: bool) -> Vec<Method> {
             scenario.quality.solver = Auto::Value(Solver::Linear)
         });
         add("rk2", MethodFamily::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Rk2));
-        // On smooth ground each depth look-up reduces the error; with houses most of it is at silhouettes. Frames
-        // with every effect take seconds.
+        // On smooth ground each depth look-up reduces the error; with houses most of it is at silhouettes.
+        // Frames with every effect take seconds.
         let look_ups: &[u32] = match (quick, case.name, case.has_houses()) {
             (true, ..) => &[2],
             (_, ALL_EFFECTS_CASE, _) => &[],

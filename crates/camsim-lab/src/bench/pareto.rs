@@ -115,7 +115,8 @@ pub fn violations(rows: &[Row]) -> Vec<Violation> {
     for row in rows.iter().filter(|row| row.family == MethodFamily::Tolerance) {
         for other in rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob) {
             let ratios = row.times.ratios(&other.times);
-            // Samples and taps do not change sources: a figure that was not measured is that of the default row.
+            // Samples and taps do not change sources: a figure that was not measured is that of the default
+            // row.
             let default =
                 rows.iter().find(|default| comparable(row, default) && default.knob == DEFAULT_METHOD);
             let compare = |figure: fn(&Row) -> Option<f64>| {
@@ -171,8 +172,8 @@ mod tests {
         let names = |rows: &[Row]| violations(rows).into_iter().map(|v| v.better).collect::<Vec<_>>();
         let better = row("better", MethodFamily::Solver, [10.0, 11.0, 10.0], 0.01, 45.0);
         assert_eq!(names(&[auto.clone(), better.clone()]), ["better"]);
-        // No violation: the time differs by noise only, or the other row has a larger error, or a worse picture.
-        // Forced rows are never violations.
+        // No violation: the time differs by noise only, or the other row has a larger error, or a worse
+        // picture. Forced rows are never violations.
         let noisy = row("noisy", MethodFamily::Solver, [19.0, 23.0, 21.5], 0.01, 45.0);
         let coarse = row("coarse", MethodFamily::Solver, [10.0, 11.0, 10.0], 0.06, 45.0);
         let ugly = row("ugly", MethodFamily::Solver, [10.0, 11.0, 10.0], 0.01, 40.0);

@@ -72,7 +72,8 @@ pub struct Row {
     /// Times of every round.
     #[serde(skip)]
     pub times: Times,
-    /// Median milliseconds a frame on the renderers of [`super::Options::compared`]; `None` without an adapter.
+    /// Median milliseconds a frame on the renderers of [`super::Options::compared`]; `None` without an
+    /// adapter.
     #[serde(skip)]
     pub compared_ms: Vec<Option<f64>>,
 }

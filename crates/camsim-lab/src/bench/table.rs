@@ -8,8 +8,8 @@ use crate::{
     timing::quantile,
 };
 
-/// Blender Cycles on two cores in the case [`CYCLES_CASE`], measured outside of camsim: seconds per frame, PSNR
-/// in dB.
+/// Blender Cycles on two cores in the case [`CYCLES_CASE`], measured outside of camsim: seconds per frame,
+/// PSNR in dB.
 const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
 /// The case with rows of Blender Cycles.
 const CYCLES_CASE: &str = "blender-plane";
@@ -85,8 +85,8 @@ impl BenchReport {
         let compared: String = self.compared.iter().map(|name| format!(" {name}, ms per frame |")).collect();
         writeln!(
             text,
-            "| method | ms per frame |{compared} p99 | CPU ms | to default | RMS px | p99 px | max px | away from \
-             silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
+            "| method | ms per frame |{compared} p99 | CPU ms | to default | RMS px | p99 px | max px | away \
+             from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
         )?;
         writeln!(text, "|{}", "---|".repeat(13 + self.compared.len()))?;
         for row in rendered {
@@ -181,8 +181,8 @@ impl BenchReport {
         if self.violations.is_empty() {
             writeln!(
                 text,
-                "None: no other method of the same case has both a lower time (by at least 2 % in nine tenths of the \
-                 rounds) and a clearly lower error."
+                "None: no other method of the same case has both a lower time (by at least 2 % in nine \
+                 tenths of the rounds) and a clearly lower error."
             )?;
         }
         for violation in &self.violations {

@@ -15,7 +15,7 @@ use camsim_core::{
 use camsim_engine::{Engine, Finished};
 
 use super::{BenchError, rounds::FRAME};
-use crate::cases::world::hash;
+use crate::cases::hash;
 
 /// Step of the pixels whose coordinates are compared, in x and y: 76 800 of 640x480, far more than a 99th
 /// percentile needs.
@@ -111,8 +111,8 @@ impl Truth {
         }
     }
 
-    /// Sums of squared differences of linear values and numbers of pixels, away from silhouettes and near them.
-    /// A pixel that is invalid in one picture counts in `falsely_valid` or `missing` instead.
+    /// Sums of squared differences of linear values and numbers of pixels, away from silhouettes and near
+    /// them. A pixel that is invalid in one picture counts in `falsely_valid` or `missing` instead.
     fn squared_errors(&self, frame: &RenderedFrame) -> [(f64, u64); 2] {
         let mut sums = [(0.0, 0); 2];
         let pairs = self.picture.color_rgba.chunks_exact(4).zip(frame.color_rgba.chunks_exact(4));

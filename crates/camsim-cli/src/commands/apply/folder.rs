@@ -198,7 +198,8 @@ pub(super) fn tell_gaps(
     if let Some((frame, _)) = steps.first() {
         let longest_s = steps.iter().fold(0.0_f64, |longest, (_, step_s)| longest.max(*step_s));
         console.warn(format_args!(
-            "{}: {} of {} frames, first frame {frame}, are in gaps of the trajectory of up to {longest_s:.1} s, which are interpolated by a straight line and a constant rotation",
+            "{}: {} of {} frames, first frame {frame}, are in gaps of the trajectory of up to {longest_s:.1} \
+             s, which are interpolated by a straight line and a constant rotation",
             args.frame.display(),
             steps.len(),
             frames.len()
