@@ -4,10 +4,10 @@ use std::{fmt, str::FromStr};
 
 /// Ranges as typed; omitted ends come from the sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FrameList(Vec<Part>);
+pub struct FrameList(Vec<FrameRange>);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
+struct FrameRange {
     first: u64,
     /// Exclusive.
     end: Option<u64>,
@@ -60,11 +60,11 @@ impl FromStr for FrameList {
     type Err = FrameListError;
 
     fn from_str(text: &str) -> Result<Self, FrameListError> {
-        text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>().map(Self)
+        text.split(',').map(|part| FrameRange::parse(part.trim())).collect::<Result<_, _>>().map(Self)
     }
 }
 
-impl Part {
+impl FrameRange {
     fn parse(text: &str) -> Result<Self, FrameListError> {
         let syntax = || FrameListError::Syntax(text.to_owned());
         let number = |digits: &str| match digits.bytes().all(|byte| byte.is_ascii_digit()) {

@@ -1,5 +1,4 @@
-//! Depth and coordinates where a look-up in the ideal frame does not tell them: by rays in f64, cast by the
-//! host.
+//! Depth and coordinates of pixels whose depth look-up is unreliable: by f64 rays on the processor.
 
 use camsim_core::temporal::unreliable_depth::{DepthGrid, changed};
 use camsim_plan::{FramePlan, PixelTruth, Planner};
@@ -8,9 +7,10 @@ use rayon::prelude::*;
 
 use camsim_plan::uniforms::Truth;
 
-/// Casts rays for the pixels that the device has left to the host (their depth is below 0), for those whose
-/// depth may belong to no surface or to the wrong one, and from each pixel that a ray has corrected on for
-/// its neighbours. `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
+/// Replaces unreliable depths and coordinates by those of exact rays: of pixels that the renderer has marked
+/// (depth below 0), of pixels whose depth may belong to no surface or to the wrong one, and, repeatedly, of
+/// the neighbours of each pixel that a ray has changed. `phase` is that of the source coordinates; valid
+/// pixels have alpha in `color_rgba`.
 pub(crate) fn complete(
     truth: &mut [Truth],
     color_rgba: &[f32],
@@ -19,17 +19,17 @@ pub(crate) fn complete(
     phase: f64,
 ) {
     let width = plan.camera.size_px[0] as usize;
-    let sight = |i: usize, truth: &Truth| {
+    let exact_truth = |i: usize, truth: &Truth| {
         let uv = DVec2::new(f64::from(truth.uv[0]), f64::from(truth.uv[1]));
         planner.pixel_truth(plan, [(i % width) as u32, (i / width) as u32], uv, phase)
     };
     let cast = |truth: &[Truth], pixels: &[usize]| -> Vec<(usize, PixelTruth)> {
-        pixels.par_iter().map(|&i| (i, sight(i, &truth[i]))).collect()
+        pixels.par_iter().map(|&i| (i, exact_truth(i, &truth[i]))).collect()
     };
-    let mut by_ray: Vec<bool> = truth.iter().map(|of| of.depth_m < 0.0).collect();
-    let unknown: Vec<usize> = (0..truth.len()).filter(|&i| by_ray[i]).collect();
-    for (i, sight) in cast(truth, &unknown) {
-        tell(&mut truth[i], &sight);
+    let mut is_exact: Vec<bool> = truth.iter().map(|pixel| pixel.depth_m < 0.0).collect();
+    let marked: Vec<usize> = (0..truth.len()).filter(|&i| is_exact[i]).collect();
+    for (i, exact) in cast(truth, &marked) {
+        set(&mut truth[i], &exact);
     }
     let valid: Vec<bool> = color_rgba.chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let inverse_depth: Vec<f32> = truth.iter().map(inverse_depth).collect();
@@ -39,34 +39,34 @@ pub(crate) fn complete(
         .unreliable_pixels()
         .into_iter()
         .enumerate()
-        .filter(|&(i, suspect)| suspect && !by_ray[i])
+        .filter(|&(i, is_unreliable)| is_unreliable && !is_exact[i])
         .map(|(i, _)| i)
         .collect();
-    pixels.iter().for_each(|&i| by_ray[i] = true);
+    pixels.iter().for_each(|&i| is_exact[i] = true);
     while !pixels.is_empty() {
-        let found = cast(truth, &pixels);
+        let results = cast(truth, &pixels);
         pixels.clear();
-        for (i, sight) in found {
-            tell(&mut truth[i], &sight);
+        for (i, exact) in results {
+            set(&mut truth[i], &exact);
             if !changed(inverse_depth[i], self::inverse_depth(&truth[i])) {
                 continue;
             }
-            for beside in grid.neighbours(i).filter(|&beside| valid[beside]) {
-                if !std::mem::replace(&mut by_ray[beside], true) {
-                    pixels.push(beside);
+            for neighbour in grid.neighbours(i).filter(|&neighbour| valid[neighbour]) {
+                if !std::mem::replace(&mut is_exact[neighbour], true) {
+                    pixels.push(neighbour);
                 }
             }
         }
     }
 }
 
-/// 1/m; 0 where nothing is.
+/// Inverse depth, 1/m; 0 for the sky.
 fn inverse_depth(truth: &Truth) -> f32 {
     if truth.depth_m > 0.0 { 1.0 / truth.depth_m } else { 0.0 }
 }
 
-fn tell(truth: &mut Truth, sight: &PixelTruth) {
-    truth.source_px = sight.source_px.as_vec2().to_array();
-    truth.point_ned_m = sight.hit.map_or([0.0; 3], |(point_ned_m, _)| point_ned_m.as_vec3().to_array());
-    truth.depth_m = sight.hit.map_or(0.0, |(_, depth_m)| depth_m as f32);
+fn set(truth: &mut Truth, exact: &PixelTruth) {
+    truth.source_px = exact.source_px.as_vec2().to_array();
+    truth.point_ned_m = exact.hit.map_or([0.0; 3], |(point_ned_m, _)| point_ned_m.as_vec3().to_array());
+    truth.depth_m = exact.hit.map_or(0.0, |(_, depth_m)| depth_m as f32);
 }

@@ -13,13 +13,13 @@ use crate::{
 
 /// Work with camera files
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CameraArgs {
     #[command(subcommand)]
-    command: Command,
+    command: CameraCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum CameraCommand {
     Import(ImportArgs),
 }
 
@@ -46,9 +46,9 @@ struct ImportArgs {
 }
 
 /// Runs a camera command.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &CameraArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     match &args.command {
-        Command::Import(args) => import(args, console),
+        CameraCommand::Import(args) => import(args, console),
     }
 }
 

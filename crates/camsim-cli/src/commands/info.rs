@@ -14,7 +14,7 @@ use crate::{backend::BackendArgs, console::Console, failure::Failure};
                   the adapter the others. --backend cpu needs no adapter\nat all. Pictures of the two differ \
                   by rounding. Exit code 3 if an adapter is demanded and there is none."
 )]
-pub struct Args {
+pub struct InfoArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -53,7 +53,7 @@ impl Adapter {
 }
 
 /// Prints the adapters of this machine.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = args.backend.open()?;
     let info = info(&engine);
     if args.json {
