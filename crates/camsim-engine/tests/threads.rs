@@ -1,4 +1,4 @@
-//! However many pixels of a line a thread takes, the frame is the same.
+//! Frames do not depend on the number of pixels per thread.
 
 mod common;
 

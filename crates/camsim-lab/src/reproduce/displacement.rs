@@ -1,10 +1,9 @@
-//! The paper's pipeline on one ideal frame (its fig. 2): every output pixel is taken back to the frame's
-//! stamp at constant twist and depth.
+//! The paper's pipeline in f64 (its fig. 2): one ideal frame at the stamp, and for each output pixel a
+//! displacement at constant twist and depth.
 //!
-//! camsim itself draws the ideal frame in the middle of what the output frame sees and takes the true pose of
-//! every row; this is what the paper does instead, in f64, so that what its approximations cost can be seen.
-//! Choices that the paper leaves open are the reference program's: depth is that of the ideal frame's nearest
-//! pixel at the ray's own place.
+//! It shows the errors of the paper's approximations: camsim itself puts the ideal frame in the middle of the
+//! window and uses the true pose of every row. Where the paper leaves a choice open, this follows the paper's
+//! program: the depth is that of the nearest ideal pixel at the ray.
 
 use std::sync::Arc;
 
@@ -25,74 +24,75 @@ use camsim_engine::Engine;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{ReproduceError, rig};
+use super::{ReproduceError, test_bench};
 
-/// By how much the ideal frame is larger than the output, as in the reference program.
+/// Size of the ideal frame over that of the output, as in the paper's program.
 const MARGIN: f64 = 1.7;
 
 /// A displacement model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Model {
-    /// Straight steps (eq. 16) of at most this rotation, radians; infinity is one step.
+pub enum DisplacementModel {
+    /// Straight steps (eq. 16). The value is the largest rotation of a step, radians; infinity means one
+    /// step.
     Linear(f64),
-    /// Heun's steps (eq. 18) of at most this rotation, radians.
+    /// Heun's steps (eq. 18). The value is the largest rotation of a step, radians.
     Rk2(f64),
 }
 
-impl Model {
-    /// Where the point now seen at `uv` was `dt_s` ago.
+impl DisplacementModel {
+    /// Image position, `dt_s` ago, of the point that is at `uv` now.
     #[must_use]
     pub fn displace(self, uv: DVec2, inverse_depth: f64, twist: &Twist, dt_s: f64) -> DVec2 {
         match self {
             Self::Linear(step_rad) => {
                 let steps = rk2_steps(twist, dt_s, step_rad);
                 let step_s = dt_s / f64::from(steps);
-                (0..steps).fold(uv, |at, _| at - image_rate(at, inverse_depth, twist) * step_s)
+                (0..steps).fold(uv, |uv, _| uv - image_rate(uv, inverse_depth, twist) * step_s)
             }
             Self::Rk2(step_rad) => rk2(uv, inverse_depth, twist, dt_s, step_rad),
         }
     }
 }
 
-/// Where the samples of an exposure are.
+/// Positions of the exposure samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
-    /// On the straight line between the places of its two ends (section 6.2).
+pub enum SamplePath {
+    /// On the straight line between the sources of the two ends (section 6.2).
     Straight,
-    /// Each at the place of its own instant.
+    /// At the source of each sample's own instant.
     Curved,
 }
 
-/// In what the exposure's samples are averaged.
+/// Values in which exposure samples are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Light {
-    /// Light.
+pub enum Averaging {
+    /// Linear values.
     Linear,
     /// Stored sRGB values, as the paper does.
     Stored,
 }
 
-/// An ideal colour and depth frame at one instant.
+/// An ideal frame at one instant: colour and depth.
 #[derive(Clone, Debug)]
-pub struct Ideal {
-    /// Its pixels.
+pub struct PaperIdealFrame {
+    /// Size, focal length and principal point.
     pub geometry: IdealGeometry,
-    /// Its pose.
+    /// Camera pose.
     pub pose: CameraPose,
-    /// Motion at its instant.
+    /// Twist of the camera at the instant.
     pub twist: Twist,
     rgba: Vec<f32>,
     inverse_depth: Vec<f32>,
 }
 
-impl Ideal {
-    /// The ideal frame of a sequence at `stamp_s`, larger than the output by the margin on all sides.
+impl PaperIdealFrame {
+    /// Renders the ideal frame of a sequence at `stamp_s`, larger than the output by [`MARGIN`].
     ///
     /// # Errors
-    /// The device.
-    pub fn at(engine: &Engine, sequence: &Sequence, stamp_s: f64) -> Result<Self, ReproduceError> {
-        let mut wide = Sequence::clone(&rig::at(sequence, stamp_s, ShutterSpec::default()));
-        let (camera, _) = rig::checked(sequence)?;
+    /// Any error of rendering.
+    pub fn render(engine: &Engine, sequence: &Sequence, stamp_s: f64) -> Result<Self, ReproduceError> {
+        let mut wide = Sequence::clone(&test_bench::with_shutter(sequence, stamp_s, ShutterSpec::default()));
+        let (camera, _) = test_bench::camera_and_shutter(sequence)?;
         let spec = &mut wide.scenario.camera;
         spec.size_px = camera.size_px.map(|side| (MARGIN * f64::from(side)).round() as u32);
         let border = [0, 1].map(|k| (spec.size_px[k] - camera.size_px[k]) as f64 / 2.0);
@@ -102,13 +102,13 @@ impl Ideal {
         spec.photometric = Default::default();
         let geometry = IdealGeometry { size_px: spec.size_px, focal_px: camera.focal_px, principal_px };
         let path = sequence.path.clone();
-        let frame = rig::render(engine, &Arc::new(wide), &[Channel::Color, Channel::Depth], [0])?
+        let frame = test_bench::render(engine, &Arc::new(wide), &[Channel::Color, Channel::Depth], [0])?
             .pop()
             .map(|finished| finished.frame);
         let (Some(pose), Some(RenderedFrame { color_rgba, depth_m: Some(depth_m), .. })) =
             (Some(path.pose(stamp_s)), frame)
         else {
-            return Err(ReproduceError::made("the ideal frame", "it has no depth"));
+            return Err(ReproduceError::setup("the ideal frame", "it has no depth"));
         };
         let camera_from_ned = pose.ned_from_camera.inverse();
         let twist = Twist {
@@ -120,44 +120,44 @@ impl Ideal {
         Ok(Self { geometry, pose, twist, rgba: color_rgba, inverse_depth })
     }
 
-    /// Where an ideal ray of the output, `dt_s` after the stamp, looks in this frame.
+    /// Source of an output pixel's ray, `dt_s` after the stamp, in this frame.
     #[must_use]
-    pub fn source_px(&self, uv: DVec2, dt_s: f64, model: Model) -> DVec2 {
+    pub fn source_px(&self, uv: DVec2, dt_s: f64, model: DisplacementModel) -> DVec2 {
         self.geometry
             .px_from_point(model.displace(uv, self.nearest_inverse_depth(uv), &self.twist, dt_s).extend(1.0))
     }
 
-    /// The camera's frame by the paper's method, `samples` of the exposure from one end to the other (1
-    /// without exposure). A pixel whose samples all lie outside of this frame is not valid.
+    /// The camera's output frame by the paper's method, with `samples` exposure samples (1 without exposure).
+    /// A pixel is invalid if all its samples are outside of this frame.
     ///
     /// # Errors
     /// A camera that cannot be used.
     pub fn frame(
         &self,
         camera: &CameraSpec,
-        model: Model,
+        model: DisplacementModel,
         samples: u32,
-        path: Path,
-        light: Light,
+        path: SamplePath,
+        averaging: Averaging,
     ) -> Result<RenderedFrame, ReproduceError> {
         let lens =
-            CameraModel::from_spec(camera).map_err(|error| ReproduceError::made("the camera", error))?;
+            CameraModel::from_spec(camera).map_err(|error| ReproduceError::setup("the camera", error))?;
         let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)
-            .map_err(|error| ReproduceError::made("the shutter", error))?;
+            .map_err(|error| ReproduceError::setup("the shutter", error))?;
         let [width, height] = camera.size_px;
         let pixel = |i: u32| {
             let [x, y] = [i % width, i / width];
             let color = lens.unproject(DVec2::new(f64::from(x), f64::from(y))).and_then(|uv| {
                 let dt_s = shutter.dt_pixel_s(x, y);
-                let place = |phase: f64| self.source_px(uv, dt_s + phase * shutter.exposure_s(), model);
-                let ends = [-0.5, 0.5].map(place);
+                let source_px = |phase: f64| self.source_px(uv, dt_s + phase * shutter.exposure_s(), model);
+                let ends = [-0.5, 0.5].map(source_px);
                 let phases = (0..samples.max(1))
                     .map(|i| if samples < 2 { 0.0 } else { f64::from(i) / f64::from(samples - 1) - 0.5 });
                 match path {
-                    Path::Straight => {
-                        self.mean(phases.map(|phase| ends[0].lerp(ends[1], phase + 0.5)), light)
+                    SamplePath::Straight => {
+                        self.mean(phases.map(|phase| ends[0].lerp(ends[1], phase + 0.5)), averaging)
                     }
-                    Path::Curved => self.mean(phases.map(place), light),
+                    SamplePath::Curved => self.mean(phases.map(source_px), averaging),
                 }
             });
             color.map_or([0.0; 4], |c| [c.x as f32, c.y as f32, c.z as f32, 1.0])
@@ -169,30 +169,31 @@ impl Ideal {
     fn nearest_inverse_depth(&self, uv: DVec2) -> f64 {
         let [width, height] = self.geometry.size_px;
         let last = DVec2::new(f64::from(width) - 1.0, f64::from(height) - 1.0);
-        let at = self.geometry.px_from_point(uv.extend(1.0)).round().clamp(DVec2::ZERO, last);
-        f64::from(self.inverse_depth[at.y as usize * width as usize + at.x as usize])
+        let pixel = self.geometry.px_from_point(uv.extend(1.0)).round().clamp(DVec2::ZERO, last);
+        f64::from(self.inverse_depth[pixel.y as usize * width as usize + pixel.x as usize])
     }
 
-    /// Mean colour of the places that lie on this frame.
-    fn mean(&self, places_px: impl Iterator<Item = DVec2>, light: Light) -> Option<DVec3> {
+    /// Mean colour of the sources that are within this frame.
+    fn mean(&self, sources_px: impl Iterator<Item = DVec2>, averaging: Averaging) -> Option<DVec3> {
         let image = ColorImage { size_px: self.geometry.size_px, rgba: &self.rgba };
         let (mut sum, mut count) = (DVec3::ZERO, 0.0);
-        for at_px in places_px.filter(|&at_px| self.geometry.contains(at_px)) {
-            let color = image.sample(at_px);
-            sum += match light {
-                Light::Linear => color,
-                Light::Stored => each(color, srgb_from_linear),
+        for source_px in sources_px.filter(|&source_px| self.geometry.contains(source_px)) {
+            let color = image.sample(source_px);
+            sum += match averaging {
+                Averaging::Linear => color,
+                Averaging::Stored => map_channels(color, srgb_from_linear),
             };
             count += 1.0;
         }
         let mean = sum / count;
-        (count > 0.0).then(|| match light {
-            Light::Linear => mean,
-            Light::Stored => each(mean, linear_from_srgb),
+        (count > 0.0).then(|| match averaging {
+            Averaging::Linear => mean,
+            Averaging::Stored => map_channels(mean, linear_from_srgb),
         })
     }
 }
 
-fn each(color: DVec3, change: fn(f32) -> f32) -> DVec3 {
+/// Applies a function to each channel.
+fn map_channels(color: DVec3, change: fn(f32) -> f32) -> DVec3 {
     DVec3::from_array(color.to_array().map(|value| f64::from(change(value as f32))))
 }

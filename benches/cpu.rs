@@ -1,7 +1,7 @@
-//! The host's share of a frame, each part alone: plan, poses, files, and what precedes the first frame. No
-//! GPU, except for the one frame that is encoded.
+//! Work on the processor, each part alone: plans, row poses, terrain triangles, tracker and file encoding. No
+//! graphics adapter is needed.
 //!
-//! `cargo bench --bench host`
+//! `cargo bench --bench cpu`
 
 #![allow(clippy::print_stdout, reason = "the numbers of triangles belong to their times")]
 
@@ -19,7 +19,7 @@ use camsim::{
         scene::{Terrain, TerrainDetail},
         tracker::track,
     },
-    engine::{AdapterChoice, Engine},
+    engine::Engine,
     io::{
         load::Loaded,
         write::{FrameFiles, FrameWriter},
@@ -31,7 +31,7 @@ use glam::{DQuat, DVec3};
 
 mod flight;
 
-use flight::{Outcome, Without};
+use flight::{Ablation, Outcome};
 
 /// Texture side limit of common adapters.
 const MAX_SIDE_PX: u32 = 16_384;
@@ -51,13 +51,13 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// What happens for each frame before the device has work.
+/// Work before the first pass of a frame.
 fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let mut group = criterion.benchmark_group("plan");
-    for (name, without) in [("full camera", Without::Nothing), ("perfect camera", Without::Anything)] {
-        let sequence = without.of(&loaded.sequence)?;
+    for (name, ablation) in [("full camera", Ablation::None), ("perfect camera", Ablation::All)] {
+        let sequence = ablation.apply(&loaded.sequence)?;
         let planner = Planner::new(sequence.clone(), &sequence.scenario.output.channels, MAX_SIDE_PX)?;
-        // A frame is planned with those that it may share its ideal frame with.
+        // All frames of a group that may share an ideal frame are planned together.
         let plan_anew = || {
             planner.forget();
             planner.plan(black_box(60)).map(drop)
@@ -74,8 +74,8 @@ fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     Ok(())
 }
 
-/// What is drawn of a terrain: of the demo's in frame 60, and of ones of different sizes under the same
-/// camera.
+/// Choice of the terrain's triangles: for the built-in terrain in frame 60, and for terrains of several sizes
+/// under the same camera.
 fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let mut group = criterion.benchmark_group("terrain");
     let sequence = &loaded.sequence;
@@ -97,11 +97,11 @@ fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
         measure("demo", terrain, &plan.key_pose);
     }
     for side in std::env::var("CAMSIM_TERRAIN_SIDES").unwrap_or("1025 4097".into()).split_whitespace() {
-        let begun = Instant::now();
-        let (name, terrain) = (format!("{side} x {side} heights"), rugged(side.parse()?)?);
-        println!("{name}: made in {:.1} s", begun.elapsed().as_secs_f64());
-        // Over its middle: straight down, which sees none of the border, and as the demo's camera looks, to
-        // the horizon.
+        let begin = Instant::now();
+        let (name, terrain) = (format!("{side} x {side} heights"), fractal_terrain(side.parse()?)?);
+        println!("{name}: made in {:.1} s", begin.elapsed().as_secs_f64());
+        // From above the centre: straight down, without the border in sight, and to the horizon as in the
+        // built-in flight.
         let position_ned_m = DVec3::new(0.0, 0.0, terrain.down_at(0.0, 0.0).unwrap_or_default() - 2000.0);
         let down = CameraPose { position_ned_m, ned_from_camera: DQuat::IDENTITY };
         measure(&format!("{name}, down"), &terrain, &down);
@@ -111,23 +111,23 @@ fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     Ok(())
 }
 
-/// Hills of all sizes, the same at each place whatever the number of heights, 10 m apart.
-fn rugged(side: u32) -> Outcome<Terrain> {
-    let at = |index: u32| f64::from(index) - f64::from(side / 2);
+/// Hills of all sizes on a grid of 10 m. The height at a point does not depend on the number of heights.
+fn fractal_terrain(side: u32) -> Outcome<Terrain> {
+    let centred = |index: u32| f64::from(index) - f64::from(side / 2);
     let height = |i: f64, j: f64| -> f64 {
         (0..12)
             .map(|octave| {
-                let (size, turn) = (0.7 * 0.5_f64.powi(octave), f64::from(octave));
-                let (x, y) = (i * turn.cos() - j * turn.sin(), i * turn.sin() + j * turn.cos());
-                0.7 / size * (size * x).sin() * (size * y + turn).cos()
+                let (frequency, angle) = (0.7 * 0.5_f64.powi(octave), f64::from(octave));
+                let (x, y) = (i * angle.cos() - j * angle.sin(), i * angle.sin() + j * angle.cos());
+                0.7 / frequency * (frequency * x).sin() * (frequency * y + angle).cos()
             })
             .sum()
     };
-    let heights: Vec<f64> = (0..side * side).map(|k| height(at(k % side), at(k / side))).collect();
+    let heights: Vec<f64> = (0..side * side).map(|k| height(centred(k % side), centred(k / side))).collect();
     Ok(Terrain::from_heights(side, side, 10.0, &heights, None)?)
 }
 
-/// The whole log, once a run.
+/// Tracking of the whole log.
 fn tracking(criterion: &mut Criterion, loaded: &Loaded) {
     let rows = &loaded.log.rows;
     let mut group = criterion.benchmark_group("track");
@@ -139,7 +139,7 @@ fn tracking(criterion: &mut Criterion, loaded: &Loaded) {
     group.finish();
 }
 
-/// One frame to one file on one thread, whatever the folder for temporary files is on.
+/// One frame to one file on one thread, in the folder for temporary files.
 fn files(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let frame = rendered(loaded)?;
     let folder = tempfile::tempdir()?;
@@ -176,7 +176,7 @@ fn files(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
 
 /// Frame 60 of the demo.
 fn rendered(loaded: &Loaded) -> Outcome<RenderedFrame> {
-    let engine = Engine::new(AdapterChoice::Best)?;
+    let engine = Engine::cpu();
     let mut session =
         engine.session::<Infallible>(loaded.sequence.clone(), &loaded.sequence.scenario.output.channels)?;
     let mut frame = RenderedFrame::default();

@@ -1,11 +1,11 @@
-"""In which order a grid's cells are read while the exposure goes by (crates/camsim-core/src/temporal/footprint.rs).
+"""Best order of the cells of a sampling grid over the exposure (crates/camsim-core/src/temporal/footprint.rs).
 
 Each sample of an exposure reads one cell of its pixel's grid at one instant. What that leaves of a border is a sum over waves f of the ideal frame, as in
 crates/camsim-plan/src/picture_error/aliasing.rs: the bilinear read's part of f and of those that the frame's pixels make look like it, times the mean of exp(2 pi i f . (cell + path)) over the
 reads, less the exact mean over the pixel's area and the path.
 
-    python3 order_of_reads.py                what the orders in use leave, against pairs from the outside to the inside
-    python3 order_of_reads.py 4 3 60         looks for a better one of 4 columns and 3 rows for 60 s: by chance, and never quite the same
+    python3 gather_order.py                what the orders in use leave, against pairs from the outside to the inside
+    python3 gather_order.py 4 3 60         looks for a better one of 4 columns and 3 rows for 60 s: by chance, and never quite the same
 
 Needs numpy.
 """

@@ -1,5 +1,5 @@
-//! The paper's test bench: a camera that looks straight down at the circle grid from 3 km, turning or flying
-//! at constant speed.
+//! The paper's test bench: a camera that looks straight down at the circle grid from 3 km, in constant
+//! rotation or translation.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -24,29 +24,30 @@ use rayon::prelude::*;
 
 use super::{
     ReproduceError, Setup,
-    pattern::{self, SKY_LINEAR},
+    circle_grid::{self, SKY_LINEAR},
 };
 
-/// Height over the target, metres, and its width: `path-pure-pattern-*.csv` of the reference program.
+/// Height above the target, metres, from `path-pure-pattern-*.csv` of the paper's program.
 pub const HEIGHT_M: f64 = 3000.0;
 /// Width of the target, metres.
 pub const TARGET_M: f64 = 6000.0;
-/// The turn of those files, degrees a second.
+/// Rotation rate of those files, degrees per second.
 pub const TURN_DEG_S: f64 = 36.0;
-/// The flight of those files, m/s.
+/// Speed of those files, m/s.
 pub const FLIGHT_M_S: f64 = 300.0;
-/// How long the motion goes on before and after t = 0.
+/// Duration of the motion before and after t = 0.
 const SPAN_S: f64 = 20.0;
 
-/// Coefficients k1 k2 p1 p2 k3 of the paper's lens, a clip-on fisheye of a phone, by Agisoft Lens (its table
-/// 2 as the reference program has it).
+/// Coefficients k1 k2 p1 p2 k3 of the paper's lens, a clip-on fisheye of a phone, by Agisoft Lens (table 2,
+/// with the digits of the paper's program).
 pub const FISHEYE: [f64; 5] = [-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63];
 
-/// The paper's camera by Agisoft Lens at `width_px` (640 there), looking straight down, every effect off.
+/// The paper's camera with the calibration of Agisoft Lens at `width_px` (640 in the paper), looking straight
+/// down, without other effects.
 #[must_use]
 pub fn fisheye(width_px: u32) -> CameraSpec {
     let scale = f64::from(width_px) / 640.0;
-    // There, image corners are at whole numbers.
+    // Integers are pixel corners in the paper.
     let principal = [305.599, 226.736].map(|c| c * scale - 0.5);
     CameraSpec {
         principal_point_px: Some(principal),
@@ -55,7 +56,8 @@ pub fn fisheye(width_px: u32) -> CameraSpec {
     }
 }
 
-/// The same focal length without the lens, centred: what the paper's temporal models see.
+/// A pinhole with the focal length of [`fisheye`] and a centred principal point, as the paper's temporal
+/// models assume.
 #[must_use]
 pub fn pinhole(width_px: u32) -> CameraSpec {
     let focal_px = 307.6075 * f64::from(width_px) / 640.0;
@@ -68,30 +70,31 @@ pub fn pinhole(width_px: u32) -> CameraSpec {
     }
 }
 
-/// Motion of the bench.
+/// Motion of the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Velocity, north, east, down, m/s.
+    /// Velocity (north, east, down), m/s.
     pub velocity_ned_m_s: DVec3,
-    /// Body rate about forward, right, down, deg/s. The camera looks down: the third turns it about its
-    /// optical axis, clockwise.
+    /// Body rate about forward, right and down, deg/s. The camera looks down, so the third component is a
+    /// clockwise rotation about the optical axis.
     pub rate_body_deg_s: DVec3,
 }
 
 impl Motion {
-    /// The turn of the paper's rotation path.
+    /// The rotation of the paper's path file.
     #[must_use]
     pub fn turning() -> Self {
         Self { rate_body_deg_s: DVec3::new(0.0, 0.0, TURN_DEG_S), ..Self::default() }
     }
 
-    /// At the speed of the paper's translation path, in a direction of the image (x right, y down).
+    /// Translation with the speed of the paper's path file, in an image direction (x right, y down).
     #[must_use]
     pub fn flying(right: f64, down: f64) -> Self {
         Self { velocity_ned_m_s: FLIGHT_M_S * DVec3::new(-down, right, 0.0), ..Self::default() }
     }
 
-    /// Poses about t = 0, when the camera is over the middle of the target with the image's top to the north.
+    /// The trajectory around t = 0, when the camera is above the centre of the target, image top to the
+    /// north.
     fn trajectory(&self) -> Option<Trajectory> {
         let rate_body_rad_s = self.rate_body_deg_s * 1f64.to_radians();
         let first = BodyState {
@@ -106,7 +109,7 @@ impl Motion {
     }
 }
 
-/// A scenario for things that are already in memory.
+/// A scenario for a sequence in memory.
 #[must_use]
 pub fn scenario(camera: CameraSpec) -> Scenario {
     Scenario {
@@ -126,25 +129,25 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
         tracker: Default::default(),
         camera,
         scene: Default::default(),
-        // Pictures of one instant each: there is nothing to share.
+        // Frames of independent instants share no ideal frame.
         quality: QualitySpec { frames_per_ideal: 1, ..QualitySpec::default() },
         output: Default::default(),
     }
 }
 
-/// A camera that moves over a scene; frame i has its stamp at `i / fps`.
+/// The sequence of a camera that moves above a scene; the stamp of frame i is `i / fps`.
 ///
 /// # Errors
-/// A mount that cannot be used.
+/// An invalid mount or motion.
 pub fn sequence(
     camera: CameraSpec,
     motion: Motion,
     scene: &Arc<Scene>,
 ) -> Result<Arc<Sequence>, ReproduceError> {
     let trajectory =
-        motion.trajectory().ok_or_else(|| ReproduceError::made("the motion", "it is not finite"))?;
+        motion.trajectory().ok_or_else(|| ReproduceError::setup("the motion", "it is not finite"))?;
     let path = CameraPath::new(trajectory, &camera.mount)
-        .map_err(|error| ReproduceError::made("the mount", error))?;
+        .map_err(|error| ReproduceError::setup("the mount", error))?;
     Ok(Arc::new(Sequence {
         scenario: scenario(camera),
         path: Arc::new(path),
@@ -157,22 +160,21 @@ pub fn sequence(
     }))
 }
 
-/// The circle grid as the paper has it: its own picture when there is a data folder, else the same one drawn
-/// here.
+/// The circle grid: the paper's own picture if there is a data folder, otherwise an equal one.
 ///
 /// # Errors
-/// The file of the data folder.
+/// The file of the data folder cannot be read.
 pub fn target(setup: &Setup<'_>, width_m: f64) -> Result<Arc<Scene>, ReproduceError> {
     let texture = match setup.data_file("camsim/acircles_pattern-patternsX-towards-imageTop(North).gif") {
         Some(path) => camsim_io::pictures::read_texture(&path, camsim_core::scene::Encoding::Srgb)?,
-        None => pattern::texture(),
+        None => circle_grid::texture(),
     };
-    Ok(Arc::new(pattern::scene(texture, width_m)))
+    Ok(Arc::new(circle_grid::scene(texture, width_m)))
 }
 
-/// The sequence with another shutter, its frame 0 stamped at `stamp_s`.
+/// The sequence with another shutter, and with the stamp of frame 0 at `stamp_s`.
 #[must_use]
-pub fn at(sequence: &Sequence, stamp_s: f64, shutter: ShutterSpec) -> Arc<Sequence> {
+pub fn with_shutter(sequence: &Sequence, stamp_s: f64, shutter: ShutterSpec) -> Arc<Sequence> {
     let mut sequence = sequence.clone();
     sequence.scenario.camera.shutter = shutter;
     sequence.start_s = stamp_s;
@@ -182,7 +184,7 @@ pub fn at(sequence: &Sequence, stamp_s: f64, shutter: ShutterSpec) -> Arc<Sequen
 /// Renders frames.
 ///
 /// # Errors
-/// The device; a camera that cannot be used.
+/// Any error of rendering.
 pub fn render(
     engine: &Engine,
     sequence: &Arc<Sequence>,
@@ -192,7 +194,7 @@ pub fn render(
     render_at_phase(engine, sequence, channels, frames, 0.0)
 }
 
-/// As [`render`], with source coordinates reported at `phase` of the exposure, -0.5 to 0.5.
+/// Renders frames with source coordinates at `phase` of the exposure, -0.5 to 0.5.
 ///
 /// # Errors
 /// As [`render`].
@@ -213,27 +215,27 @@ pub fn render_at_phase(
     Ok(done)
 }
 
-/// Frame 0.
+/// Renders frame 0.
 ///
 /// # Errors
 /// As [`render`].
-pub fn picture(engine: &Engine, sequence: &Arc<Sequence>) -> Result<RenderedFrame, ReproduceError> {
+pub fn render_first(engine: &Engine, sequence: &Arc<Sequence>) -> Result<RenderedFrame, ReproduceError> {
     let mut frames = render(engine, sequence, &[Channel::Color], [0])?;
     frames
         .pop()
         .map(|finished| finished.frame)
-        .ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))
+        .ok_or_else(|| ReproduceError::setup("the sequence", "it gave no frame"))
 }
 
-/// What a perfect camera sees at `stamp_s`.
+/// The frame of a perfect camera at `stamp_s`.
 ///
 /// # Errors
 /// As [`render`].
 pub fn snapshot(engine: &Engine, sequence: &Sequence, stamp_s: f64) -> Result<RenderedFrame, ReproduceError> {
-    picture(engine, &at(sequence, stamp_s, ShutterSpec::default()))
+    render_first(engine, &with_shutter(sequence, stamp_s, ShutterSpec::default()))
 }
 
-/// Pixel by pixel the mean light of frames of one size; a pixel is valid where it is in all of them.
+/// Mean of frames of one size, in linear values. A pixel is valid if it is valid in all of them.
 #[must_use]
 pub fn mean<'a>(frames: impl IntoIterator<Item = &'a RenderedFrame>) -> RenderedFrame {
     let mut frames = frames.into_iter();
@@ -251,50 +253,49 @@ pub fn mean<'a>(frames: impl IntoIterator<Item = &'a RenderedFrame>) -> Rendered
     sum
 }
 
-/// Difference of two frames in linear light.
+/// Difference of two frames in linear values.
 ///
 /// # Errors
-/// Different sizes.
+/// The frames have different sizes.
 pub fn difference(a: &RenderedFrame, b: &RenderedFrame) -> Result<Comparison, ReproduceError> {
     fn view(frame: &RenderedFrame) -> ImageView<'_> {
         ImageView { size_px: frame.size_px, channels: 4, alpha: Some(3), samples: &frame.color_rgba }
     }
-    compare(view(a), view(b)).map_err(|error| ReproduceError::made("the pair of pictures", error))
+    compare(view(a), view(b)).map_err(|error| ReproduceError::setup("the pair of pictures", error))
 }
 
-/// The oracle of a sequence.
+/// The reference renderer of a sequence.
 ///
 /// # Errors
-/// A camera or shutter that cannot be used.
-pub fn oracle(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
-    Oracle::new(sequence.clone()).map_err(|error| ReproduceError::made("the camera", error))
+/// An invalid camera or shutter.
+pub fn reference(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
+    Oracle::new(sequence.clone()).map_err(|error| ReproduceError::setup("the camera", error))
 }
 
-/// Pixels of frame 0 that show the target where the oracle's ray through their centre meets nothing, or the
-/// sky where it meets the target.
+/// Number of pixels of frame 0 that show the target where the exact ray through their centre hits nothing, or
+/// the sky where it hits the target.
 ///
 /// # Errors
-/// A camera that cannot be used.
-pub fn wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<usize, ReproduceError> {
-    let oracle = oracle(sequence)?;
+/// An invalid camera.
+pub fn count_wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<usize, ReproduceError> {
+    let reference = reference(sequence)?;
     let [width, _] = frame.size_px;
-    // The sky is blue, the target has no hue. A pixel on the border that shows as much of both is right
-    // either way.
-    let sky = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
-    let view = oracle.view(0);
+    // The sky is blue, the target grey. A border pixel with similar shares of both is right either way.
+    let sky_share = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
+    let view = reference.view(0);
     let wrong = frame.color_rgba.par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
-        let at = [*i as u32 % width, *i as u32 / width];
-        let look = view.sample(at, DVec2::ZERO, 0.0);
-        look.is_some_and(|look| {
-            pixel[3] > 0.0 && if look.hit.is_some() { sky(pixel) > 0.75 } else { sky(pixel) < 0.25 }
+        let position = [*i as u32 % width, *i as u32 / width];
+        let sample = view.sample(position, DVec2::ZERO, 0.0);
+        sample.is_some_and(|sample| {
+            pixel[3] > 0.0
+                && if sample.hit.is_some() { sky_share(pixel) > 0.75 } else { sky_share(pixel) < 0.25 }
         })
     });
     Ok(wrong.count())
 }
 
-/// Where a point of the world appears in a frame whose pixels have the times of the camera's shutter (rows,
-/// no fields): the time depends on the row, and the row on the time. `None` behind the camera or beyond the
-/// fold of the lens.
+/// Projects a point into a frame with a rolling shutter without fields, by fixed-point iteration: the time
+/// depends on the row, and the row on the time. `None` behind the camera or beyond the fold of the lens.
 #[must_use]
 pub fn project(
     sequence: &Sequence,
@@ -305,7 +306,7 @@ pub fn project(
 ) -> Option<DVec2> {
     let rows = f64::from(camera.size_px[1]);
     let mut t_s = stamp_s - shutter.delay_s();
-    let mut at = DVec2::ZERO;
+    let mut position_px = DVec2::ZERO;
     for _ in 0..60 {
         let pose = sequence.path.pose(t_s);
         let in_camera = pose.ned_from_camera.inverse() * (point_ned_m - pose.position_ned_m);
@@ -313,47 +314,47 @@ pub fn project(
         if in_camera.z <= 0.0 || !camera.lens.contains(ideal) {
             return None;
         }
-        let before = std::mem::replace(&mut at, camera.project(ideal));
-        t_s = stamp_s - shutter.delay_s() + ((at.y + 0.5) / rows - 0.5) * shutter.readout_s();
-        if before.distance(at) < 1e-9 {
+        let previous_px = std::mem::replace(&mut position_px, camera.project(ideal));
+        t_s = stamp_s - shutter.delay_s() + ((position_px.y + 0.5) / rows - 0.5) * shutter.readout_s();
+        if previous_px.distance(position_px) < 1e-9 {
             break;
         }
     }
-    Some(at)
+    Some(position_px)
 }
 
-/// Checked camera and shutter of a sequence.
+/// Camera model and shutter of a sequence.
 ///
 /// # Errors
-/// What cannot be used.
-pub fn checked(sequence: &Sequence) -> Result<(CameraModel, Shutter), ReproduceError> {
+/// An invalid camera or shutter.
+pub fn camera_and_shutter(sequence: &Sequence) -> Result<(CameraModel, Shutter), ReproduceError> {
     let spec = &sequence.scenario.camera;
-    let camera = CameraModel::from_spec(spec).map_err(|error| ReproduceError::made("the camera", error))?;
+    let camera = CameraModel::from_spec(spec).map_err(|error| ReproduceError::setup("the camera", error))?;
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
-        .map_err(|error| ReproduceError::made("the shutter", error))?;
+        .map_err(|error| ReproduceError::setup("the shutter", error))?;
     Ok((camera, shutter))
 }
 
-/// How each circle of the target wholly in the picture (and a little inside) is seen by a frame of the
-/// sequence with its stamp at `stamp_s`.
+/// Images of the target's circles in the frame with the stamp `stamp_s`, of those wholly within the frame
+/// with a margin of 3 px.
 ///
 /// # Errors
-/// What cannot be used.
-pub fn seen_circles(
+/// An invalid camera or shutter.
+pub fn circles_in_view(
     sequence: &Sequence,
     stamp_s: f64,
     target_m: f64,
-) -> Result<Vec<pattern::Seen>, ReproduceError> {
-    let (camera, shutter) = checked(sequence)?;
+) -> Result<Vec<circle_grid::CircleImage>, ReproduceError> {
+    let (camera, shutter) = camera_and_shutter(sequence)?;
     let last = DVec2::new(f64::from(camera.size_px[0]) - 1.0, f64::from(camera.size_px[1]) - 1.0);
-    let inside = |seen: &pattern::Seen| {
-        let [low, high] = seen.bounds_px;
+    let is_inside = |circle: &circle_grid::CircleImage| {
+        let [low, high] = circle.bounds_px;
         low.cmpge(DVec2::splat(3.0)).all() && high.cmple(last - 3.0).all()
     };
-    let seen = pattern::circles(target_m)
+    let circles = circle_grid::circles(target_m)
         .iter()
-        .filter_map(|circle| circle.seen(|point| project(sequence, &camera, &shutter, stamp_s, point)))
-        .filter(inside)
+        .filter_map(|circle| circle.image(|point| project(sequence, &camera, &shutter, stamp_s, point)))
+        .filter(is_inside)
         .collect();
-    Ok(seen)
+    Ok(circles)
 }

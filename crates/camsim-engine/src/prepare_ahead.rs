@@ -1,6 +1,5 @@
-//! Frames' plans and what else the host computes for them, made by rayon's threads while the device works on
-//! earlier frames. All of it is a function of sequence and frame number: who computes it, and when, does not
-//! show.
+//! Plans, terrain triangles and row tables of frames, computed on rayon threads while earlier frames are
+//! rendered. All of it is a function of sequence and frame number, so thread and time do not change it.
 
 use std::{
     collections::VecDeque,
@@ -24,66 +23,65 @@ use camsim_plan::uniforms::base_ned_m;
 
 use crate::session::ms_since;
 
-/// Frames that are prepared before they are asked for, at most, with as many threads, where each is planned
-/// by itself: some megabytes of triangles and poses. Those of a group have one ideal frame's, and as many
-/// groups are begun as are best planned at once.
+/// Most frames that are prepared ahead, one per thread, if each is planned alone: a few megabytes of
+/// triangles and poses. Frames of a group share an ideal frame; of them [`Planner::groups_at_once`] groups
+/// are prepared.
 const MOST_AHEAD: usize = 16;
-/// Frames of one group that one thread prepares, at most: as many are ready while as many are begun.
-const MOST_TOGETHER: usize = 16;
+/// Most frames of a group that one task prepares.
+const MOST_PER_TASK: usize = 16;
 
-/// A frame before anything of it is recorded.
+/// Inputs of the passes of a frame.
 #[derive(Debug)]
 pub(super) struct Prepared {
     pub plan: FramePlan,
-    /// Triangles of the terrain for each key; none without a terrain.
+    /// Terrain triangles of each key frame; empty without a terrain.
     pub meshes: Arc<[PlacedMesh]>,
     pub rows: RowTable,
     pub plan_ms: f64,
 }
 
-/// What the choice of triangles depends on.
+/// Inputs of the choice of terrain triangles.
 #[derive(Debug, PartialEq)]
-struct View {
+struct TerrainView {
     poses: Vec<CameraPose>,
     ideal: IdealGeometry,
     terrain_error_px: f64,
     reads: PrefilterTaps,
 }
 
-/// Prepares frames; the last triangles are kept, of as many groups as are planned at once, for frames that
-/// see them in the same way.
+/// Prepares frames. The triangles of the last groups are cached for frames with the same view.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
-    /// Of the ground's picture, if it is in tiles.
+    /// Tiles of the terrain texture, if it is tiled.
     tiles: Option<Arc<TerrainTiles>>,
-    seen: Mutex<VecDeque<(View, Arc<[PlacedMesh]>)>>,
+    mesh_cache: Mutex<VecDeque<(TerrainView, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
     pub fn new(planner: Arc<Planner>, tiles: Option<Arc<TerrainTiles>>) -> Self {
-        Self { planner, tiles, seen: Mutex::default() }
+        Self { planner, tiles, mesh_cache: Mutex::default() }
     }
 
     fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
-        let begun = Instant::now();
+        let begin = Instant::now();
         let plan = self.planner.plan(frame)?;
         let meshes = self.meshes(&plan);
         let rows = RowTable::new(&plan, &self.planner.sequence().path);
-        Ok(Prepared { plan, meshes, rows, plan_ms: ms_since(begun) })
+        Ok(Prepared { plan, meshes, rows, plan_ms: ms_since(begin) })
     }
 
     fn meshes(&self, plan: &FramePlan) -> Arc<[PlacedMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
-        let view = View {
+        let view = TerrainView {
             poses,
             ideal: plan.ideal,
             terrain_error_px: plan.terrain_error_px,
             reads: plan.surface_reads,
         };
-        // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
-        let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, meshes)) = seen().iter().find(|(seen, _)| *seen == view) {
+        // Entries are replaced as a whole, so a panic on another thread leaves the cache valid.
+        let cache = || self.mesh_cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, meshes)) = cache().iter().find(|(cached, _)| *cached == view) {
             return meshes.clone();
         }
         let focal_px = plan.ideal.focal_px.max_element();
@@ -98,49 +96,49 @@ impl Preparer {
             })
         });
         let meshes: Arc<[PlacedMesh]> = meshes.collect();
-        let mut seen = seen();
-        while seen.len() >= Planner::groups_at_once() {
-            seen.pop_front();
+        let mut cache = cache();
+        while cache.len() >= Planner::groups_at_once() {
+            cache.pop_front();
         }
-        seen.push_back((view, meshes.clone()));
+        cache.push_back((view, meshes.clone()));
         meshes
     }
 }
 
-/// Frames in the order asked for, each begun before it is taken.
-pub(super) struct Ahead<'a, 'scope, I: Iterator<Item = u64>> {
+/// Prepared frames in the given order; preparation begins before a frame is taken.
+pub(super) struct PrepareAhead<'a, 'scope, I: Iterator<Item = u64>> {
     scope: &'a rayon::Scope<'scope>,
     preparer: &'scope Preparer,
     frames: Peekable<I>,
-    begun: VecDeque<Receiver<Result<Prepared, PlanError>>>,
-    /// Frames of the last group.
-    together: usize,
+    pending: VecDeque<Receiver<Result<Prepared, PlanError>>>,
+    /// Number of frames in the last group.
+    group_size: usize,
 }
 
-impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
-    /// Begins with the first frames. The scope ends when those that have been begun are done.
+impl<'a, 'scope, I: Iterator<Item = u64>> PrepareAhead<'a, 'scope, I> {
+    /// Begins to prepare the first frames. The scope ends when all begun frames are prepared.
     pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
         let mut ahead =
-            Self { scope, preparer, frames: frames.peekable(), begun: VecDeque::new(), together: 0 };
+            Self { scope, preparer, frames: frames.peekable(), pending: VecDeque::new(), group_size: 0 };
         ahead.begin();
         ahead
     }
 
     /// The next frame; `None` after the last.
     pub fn next(&mut self) -> Option<Result<Prepared, PlanError>> {
-        let given = self.begun.pop_front()?;
-        // Planning that panics gives no answer; the scope then panics too, when it ends.
-        let prepared = wait(&given)?;
+        let receiver = self.pending.pop_front()?;
+        // After a panic in planning nothing is received, and the scope panics when it ends.
+        let prepared = wait(&receiver)?;
         self.begin();
         Some(prepared)
     }
 
-    /// The next frames that are planned together.
+    /// The next frames for one task: those of one group.
     fn next_group(&mut self) -> Vec<u64> {
         let planner = &self.preparer.planner;
         let mut frames: Vec<u64> = self.frames.next().into_iter().collect();
         let Some(number) = frames.first().map(|&frame| planner.group_of(frame)) else { return frames };
-        while frames.len() < MOST_TOGETHER
+        while frames.len() < MOST_PER_TASK
             && let Some(frame) = self.frames.next_if(|&frame| planner.group_of(frame) == number)
         {
             frames.push(frame);
@@ -149,40 +147,41 @@ impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
     }
 
     fn begin(&mut self) {
-        // One to be taken and one at work at least; more where there are threads for it.
+        // At least one frame to take and one in work.
         let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
-        // Parts of one larger group would each look at all of it.
-        let at_once = |together: usize| if together < MOST_TOGETHER { Planner::groups_at_once() } else { 1 };
-        while self.begun.len() < ahead.max(at_once(self.together) * self.together) {
+        // Tasks for parts of a larger group would each plan the whole group.
+        let at_once =
+            |group_size: usize| if group_size < MOST_PER_TASK { Planner::groups_at_once() } else { 1 };
+        while self.pending.len() < ahead.max(at_once(self.group_size) * self.group_size) {
             let group = self.next_group();
             if group.is_empty() {
                 return;
             }
-            self.together = group.len();
-            let (gives, given): (Vec<_>, Vec<_>) = group.iter().map(|_| channel()).unzip();
+            self.group_size = group.len();
+            let (senders, receivers): (Vec<_>, Vec<_>) = group.iter().map(|_| channel()).unzip();
             let preparer = self.preparer;
             self.scope.spawn(move |_| {
-                for (frame, give) in group.into_iter().zip(gives) {
-                    // After a fault nobody takes it.
-                    if give.send(preparer.prepare(frame)).is_err() {
+                for (frame, sender) in group.into_iter().zip(senders) {
+                    // After an error elsewhere nothing is received.
+                    if sender.send(preparer.prepare(frame)).is_err() {
                         return;
                     }
                 }
             });
-            self.begun.extend(given);
+            self.pending.extend(receivers);
         }
     }
 }
 
-/// Waits. A thread of rayon's own first does what there is to do: it may be the only one.
-fn wait<T>(given: &Receiver<T>) -> Option<T> {
+/// Waits for a value. A rayon thread first executes pending tasks, since it may be the only thread.
+fn wait<T>(receiver: &Receiver<T>) -> Option<T> {
     loop {
-        match given.try_recv() {
+        match receiver.try_recv() {
             Ok(value) => return Some(value),
             Err(TryRecvError::Disconnected) => return None,
             Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => {}
-            // Not of the pool, or others are at it.
-            Err(TryRecvError::Empty) => return given.recv().ok(),
+            // Not a rayon thread, or other threads execute the tasks.
+            Err(TryRecvError::Empty) => return receiver.recv().ok(),
         }
     }
 }
