@@ -27,7 +27,7 @@ use crate::{
 Examples:
   camsim board flight.toml -o board.png --points points.csv
   camsim board april_6x6.yaml -o board.png")]
-pub struct Args {
+pub struct BoardArgs {
     /// Scenario with a [scene.board], or Kalibr's target YAML
     board: PathBuf,
     /// Image file: .png or linear .exr
@@ -40,7 +40,7 @@ pub struct Args {
 }
 
 /// Runs `camsim board`.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     args.output.as_deref().map_or(Ok(()), check_output)?;
     let yaml = args
         .board
