@@ -18,7 +18,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum CompareError {
     /// A file or folder cannot be read.
-    #[error("cannot read {}: {message}; give two EXR or PNG pictures, or two folders of them", path.display())]
+    #[error("cannot read {}: {message}; give two EXR or PNG pictures, or two folders of \
+        them", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -46,7 +47,8 @@ pub enum CompareError {
         source: MetricError,
     },
     /// Two folders without a picture of one name.
-    #[error("{} and {} have no EXR or PNG of the same name; compare two output folders of one scenario", a.display(), b.display())]
+    #[error("{} and {} have no EXR or PNG of the same name; compare two output folders of one \
+        scenario", a.display(), b.display())]
     NothingInCommon {
         /// First.
         a: PathBuf,

@@ -340,7 +340,8 @@ fn read_pictures(
         None if motion.translates() => {
             return Err(fail(
                 "depth",
-                "is missing, and the camera moves: without depth nothing says by how much surfaces shift; add it, or leave only the rotation",
+                "is missing, and the camera moves: without depth nothing says by how much surfaces shift; \
+                    add it, or leave only the rotation",
             ));
         }
         None => vec![0.0; (width * height) as usize],

@@ -22,8 +22,8 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
-mod beyond;
 mod optics;
+mod ortho_coverage;
 mod placements;
 mod scene;
 
@@ -61,7 +61,8 @@ pub enum LoadError {
     },
     /// A local log over a georeferenced scene.
     #[error(
-        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
+        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, \
+            height_m], the place on Earth of the log's (0, 0, 0)"
     )]
     NoOrigin {
         /// The log.
@@ -82,7 +83,8 @@ pub enum LoadError {
     },
     /// A place without ground.
     #[error(
-        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east {east_m:.1} m: move it onto the terrain, or leave on_ground out"
+        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east \
+            {east_m:.1} m: move it onto the terrain, or leave on_ground out"
     )]
     NoGround {
         /// The model.
@@ -94,7 +96,8 @@ pub enum LoadError {
     },
     /// A model farther away than anything can be.
     #[error(
-        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than {FARTHEST_M:.0e}: check its place and scale"
+        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
+            {FARTHEST_M:.0e}: check its place and scale"
     )]
     TooFar {
         /// The model.
@@ -107,17 +110,20 @@ pub enum LoadError {
     Board(#[from] BoardFileError),
     /// No frame falls into the window.
     #[error(
-        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher"
+        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or \
+            camera.fps higher"
     )]
     NoFrame(f64, f64, f64),
     /// More frames than a sequence may have.
     #[error(
-        "the window holds {0:.0} frames at {1} frames a second, more than {MOST_FRAMES:.0}: make flight.window_s shorter or camera.fps lower"
+        "the window holds {0:.0} frames at {1} frames a second, more than {MOST_FRAMES:.0}: make \
+            flight.window_s shorter or camera.fps lower"
     )]
     TooManyFrames(f64, f64),
     /// The zoom track.
     #[error(
-        "{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` (or t_ms, t_us, t_ns) and rows of finite numbers by ascending time"
+        "{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` (or t_ms, t_us, t_ns) and rows \
+            of finite numbers by ascending time"
     )]
     ZoomTrack {
         /// The file.
@@ -317,7 +323,8 @@ fn blind_share_warning(sequence: &Sequence) -> Option<String> {
     let share = 100.0 * f64::from(blind) / f64::from(all.max(1));
     (share >= 0.5).then(|| {
         format!(
-            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see `camsim lens SCENARIO.toml check`"
+            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see \
+                `camsim lens SCENARIO.toml check`"
         )
     })
 }
@@ -341,7 +348,8 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
     ];
     let told = |(key, ms, why): &(&str, f64, &str)| {
         format!(
-            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = {}): {why}",
+            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = \
+                {}): {why}",
             camera.fps
         )
     };
@@ -361,7 +369,8 @@ fn warnings(
     let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();
     if far_m > FAR_FROM_ORIGIN_M {
         warnings.push(format!(
-            "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the log's positions",
+            "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the \
+                log's positions",
             far_m / 1e3
         ));
     }
@@ -369,7 +378,8 @@ fn warnings(
         && !sequence.scene.has_triangle_borders_only()
     {
         warnings.push(format!(
-            "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"
+            "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their \
+                pictures, or are mixed with what is behind them, and samples do not show such borders"
         ));
     }
     warnings.extend(shutter_warnings(&sequence.scenario.camera));
@@ -377,11 +387,12 @@ fn warnings(
     let outside = frames_outside(sequence);
     if outside > 0 {
         warnings.push(format!(
-            "{outside} of {} frames lie outside of the log and fly on at constant velocity: check flight.window_s and camera.shutter.delay_ms",
+            "{outside} of {} frames lie outside of the log and fly on at constant velocity: check \
+                flight.window_s and camera.shutter.delay_ms",
             sequence.frames
         ));
     }
-    warnings.extend(terrain.and_then(|summary| beyond::beyond_picture_warning(sequence, summary)));
+    warnings.extend(terrain.and_then(|summary| ortho_coverage::ortho_coverage_warning(sequence, summary)));
     if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
         let step = (sequence.frames / 200).max(1);
         let places = (0..sequence.frames)
@@ -402,14 +413,19 @@ fn warnings(
         let [lat, lon] = summary.centre_rad.map(f64::to_degrees);
         if over == 0 && beside < all {
             warnings.push(format!(
-                "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain without heights (missing, masked or not plausible)",
+                "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain \
+                    without heights (missing, masked or not plausible)",
                 all - beside
             ));
         } else if over == 0 {
-            warnings.push(format!("the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} deg"));
+            warnings.push(format!(
+                "the flight is never over the terrain, whose middle is at latitude \
+                {lat:.5}, longitude {lon:.5} deg"
+            ));
         } else if below > 0 {
             warnings.push(format!(
-                "the camera is below the ground in {below} of {all} places looked at: check flight.height, scene.terrain.height and scene.terrain.height_unit"
+                "the camera is below the ground in {below} of {all} places looked at: check flight.height, \
+                    scene.terrain.height and scene.terrain.height_unit"
             ));
         }
     }

@@ -66,7 +66,8 @@ pub enum ResumeError {
         source: std::io::Error,
     },
     /// `run.json` is not one.
-    #[error("{} is not a run.json of camsim ({message}); render without --resume, or into another folder", path.display())]
+    #[error("{} is not a run.json of camsim ({message}); render without --resume, or into another \
+        folder", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
@@ -74,7 +75,8 @@ pub enum ResumeError {
         message: String,
     },
     /// Another scenario, or other files.
-    #[error("{} was made {made}: {}; render without --resume, or into another folder", path.display(), shortened(differences))]
+    #[error("{} was made {made}: {}; render without --resume, or into another \
+        folder", path.display(), shortened(differences))]
     Differs {
         /// The file.
         path: PathBuf,
@@ -445,7 +447,7 @@ mod tests {
 
     #[test]
     fn every_path_of_a_scenario_is_made_relative() {
-        use crate::scenario_file::{Kind, keys};
+        use crate::scenario_file::{ValueKind, keys};
         let text = r#"
             flight = { log = "x/1" }
             [camera]
@@ -464,7 +466,7 @@ mod tests {
         let mut tree = serde_json::to_value(&scenario).unwrap();
         let mut seen = Vec::new();
         for_each_path(&mut tree, &mut |key, _| seen.push(key.replace(".0.", ".").replace(".1.", ".")));
-        for (key, _) in keys().iter().filter(|(_, kind)| *kind == Kind::Path) {
+        for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
             assert!(seen.iter().any(|seen| seen == key), "{key}");
         }
         assert_eq!(seen.len(), 10);

@@ -138,7 +138,8 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
             return Err(PictureError::decode(
                 path,
                 format!(
-                    "grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"
+                    "grey values of floats are 0 to 1, and the largest is {most}: divide them by what white \
+                        is"
                 ),
             ));
         }

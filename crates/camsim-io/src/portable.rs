@@ -92,7 +92,8 @@ pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError
         |error: toml::ser::Error| WriteError::Encode { path: target.clone(), message: error.to_string() };
     let text = toml::to_string(&own).map_err(encode)?;
     let text = format!(
-        "# The camera of this run: `camera = \"camera.toml\"` in a scenario uses it. Paths are relative to this file.\n{text}"
+        "# The camera of this run: `camera = \"camera.toml\"` in a scenario uses it. Paths are relative to \
+            this file.\n{text}"
     );
     write_atomic(&target, text.as_bytes())
 }

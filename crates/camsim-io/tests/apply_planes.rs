@@ -143,15 +143,18 @@ fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, NoSourceCounts) {
     }
     write_picture(&folder.join("ideal.exr"), &ideal, OutputEncoding::Srgb8).unwrap();
     let frame = format!(
-        "color = \"ideal.exr\"\ndepth = \"ideal.exr\"\nfocal_px = [{IDEAL_FOCAL:?}, {IDEAL_FOCAL:?}]\n[motion]\nvelocity_m_s = {:?}\n\
+        "color = \"ideal.exr\"\ndepth = \"ideal.exr\"\nfocal_px = [{IDEAL_FOCAL:?}, \
+            {IDEAL_FOCAL:?}]\n[motion]\nvelocity_m_s = {:?}\n\
          angular_rate_rad_s = {:?}\n",
         VELOCITY.to_array(),
         RATE.to_array()
     );
     std::fs::write(folder.join("FRAME.toml"), frame).unwrap();
     let camera = format!(
-        "size_px = {OUT_PX:?}\nfocal_px = [{OUT_FOCAL:?}, {OUT_FOCAL:?}]\nprincipal_point_px = [159.5, 119.5]\n[lens]\n\
-         model = \"brown-conrady\"\ncoefficients = {LENS:?}\n[shutter]\nreadout_ms = {:?}\nexposure_ms = {:?}\n",
+        "size_px = {OUT_PX:?}\nfocal_px = [{OUT_FOCAL:?}, {OUT_FOCAL:?}]\nprincipal_point_px = [159.5, \
+            119.5]\n[lens]\n\
+         model = \"brown-conrady\"\ncoefficients = {LENS:?}\n[shutter]\nreadout_ms = {:?}\nexposure_ms = \
+         {:?}\n",
         1e3 * READOUT_S,
         1e3 * exposure_s
     );
@@ -211,7 +214,8 @@ fn sources_are_those_of_rays_into_the_scene() {
     let worst = clear.iter().copied().fold(0.0, f64::max);
     let right = near.iter().filter(|error| **error < 0.05).count() as f64 / near.len() as f64;
     eprintln!(
-        "away from silhouettes {} px: RMS {:.6}, worst {worst:.6}; beside them {}: RMS {:.3}, {:.1} % within 0.05; hidden {hidden}, outside {outside}",
+        "away from silhouettes {} px: RMS {:.6}, worst {worst:.6}; beside them {}: RMS {:.3}, {:.1} % within \
+            0.05; hidden {hidden}, outside {outside}",
         clear.len(),
         rms(&clear),
         near.len(),

@@ -65,7 +65,8 @@ impl Set {
             data.join(self.folder).join(name.replace('#', &number.to_string())).display().to_string()
         };
         format!(
-            "color = {:?}\ndepth = {:?}\ndepth_per_metre = {:?}\nfocal_px = {:?}\nprincipal_point_px = {:?}\n{rest}",
+            "color = {:?}\ndepth = {:?}\ndepth_per_metre = {:?}\nfocal_px = {:?}\nprincipal_point_px = \
+                {:?}\n{rest}",
             file(self.color),
             file(self.depth),
             self.per_metre,
@@ -167,7 +168,8 @@ fn a_frame_carried_to_the_place_of_another_is_that_other() {
             Pipeline::new(&still, &file.frame, &file.motion, &Settings::default()).unwrap().render(None);
         let (_, by_chance, _) = agreement(&unmoved, &own);
         eprintln!(
-            "{} {from} -> {to}: {both} px with depth in both, {:.1} % agree ({:.1} % unmoved), colour {color:.4}",
+            "{} {from} -> {to}: {both} px with depth in both, {:.1} % agree ({:.1} % unmoved), colour \
+                {color:.4}",
             set.folder,
             100.0 * agree,
             100.0 * by_chance
@@ -191,7 +193,8 @@ fn silhouettes_hold_in_every_frame() {
         .chain((1..=2).map(|i| (&DESK, i)));
     for (set, number) in frames {
         let folder = tempfile::tempdir().unwrap();
-        let rest = "holes = \"mark\"\n[motion]\nvelocity_m_s = [1.5, 0.0, 0.5]\nangular_rate_rad_s = [0.0, 0.3, 0.4]\n";
+        let rest = "holes = \"mark\"\n[motion]\nvelocity_m_s = [1.5, 0.0, 0.5]\nangular_rate_rad_s = [0.0, \
+            0.3, 0.4]\n";
         let file = set.read(&data, folder.path(), number, rest);
         let spec = set.camera(ShutterSpec { readout_ms: 100.0, exposure_ms: 10.0, ..ShutterSpec::default() });
         let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &Settings::default()).unwrap();

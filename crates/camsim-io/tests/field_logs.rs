@@ -413,7 +413,9 @@ fn every_real_flight_gives_its_value_or_says_why_not() {
         ("camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv", ned(), Ok(60)),
     ];
     let mut table = String::from(
-        "# Real flights, as they are read\n\nMade by a test from the files in CAMSIM_DATA. Speed: the 99.9th percentile. Warnings are the reader's; repairs are in the report.\n\n| file | read with | rows | seconds | m/s | what is said |\n|---|---|---|---|---|---|\n",
+        "# Real flights, as they are read\n\nMade by a test from the files in CAMSIM_DATA. Speed: the 99.9th \
+            percentile. Warnings are the reader's; repairs are in the report.\n\n| file | read with | rows | \
+            seconds | m/s | what is said |\n|---|---|---|---|---|---|\n",
     );
     let mut faults = Vec::new();
     for (file, spec, expected) in &cases {

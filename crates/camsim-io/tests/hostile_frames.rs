@@ -363,7 +363,8 @@ fn tables_of_frames_say_their_unit() {
     names(&notes.join("\n"), &["t.csv: the columns exposure_ms are not read"]);
 }
 
-const SCENARIO: &str = "[flight]\nlog = \"log.csv\"\n[scene.board]\nkind = \"circles\"\ncolumns = 4\nrows = 3\nsize_m = 0.1\n\
+const SCENARIO: &str = "[flight]\nlog = \"log.csv\"\n[scene.board]\nkind = \"circles\"\ncolumns = 4\nrows = \
+    3\nsize_m = 0.1\n\
                         [camera]\nsize_px = [40, 30]\nfocal_px = [40, 40]\nfps = 10\n";
 
 fn warnings(folder: &Path, camera: &str) -> Result<Vec<String>, String> {

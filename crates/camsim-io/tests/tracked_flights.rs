@@ -20,7 +20,8 @@ fn agile_flights_are_followed_to_a_degree() {
     };
     for (file, bounds) in FLIGHTS {
         let text = format!(
-            "[flight]\nlog = \"{file}\"\n[scene]\npattern = {{ image = \"none.png\", width_m = 1.0 }}\n[tracker]\nmax_acceleration_m_s2 = \"auto\"\n"
+            "[flight]\nlog = \"{file}\"\n[scene]\npattern = {{ image = \"none.png\", width_m = 1.0 \
+                }}\n[tracker]\nmax_acceleration_m_s2 = \"auto\"\n"
         );
         let mut scenario = parse_scenario(&text, &data.join("flights/s.toml"), &[]).unwrap();
         for (kind, most_deg) in bounds {

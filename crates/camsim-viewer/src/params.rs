@@ -356,7 +356,7 @@ pub const PARAMS: &[Param] = &[
 
 #[cfg(test)]
 mod tests {
-    use camsim_io::scenario_file::{Kind, keys};
+    use camsim_io::scenario_file::{ValueKind, keys};
 
     use super::*;
 
@@ -364,7 +364,7 @@ mod tests {
     fn every_key_of_the_format_has_its_facts_and_no_other() {
         let known: Vec<&str> = PARAMS.iter().map(|param| param.key).collect();
         let format: Vec<&str> =
-            keys().iter().filter(|(_, kind)| *kind != Kind::Later).map(|(key, _)| *key).collect();
+            keys().iter().filter(|(_, kind)| *kind != ValueKind::Unsupported).map(|(key, _)| *key).collect();
         assert_eq!(known, format);
         for param in PARAMS {
             assert!(

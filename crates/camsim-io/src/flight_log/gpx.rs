@@ -15,11 +15,14 @@ use camsim_core::{
 };
 use roxmltree::{Document, Node};
 
-use super::{FlightLogError, RawLog, columns::format_name, sniff, time};
+use super::{FlightLogError, RawLog, columns::format_name, foreign_formats, time_fields};
 
-/// Reads the rows of XML text, if it is GPX.
+/// Reads the track points of a GPX file.
+///
+/// # Errors
+/// The text is no XML, no GPX, or has no usable track points.
 pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let other = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
+    let foreign = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
         path: path.to_owned(),
         what,
         advice,
@@ -28,8 +31,8 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
     match document.root_element().tag_name().name() {
         "gpx" => {}
-        "kml" => return Err(other(sniff::KML)),
-        _ => return Err(other(sniff::OTHER_XML)),
+        "kml" => return Err(foreign(foreign_formats::KML)),
+        _ => return Err(foreign(foreign_formats::OTHER_XML)),
     }
     if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
         return Err(problem(format!(
@@ -38,7 +41,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         )));
     }
     let points: Vec<Node<'_, '_>> =
-        document.descendants().filter(|node| node.has_tag_name_of("trkpt")).collect();
+        document.descendants().filter(|node| node.has_local_name("trkpt")).collect();
     if points.is_empty() {
         return Err(problem(
             "the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown"
@@ -48,7 +51,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     let child = |point: &Node<'_, '_>, name: &str| {
         point
             .children()
-            .find(|node| node.has_tag_name_of(name))
+            .find(|node| node.has_local_name(name))
             .and_then(|node| node.text())
             .map(|text| text.trim().to_owned())
     };
@@ -81,7 +84,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         let height_m = number("ele", child(point, "ele").as_deref())?;
         let t_ns = match child(point, "time") {
             None => None,
-            Some(text) => Some(time::date_time_ns(&text).ok_or_else(|| {
+            Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
                 problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
             })?),
         };
@@ -95,10 +98,12 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     Ok(RawLog { rows, notes: notes(&document, &points, spec) })
 }
 
+/// Notes on keys and tags that are not used.
 fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
     let mut notes = Vec::new();
     if spec.height == HeightReference::Ellipsoid {
-        let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set flight.height = \"msl\" unless you know better";
+        let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
+            flight.height = \"msl\" unless you know better";
         notes.push(Note { is_warning: true, text: text.to_owned() });
     }
     if spec.time_unit != TimeUnit::Auto {
@@ -112,7 +117,7 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
     let beside = document
         .root_element()
         .children()
-        .filter(|node| node.has_tag_name_of("wpt") || node.has_tag_name_of("rte"));
+        .filter(|node| node.has_local_name("wpt") || node.has_local_name("rte"));
     let not_used: BTreeSet<&str> = in_points
         .chain(beside)
         .filter(|node| node.is_element())
@@ -120,7 +125,7 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
         .filter(|name| !used.contains(name) && *name != "extensions")
         .collect();
     if !not_used.is_empty() {
-        // These would have changed the picture in a log of another format.
+        // Attitude tags change the picture in other formats, so leaving them out is worth a warning.
         const ATTITUDE: [&str; 6] = ["heading", "yaw", "roll", "pitch", "course", "geoidheight"];
         let is_warning = not_used.iter().any(|name| ATTITUDE.contains(name));
         let list: Vec<&str> = not_used.into_iter().collect();
@@ -133,12 +138,12 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
 }
 
 trait LocalName {
-    /// Of this name in any namespace: GPX 1.0, 1.1, or none.
-    fn has_tag_name_of(&self, name: &str) -> bool;
+    /// Whether this is an element of the given name in any namespace: GPX 1.0, 1.1, or none.
+    fn has_local_name(&self, name: &str) -> bool;
 }
 
 impl LocalName for Node<'_, '_> {
-    fn has_tag_name_of(&self, name: &str) -> bool {
+    fn has_local_name(&self, name: &str) -> bool {
         self.is_element() && self.tag_name().name() == name
     }
 }

@@ -180,20 +180,28 @@ fn per_metre(spec: &FrameSpec, stored: &Stored, frame_path: &Path) -> Result<f64
     let message = match (given, stored.unit) {
         // Where depth_per_metre is given as well, they agree.
         (_, Unit::Stated) => return Ok(1.0),
-        (Some(_), Unit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in metres: leave it out".to_owned(),
+        (Some(_), Unit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in \
+            metres: leave it out"
+            .to_owned(),
         (Some(per_metre), _) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
-        (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned(),
+        (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for \
+            millimetres or 5000 for TUM"
+            .to_owned(),
         (None, Unit::Whole | Unit::Floats) if inverse => {
-            "is missing: with depth_kind = \"inverse\" give the stored value of 1/m; of disparities in pixels that is focal length in pixels times \
+            "is missing: with depth_kind = \"inverse\" give the stored value of 1/m; of disparities in \
+                pixels that is focal length in pixels times \
              baseline in metres"
                 .to_owned()
         }
         (None, Unit::Whole) => {
-            "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned()
+            "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres \
+                or 5000 for TUM"
+                .to_owned()
         }
         (None, Unit::Floats) => match whole_numbers_between(&stored.values) {
             Some([least, most]) => format!(
-                "is missing: depth is of floats, which are metres, but all of them are whole numbers from {least} to {most}, as millimetres are: give \
+                "is missing: depth is of floats, which are metres, but all of them are whole numbers from \
+                    {least} to {most}, as millimetres are: give \
                  1000 for millimetres, 1 for metres"
             ),
             None => return Ok(1.0),
@@ -269,7 +277,8 @@ fn refuse_without_any(
     Err(failure(
         path,
         format!(
-            "has no depth: of {all} pixels {negative} are negative, {nan} not a number, {near} nearer than a micrometre; depth is in metres and \
+            "has no depth: of {all} pixels {negative} are negative, {nan} not a number, {near} nearer than a \
+                micrometre; depth is in metres and \
              positive forward (OpenGL's z is the negative of it), 0 where it is unknown"
         ),
     ))
@@ -281,14 +290,16 @@ fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameF
         DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
         DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
             let message = format!(
-                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or give it as {kinds}",
+                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or \
+                    give it as {kinds}",
                 packed::FORMULAS
             );
             Err(failure(path, message))
         }
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
             let message = format!(
-                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are no distances: give depth as {kinds}"
+                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are \
+                    no distances: give depth as {kinds}"
             );
             Err(failure(path, message))
         }

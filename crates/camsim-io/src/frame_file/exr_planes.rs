@@ -99,14 +99,16 @@ impl Planes {
         if self.pixel_aspect != 1.0 && (implied / self.pixel_aspect - 1.0).abs() > 0.01 {
             let (path, aspect) = (self.path.display(), self.pixel_aspect);
             notes.push(format!(
-                "{path}: its header says that a pixel is {aspect} times as wide as high (pixelAspectRatio), focal_px = [{fx}, {fy}] that it is {implied:.4} times: \
+                "{path}: its header says that a pixel is {aspect} times as wide as high (pixelAspectRatio), \
+                    focal_px = [{fx}, {fy}] that it is {implied:.4} times: \
                  focal_px counts"
             ));
         }
         if self.other_primaries {
             let path = self.path.display();
             notes.push(format!(
-                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; convert the picture if they matter"
+                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; \
+                    convert the picture if they matter"
             ));
         }
         notes

@@ -50,7 +50,8 @@ pub(super) fn read(
         Some(_) if !pfm => Err(key("is for PFM, and depth is none; leave it out")),
         Some(rows) => read_pfm(path, rows).map(Some),
         None if pfm => Err(key(
-            "is missing: a PFM begins with the bottom row by its definition (\"bottom-up\"), and with the top one as AirSim writes it (\"top-down\")",
+            "is missing: a PFM begins with the bottom row by its definition (\"bottom-up\"), and with the \
+                top one as AirSim writes it (\"top-down\")",
         )),
         None if tiff => read_tiff(path, spec, frame_path).map(Some),
         None => Ok(None),
@@ -68,7 +69,8 @@ fn read_tiff(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Stored,
     let Some(whole) = raster.depth_is_whole() else {
         return Err(failure(
             path,
-            "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of these",
+            "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of \
+                these",
         ));
     };
     let unit = if whole { Unit::Whole } else { Unit::Floats };
@@ -151,7 +153,8 @@ fn stated(
         return Err(key(
             "depth_per_metre",
             format!(
-                "is {per_metre}, but {name} states another: {said}; leave the key out, or take these marks out of the file"
+                "is {per_metre}, but {name} states another: {said}; leave the key out, or take these marks \
+                    out of the file"
             ),
         ));
     }

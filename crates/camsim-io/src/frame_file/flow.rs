@@ -42,7 +42,8 @@ pub(super) fn read_flow(
         return Err(failure(
             path,
             format!(
-                "times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what the file holds"
+                "times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what \
+                    the file holds"
             ),
         ));
     }
@@ -66,7 +67,8 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<Values, FrameFileEr
         return Err(failure(
             path,
             format!(
-                "has one channel {} for both names of motion.flow_channels: give that to the right, and that down",
+                "has one channel {} for both names of motion.flow_channels: give that to the right, and that \
+                    down",
                 u.name
             ),
         ));
@@ -88,7 +90,8 @@ fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
     if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
         return Err(failure(
             path,
-            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is one of these",
+            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is \
+                one of these",
         ));
     }
     let side = |word: Option<[u8; 4]>| word.map_or(0, u32::from_le_bytes);

@@ -92,7 +92,8 @@ fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Resul
     if let Some(icc) = icc.filter(|icc| !icc.windows(4).any(|part| part == b"sRGB")) {
         let bytes = icc.len();
         notes.push(format!(
-            "{}: its colour profile ({bytes} bytes of ICC) is not applied: values are taken as color_space says",
+            "{}: its colour profile ({bytes} bytes of ICC) is not applied: values are taken as color_space \
+                says",
             path.display()
         ));
     }
@@ -113,7 +114,8 @@ fn few_bits(picture: &DynamicImage) -> Option<String> {
     let largest = largest_of_16_bits(picture).filter(|largest| (1..1 << 14).contains(largest))?;
     let white = (1_u32 << (u16::BITS - largest.leading_zeros())) - 1;
     Some(format!(
-        "its values of 16 bits end at {largest} of 65535, which is white: the picture is nearly black. If white is {white}, multiply its values by 65535 / {white}"
+        "its values of 16 bits end at {largest} of 65535, which is white: the picture is nearly black. If \
+            white is {white}, multiply its values by 65535 / {white}"
     ))
 }
 
@@ -156,7 +158,8 @@ fn decode(path: &Path) -> Result<Opened, FrameFileError> {
         return Err(failure(
             path,
             format!(
-                "is stored turned (EXIF orientation {}), and depth, focal_px and principal_point_px may be of either: save it upright, or take the mark away \
+                "is stored turned (EXIF orientation {}), and depth, focal_px and principal_point_px may be \
+                    of either: save it upright, or take the mark away \
                  where they go with the pixels as they are stored (`exiftool -Orientation=1 -n FILE`)",
                 orientation.to_exif()
             ),

@@ -126,7 +126,8 @@ fn one(spec: &FrameSpec, color: &Path, path: &Path) -> Result<Listed, FrameFileE
         return Err(key(
             path,
             name,
-            "is for many frames, and color names one picture; leave it out, or write color = \"folder/*.png\"",
+            "is for many frames, and color names one picture; leave it out, or write color = \
+                \"folder/*.png\"",
         ));
     }
     if spec.depth.as_deref().is_some_and(|depth| Pictures::of(depth) != Pictures::One) {
@@ -237,7 +238,8 @@ fn by_times(
     let left_out = depth_of.iter().filter(|depth| depth.is_none()).count();
     if left_out == colors.len() {
         let message = format!(
-            "no picture is within {max_gap_ms} ms of a colour: check that both have one clock, or raise max_gap_ms"
+            "no picture is within {max_gap_ms} ms of a colour: check that both have one clock, or raise \
+                max_gap_ms"
         );
         return Err(key(path, "depth", message));
     }
@@ -257,7 +259,8 @@ fn give_times(spec: &FrameSpec, entries: &mut [Entry], path: &Path) -> Result<()
     let timed = entries.iter().any(|entry| entry.stamp_ns.is_some());
     let Some(fps) = spec.fps else {
         if spec.motion.stamp_s.is_some() {
-            let fix = "is of one frame, or of the first one with fps; these frames have times of their own, or none: leave it out, or add fps";
+            let fix = "is of one frame, or of the first one with fps; these frames have times of their own, \
+                or none: leave it out, or add fps";
             return Err(key(path, "motion.stamp_s", fix));
         }
         return Ok(());

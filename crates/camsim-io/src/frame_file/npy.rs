@@ -31,7 +31,8 @@ pub(super) fn read(path: &Path) -> Result<Option<Array>, FrameFileError> {
     };
     let named_npz = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
     if named_npz || start.starts_with(b"PK\x03\x04") {
-        let of = "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", numpy.load(\"FILE.npz\")[\"NAME\"])`";
+        let of = "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", \
+            numpy.load(\"FILE.npz\")[\"NAME\"])`";
         return Err(failure(path, of));
     }
     if start != *b"\x93NUMPY" {
@@ -76,7 +77,10 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
         .filter(|count| (1..=MOST).contains(count));
     let count = count.ok_or_else(|| format!("is a .npy file of shape {shape:?}: that is no picture"))?;
     let (size, number, whole) = reader(kind).ok_or_else(|| {
-        format!("is a .npy file of elements `{kind}`: floats (f2, f4, f8) and integers (u2, u4, i2, i4, i8) are read; convert with `.astype(\"float32\")`")
+        format!(
+            "is a .npy file of elements `{kind}`: floats (f2, f4, f8) and integers (u2, u4, i2, i4, i8) \
+            are read; convert with `.astype(\"float32\")`"
+        )
     })?;
     let data = &bytes[from + length..];
     if data.len() != count * size {
@@ -171,7 +175,8 @@ impl Array {
         let [height, width] = match self.shape[..] {
             [height, width] | [height, width, 1] | [1, height, width] => [height, width],
             _ => {
-                let fix = "depth is of rows and columns, (H, W), with an axis of 1 or without; take one channel or one frame out of it";
+                let fix = "depth is of rows and columns, (H, W), with an axis of 1 or without; take one \
+                    channel or one frame out of it";
                 return Err(format!("is a .npy file of shape {:?}: {fix}", self.shape));
             }
         };
@@ -185,7 +190,8 @@ impl Array {
             [2, height, width] if width != 2 => (height, width, true),
             _ => {
                 return Err(format!(
-                    "is a .npy file of shape {:?}: a flow is of rows, columns and two numbers, (H, W, 2) or (2, H, W)",
+                    "is a .npy file of shape {:?}: a flow is of rows, columns and two numbers, (H, W, 2) or \
+                        (2, H, W)",
                     self.shape
                 ));
             }

@@ -23,7 +23,8 @@ const CARLA_FAR_M: f64 = 1000.0;
 const THREE_BYTES: f64 = 16_777_215.0;
 
 /// What each encoding makes of bytes, for messages: a picture does not tell which of them it is of.
-pub(super) const FORMULAS: &str = "depth_encoding = \"carla\" where metres are 1000 (R + 256 G + 65536 B) / 16777215, or \"packed24\" where they are \
+pub(super) const FORMULAS: &str = "depth_encoding = \"carla\" where metres are 1000 (R + 256 G + 65536 B) / \
+    16777215, or \"packed24\" where they are \
                                    (65025 R + 255 G + B) / 255";
 
 /// Metres, 0 where nothing is in reach. Decoded texel by texel: packed bytes must never be filtered.
@@ -34,11 +35,13 @@ pub(super) fn metres(
     path: &Path,
 ) -> Result<Vec<f64>, FrameFileError> {
     if !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
-        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
+        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, \
+            BMP or PPM";
         return Err(failure(path, message));
     }
     if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
-        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
+        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; \
+            leave that key out for 16-bit grey";
         return Err(failure(path, message));
     }
     Ok(picture.to_rgb8().pixels().map(|pixel| packing.metres(pixel.0.map(f64::from))).collect())

@@ -77,7 +77,8 @@ impl PngChunks {
         if let Some(cicp) = self.cicp {
             let of = || {
                 format!(
-                    "its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as color_space says"
+                    "its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as \
+                        color_space says"
                 )
             };
             return (cicp != SRGB_CICP).then(of);
@@ -86,7 +87,10 @@ impl PngChunks {
             all.iter().zip(&SRGB_CHROMATICITIES).any(|(a, b)| a.abs_diff(*b) > CHROMATICITY_SLACK)
         };
         self.chromaticities.filter(|all| !self.is_srgb && other(all)).map(|all| {
-            format!("its primaries (cHRM {all:?}) are not those of sRGB, and are not applied: its colours are taken for those of sRGB")
+            format!(
+                "its primaries (cHRM {all:?}) are not those of sRGB, and are not applied: its colours \
+                are taken for those of sRGB"
+            )
         })
     }
 

@@ -60,7 +60,9 @@ fn read_tum(path: &Path, base_s: f64) -> Result<Vec<PoseRow>, FrameFileError> {
         let numbers = numbers.and_then(|numbers| <[f64; 8]>::try_from(numbers).ok()).ok_or_else(|| {
             fail(
                 Some(line),
-                "is not the 8 numbers t x y z qx qy qz qw of motion.trajectory_format = \"tum\"; correct it or leave it out".into(),
+                "is not the 8 numbers t x y z qx qy qz qw of motion.trajectory_format = \"tum\"; correct it \
+                    or leave it out"
+                    .into(),
             )
         })?;
         rows.push(
@@ -109,7 +111,8 @@ pub(super) fn words_of(line: &str) -> Option<Vec<&str>> {
 fn pose([t_s, x, y, z, qw, qx, qy, qz]: [f64; 8], base_s: f64) -> Result<PoseRow, String> {
     if t_s.abs() > LATEST_S {
         return Err(format!(
-            "its time is {t_s:e} s, which no clock has: give a CSV whose header says the unit, t_ms, t_us or t_ns"
+            "its time is {t_s:e} s, which no clock has: give a CSV whose header says the unit, t_ms, t_us or \
+                t_ns"
         ));
     }
     Ok(PoseRow {
@@ -148,7 +151,8 @@ fn places_of(header: &csv::StringRecord) -> Result<(Places, Vec<String>), String
     }
     if let Some(missing) = places.iter().position(Option::is_none) {
         return Err(format!(
-            "the header names no column {}; the columns are {} (world_from_camera), units as in t_ms or x_mm; for t x y z qx qy qz qw without a \
+            "the header names no column {}; the columns are {} (world_from_camera), units as in t_ms or \
+                x_mm; for t x y z qx qy qz qw without a \
              header set trajectory_format = \"tum\"",
             COLUMNS[missing],
             COLUMNS.join(",")

@@ -143,7 +143,8 @@ impl FrameSet {
                 return Err(failure(
                     path,
                     format!(
-                        "is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"
+                        "is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have \
+                            one size"
                     ),
                 ));
             }
@@ -151,7 +152,8 @@ impl FrameSet {
                 && flow_px != color_px
             {
                 let message = format!(
-                    "begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels"
+                    "begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover \
+                        the same pixels"
                 );
                 return Err(failure(path, message));
             }
@@ -223,7 +225,8 @@ fn read_moves(
         (true, _) => match entries.first().and_then(|entry| entry.stamp_ns) {
             Some(stamp_ns) => seconds(stamp_ns),
             None => {
-                let fix = "is there, but the frames have no times: say what their names count with name_unit (\"s\", \"ms\", \"us\" or \"ns\"), \
+                let fix = "is there, but the frames have no times: say what their names count with name_unit \
+                    (\"s\", \"ms\", \"us\" or \"ns\"), \
                            or give fps, with motion.stamp_s for the first";
                 return fail("motion.trajectory", fix);
             }
@@ -270,11 +273,13 @@ fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameF
         Some(ms) if ms.is_finite() && ms != 0.0 => Ok(()),
         Some(_) => fail(
             "motion.flow_interval_ms",
-            "must be a finite number of milliseconds that is not 0: the time between the two instants that the flow joins",
+            "must be a finite number of milliseconds that is not 0: the time between the two instants that \
+                the flow joins",
         ),
         None => fail(
             "motion.flow_interval_ms",
-            "is missing: give the time between the two instants that the flow joins, 1000 / fps for successive frames",
+            "is missing: give the time between the two instants that the flow joins, 1000 / fps for \
+                successive frames",
         ),
     }
 }

@@ -54,8 +54,10 @@ fn a_frame_is_read_with_its_defaults() {
 
 #[test]
 fn every_key_is_taken() {
-    let text = "color_space = \"linear\"\ndepth_kind = \"range\"\nprincipal_point_px = [0, 0]\ninstant_ms = -20\n\
-                [motion]\nvelocity_m_s = [1, 2, 3]\nangular_rate_rad_s = [0.1, 0.2, 0.3]\n[fog]\nend_m = 9\ncolor = [0.5, 0.6, 0.7]\n";
+    let text = "color_space = \"linear\"\ndepth_kind = \"range\"\nprincipal_point_px = [0, 0]\ninstant_ms = \
+        -20\n\
+                [motion]\nvelocity_m_s = [1, 2, 3]\nangular_rate_rad_s = [0.1, 0.2, 0.3]\n[fog]\nend_m = \
+                9\ncolor = [0.5, 0.6, 0.7]\n";
     let file = read(&format!("{GOOD}{text}")).unwrap();
     assert_eq!(file.frame.color_rgba[4], 10.0 / 255.0);
     // Pixel (1, 1) lies at (0.5, 0.5): its range is longer than its depth by sqrt(1.5).

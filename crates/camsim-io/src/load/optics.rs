@@ -93,7 +93,8 @@ fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
     let frame_s = 1.0 / camera.fps + 1e-9;
     if before_s > frame_s || after_s > frame_s {
         warnings.push(format!(
-            "{path}: camera.zoom_track covers {:.3} s to {:.3} s after the log's first row, the frames {:.3} s to {end_s:.3} s: beyond it the first or last zoom \
+            "{path}: camera.zoom_track covers {:.3} s to {:.3} s after the log's first row, the frames {:.3} \
+                s to {end_s:.3} s: beyond it the first or last zoom \
              is held; check that both have one clock",
             first.0, last.0, sequence.start_s
         ));
@@ -107,7 +108,8 @@ fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
         let [low, high] = values()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], zoom| [zoom.min(low), zoom.max(high)]);
         warnings.push(format!(
-            "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, {low} to {high} where {least} to {most} are known: the \
+            "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, \
+                {low} to {high} where {least} to {most} are known: the \
              nearest is taken",
             sequence.zoom_track.len()
         ));
@@ -124,7 +126,8 @@ pub fn vignette_warnings(camera: &CameraSpec, map: &GrayImage) -> Vec<String> {
     let brightest = map.values.iter().copied().fold(0.0, f32::max);
     if brightest < DIM {
         warnings.push(format!(
-            "{path}: the brightest value of the vignette is {:.1} % of what it can be: if it is of fewer bits than it is stored in, scale it up",
+            "{path}: the brightest value of the vignette is {:.1} % of what it can be: if it is of fewer \
+                bits than it is stored in, scale it up",
             100.0 * brightest
         ));
     }

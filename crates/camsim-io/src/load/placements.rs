@@ -54,7 +54,8 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
             return Err(fail(match missing {
                 Some((name, _)) if !on_ground => {
                     format!(
-                        "line 1: the column `{name}` is missing; give it, or set scene.gltf.on_ground = true for what stands on the terrain"
+                        "line 1: the column `{name}` is missing; give it, or set scene.gltf.on_ground = true \
+                            for what stands on the terrain"
                     )
                 }
                 _ => format!("line 1: places are missing, or there are two kinds of them; {COLUMNS}"),
@@ -81,7 +82,8 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
             place.1.filter(|[lat_deg, lon_deg, _]| lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0)
         {
             return Err(fail(format!(
-                "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are degrees, latitude -90 to 90"
+                "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are \
+                    degrees, latitude -90 to 90"
             )));
         }
         let scale = number(column("scale"), 1.0)?;

@@ -63,7 +63,11 @@ pub(super) fn load_scene(
             .push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
     }
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
-        notes.push("scene.light changes nothing: it falls on terrain and models, of which the scene has none; patterns and boards keep their colours".to_owned());
+        notes.push(
+            "scene.light changes nothing: it falls on terrain and models, of which the scene has \
+            none; patterns and boards keep their colours"
+                .to_owned(),
+        );
     }
     for spec in &spec.gltf {
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
@@ -71,7 +75,10 @@ pub(super) fn load_scene(
     notes.extend(too_many_to_order(&scene));
     let left = split_intersecting_blended(&mut scene.meshes).remaining;
     notes.extend((left > 0).then(|| {
-        format!("scene.gltf: {left} places where blended triangles pass through each other are not cut, and may be mixed in the wrong order there")
+        format!(
+            "scene.gltf: {left} places where blended triangles pass through each other are not cut, and \
+            may be mixed in the wrong order there"
+        )
     }));
     // Models of one file say the same.
     let mut said = HashSet::new();
@@ -85,8 +92,10 @@ fn too_many_to_order(scene: &Scene) -> Option<String> {
     let triangles: usize = blended.map(|mesh| mesh.shape.indices.len() / 3).sum();
     (triangles > MAX_TRIANGLES).then(|| {
         format!(
-            "scene.gltf: {triangles} triangles are blended; frames with more than {MAX_TRIANGLES} of them in view draw them mesh by mesh by distance, and may \
-             mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode MASK does without"
+            "scene.gltf: {triangles} triangles are blended; frames with more than {MAX_TRIANGLES} of them in \
+                view draw them mesh by mesh by distance, and may \
+             mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode \
+             MASK does without"
         )
     })
 }

@@ -17,7 +17,8 @@ use super::{
 /// What each row begins with, before a column of paths for each file of a frame. The first pose is the
 /// camera's at the stamp; columns that begin with `ideal_` say what the source coordinates x, y of `coords`
 /// are in: a pinhole camera's frame, and where that camera is at which instant. Both q are ned_from_camera.
-pub const FRAMES_COLUMNS: &str = "frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
+pub const FRAMES_COLUMNS: &str = "\
+    frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
                                   ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
 /// One row.

@@ -1,10 +1,10 @@
-//! Units of lengths, angles and times, named and not.
+//! Units of lengths, angles and times, with and without a name in the header.
 
 use super::*;
 
 #[test]
-fn units_of_headers() {
-    let _all = AllFaults;
+fn header_units_are_applied_or_refused() {
+    let _report = FaultReport;
     let feet = |metres: f64| metres / 0.3048;
     let with_heights = |header: &str, scale: &dyn Fn(f64) -> f64| {
         let rows: Vec<String> = (0..21)
@@ -129,8 +129,8 @@ fn units_of_headers() {
 }
 
 #[test]
-fn units_of_time() {
-    let _all = AllFaults;
+fn time_units_are_applied_inferred_or_refused() {
+    let _report = FaultReport;
     let lla = "T,LAT,LON,H,0,0,30";
     let header = "time,lat,lon,alt,roll,pitch,yaw";
     for (name, per_second, unit) in [
@@ -246,7 +246,7 @@ fn units_of_time() {
         &track(),
         &["`nsecs`"],
     );
-    // Days as spreadsheets count them.
+    // Spreadsheets count times in days.
     let days: String = (0..21)
         .map(|i| {
             format!(
@@ -269,13 +269,14 @@ fn units_of_time() {
         &FlightSpec { time_unit: TimeUnit::S, ..track() },
         "",
     );
-    // EuRoC's stamps, small ones too, and its names without a unit.
+    // EuRoC stamps of small value, and EuRoC names without a unit.
     let euroc: String =
         (0..21).map(|i| format!("{},0,{},{},1,0,0,0\n", i * 1_000_000_000_i64, 10 * i, i)).collect();
     assert_flies(
         "EuRoC, with its unit",
         &format!(
-            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n{euroc}"
+            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z \
+                []\n{euroc}"
         ),
         &auto(),
         "",
@@ -305,8 +306,8 @@ fn units_of_time() {
 }
 
 #[test]
-fn columns_beside_a_quantity_are_not_passed_over() {
-    let _all = AllFaults;
+fn columns_that_qualify_a_quantity_are_refused_or_noted() {
+    let _report = FaultReport;
     let minutes = log("t,lat_deg,lat_min,lat_sec,lon_deg,lon_min,alt", "T,47,30,0,8,15,H");
     assert_refused(
         "minutes",
@@ -337,8 +338,8 @@ fn columns_beside_a_quantity_are_not_passed_over() {
 }
 
 #[test]
-fn angles_and_quaternions() {
-    let _all = AllFaults;
+fn angle_units_and_quaternion_norms_are_checked() {
+    let _report = FaultReport;
     let header = "t,lat,lon,alt,roll,pitch,yaw";
     let yaw_of = |content: &str, spec: &FlightSpec| {
         let log = read_with(content.as_bytes(), spec).unwrap();

@@ -113,7 +113,8 @@ fn every_part_is_read() {
         first(&chosen("color_layer = \"eye\"\ndepth_channel = \"eye.Z\"\n").unwrap()),
         [0.1, 0.2, 0.3, 5.0]
     );
-    let mixed = "color_channels = [\"rgba.B\", \"eye.G\", \"rgba.R\"]\ndepth_channel = \"Z\"\ndepth_layer = \"eye\"\n";
+    let mixed = "color_channels = [\"rgba.B\", \"eye.G\", \"rgba.R\"]\ndepth_channel = \"Z\"\ndepth_layer = \
+        \"eye\"\n";
     assert_eq!(first(&chosen(mixed).unwrap()), [0.75, 0.2, 0.25, 5.0]);
     assert_eq!(
         first(&chosen("color_channels = [\"depth.Z\"]\ndepth_layer = \"depth\"\n").unwrap()),

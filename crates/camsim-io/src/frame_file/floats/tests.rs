@@ -186,7 +186,8 @@ fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
         (
             "",
             "",
-            "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole numbers from 2000",
+            "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole \
+                numbers from 2000",
         ),
     ] {
         let error = read("d.tif", &with_items(2000.0, items), text).unwrap_err();

@@ -150,7 +150,8 @@ fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, Stri
                     .ok_or_else(|| format!("the column `{cell}` is in minutes: give t_s"))
             }
             _ => Err(format!(
-                "the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, t_us or t_ns"
+                "the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, \
+                    t_us or t_ns"
             )),
         },
         [(_, a), (_, b), ..] => {
@@ -174,7 +175,8 @@ fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
         return Err(row(
             path,
             Some(1),
-            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, depth",
+            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, \
+                depth",
         ));
     };
     let depth_at = place(&["depth"]);

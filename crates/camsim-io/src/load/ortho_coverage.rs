@@ -10,7 +10,7 @@ const FRAMES: u64 = 25;
 const PLACES: u32 = 12;
 
 /// Says how much of the frames is ground beyond the ortho-image, by some frames and pixels of a fixed lens.
-pub(super) fn beyond_picture_warning(sequence: &Sequence, summary: &TerrainSummary) -> Option<String> {
+pub(super) fn ortho_coverage_warning(sequence: &Sequence, summary: &TerrainSummary) -> Option<String> {
     let spec = sequence.scenario.scene.terrain.as_ref()?;
     if summary.outside_ortho == 0 || spec.beyond == Beyond::Void {
         return None;
@@ -40,7 +40,8 @@ pub(super) fn beyond_picture_warning(sequence: &Sequence, summary: &TerrainSumma
     let percent = |share: f64| 100.0 * share;
     (beyond > 0).then(|| {
         format!(
-            "about {:.0} % of the frames is ground beyond the ortho-image, {:.0} % of frame {}: see scene.terrain.beyond",
+            "about {:.0} % of the frames is ground beyond the ortho-image, {:.0} % of frame {}: see \
+                scene.terrain.beyond",
             percent(f64::from(beyond) / f64::from(all)),
             percent(f64::from(worst.0) / f64::from(PLACES * PLACES)),
             worst.1
