@@ -2,7 +2,7 @@
 //!
 //! | format | columns without a header | frames |
 //! |---|---|---|
-//! | `csv-lla` | t s, lat, lon, height, roll, pitch, yaw | degrees, metres; ZYX angles of the body (FRD) in the tangent frame at the row |
+//! | `csv-lla` | t s, lat, lon, height, roll, pitch, yaw | degrees, metres; ZYX angles of the body (FRD) in the local tangent frame |
 //! | `csv-xya` | t s, north, east, altitude (up), roll, pitch, yaw | metres, degrees |
 //! | `csv-ned` | t s, north, east, down, roll, pitch, yaw | metres, degrees |
 //! | `tum` | t s, x, y, z, qx, qy, qz, qw | see below |

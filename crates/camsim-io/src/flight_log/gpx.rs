@@ -2,7 +2,7 @@
 //!
 //! | tag | |
 //! |---|---|
-//! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks and segments are one log |
+//! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks are one log |
 //! | `trkpt` without `time`, or without `ele` where others have one | left out, counted |
 //! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
 
@@ -114,12 +114,12 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
     }
     let used = ["ele", "time", "trkpt", "trk", "trkseg", "gpx"];
     let in_points = points.iter().flat_map(|point| point.descendants());
-    let beside = document
+    let waypoints = document
         .root_element()
         .children()
         .filter(|node| node.has_local_name("wpt") || node.has_local_name("rte"));
     let not_used: BTreeSet<&str> = in_points
-        .chain(beside)
+        .chain(waypoints)
         .filter(|node| node.is_element())
         .map(|node| node.tag_name().name())
         .filter(|name| !used.contains(name) && *name != "extensions")

@@ -237,14 +237,14 @@ impl<'a> RowFields<'a, '_> {
             }
             TimeFormat::Number => {
                 let decimal_commas = self.reader.table.has_decimal_commas;
-                let whole = time_fields::fixed_point(field, decimal_commas)
+                let seconds = time_fields::fixed_point(field, decimal_commas)
                     .ok_or_else(|| bad(columns.column, field))?;
-                let Some(column) = columns.nanoseconds else { return Ok(whole) };
+                let Some(column) = columns.nanoseconds else { return Ok(seconds) };
                 let field = self.field(column)?;
                 let part =
                     time_fields::fixed_point(field, decimal_commas).ok_or_else(|| bad(column, field))?;
                 // Seconds in steps of 1e-12 s, nanoseconds in steps of 1e-12 ns.
-                Ok(whole.zip(part).map(|(whole, part)| whole + part / 1_000_000_000))
+                Ok(seconds.zip(part).map(|(seconds, part)| seconds + part / 1_000_000_000))
             }
         }
     }

@@ -1,11 +1,10 @@
-//! What becomes of each key of a FRAME.toml, and of what its files say of themselves: the tables of
-//! `docs/inputs/APPLY.md`.
+//! Tables of `docs/inputs/APPLY.md`: the keys of FRAME.toml, and the treatment of metadata in its files.
 
-/// A key, what it takes, and what it does.
-type Row = (&'static str, &'static str);
+/// A key, and the values that it takes.
+type KeyTreatment = (&'static str, &'static str);
 
 /// Keys of FRAME.toml.
-const KEYS: &[Row] = &[
+const KEYS: &[KeyTreatment] = &[
     (
         "frames",
         "a table of `time color` or `time color time depth`, or a .csv of color, depth and t_s (t_ms, t_us, \
@@ -65,7 +64,7 @@ const KEYS: &[Row] = &[
     ("fog.color", "with --preset paper"),
 ];
 
-/// What files say of themselves.
+/// Metadata in files: what, treatment, remark.
 const FILES: &[(&str, &str, &str)] = &[
     (
         "PFM: scale",
@@ -158,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_of_apply_is_made_from_the_tables_and_has_every_key() {
+    fn apply_md_is_up_to_date_and_has_every_key() {
         let keys = KEYS.iter().map(|(key, _)| *key);
         assert!(keys.eq(FRAME.keys.iter().map(|(key, _)| *key)), "a key is in one table alone");
         crate::inputs_page::check("APPLY.md", &page());

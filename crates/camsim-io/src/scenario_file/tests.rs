@@ -108,12 +108,12 @@ fn every_key_of_the_structs_is_in_the_schema() {
     (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
     (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
     let saved = toml::to_string(&scenario).unwrap();
-    let mut seen = Vec::new();
-    collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
+    let mut visited = Vec::new();
+    collect(&toml::from_str(&saved).unwrap(), "", &mut visited);
     for (key, kind) in KEYS {
         let is_unsupported = matches!(kind, schema::ValueKind::Unsupported);
         assert_eq!(
-            seen.iter().any(|s| s == key),
+            visited.iter().any(|s| s == key),
             !is_unsupported,
             "{key} stands in the schema but not in the struct, or the other way round"
         );
@@ -157,17 +157,17 @@ fn keys_of_boards_are_checked_by_kind() {
     }
 }
 
-fn collect(value: &toml::Table, prefix: &str, seen: &mut Vec<String>) {
+fn collect(value: &toml::Table, prefix: &str, visited: &mut Vec<String>) {
     for (name, value) in value {
         let key = tree::join(prefix, name);
         match value {
-            toml::Value::Table(table) => collect(table, &key, seen),
+            toml::Value::Table(table) => collect(table, &key, visited),
             toml::Value::Array(array) => {
-                array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, seen))
+                array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, visited))
             }
             _ => {}
         }
-        seen.push(key);
+        visited.push(key);
     }
 }
 

@@ -244,7 +244,8 @@ fn ambiguous_columns_and_axes_are_refused() {
     assert_flies(
         "ROS by the key",
         &log(
-            "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
+            "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,\
+             field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
             "T,0,N,H,0,0,0,1",
         ),
         &spec(LogFormat::Tum),
@@ -343,8 +344,15 @@ fn other_formats_are_refused_and_gpx_is_read() {
         )
     };
     let points: String = (0..21)
-        .map(|i| format!("<trkpt lat=\"{:.9}\" \
-            lon=\"8\"><ele>{}</ele><time>2023-05-01T10:00:{i:02}Z</time><extensions><course>30</course></extensions></trkpt>\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
+        .map(|i| {
+            format!(
+                "<trkpt lat=\"{:.9}\" \
+            lon=\"8\"><ele>{}</ele><time>2023-05-01T10:00:{i:02}Z</time>\
+             <extensions><course>30</course></extensions></trkpt>\n",
+                47.0 + f64::from(i) * 8.994_6e-5,
+                500 + i
+            )
+        })
         .collect();
     let msl = FlightSpec { height: HeightReference::Msl, ..track() };
     assert_flies("GPX", &gpx(&points), &msl, "not used: course");
