@@ -39,6 +39,7 @@ use glam::{DQuat, DVec3};
 
 mod angle_unit;
 mod clock_rollover;
+mod column_meaning;
 mod column_names;
 mod column_selection;
 mod columns;
@@ -46,6 +47,7 @@ mod detect;
 mod foreign_formats;
 mod gpx;
 mod header;
+mod height_column;
 mod layout;
 mod quaternions;
 mod reference;

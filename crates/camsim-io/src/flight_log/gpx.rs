@@ -48,13 +48,6 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
                 .to_owned(),
         ));
     }
-    let child = |point: &Node<'_, '_>, name: &str| {
-        point
-            .children()
-            .find(|node| node.has_local_name(name))
-            .and_then(|node| node.text())
-            .map(|text| text.trim().to_owned())
-    };
     for (name, advice) in [("time", "record the track with times"), ("ele", "add heights (ele)")] {
         if points.iter().all(|point| child(point, name).is_none()) {
             return Err(problem(format!(
@@ -62,40 +55,47 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
             )));
         }
     }
-    let mut rows = Vec::with_capacity(points.len());
-    for point in &points {
-        let line = document.text_pos_at(point.range().start).row as usize;
-        let not_a_number = |name: &str, text: &str| FlightLogError::Header {
-            path: path.to_owned(),
-            line,
-            problem: format!("`{text}` of {name} is not a number"),
-        };
-        let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
-            None | Some("") => Ok(f64::NAN),
-            Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
-        };
-        let (latitude, longitude) =
-            (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
-        if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
-            return Err(problem(format!(
-                "line {line}: latitude {latitude}, longitude {longitude} is no place"
-            )));
-        }
-        let height_m = number("ele", child(point, "ele").as_deref())?;
-        let t_ns = match child(point, "time") {
-            None => None,
-            Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
-                problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
-            })?),
-        };
-        rows.push(RawRow {
-            line,
-            t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
-            position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
-            attitude: RawAttitude::None,
-        });
-    }
+    let line = |point: &Node<'_, '_>| document.text_pos_at(point.range().start).row as usize;
+    let rows = points.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
     Ok(RawLog { rows, notes: notes(&document, &points, spec) })
+}
+
+/// Text of the child element `name` of a track point.
+fn child(point: &Node<'_, '_>, name: &str) -> Option<String> {
+    let element = point.children().find(|node| node.has_local_name(name))?;
+    element.text().map(|text| text.trim().to_owned())
+}
+
+/// Parses one track point.
+fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, FlightLogError> {
+    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
+    let not_a_number = |name: &str, text: &str| FlightLogError::Header {
+        path: path.to_owned(),
+        line,
+        problem: format!("`{text}` of {name} is not a number"),
+    };
+    let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
+        None | Some("") => Ok(f64::NAN),
+        Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
+    };
+    let (latitude, longitude) =
+        (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
+    if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
+        return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
+    }
+    let height_m = number("ele", child(point, "ele").as_deref())?;
+    let t_ns = match child(point, "time") {
+        None => None,
+        Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
+            problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
+        })?),
+    };
+    Ok(RawRow {
+        line,
+        t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
+        position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
+        attitude: RawAttitude::None,
+    })
 }
 
 /// Notes on keys and tags that are not used.

@@ -1,7 +1,8 @@
 //! Header lines: the meaning and unit of each name, and lookup of columns by meaning.
 
 use super::{
-    column_names::{self, ColumnMeaning},
+    column_meaning::ColumnMeaning,
+    column_names,
     units::{Dimension, Qualifier, Unit, VerticalDatum, parse_qualifier},
 };
 

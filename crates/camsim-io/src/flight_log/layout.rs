@@ -9,7 +9,7 @@ use camsim_core::{
 
 use super::{
     FlightLogError,
-    column_names::ColumnMeaning,
+    column_meaning::ColumnMeaning,
     column_selection::{
         attitude_columns, has_time_and_position, missing_columns_message, note_unused_columns,
         position_columns, time_columns,

@@ -211,31 +211,7 @@ fn pair_by_time(
     max_gap_ms: f64,
     path: &Path,
 ) -> Result<FrameList, FrameFileError> {
-    let mut pairs: Vec<(i64, usize, usize)> = Vec::new();
-    for (i, color) in colors.iter().enumerate() {
-        let Some(stamp_ns) = color.stamp_ns else {
-            return Err(key_error(
-                path,
-                "name_unit",
-                "is missing: depth is a list with times, so the colours' names must be times too",
-            ));
-        };
-        let after = depths.partition_point(|depth| depth.stamp_ns < Some(stamp_ns));
-        // Two candidates on each side, as the nearest may belong to the neighbouring colour picture.
-        for (j, depth) in depths.iter().enumerate().take(after + 2).skip(after.saturating_sub(2)) {
-            let Some(depth_ns) = depth.stamp_ns else {
-                return Err(key_error(
-                    path,
-                    "name_unit",
-                    "is missing: color is a list with times, so the depths' names must be times too",
-                ));
-            };
-            let gap_ns = depth_ns.abs_diff(stamp_ns);
-            if gap_ns as f64 <= 1e6 * max_gap_ms {
-                pairs.push((gap_ns as i64, i, j));
-            }
-        }
-    }
+    let mut pairs = candidate_pairs(&colors, &depths, max_gap_ms, path)?;
     pairs.sort_unstable();
     let mut depth_of: Vec<Option<usize>> = vec![None; colors.len()];
     let mut taken = vec![false; depths.len()];
@@ -266,6 +242,41 @@ fn pair_by_time(
         several: true,
         notes: Vec::new(),
     })
+}
+
+/// Pairs of colour and depth pictures within `max_gap_ms`: gap in nanoseconds, index of colour, index of depth.
+fn candidate_pairs(
+    colors: &[TimedPicture],
+    depths: &[TimedPicture],
+    max_gap_ms: f64,
+    path: &Path,
+) -> Result<Vec<(i64, usize, usize)>, FrameFileError> {
+    let mut pairs: Vec<(i64, usize, usize)> = Vec::new();
+    for (i, color) in colors.iter().enumerate() {
+        let Some(stamp_ns) = color.stamp_ns else {
+            return Err(key_error(
+                path,
+                "name_unit",
+                "is missing: depth is a list with times, so the colours' names must be times too",
+            ));
+        };
+        let after = depths.partition_point(|depth| depth.stamp_ns < Some(stamp_ns));
+        // Two candidates on each side, as the nearest may belong to the neighbouring colour picture.
+        for (j, depth) in depths.iter().enumerate().take(after + 2).skip(after.saturating_sub(2)) {
+            let Some(depth_ns) = depth.stamp_ns else {
+                return Err(key_error(
+                    path,
+                    "name_unit",
+                    "is missing: color is a list with times, so the depths' names must be times too",
+                ));
+            };
+            let gap_ns = depth_ns.abs_diff(stamp_ns);
+            if gap_ns as f64 <= 1e6 * max_gap_ms {
+                pairs.push((gap_ns as i64, i, j));
+            }
+        }
+    }
+    Ok(pairs)
 }
 
 /// Sets the times of frames without times by `fps`.

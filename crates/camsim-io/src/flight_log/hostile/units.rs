@@ -71,7 +71,11 @@ fn header_units_are_applied_or_refused() {
         &track(),
         &["rel_alt", "take-off"],
     );
+}
 
+#[test]
+fn angles_of_positions_need_a_unit_unless_degrees() {
+    let _report = FaultReport;
     let e7: String = (0..21)
         .map(|i| format!("{i},{},80000000,{}\n", 470_000_000 + (f64::from(i) * 899.46) as i64, 500 + i))
         .collect();
@@ -103,7 +107,7 @@ fn header_units_are_applied_or_refused() {
     assert_flies(
         "local feet",
         &(0..21)
-            .map(|i| format!("{i},{},0,{}\n", feet(10.0 * f64::from(i)), feet(f64::from(i))))
+            .map(|i| format!("{i},{},0,{}\n", 10.0 * f64::from(i) / 0.3048, f64::from(i) / 0.3048))
             .fold("t,north_ft,east_ft,alt_ft\n".to_owned(), |a, b| a + &b),
         &track(),
         "",
@@ -129,7 +133,7 @@ fn header_units_are_applied_or_refused() {
 }
 
 #[test]
-fn time_units_are_applied_inferred_or_refused() {
+fn stated_time_units_are_applied() {
     let _report = FaultReport;
     let lla = "T,LAT,LON,H,0,0,30";
     let header = "time,lat,lon,alt,roll,pitch,yaw";
@@ -160,6 +164,13 @@ fn time_units_are_applied_inferred_or_refused() {
     {
         assert_flies(name, &scaled(&header.replace("time", name), lla, 1e6), &auto(), "");
     }
+}
+
+#[test]
+fn unitless_times_are_inferred_or_refused() {
+    let _report = FaultReport;
+    let lla = "T,LAT,LON,H,0,0,30";
+    let header = "time,lat,lon,alt,roll,pitch,yaw";
     assert_flies("microseconds", &scaled(header, lla, 1e6), &auto(), "read as us");
     assert_flies("nanoseconds", &scaled(header, lla, 1e9), &auto(), "read as ns");
     assert_flies("hours", &scaled(header, lla, 1.0 / 3600.0), &auto(), "read as h");
@@ -209,6 +220,13 @@ fn time_units_are_applied_inferred_or_refused() {
     assert_flies("dates in s", &epoch(1.0), &auto(), "");
     assert_flies("dates in ms", &epoch(1e3), &auto(), "read as ms");
     assert_flies("dates in us", &epoch(1e6), &auto(), "(2023)");
+}
+
+#[test]
+fn several_time_columns_are_joined_or_refused() {
+    let _report = FaultReport;
+    let lla = "T,LAT,LON,H,0,0,30";
+    let header = "time,lat,lon,alt,roll,pitch,yaw";
     let unknown = header.replace("time", "time [fortnights]");
     assert_refused("fortnights", log(&unknown, lla).as_bytes(), &auto(), &["fortnights", "column 1"]);
     assert_refused(
@@ -269,6 +287,11 @@ fn time_units_are_applied_inferred_or_refused() {
         &FlightSpec { time_unit: TimeUnit::S, ..track() },
         "",
     );
+}
+
+#[test]
+fn units_of_euroc_and_tum_times_are_known() {
+    let _report = FaultReport;
     // EuRoC stamps of small value, and EuRoC names without a unit.
     let euroc: String =
         (0..21).map(|i| format!("{},0,{},{},1,0,0,0\n", i * 1_000_000_000_i64, 10 * i, i)).collect();

@@ -200,23 +200,11 @@ fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileErro
     {
         return Err(row_error(path, Some(1), format!("the header names two columns {name}: leave one out")));
     }
-    // Tables that camsim wrote have further columns, which need no note.
-    let is_from_camsim = index_of(&["frame"]).is_some() && index_of(&["stamp_ns"]).is_some();
-    let read = [Some(color_index), depth_index, time_index.map(|(index, _)| index), index_of(&["frame"])];
-    let unread: Vec<&str> = header
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !is_from_camsim && !read.contains(&Some(*index)))
-        .map(|(_, cell)| cell)
-        .collect();
-    let notes = match unread[..] {
-        [] => Vec::new(),
-        _ => vec![format!(
-            "{}: the columns {} are not read: frames are of t_s, color and depth",
-            path.display(),
-            unread.join(", ")
-        )],
-    };
+    let notes = unread_columns_note(
+        path,
+        &header,
+        [Some(color_index), depth_index, time_index.map(|(index, _)| index)],
+    );
     let mut entries: Vec<FrameEntry> = Vec::new();
     for record in reader.records() {
         let record = record
@@ -230,6 +218,30 @@ fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileErro
         entries.push(FrameEntry { color: picture(path, line, cell(color_index))?, depth, stamp_ns });
     }
     Ok((entries, notes))
+}
+
+/// A note about the columns that are not read, unless camsim wrote the table. `read` are indices of columns.
+fn unread_columns_note(path: &Path, header: &csv::StringRecord, read: [Option<usize>; 3]) -> Vec<String> {
+    let is_named = |cell: &str, name: &str| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name);
+    let index_of = |name: &str| header.iter().position(|cell| is_named(cell, name));
+    let frame_index = index_of("frame");
+    if frame_index.is_some() && index_of("stamp_ns").is_some() {
+        return Vec::new();
+    }
+    let unread: Vec<&str> = header
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| !read.contains(&Some(*index)) && frame_index != Some(*index))
+        .map(|(_, cell)| cell)
+        .collect();
+    match unread[..] {
+        [] => Vec::new(),
+        _ => vec![format!(
+            "{}: the columns {} are not read: frames are of t_s, color and depth",
+            path.display(),
+            unread.join(", ")
+        )],
+    }
 }
 
 /// Words of the lines that are no comments, each with its line number.
