@@ -87,7 +87,7 @@ pub fn run(
 ) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
     let files = folder::files_of(scenario, job.folder);
-    let inputs = inputs::of_scenario(scenario);
+    let inputs = inputs::scenario_fingerprints(scenario);
     let adapter = source.adapter();
     folder::check(job, &files, &inputs, &adapter, console)?;
     let shard_frames: Vec<u64> = job
@@ -200,7 +200,7 @@ fn prepare(
         files.remove(job.frames).or_failed()?;
     }
     manifest.write(job.folder).or_failed()?;
-    files.sweep(todo);
+    files.remove_temporaries(todo);
     tables::write_fixed(job, source.planner(), console)?;
     tables::begin_frames(job, folder_state == FolderState::Ours)
 }

@@ -10,7 +10,7 @@ use std::{
 
 use camsim_core::scenario::{CameraSpec, Problem, Scenario, validate};
 use camsim_io::{
-    scenario_file::{Kind, keys, read_scenario},
+    scenario_file::{ValueKind, keys, read_scenario},
     write::write_atomic,
 };
 use toml::{Table, Value};
@@ -268,13 +268,13 @@ fn tree_of(scenario: &Scenario) -> Result<Table, String> {
 /// Keys of all paths in a tree, with elements of lists by index.
 fn path_keys(tree: &Table) -> Vec<String> {
     let split_list_key = |key: &str| {
-        let lists = keys().iter().filter(|(_, kind)| *kind == Kind::Tables).map(|(list, _)| *list);
+        let lists = keys().iter().filter(|(_, kind)| *kind == ValueKind::Tables).map(|(list, _)| *list);
         lists
             .filter_map(|list| Some((list, key.strip_prefix(list)?.strip_prefix('.')?)))
             .map(|(list, leaf)| (list.to_owned(), leaf.to_owned()))
             .next()
     };
-    let paths = keys().iter().filter(|(_, kind)| *kind == Kind::Path);
+    let paths = keys().iter().filter(|(_, kind)| *kind == ValueKind::Path);
     let expanded = paths.flat_map(|(key, _)| match split_list_key(key) {
         None => vec![(*key).to_owned()],
         Some((list, leaf)) => {

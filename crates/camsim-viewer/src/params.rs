@@ -363,7 +363,7 @@ pub const PARAMS: &[Param] = &[
 
 #[cfg(test)]
 mod tests {
-    use camsim_io::scenario_file::{Kind, keys};
+    use camsim_io::scenario_file::{ValueKind, keys};
 
     use super::*;
 
@@ -371,7 +371,7 @@ mod tests {
     fn params_lists_exactly_the_keys_of_the_format() {
         let known: Vec<&str> = PARAMS.iter().map(|param| param.key).collect();
         let format: Vec<&str> =
-            keys().iter().filter(|(_, kind)| *kind != Kind::Later).map(|(key, _)| *key).collect();
+            keys().iter().filter(|(_, kind)| *kind != ValueKind::Unsupported).map(|(key, _)| *key).collect();
         assert_eq!(known, format);
         for param in PARAMS {
             assert!(

@@ -10,7 +10,7 @@ use camsim_core::{
 };
 use camsim_io::{
     board_file::read_board,
-    load::{board_place, load_flight},
+    load::{board_position_ned_m, load_flight},
     scenario_file::read_scenario,
     write::write_picture,
 };
@@ -58,7 +58,7 @@ pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         let spec =
             spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
         let (log, _) = load_flight(&scenario).or_bad_input()?;
-        let centre_ned_m = board_place(&scenario, spec, &log).or_bad_input()?;
+        let centre_ned_m = board_position_ned_m(&scenario, spec, &log).or_bad_input()?;
         (read_board(spec).or_bad_input()?, Some((centre_ned_m, ned_from_board(spec.angles_deg))))
     };
     if let Some(path) = &args.output {

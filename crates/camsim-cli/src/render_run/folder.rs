@@ -9,7 +9,7 @@ use anyhow::anyhow;
 use camsim_core::scenario::Scenario;
 use camsim_io::{
     inputs::Inputs,
-    manifest::{BY_SCENARIO, ResumeError, check_resume, check_resume_of},
+    manifest::{BY_OTHER_SCENARIO, ResumeError, check_resume, check_resume_key},
     write::FrameFiles,
 };
 
@@ -58,14 +58,14 @@ pub fn folder_state(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Resul
     };
     match error {
         // Other files of the same frames do not contradict each other.
-        Some(ResumeError::Differs { made: BY_SCENARIO, differences, .. })
+        Some(ResumeError::Differs { made: BY_OTHER_SCENARIO, differences, .. })
             if !job.resume && differences.iter().all(|text| is_of_files(text)) =>
         {
             Ok(FolderState::Ours)
         }
         Some(error) if job.resume => Err(Failure::bad_input(error)),
         Some(error @ ResumeError::Differs { .. }) => {
-            refuse_others(job.frames, files, &error.what())?;
+            refuse_others(job.frames, files, &error.reason())?;
             Ok(FolderState::Replaced)
         }
         _ => {
@@ -82,7 +82,7 @@ fn is_of_files(difference: &str) -> bool {
 
 /// Refuses a folder with frame files other than those that will be replaced.
 pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<(), Failure> {
-    let others = files.others(frames);
+    let others = files.unlisted_frame_files(frames);
     let Some(first) = others.first() else { return Ok(()) };
     let count = others.len();
     Err(Failure::bad_input(anyhow!(
@@ -109,7 +109,7 @@ pub fn refuse_unknown(
 
 fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
     if let Err(ResumeError::Differs { path, .. }) =
-        check_resume_of(job.folder, "adapter", "by another adapter", &adapter)
+        check_resume_key(job.folder, "adapter", "by another adapter", &adapter)
     {
         console.warn(format_args!(
             "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from \

@@ -61,7 +61,7 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
 pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
     let path = frames_path(job.folder);
     let mut table = if is_ours { FrameTable::read(&path) } else { FrameTable::default() };
-    table.keep_what_is_in(job.folder, &|_| false);
+    table.retain_existing(job.folder, &|_| false);
     table.write(&path).or_failed()
 }
 
@@ -88,7 +88,7 @@ pub fn end_frames(
             table.insert(&record(job.sequence, files, planner, frame, source_frame(job.sequence, &plan)));
         }
     }
-    table.keep_what_is_in(job.folder, &|frame| !writes && made.contains_key(&frame));
+    table.retain_existing(job.folder, &|frame| !writes && made.contains_key(&frame));
     table.write(&path).or_failed()
 }
 

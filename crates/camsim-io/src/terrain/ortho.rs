@@ -17,7 +17,7 @@ use super::{
     systems::Stated,
     tiff_file::gdal_translate,
 };
-use crate::pictures::{PictureError, Stored, read_stored};
+use crate::pictures::{PictureError, StoredPicture, read_stored};
 
 /// A picture of the ground.
 pub(super) struct Ortho {
@@ -187,7 +187,7 @@ fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<Str
             "scene.terrain.ortho_white is for TIFF files: leave it out",
         )));
     }
-    let Stored { texture, orientation, largest_of_16_bits } =
+    let StoredPicture { texture, orientation, largest_of_16_bits } =
         read_stored(path, Encoding::Srgb).map_err(failed)?;
     let mut geo = GeoTags { orientation, ..GeoTags::default() };
     beside::read_tags(path, &mut geo)?;

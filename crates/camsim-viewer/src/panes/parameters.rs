@@ -6,7 +6,7 @@ mod presets;
 
 use std::sync::LazyLock;
 
-use camsim_io::scenario_file::{Kind, keys};
+use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{self, RichText, Role, Ui};
 
 use super::{
@@ -39,7 +39,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn groups() -> &'static [Group] {
     static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
         let mut groups: Vec<Group> = Vec::new();
-        for (key, kind) in keys().iter().filter(|(key, kind)| *kind != Kind::Later && !is_element(key)) {
+        for (key, kind) in
+            keys().iter().filter(|(key, kind)| *kind != ValueKind::Unsupported && !is_element(key))
+        {
             let name = key.rsplit_once('.').map_or("", |(group, _)| group);
             match groups.iter_mut().find(|group| group.name == name) {
                 Some(group) => group.keys.push((*key, *kind)),
@@ -60,14 +62,14 @@ pub fn section_names() -> Vec<&'static str> {
 /// Whether a key belongs to elements of a list of tables.
 fn is_element(key: &str) -> bool {
     keys().iter().any(|(list, kind)| {
-        *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
+        *kind == ValueKind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
     })
 }
 
 /// A table of the format with its keys.
 struct Group {
     name: &'static str,
-    keys: Vec<(&'static str, Kind)>,
+    keys: Vec<(&'static str, ValueKind)>,
 }
 
 impl Group {
@@ -90,7 +92,7 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
     egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
         for (key, kind) in &group.keys {
             match kind {
-                Kind::Tables => lists::show(ui, state, document, key, out),
+                ValueKind::Tables => lists::show(ui, state, document, key, out),
                 kind => row(ui, state, document, key, *kind, out),
             }
         }
@@ -106,7 +108,7 @@ pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
 }
 
 /// Draws a key with its editor and unit, and a reset button if it was changed.
-fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, out: &mut Outbox) {
+fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: ValueKind, out: &mut Outbox) {
     let Some(param) = params::find(key) else { return };
     row_with_param(ui, state, document, key, kind, param, out);
 }
@@ -117,7 +119,7 @@ fn row_with_param(
     state: &State,
     document: &Document,
     key: &str,
-    kind: Kind,
+    kind: ValueKind,
     param: &Param,
     out: &mut Outbox,
 ) {

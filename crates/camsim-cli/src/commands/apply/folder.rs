@@ -10,9 +10,9 @@ use camsim_core::{
     shutter::Shutter,
 };
 use camsim_io::{
-    frame_file::{FrameSet, list::Entry},
+    frame_file::{FrameSet, list::FrameEntry},
     inputs,
-    manifest::{PATHS, check_resume_of, portable_inputs},
+    manifest::{PATHS, check_resume_key, portable_inputs},
     portable::{relative_to, write_camera},
     write::{FrameFiles, FrameWriter, write_atomic},
 };
@@ -95,14 +95,14 @@ pub(super) fn run(
     let files = FrameFiles::new(folder, &output_spec(args, set), spec.photometric.output);
     let number = |index: u64| args.frame_number.saturating_add(index);
     let numbers: Vec<u64> = frames.iter().map(|&index| number(index)).collect();
-    let made = check_resume_of(folder, "apply", "from other inputs", &inputs);
+    let made = check_resume_key(folder, "apply", "from other inputs", &inputs);
     let is_ours = matches!(made, Ok(true));
     match made {
         Ok(true) => {}
         Ok(false) => refuse_unknown(folder, &numbers, &files, args.resume)?,
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
         Err(error) => {
-            refuse_others(&numbers, &files, &error.what())?;
+            refuse_others(&numbers, &files, &error.reason())?;
             console
                 .warn(format_args!("{} belongs to other inputs: its frames are replaced", folder.display()));
         }
@@ -123,7 +123,7 @@ pub(super) fn run(
         finished: false,
     };
     write_manifest(args, &manifest)?;
-    files.sweep(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
+    files.remove_temporaries(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
     write_camera(folder, spec).or_failed()?;
     write_table(args, set, &files)?;
 
@@ -236,19 +236,20 @@ fn check_motion(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet, frames: &[u
 fn inputs(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<ApplyInputs, Failure> {
     let folder = &args.output;
     // There are too many images to read their contents.
-    let text = |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::dated(path));
+    let text =
+        |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::size_and_mtime(path));
     let mut camera = spec.clone();
     for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
         *path = relative_to(path, folder);
     }
-    let files = inputs::of_files(
+    let files = inputs::file_fingerprints(
         set.motion_file()
             .into_iter()
             .chain(spec.photometric.vignette.as_deref())
             .map(Path::to_owned)
             .collect(),
     );
-    let picture = |entry: &Entry| {
+    let picture = |entry: &FrameEntry| {
         let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
         format!(
             "{}, {}, {stamp}",

@@ -3,7 +3,7 @@
 mod labels;
 
 use camsim_core::scenario::LightSpec;
-use camsim_io::scenario_file::Kind;
+use camsim_io::scenario_file::ValueKind;
 use eframe::egui::{self, Role, Ui};
 use toml::Value;
 
@@ -27,24 +27,24 @@ struct Edit {
 }
 
 /// Draws the editor of a key.
-pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param: &Param, out: &mut Outbox) {
     let value = document.value(key);
     let edit = match kind {
-        Kind::Number => number(ui, key, value, param, false, out),
-        Kind::Whole | Kind::Within(..) => number(ui, key, value, param, true, out),
-        Kind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
-        Kind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
-        Kind::Numbers(count) => optional_numbers(ui, key, value, document, param, count, out),
-        Kind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
-        Kind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
-        Kind::NumberList => number_list(ui, document, key, value, param, out),
-        Kind::Path => path(ui, document, key, value),
-        Kind::Flag => flag(ui, key, value),
-        Kind::Word(words) => word(ui, key, value, words),
-        Kind::Words(words) => word_list(ui, key, value, words),
-        Kind::Text => text(ui, key, value, param),
+        ValueKind::Number => number(ui, key, value, param, false, out),
+        ValueKind::Whole | ValueKind::Within(..) => number(ui, key, value, param, true, out),
+        ValueKind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
+        ValueKind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
+        ValueKind::Numbers(count) => optional_numbers(ui, key, value, document, param, count, out),
+        ValueKind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
+        ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
+        ValueKind::NumberList => number_list(ui, document, key, value, param, out),
+        ValueKind::Path => path(ui, document, key, value),
+        ValueKind::Flag => flag(ui, key, value),
+        ValueKind::Word(words) => word(ui, key, value, words),
+        ValueKind::Words(words) => word_list(ui, key, value, words),
+        ValueKind::Text => text(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
-        Kind::Tables | Kind::Later | Kind::Texts => None,
+        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts => None,
     };
     if let Some(Edit { value, is_dragged }) = edit {
         out.push(Message::Set(key.to_owned(), value, is_dragged));

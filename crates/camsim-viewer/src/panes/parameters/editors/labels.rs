@@ -29,7 +29,7 @@ pub fn element_labels(key: &str, lens: LensModel) -> &'static [&'static str] {
 
 #[cfg(test)]
 mod tests {
-    use camsim_io::scenario_file::{Kind, keys};
+    use camsim_io::scenario_file::{ValueKind, keys};
 
     use super::*;
 
@@ -37,7 +37,9 @@ mod tests {
     fn every_list_of_fixed_length_has_a_label_per_element() {
         for (key, kind) in keys() {
             let count = match kind {
-                Kind::Numbers(count) | Kind::NumbersOr(count, _) | Kind::Counts(count, _) => *count,
+                ValueKind::Numbers(count) | ValueKind::NumbersOr(count, _) | ValueKind::Counts(count, _) => {
+                    *count
+                }
                 _ => continue,
             };
             assert_eq!(element_labels(key, LensModel::BrownConrady).len(), count, "{key}");

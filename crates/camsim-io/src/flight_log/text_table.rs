@@ -1,13 +1,13 @@
-//! Lines, separators, quotes and numbers of a text table.
+//! Delimited text tables: lines, separators, quotes, headers, numbers.
 
 use std::collections::BTreeMap;
 
-use super::time;
+use super::time_fields;
 
-/// Lines looked at to tell the separator and the number of columns.
+/// Lines that are sampled to detect the separator.
 const SAMPLE_LINES: usize = 32;
 
-/// How fields are separated.
+/// Separator of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
     Semicolon,
@@ -28,11 +28,11 @@ impl Separator {
         }
     }
 
-    /// The one by which most fields of these lines are numbers or times.
-    fn of(lines: &[&str]) -> Self {
+    /// The separator that splits lines into the most numbers and times.
+    fn detect(lines: &[&str]) -> Self {
         let mut fields = Vec::new();
         let mut best = (0, Self::Space);
-        // Of equal ones the first stands, which is the one that people don't use within numbers.
+        // Of equal scores the first in `ALL` wins, which is the least likely within numbers.
         for separator in Self::ALL.into_iter().rev() {
             let mut score = 0;
             for line in lines {
@@ -46,7 +46,7 @@ impl Separator {
         best.1
     }
 
-    /// Fields of a line, trimmed and without their quotes.
+    /// Splits a line into fields, trimmed and without their quotes.
     pub(super) fn split<'a>(self, line: &'a str, fields: &mut Vec<&'a str>) {
         fields.clear();
         if line.contains('"') {
@@ -67,7 +67,7 @@ impl Separator {
             if self == Self::Space && rest.is_empty() {
                 return;
             }
-            // A quote that nothing closes is a character like others.
+            // A quote without a closing one is an ordinary character.
             let quoted = rest
                 .strip_prefix('"')
                 .and_then(|inner| closing_quote(inner).map(|end| (&inner[..end], &inner[end + 1..])));
@@ -83,38 +83,42 @@ impl Separator {
                 }
             };
             match after.find(is_end) {
-                Some(at) => rest = &after[at + after[at..].chars().next().map_or(1, char::len_utf8)..],
+                Some(end) => rest = &after[end + after[end..].chars().next().map_or(1, char::len_utf8)..],
                 None => return,
             }
         }
     }
 }
 
-/// Where the text before a closing quote ends; two quotes are one that belongs to the text.
+/// Byte offset of the closing quote. Two quotes in a row are an escaped quote.
 fn closing_quote(text: &str) -> Option<usize> {
-    let mut from = 0;
+    let mut start = 0;
     loop {
-        let at = from + text[from..].find('"')?;
-        if !text[at + 1..].starts_with('"') {
-            return Some(at);
+        let quote = start + text[start..].find('"')?;
+        if !text[quote + 1..].starts_with('"') {
+            return Some(quote);
         }
-        from = at + 2;
+        start = quote + 2;
     }
 }
 
 /// One line of data.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
+    /// Number in the file, from 1.
     pub(super) number: usize,
+    /// Text without surrounding blanks.
     pub(super) text: &'a str,
 }
 
 /// A line that may name columns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HeaderLine<'a> {
+    /// Number in the file, from 1.
     pub(super) number: usize,
+    /// Text without the mark of a comment.
     pub(super) text: &'a str,
-    /// A comment may be prose; a line that is none has to be a header, or units below one.
+    /// Whether it is a comment, which may be prose. Any other line must be a header, or units below one.
     pub(super) is_comment: bool,
 }
 
@@ -123,23 +127,27 @@ pub(super) struct HeaderLine<'a> {
 pub(super) struct Table<'a> {
     /// Lines before the data that may name columns, in the file's order.
     pub(super) headers: Vec<HeaderLine<'a>>,
+    /// Lines of data, in the file's order.
     pub(super) rows: Vec<Line<'a>>,
+    /// Separator of fields.
     pub(super) separator: Separator,
-    /// Commas, not points, begin the decimals.
+    /// Whether numbers have decimal commas, not points.
     pub(super) has_decimal_commas: bool,
-    /// Columns that are not empty throughout, by a sample of the rows of the usual number of fields.
+    /// Number of columns without the empty ones at the end, in sampled rows of the most frequent width.
     pub(super) columns: usize,
-    /// Fields of these rows, empty ones too.
+    /// Number of fields of these rows, empty ones included.
     pub(super) width: usize,
 }
 
 impl<'a> Table<'a> {
+    /// Detects separator, headers, width and decimal commas of a text.
+    // Long because each step needs the results of the one before.
     pub(super) fn new(content: &'a str) -> Self {
-        // Lines of old end in a carriage return alone.
-        let is_old = !content.contains('\n');
+        // Files of classic Mac OS end lines with a carriage return alone.
+        let has_cr_only = !content.contains('\n');
         let texts: Box<dyn Iterator<Item = &'a str>> =
-            if is_old { Box::new(content.split('\r')) } else { Box::new(content.lines()) };
-        // Not tabs: one at the beginning of a line is an empty field.
+            if has_cr_only { Box::new(content.split('\r')) } else { Box::new(content.lines()) };
+        // Tabs are not trimmed: one at the start of a line marks an empty field.
         let lines: Vec<Line<'a>> = texts
             .enumerate()
             .map(|(index, text)| Line { number: index + 1, text: text.trim_matches([' ', '\r']) })
@@ -149,25 +157,26 @@ impl<'a> Table<'a> {
         let body: Vec<&str> = lines.iter().filter(|line| !is_comment(line)).map(|line| line.text).collect();
         let sample: Vec<&str> =
             body.iter().copied().step_by(body.len().div_ceil(SAMPLE_LINES).max(1)).collect();
-        // Where a header is half of the sample, it shall not decide.
+        // The last line is added so that a header is less than half of a small sample.
         let last = body.last().into_iter().copied();
-        let separator = Separator::of(&sample.into_iter().chain(last).collect::<Vec<_>>());
+        let separator = Separator::detect(&sample.into_iter().chain(last).collect::<Vec<_>>());
 
         let mut headers = Vec::new();
         let mut rows = Vec::new();
         let mut fields = Vec::new();
         for line in lines {
-            let comment = is_comment(&line);
-            if rows.is_empty() && (comment || is_header(line.text, separator, &mut fields)) {
-                let text = if comment { line.text.trim_start_matches(['#', '%']).trim() } else { line.text };
-                headers.push(HeaderLine { number: line.number, text, is_comment: comment });
-            } else if !comment {
+            let line_is_comment = is_comment(&line);
+            if rows.is_empty() && (line_is_comment || is_header(line.text, separator, &mut fields)) {
+                let text =
+                    if line_is_comment { line.text.trim_start_matches(['#', '%']).trim() } else { line.text };
+                headers.push(HeaderLine { number: line.number, text, is_comment: line_is_comment });
+            } else if !line_is_comment {
                 rows.push(line);
             }
         }
         let mut table = Self { headers, rows, separator, has_decimal_commas: false, columns: 0, width: 0 };
         let (mut commas, mut points) = (0, 0);
-        // Rows of each number of fields, and how many of them are not empty throughout.
+        // For each number of fields: the number of rows, and of columns up to the last that is not empty.
         let mut widths: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
         for row in table.sample(500) {
             separator.split(row.text, &mut fields);
@@ -182,7 +191,7 @@ impl<'a> Table<'a> {
             points +=
                 fields.iter().filter(|field| field.contains('.') && number(field, false).is_some()).count();
         }
-        // Most rows are right; a field too many in some of them is found when they are read.
+        // The most frequent width counts. Rows with surplus fields are refused when they are parsed.
         if let Some((&width, &(_, columns))) = widths.iter().max_by_key(|(_, (rows, _))| *rows) {
             (table.columns, table.width) = (columns, width);
         }
@@ -190,21 +199,23 @@ impl<'a> Table<'a> {
         table
     }
 
+    /// The fields of a row.
     pub(super) fn fields(&self, row: &Line<'a>) -> Vec<&'a str> {
         let mut fields = Vec::new();
         self.separator.split(row.text, &mut fields);
         fields
     }
 
-    /// Names of a header line, as many as the rows have columns if any way of splitting gives that.
+    /// Splits a header line into names, by the separator of the rows or by another one that gives as many
+    /// names as there are columns.
     pub(super) fn names(&self, text: &'a str) -> Vec<&'a str> {
         let mut names = Vec::new();
         let mut split = |separator: Separator| {
             separator.split(text, &mut names);
             if separator == Separator::Space {
-                with_brackets(&names, text)
+                join_bracketed_units(&names, text)
             } else {
-                without_last_blank(&names)
+                without_trailing_empty(&names)
             }
         };
         let first = split(self.separator);
@@ -217,31 +228,32 @@ impl<'a> Table<'a> {
         others.map(split).find(|names| self.fits(names.len())).unwrap_or(first)
     }
 
-    /// Whether so many names can be those of the columns.
+    /// Whether the number of names matches the number of columns.
     pub(super) fn fits(&self, names: usize) -> bool {
         (self.columns..=self.width).contains(&names)
     }
 
+    /// Parses a number of this table, as the function [`number`] does.
     pub(super) fn number(&self, field: &str) -> Option<f64> {
         number(field, self.has_decimal_commas)
     }
 
-    /// Up to `count` rows, evenly over the file.
+    /// Up to `count` rows, evenly spaced over the file.
     pub(super) fn sample(&self, count: usize) -> impl Iterator<Item = &Line<'a>> {
         self.rows.iter().step_by(self.rows.len().div_ceil(count).max(1))
     }
 }
 
-/// `time [s]` is one name where blanks separate.
-fn with_brackets<'a>(names: &[&'a str], text: &'a str) -> Vec<&'a str> {
+/// Joins names and units that blanks separate: `time [s]` is one name.
+fn join_bracketed_units<'a>(names: &[&'a str], text: &'a str) -> Vec<&'a str> {
     let mut joined: Vec<&'a str> = Vec::with_capacity(names.len());
     for name in names {
         match joined.last_mut() {
             Some(last) if name.starts_with(['[', '(']) => {
-                // Both are parts of `text`.
-                let from = last.as_ptr() as usize - text.as_ptr() as usize;
-                let to = name.as_ptr() as usize - text.as_ptr() as usize + name.len();
-                *last = &text[from..to];
+                // Both are slices of `text`.
+                let start = last.as_ptr() as usize - text.as_ptr() as usize;
+                let end = name.as_ptr() as usize - text.as_ptr() as usize + name.len();
+                *last = &text[start..end];
             }
             _ => joined.push(name),
         }
@@ -249,12 +261,13 @@ fn with_brackets<'a>(names: &[&'a str], text: &'a str) -> Vec<&'a str> {
     joined
 }
 
-fn without_last_blank<'a>(names: &[&'a str]) -> Vec<&'a str> {
+/// Names without the empty ones at the end.
+fn without_trailing_empty<'a>(names: &[&'a str]) -> Vec<&'a str> {
     let end = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     names[..end].to_vec()
 }
 
-/// Whether a line has words and no values.
+/// Whether a line has words, and neither numbers nor times.
 fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) -> bool {
     separator.split(line, fields);
     let is_word = |field: &str| !is_missing(field) && !is_value(field, separator != Separator::Comma);
@@ -262,15 +275,15 @@ fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>)
         && fields.iter().all(|field| is_word(field) || is_missing(field))
 }
 
-/// A number or a time that is there.
+/// Whether a field is a number or a time, and not missing.
 fn is_value(field: &str, may_have_decimal_comma: bool) -> bool {
     !is_missing(field)
         && (number(field, false).is_some()
             || (may_have_decimal_comma && number(field, true).is_some())
-            || time::is_time(field))
+            || time_fields::is_time(field))
 }
 
-/// What loggers write where they have no value.
+/// Whether a field holds one of the marks that loggers write for a missing value.
 pub(super) fn is_missing(field: &str) -> bool {
     const WORDS: [&str; 8] = ["na", "n/a", "#n/a", "nan", "null", "none", "nil", "-nan"];
     field.is_empty()
@@ -278,9 +291,9 @@ pub(super) fn is_missing(field: &str) -> bool {
         || WORDS.iter().any(|word| field.eq_ignore_ascii_case(word))
 }
 
-/// A field's value: `None` if it is no number, NaN if it is missing.
+/// Parses a number: `None` if the field is no number, NaN if it is missing.
 pub(super) fn number(field: &str, has_decimal_comma: bool) -> Option<f64> {
-    // Rust also reads `infinity`; a column of that name is none of numbers.
+    // Rust also parses words as `nan` and `infinity`; the first character limits that to `inf` and its like.
     let may_be_number =
         field.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | 'i' | 'I'));
     if may_be_number

@@ -1,83 +1,37 @@
-//! Names of columns: which names mean what. The documentation of columns is made from this table.
+//! Known names of columns and their meanings. docs/inputs/LOGS.md is generated from this table.
 
-use super::units::{Datum, MICROSECOND, MILLISECOND, NANOSECOND, SECOND, Unit};
+use super::{
+    column_meaning::ColumnMeaning,
+    units::{MICROSECOND, MILLISECOND, NANOSECOND, SECOND, Unit, VerticalDatum},
+};
 
-/// What a column holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Meaning {
-    /// Times as numbers, clock times or dates with times.
-    Time,
-    /// Date and time as text; counts only where no column is a [`Meaning::Time`].
-    DateTime,
-    /// Nanoseconds that belong to a column of whole seconds.
-    NanosecondsPart,
-    Date,
-    /// Two numbers in one field.
-    LatitudeLongitude,
-    Latitude,
-    Longitude,
-    /// Up, above what its name says or `flight.height`.
-    Height(Option<Datum>),
-    /// By air pressure: less trusted than `Height`.
-    PressureHeight,
-    /// Above take-off or ground: no place in the world.
-    RelativeHeight,
-    North,
-    East,
-    Down,
-    /// Grid coordinates, whose north isn't true north.
-    Grid,
-    X,
-    Y,
-    Z,
-    Roll,
-    Pitch,
-    Yaw,
-    /// Of magnetic north.
-    MagneticYaw,
-    Qx,
-    Qy,
-    Qz,
-    Qw,
-    /// Where the aircraft moves, not where its nose points.
-    Course,
-    /// Attitude of a gimbal.
-    Gimbal,
-    /// The ground's height.
-    Ground,
-    /// North or south, east or west.
-    Hemisphere,
-    /// Hours or minutes beside a column of seconds.
-    TimePart,
-    /// Whose row it is.
-    Vehicle,
-}
-
-/// A meaning with its names.
-pub(super) struct Known {
-    pub(super) meaning: Meaning,
-    /// Lower case; blanks, hyphens, dots, slashes and colons are underscores.
+/// A meaning with the names that have it.
+pub(super) struct KnownName {
+    pub(super) meaning: ColumnMeaning,
+    /// Names in normal form: lower case, with underscores for blanks, hyphens, dots, slashes and colons.
     pub(super) names: &'static [&'static str],
-    /// Where the name alone says it.
+    /// Unit that the name implies.
     pub(super) unit: Option<&'static Unit>,
-    pub(super) what: &'static str,
-    pub(super) use_of_it: &'static str,
+    /// The quantity, for LOGS.md.
+    pub(super) quantity: &'static str,
+    /// What the reader does with it, for LOGS.md.
+    pub(super) treatment: &'static str,
 }
 
-const fn known(
-    meaning: Meaning,
+const fn known_name(
+    meaning: ColumnMeaning,
     names: &'static [&'static str],
-    what: &'static str,
-    use_of_it: &'static str,
-) -> Known {
-    Known { meaning, names, unit: None, what, use_of_it }
+    quantity: &'static str,
+    treatment: &'static str,
+) -> KnownName {
+    KnownName { meaning, names, unit: None, quantity, treatment }
 }
 
-const fn time_in(unit: &'static Unit, names: &'static [&'static str], what: &'static str) -> Known {
-    Known { meaning: Meaning::Time, names, unit: Some(unit), what, use_of_it: "applied" }
+const fn time_name(unit: &'static Unit, names: &'static [&'static str], quantity: &'static str) -> KnownName {
+    KnownName { meaning: ColumnMeaning::Time, names, unit: Some(unit), quantity, treatment: "applied" }
 }
 
-/// Prefixes that say which message or device a column is from.
+/// Prefixes that name the message or device a column comes from.
 pub(super) const PREFIXES: &[&str] = &[
     "osd_",
     "gps_",
@@ -94,10 +48,10 @@ pub(super) const PREFIXES: &[&str] = &[
     "gnss_",
 ];
 
-/// Every name known.
-pub(super) static KNOWN: &[Known] = &[
-    known(
-        Meaning::Time,
+/// All known names.
+pub(super) static KNOWN_NAMES: &[KnownName] = &[
+    known_name(
+        ColumnMeaning::Time,
         &[
             "t",
             "time",
@@ -119,43 +73,43 @@ pub(super) static KNOWN: &[Known] = &[
         "time: number, clock time `h:m:s`, or ISO 8601",
         "applied",
     ),
-    time_in(&SECOND, &["sec", "secs", "seconds", "secs_of_week", "seconds_of_week"], "time in seconds"),
-    time_in(&MILLISECOND, &["ms", "msec", "millis", "milliseconds", "itow"], "time in milliseconds"),
-    time_in(&MICROSECOND, &["us", "usec", "micros", "microseconds"], "time in microseconds"),
-    known(
-        Meaning::NanosecondsPart,
+    time_name(&SECOND, &["sec", "secs", "seconds", "secs_of_week", "seconds_of_week"], "time in seconds"),
+    time_name(&MILLISECOND, &["ms", "msec", "millis", "milliseconds", "itow"], "time in milliseconds"),
+    time_name(&MICROSECOND, &["us", "usec", "micros", "microseconds"], "time in microseconds"),
+    known_name(
+        ColumnMeaning::NanosecondsPart,
         &["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds", "ns"],
         "nanoseconds: added to a column of whole seconds, else the time itself",
         "applied",
     ),
-    known(
-        Meaning::DateTime,
+    known_name(
+        ColumnMeaning::DateTime,
         &["datetime", "date_time", "utc", "utc_datetime", "iso_time", "timestamp_iso", "time_iso"],
         "date and time as text",
         "applied where no other column is a time",
     ),
-    known(
-        Meaning::Date,
+    known_name(
+        ColumnMeaning::Date,
         &["date", "day", "utc_date", "date_utc"],
         "date, `year-month-day`",
         "applied to clock times",
     ),
-    known(
-        Meaning::LatitudeLongitude,
+    known_name(
+        ColumnMeaning::LatitudeLongitude,
         &["gps", "coordinates", "gps_coordinates", "latlon", "lat_lon", "latlng", "gps_position"],
         "latitude and longitude in one field, with a blank between them",
         "applied",
     ),
-    known(Meaning::Latitude, &["lat", "latitude"], "latitude", "applied"),
-    known(Meaning::Longitude, &["lon", "lng", "long", "longitude"], "longitude", "applied"),
-    known(
-        Meaning::Height(None),
+    known_name(ColumnMeaning::Latitude, &["lat", "latitude"], "latitude", "applied"),
+    known_name(ColumnMeaning::Longitude, &["lon", "lng", "long", "longitude"], "longitude", "applied"),
+    known_name(
+        ColumnMeaning::Height(None),
         &["alt", "altitude", "height", "h", "up", "elevation", "elev", "ele", "abs_alt", "absolute_altitude"],
         "height, up; above what flight.height says",
         "applied",
     ),
-    known(
-        Meaning::Height(Some(Datum::MeanSeaLevel)),
+    known_name(
+        ColumnMeaning::Height(Some(VerticalDatum::MeanSeaLevel)),
         &[
             "msl",
             "amsl",
@@ -168,14 +122,14 @@ pub(super) static KNOWN: &[Known] = &[
         "height above mean sea level",
         "applied; a warning where flight.height says otherwise",
     ),
-    known(
-        Meaning::Height(Some(Datum::Ellipsoid)),
+    known_name(
+        ColumnMeaning::Height(Some(VerticalDatum::Ellipsoid)),
         &["hae", "ellipsoid_height", "ellipsoidal_height", "height_above_ellipsoid", "h_ell", "alt_ell"],
         "height above the ellipsoid",
         "applied; a warning where flight.height says otherwise",
     ),
-    known(
-        Meaning::PressureHeight,
+    known_name(
+        ColumnMeaning::PressureHeight,
         &[
             "pressure_alt",
             "pressure_altitude",
@@ -189,8 +143,8 @@ pub(super) static KNOWN: &[Known] = &[
         "height by air pressure",
         "applied where there is no other height",
     ),
-    known(
-        Meaning::RelativeHeight,
+    known_name(
+        ColumnMeaning::RelativeHeight,
         &[
             "height_above_takeoff",
             "height_above_take_off",
@@ -218,22 +172,32 @@ pub(super) static KNOWN: &[Known] = &[
         "height above take-off or ground",
         "refused as the only height",
     ),
-    known(
-        Meaning::Ground,
+    known_name(
+        ColumnMeaning::Ground,
         &["ground_elevation", "ground_elevation_at_drone_location", "terrain_alt", "terrain_elevation"],
         "height of the ground",
         "not used",
     ),
-    known(
-        Meaning::North,
+    known_name(
+        ColumnMeaning::North,
         &["n", "north", "pn", "pos_n", "pos_north", "position_north"],
         "local north",
         "applied",
     ),
-    known(Meaning::East, &["e", "east", "pe", "pos_e", "pos_east", "position_east"], "local east", "applied"),
-    known(Meaning::Down, &["d", "down", "pd", "pos_d", "pos_down", "position_down"], "local down", "applied"),
-    known(
-        Meaning::Grid,
+    known_name(
+        ColumnMeaning::East,
+        &["e", "east", "pe", "pos_e", "pos_east", "position_east"],
+        "local east",
+        "applied",
+    ),
+    known_name(
+        ColumnMeaning::Down,
+        &["d", "down", "pd", "pos_d", "pos_down", "position_down"],
+        "local down",
+        "applied",
+    ),
+    known_name(
+        ColumnMeaning::Grid,
         &[
             "easting",
             "northing",
@@ -249,8 +213,8 @@ pub(super) static KNOWN: &[Known] = &[
         "grid coordinates, whose north is not true north",
         "refused as the only position",
     ),
-    known(
-        Meaning::X,
+    known_name(
+        ColumnMeaning::X,
         &[
             "x",
             "tx",
@@ -267,8 +231,8 @@ pub(super) static KNOWN: &[Known] = &[
         "local x",
         "applied; axes by flight.format, TUM's order or EuRoC's names",
     ),
-    known(
-        Meaning::Y,
+    known_name(
+        ColumnMeaning::Y,
         &[
             "y",
             "ty",
@@ -285,8 +249,8 @@ pub(super) static KNOWN: &[Known] = &[
         "local y",
         "as x",
     ),
-    known(
-        Meaning::Z,
+    known_name(
+        ColumnMeaning::Z,
         &[
             "z",
             "tz",
@@ -303,22 +267,27 @@ pub(super) static KNOWN: &[Known] = &[
         "local z",
         "as x",
     ),
-    known(Meaning::Roll, &["roll", "phi", "roll_angle", "bank"], "roll of the body", "applied"),
-    known(Meaning::Pitch, &["pitch", "theta", "pitch_angle", "ptch"], "pitch of the body", "applied"),
-    known(
-        Meaning::Yaw,
+    known_name(ColumnMeaning::Roll, &["roll", "phi", "roll_angle", "bank"], "roll of the body", "applied"),
+    known_name(
+        ColumnMeaning::Pitch,
+        &["pitch", "theta", "pitch_angle", "ptch"],
+        "pitch of the body",
+        "applied",
+    ),
+    known_name(
+        ColumnMeaning::Yaw,
         &["yaw", "heading", "hdg", "psi", "yaw_angle", "compass_heading", "true_heading", "heading_true"],
         "yaw of the body, from true north",
         "applied",
     ),
-    known(
-        Meaning::MagneticYaw,
+    known_name(
+        ColumnMeaning::MagneticYaw,
         &["magnetic_heading", "mag_heading", "heading_magnetic", "heading_mag"],
         "yaw of the body, from magnetic north",
         "applied as true, with a warning",
     ),
-    known(
-        Meaning::Qx,
+    known_name(
+        ColumnMeaning::Qx,
         &[
             "qx",
             "q_x",
@@ -333,8 +302,8 @@ pub(super) static KNOWN: &[Known] = &[
         "quaternion, x",
         "applied",
     ),
-    known(
-        Meaning::Qy,
+    known_name(
+        ColumnMeaning::Qy,
         &[
             "qy",
             "q_y",
@@ -349,8 +318,8 @@ pub(super) static KNOWN: &[Known] = &[
         "quaternion, y",
         "applied",
     ),
-    known(
-        Meaning::Qz,
+    known_name(
+        ColumnMeaning::Qz,
         &[
             "qz",
             "q_z",
@@ -365,8 +334,8 @@ pub(super) static KNOWN: &[Known] = &[
         "quaternion, z",
         "applied",
     ),
-    known(
-        Meaning::Qw,
+    known_name(
+        ColumnMeaning::Qw,
         &[
             "qw",
             "q_w",
@@ -381,8 +350,8 @@ pub(super) static KNOWN: &[Known] = &[
         "quaternion, scalar",
         "applied",
     ),
-    known(
-        Meaning::Course,
+    known_name(
+        ColumnMeaning::Course,
         &[
             "course",
             "track",
@@ -397,8 +366,8 @@ pub(super) static KNOWN: &[Known] = &[
         "direction of motion",
         "not used: it is no heading",
     ),
-    known(
-        Meaning::Hemisphere,
+    known_name(
+        ColumnMeaning::Hemisphere,
         &[
             "n_s",
             "e_w",
@@ -418,14 +387,14 @@ pub(super) static KNOWN: &[Known] = &[
         "hemisphere as a letter",
         "refused beside latitude and longitude: write signed degrees",
     ),
-    known(
-        Meaning::TimePart,
+    known_name(
+        ColumnMeaning::TimePart,
         &["hour", "hours", "hr", "minute", "minutes", "min", "mins"],
         "hours or minutes of a time in several columns",
         "refused beside a column of seconds: write one column",
     ),
-    known(
-        Meaning::Vehicle,
+    known_name(
+        ColumnMeaning::Vehicle,
         &[
             "vehicle",
             "vehicle_name",
@@ -448,8 +417,8 @@ pub(super) static KNOWN: &[Known] = &[
         "whose row it is",
         "refused where there are several: keep the rows of one",
     ),
-    known(
-        Meaning::Gimbal,
+    known_name(
+        ColumnMeaning::Gimbal,
         &[
             "gimbal_heading",
             "gimbal_yaw",
@@ -464,24 +433,24 @@ pub(super) static KNOWN: &[Known] = &[
     ),
 ];
 
-/// The meaning of a whole name, with the unit that it implies.
-pub(super) fn find(name: &str) -> Option<&'static Known> {
-    let exact = |name: &str| KNOWN.iter().find(|known| known.names.contains(&name));
-    // An `imu_x` is no position, and a `gps_h` may be an accuracy: behind a prefix only words count, and only
-    // these.
-    let behind_prefix = |name: &str| {
-        use Meaning::{Height, Latitude, LatitudeLongitude, Longitude, Pitch, Roll, Time, Yaw};
-        let may = |known: &&Known| {
+/// Looks up a whole name in normal form.
+pub(super) fn find(name: &str) -> Option<&'static KnownName> {
+    let exact = |name: &str| KNOWN_NAMES.iter().find(|known| known.names.contains(&name));
+    // `imu_x` is no position, and `gps_h` may be an accuracy: after a prefix only names of more than two
+    // letters count, and only those of these meanings.
+    let after_prefix = |name: &str| {
+        use ColumnMeaning::{Height, Latitude, LatitudeLongitude, Longitude, Pitch, Roll, Time, Yaw};
+        let is_allowed = |known: &&KnownName| {
             matches!(
                 known.meaning,
                 Time | Latitude | Longitude | LatitudeLongitude | Height(_) | Roll | Pitch | Yaw
             )
         };
-        (name.len() > 2).then(|| exact(name).filter(may)).flatten()
+        (name.len() > 2).then(|| exact(name).filter(is_allowed)).flatten()
     };
     exact(name)
-        .or_else(|| PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix).and_then(behind_prefix)))
+        .or_else(|| PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix).and_then(after_prefix)))
 }
 
-/// The unit that goes with [`Meaning::NanosecondsPart`] alone.
+/// The unit of [`ColumnMeaning::NanosecondsPart`].
 pub(super) static NANOSECONDS: &Unit = &NANOSECOND;
