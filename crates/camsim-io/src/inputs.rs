@@ -11,7 +11,7 @@ use std::{
 use camsim_core::scenario::Scenario;
 use rayon::prelude::*;
 
-use crate::{gltf_file::files_beside, terrain::files_beside_raster};
+use crate::{gltf_file::referenced_files, terrain::files_beside_raster};
 
 /// What is in files, by their paths.
 pub type Inputs = BTreeMap<String, String>;
@@ -35,7 +35,7 @@ pub fn of_scenario(scenario: &Scenario) -> Inputs {
     paths.extend(scene.board.iter().filter_map(|board| board.target.clone()));
     for model in &scene.gltf {
         paths.push(model.file.clone());
-        paths.extend(files_beside(&model.file));
+        paths.extend(referenced_files(&model.file));
         paths.extend(model.placements.clone());
     }
     of_files(paths)

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     board_file::read_board,
-    gltf_file::{FARTHEST_M, GltfOptions, read_gltf},
+    gltf_file::{GltfOptions, MAX_RADIUS_M, read_gltf},
     pictures::read_texture,
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
 };
@@ -130,8 +130,8 @@ fn add_model(
             };
             at_ned_m.z = ground_down_m;
         }
-        let reach_m = at_ned_m.length() + model.reach_m * spec.scale * scale;
-        if reach_m.is_nan() || reach_m > FARTHEST_M {
+        let reach_m = at_ned_m.length() + model.radius_m * spec.scale * scale;
+        if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
             return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
         scene.meshes.extend(model.place(
