@@ -11,7 +11,7 @@ use std::{
 use camsim_core::scenario::Scenario;
 use rayon::prelude::*;
 
-use crate::{gltf_file::referenced_files, terrain::files_beside_raster};
+use crate::{gltf_file::referenced_files, terrain::sidecar_files};
 
 /// What is in files, by their paths.
 pub type Inputs = BTreeMap<String, String>;
@@ -29,7 +29,7 @@ pub fn of_scenario(scenario: &Scenario) -> Inputs {
     paths.extend(scenario.camera.zoom_track.clone());
     for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
         paths.push(picture.clone());
-        paths.extend(files_beside_raster(picture));
+        paths.extend(sidecar_files(picture));
     }
     paths.extend(scene.pattern.iter().map(|pattern| pattern.image.clone()));
     paths.extend(scene.board.iter().filter_map(|board| board.target.clone()));
