@@ -56,7 +56,8 @@ pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
         }
         let words: Vec<&str> = line.split_whitespace().collect();
         let numbers: Vec<f64> = words[2..].iter().filter_map(|word| word.parse().ok()).collect();
-        cameras.push(json!({"id": words[0], "model": words[1], "width": numbers[0], "height": numbers[1], "params": &numbers[2..]}));
+        cameras.push(json!({"id": words[0], "model": words[1], "width": numbers[0], "height": numbers[1],
+            "params": &numbers[2..]}));
     }
     Ok(Document { root: "colmap".to_owned(), value: json!({ "cameras": cameras }) })
 }

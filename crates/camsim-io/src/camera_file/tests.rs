@@ -132,8 +132,10 @@ fn opencv_xml_is_imported() {
 fn reference_program_pixels_are_shifted_by_half_a_pixel() {
     let xml = r#"<simParams>
         <idealParams0 width="1" height="1" f="1"/>
-        <idealParams resolutionScale="1." width="640" height="480" oxOffset="-14.401" oyOffset="-13.264" f="307.6075" />
-        <staticParams k1="-0.390024" k2="0.111124" t1="-0.0012744" t2="-0.0081517" k3="-0.00842763" k4="0.000000" />
+        <idealParams resolutionScale="1." width="640" height="480" oxOffset="-14.401" oyOffset="-13.264"
+            f="307.6075" />
+        <staticParams k1="-0.390024" k2="0.111124" t1="-0.0012744" t2="-0.0081517" k3="-0.00842763"
+            k4="0.000000" />
         <vignetParams vignetFile="vignet-S3LowOffset.bmp" vignetThresh1="0.05" vignetThresh2="0.5" />
         <camInAcEu roll="84.0" pitch="-20.0" yaw="0."/>
         <sensorParams cameraFps="30." phasePercent="0.8"/>
@@ -164,11 +166,15 @@ fn reference_program_pixels_are_shifted_by_half_a_pixel() {
 
 #[test]
 fn both_agisoft_dialects_are_imported() {
-    let metashape = "<calibration><projection>frame</projection><width>2256</width><height>1504</height><f>1940.5</f><cx>13.25</cx><cy>9.75</cy><k1>-0.1</k1><k2>0.18</k2><k3>-0.06</k3><p1>0.002</p1><p2>0.0005</p2></calibration>";
+    let metashape = "<calibration><projection>frame</projection><width>2256</width><height>1504</height>\
+        <f>1940.5</f><cx>13.25</cx><cy>9.75</cy><k1>-0.1</k1><k2>0.18</k2><k3>-0.06</k3><p1>0.002</p1>\
+        <p2>0.0005</p2></calibration>";
     let spec = import("m.xml", metashape).unwrap().spec;
     assert_eq!(spec.principal_point_px, Some([1128.0 + 13.25 - 0.5, 752.0 + 9.75 - 0.5]));
     assert_eq!(spec.lens.coefficients, [-0.1, 0.18, 0.0005, 0.002, -0.06]);
-    let lens = "<calibration><projection>frame</projection><width>640</width><height>480</height><fx>307</fx><fy>308</fy><cx>305.599</cx><cy>226.736</cy><k1>-0.39</k1><p1>-0.001</p1><p2>-0.008</p2></calibration>";
+    let lens = "<calibration><projection>frame</projection><width>640</width><height>480</height>\
+        <fx>307</fx><fy>308</fy><cx>305.599</cx><cy>226.736</cy><k1>-0.39</k1><p1>-0.001</p1><p2>-0.008</p2>\
+        </calibration>";
     let spec = import("l.xml", lens).unwrap().spec;
     assert_eq!((spec.focal_px, spec.lens.coefficients), ([307.0, 308.0], vec![-0.39, 0.0, -0.001, -0.008]));
     let k4 = import("m.xml", &metashape.replace("<p1>", "<k4>0.1</k4><p1>")).unwrap_err().to_string();
@@ -177,7 +183,8 @@ fn both_agisoft_dialects_are_imported() {
 
 #[test]
 fn gyroflow_readout_is_imported() {
-    let json = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97, "digital_lens": null,
+    let json = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97,
+        "digital_lens": null,
         "fisheye_params": {"camera_matrix": [[1340.9, 0.0, 1353.5], [0.0, 1345.0, 1022.9], [0.0, 0.0, 1.0]],
         "distortion_coeffs": [0.041, 0.027, -0.015, 0.002]}}"#;
     let spec = import("p.json", json).unwrap().spec;

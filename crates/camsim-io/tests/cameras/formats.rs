@@ -131,8 +131,10 @@ fn orb_slam_settings_are_imported() {
 fn basalt(kind: &str, numbers: &str) -> String {
     format!(
         r#"{{"value0": {{"T_imu_cam": [{{"px": 0.1, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}}],
-        "intrinsics": [{{"camera_type": "{kind}", "intrinsics": {{"fx": 300, "fy": 301, "cx": 255, "cy": 256, {numbers}}}}}],
-        "resolution": [[512, 514]], "imu_update_rate": 200.0, "cam_time_offset_ns": 5000000, "vignette": [{{"value0": 0, "value1": 10}}]}}}}"#
+        "intrinsics": [{{"camera_type": "{kind}", "intrinsics": {{"fx": 300, "fy": 301, "cx": 255, "cy": 256,
+            {numbers}}}}}],
+        "resolution": [[512, 514]], "imu_update_rate": 200.0, "cam_time_offset_ns": 5000000,
+            "vignette": [{{"value0": 0, "value1": 10}}]}}}}"#
     )
 }
 
@@ -158,7 +160,8 @@ fn basalt_models_are_imported_or_refused() {
         ],
     );
     check("kb4", &kb4, &notes());
-    let radtan = r#""k1": 0.1, "k2": 0.2, "p1": 0.01, "p2": 0.02, "k3": 0.3, "k4": 0.4, "k5": 0.5, "k6": 0.6, "rpmax": 2.7"#;
+    let radtan = r#""k1": 0.1, "k2": 0.2, "p1": 0.01, "p2": 0.02, "k3": 0.3, "k4": 0.4, "k5": 0.5, "k6": 0.6,
+        "rpmax": 2.7"#;
     let expectations = [Lens(BrownConrady, &[0.1, 0.2, 0.01, 0.02, 0.3, 0.4, 0.5, 0.6]), Note("rpmax = 2.7")];
     check("radtan8", &read("calibration.json", &basalt("pinhole-radtan8", radtan)), &expectations);
     for (kind, numbers, words) in [
@@ -275,7 +278,8 @@ fn vikit_files_are_imported() {
 #[test]
 fn opensfm_projections_are_imported_or_refused() {
     // In portrait format the longer side is the height.
-    let text = r#"{"v2 phone 3000 4000 brown 0.85": {"projection_type": "brown", "width": 3000, "height": 4000, "focal_x": 0.8, "focal_y": 0.81, "c_x": 0.01, "c_y": -0.02,
+    let text = r#"{"v2 phone 3000 4000 brown 0.85": {"projection_type": "brown",
+        "width": 3000, "height": 4000, "focal_x": 0.8, "focal_y": 0.81, "c_x": 0.01, "c_y": -0.02,
         "k1": -0.1, "k2": 0.02, "p1": 0.001, "p2": 0.002, "k3": 0.003}}"#;
     let expectations = [
         Size([3000, 4000]),
@@ -305,8 +309,10 @@ fn opensfm_projections_are_imported_or_refused() {
     }
 }
 
-const GYROFLOW: &str = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "orig_dimension": {"w": 2704, "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97, "asymmetrical": true,
-    "fisheye_params": {"camera_matrix": [[1340.0, 0.0, 1353.5], [0.0, 1345.0, 1022.9], [0.0, 0.0, 1.0]], "distortion_coeffs": [0.041, 0.027, -0.015, 0.002]}}"#;
+const GYROFLOW: &str = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "orig_dimension": {"w": 2704,
+    "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97, "asymmetrical": true,
+    "fisheye_params": {"camera_matrix": [[1340.0, 0.0, 1353.5], [0.0, 1345.0, 1022.9], [0.0, 0.0, 1.0]],
+        "distortion_coeffs": [0.041, 0.027, -0.015, 0.002]}}"#;
 
 #[test]
 fn gyroflow_profiles_are_imported_or_refused() {
@@ -366,7 +372,8 @@ fn gyroflow_profiles_are_imported_or_refused() {
 
 #[test]
 fn metashape_calibrations_and_projects_are_imported() {
-    let text = "<calibration><projection>frame</projection><width>2000</width><height>1000</height><f>1500</f><cx>10</cx><cy>-20</cy><b1>3</b1><k1>0.1</k1><p1>0.001</p1><p2>0.002</p2></calibration>";
+    let text = "<calibration><projection>frame</projection><width>2000</width><height>1000</height>\
+        <f>1500</f><cx>10</cx><cy>-20</cy><b1>3</b1><k1>0.1</k1><p1>0.001</p1><p2>0.002</p2></calibration>";
     check(
         "b1",
         &read("m.xml", text),

@@ -23,7 +23,8 @@ fn named_camera_is_imported() {
     let rig = format!("cameras:\n{}{}", rig("left", "500"), rig("right", "600"));
     let basalt = |f: &str| {
         format!(
-            r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5, "cy": 239.5}}}}"#
+            r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5,
+                "cy": 239.5}}}}"#
         )
     };
     let basalt = format!(
@@ -59,7 +60,8 @@ fn named_camera_is_imported() {
         format!("[image]\n\nwidth\n640\n\nheight\n480\n\n{}{}", ini("left", "500"), ini("right", "600"));
     let sfm = |name: &str, f: f64| {
         format!(
-            r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {}, "k1": 0, "k2": 0}}"#,
+            r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {},
+                "k1": 0, "k2": 0}}"#,
             f / 640.0
         )
     };

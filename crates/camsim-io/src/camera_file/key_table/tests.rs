@@ -22,7 +22,8 @@ fn paths_match_patterns() {
 
 #[test]
 fn leaves_are_numbers_texts_and_lists() {
-    let value = json!({"a": {"b": 1}, "m": {"rows": 1, "cols": 2, "data": [1, 2]}, "l": [{"c": [[1], [2]]}, {"c": "x"}], "e": {}});
+    let value = json!({"a": {"b": 1}, "m": {"rows": 1, "cols": 2, "data": [1, 2]}, "l": [{"c": [[1], [2]]},
+        {"c": "x"}], "e": {}});
     let paths: Vec<String> = leaves(&value).into_iter().map(|leaf| leaf.path).collect();
     assert_eq!(paths, ["a.b", "e", "l[0].c", "l[1].c", "m"]);
     let leaf = Leaf { path: "l[0].c[12].d".to_owned(), value: &value };
@@ -69,7 +70,8 @@ fn coefficient_names_are_recognised() {
 
 #[test]
 fn unknown_conventions_are_reported() {
-    let value = json!({"orientation": "upside_down", "pixel_origin": "corner", "color_encoding": "linear", "serial": "a1"});
+    let value = json!({"orientation": "upside_down", "pixel_origin": "corner", "color_encoding": "linear",
+        "serial": "a1"});
     let notes = unapplied_notes(&[], &leaves(&value), &[]).join(" ");
     for word in ["orientation = `upside_down`", "pixel_origin = `corner`", "color_encoding = `linear`"] {
         assert!(notes.contains(word), "{notes}");
