@@ -1,4 +1,4 @@
-//! Calibration boards: the parameters of a scenario, or Kalibr's target YAML in their place.
+//! Calibration boards, from the scenario's parameters or Kalibr's target YAML.
 
 use std::path::{Path, PathBuf};
 
@@ -8,33 +8,33 @@ use camsim_core::{
 };
 use serde_json::Value;
 
-use crate::camera_file::document::{Document, Problem, find, number, optional_number, word};
+use crate::camera_file::document::{Document, KeyProblem, find, number, optional_number, word};
 
-/// What is wrong with a board.
+/// Why a board cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardFileError {
-    /// The file of the parameters cannot be read.
+    /// The target file cannot be read.
     #[error("{}: cannot be read: {source}; check the path", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// It does not say what a board is.
+    /// The target file does not describe a board.
     #[error("{}: {message}", path.display())]
     Target {
         /// The file.
         path: PathBuf,
-        /// The key, what is wrong with it and what to do.
+        /// The key, the problem and the remedy.
         message: String,
     },
-    /// The parameters make no board.
+    /// The parameters do not make a board.
     #[error(transparent)]
     Board(#[from] camsim_core::scene::BoardError),
 }
 
-/// The board that a scenario describes, its target file read.
+/// The board of a scenario, with its target file if there is one.
 ///
 /// # Errors
 /// [`BoardFileError`] names the file and the key.
@@ -47,61 +47,64 @@ pub fn read_board(spec: &BoardSpec) -> Result<Board, BoardFileError> {
         .map_err(|error| BoardFileError::Target { path: path.clone(), message: error.to_string() })
 }
 
-/// Kalibr's description of a target: `target_type` and what belongs to it.
+/// Reads Kalibr's target YAML: `target_type` and its parameters.
 ///
 /// # Errors
-/// As [`read_board`].
-pub fn read_target(path: &Path) -> Result<BoardSpec, BoardFileError> {
+/// Those of [`read_board`].
+fn read_target(path: &Path) -> Result<BoardSpec, BoardFileError> {
     let text =
         std::fs::read_to_string(path).map_err(|source| BoardFileError::Read { path: path.into(), source })?;
-    let wrong = |message: String| BoardFileError::Target { path: path.into(), message };
-    let document = Document::parse(&text).map_err(|problem| wrong(problem.message))?;
-    parse(&document.value).map_err(|problem| wrong(format!("{} {}", problem.key, problem.message)))
+    let error = |message: String| BoardFileError::Target { path: path.into(), message };
+    let document = Document::parse(&text).map_err(|problem| error(problem.message))?;
+    parse(&document.value).map_err(|problem| error(format!("{} {}", problem.key, problem.message)))
 }
 
-/// Keys of each kind of target; what is not here would be something that nobody sees in the picture.
+/// Keys of each type of target; others are refused.
 const KEYS: &[(&str, &[&str])] = &[
     ("aprilgrid", &["tagCols", "tagRows", "tagSize", "tagSpacing"]),
     ("checkerboard", &["targetCols", "targetRows", "rowSpacingMeters", "colSpacingMeters"]),
     ("circlegrid", &["targetCols", "targetRows", "spacingMeters", "asymmetricGrid"]),
 ];
-/// No square, tag or gap that was held before a camera is as large, metres.
-const LARGEST_M: f64 = 10.0;
+/// Size from which a square or tag is refused, metres.
+const MAX_SIZE_M: f64 = 10.0;
 
-fn parse(value: &Value) -> Result<BoardSpec, Problem> {
+/// The board of a parsed target file.
+fn parse(value: &Value) -> Result<BoardSpec, KeyProblem> {
     let count = |key: &str| {
         let n = number(value, key)?;
-        let whole = n.fract() == 0.0 && (1.0..=1e4).contains(&n);
-        if whole {
+        let is_count = n.fract() == 0.0 && (1.0..=1e4).contains(&n);
+        if is_count {
             Ok(Some(n as u32))
         } else {
-            Err(Problem::new(key, format!("is {n}, not a number of squares, circles or tags")))
+            Err(KeyProblem::new(key, format!("is {n}, not a number of squares, circles or tags")))
         }
     };
     let in_metres = |key: &str, size: f64| {
-        let fix = "targets of Kalibr's are in metres: if these are millimetres divide them by 1000; a board as large is described with scene.board's own keys";
-        if size < LARGEST_M { Ok(size) } else { Err(Problem::new(key, format!("is {size} m: {fix}"))) }
+        let fix = "Kalibr's targets are in metres: divide millimetres by 1000; for a board of this size use \
+                   scene.board's own keys";
+        if size < MAX_SIZE_M { Ok(size) } else { Err(KeyProblem::new(key, format!("is {size} m: {fix}"))) }
     };
     let metres = |key: &str| number(value, key).and_then(|size| in_metres(key, size));
     let kind = match word(value, "target_type") {
         Some(kind) => kind,
-        // Basalt's files leave it out.
+        // Basalt's files omit target_type.
         None if find(value, "tagCols").is_some() => "aprilgrid",
-        None => return Err(Problem::new("target_type", "is missing: this is no target of Kalibr's")),
+        None => return Err(KeyProblem::new("target_type", "is missing: this is not a Kalibr target")),
     };
     let Some((_, keys)) = KEYS.iter().find(|(known, _)| *known == kind) else {
-        return Err(Problem::new(
+        return Err(KeyProblem::new(
             "target_type",
-            format!("is `{kind}`: `aprilgrid`, `checkerboard` and `circlegrid` are known"),
+            format!("is `{kind}`: `aprilgrid`, `checkerboard` and `circlegrid` are supported"),
         ));
     };
     let known = |key: &str| key == "target_type" || keys.contains(&key);
     if let Some(key) = value.as_object().and_then(|map| map.keys().find(|key| !known(key))) {
         let fix = format!(
-            "is no key of a target of type `{kind}`, which has {}: leave it out, or describe the board with scene.board's own keys",
+            "is not a key of a target of type `{kind}`, which has {}: delete it, or describe the board with \
+             scene.board's own keys",
             keys.join(", ")
         );
-        return Err(Problem::new(key.clone(), fix));
+        return Err(KeyProblem::new(key.clone(), fix));
     }
     match kind {
         "aprilgrid" => Ok(BoardSpec {
@@ -132,19 +135,19 @@ fn parse(value: &Value) -> Result<BoardSpec, Problem> {
     }
 }
 
-/// `asymmetricGrid`, which is false if left out.
-fn is_asymmetric(value: &Value) -> Result<bool, Problem> {
-    let Some(found) = find(value, "asymmetricGrid") else { return Ok(false) };
-    match (found.as_bool(), found.as_i64()) {
+/// `asymmetricGrid`; false if absent.
+fn is_asymmetric(value: &Value) -> Result<bool, KeyProblem> {
+    let Some(item) = find(value, "asymmetricGrid") else { return Ok(false) };
+    match (item.as_bool(), item.as_i64()) {
         (Some(flag), _) => Ok(flag),
         (_, Some(flag @ (0 | 1))) => Ok(flag == 1),
-        _ => Err(Problem::new("asymmetricGrid", format!("is {found}: give True or False"))),
+        _ => Err(KeyProblem::new("asymmetricGrid", format!("is {item}: give True or False"))),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
 
@@ -157,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_of_kalibr_are_the_boards_of_the_same_parameters() {
+    fn kalibr_targets_equal_boards_of_the_same_parameters() {
         let board = |kind, columns, rows, size_m: f64| BoardSpec {
             kind: Some(kind),
             columns: Some(columns),
@@ -167,32 +170,36 @@ mod tests {
         };
         for (text, spec) in [
             (
-                "target_type: 'aprilgrid' #gridtype\ntagCols: 6\ntagRows: 7\ntagSize: 0.088\ntagSpacing: 0.3\n",
+                "target_type: 'aprilgrid' #gridtype\ntagCols: 6\ntagRows: 7\ntagSize: 0.088\ntagSpacing: \
+                 0.3\n",
                 BoardSpec { spacing: Some(0.3), ..board(BoardKind::Aprilgrid, 6, 7, 0.088) },
             ),
             (
-                "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\ncolSpacingMeters: 0.07\n",
+                "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: \
+                 0.06\ncolSpacingMeters: 0.07\n",
                 BoardSpec { row_size_m: Some(0.06), ..board(BoardKind::Chessboard, 6, 7, 0.07) },
             ),
             (
-                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 11\nspacingMeters: 0.02\nasymmetricGrid: True\n",
+                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 11\nspacingMeters: \
+                 0.02\nasymmetricGrid: True\n",
                 board(BoardKind::AsymmetricCircles, 4, 11, 0.02),
             ),
             (
-                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 5\nspacingMeters: 0.02\nasymmetricGrid: False\n",
+                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 5\nspacingMeters: \
+                 0.02\nasymmetricGrid: False\n",
                 board(BoardKind::Circles, 4, 5, 0.02),
             ),
         ] {
             assert_eq!(read(text).unwrap(), Board::from_spec(&spec).unwrap(), "{text}");
         }
-        let of_basalt = "{ \"tagCols\": 6, \"tagRows\": 6, \"tagSize\": 0.088, \"tagSpacing\": 0.3 }";
+        let basalt = "{ \"tagCols\": 6, \"tagRows\": 6, \"tagSize\": 0.088, \"tagSpacing\": 0.3 }";
         let expected = BoardSpec { spacing: Some(0.3), ..board(BoardKind::Aprilgrid, 6, 6, 0.088) };
-        assert_eq!(read(of_basalt).unwrap(), Board::from_spec(&expected).unwrap());
+        assert_eq!(read(basalt).unwrap(), Board::from_spec(&expected).unwrap());
     }
 
     #[test]
-    fn what_is_no_target_is_named() {
-        for (text, wanted) in [
+    fn invalid_targets_are_refused_by_key() {
+        for (text, expected) in [
             ("tagCols: 6\n", "tagRows is missing"),
             ("target_type: 'dots'\n", "target_type is `dots`"),
             ("target_type: 'aprilgrid'\ntagRows: 6\n", "tagCols is missing"),
@@ -204,24 +211,27 @@ mod tests {
             ("target_type: [", "target.yaml"),
             (
                 "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 88\ntagSpacing: 0.3\n",
-                "tagSize is 88 m: targets of Kalibr's are in metres",
+                "tagSize is 88 m: Kalibr's targets are in metres",
             ),
             (
-                "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 60\ncolSpacingMeters: 0.07\n",
+                "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: \
+                 60\ncolSpacingMeters: 0.07\n",
                 "rowSpacingMeters is 60 m",
             ),
             (
-                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\nstartId: 36\n",
-                "startId is no key of a target of type `aprilgrid`",
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\nstartId: \
+                 36\n",
+                "startId is not a key of a target of type `aprilgrid`",
             ),
             (
-                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 5\nspacingMeters: 0.02\nasymmetricGrid: 'yes'\n",
+                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 5\nspacingMeters: \
+                 0.02\nasymmetricGrid: 'yes'\n",
                 "asymmetricGrid is \"yes\": give True or False",
             ),
             ("targetCols: 4\ntargetRows: 5\n", "target_type is missing"),
         ] {
             let error = read(text).unwrap_err();
-            assert!(error.contains(wanted) && error.contains("target.yaml"), "{error}");
+            assert!(error.contains(expected) && error.contains("target.yaml"), "{error}");
         }
     }
 }

@@ -1,9 +1,8 @@
 //! Camera files: CAMERA.toml, and the calibration files of other programs.
 //!
-//! An importer is one file here: it takes its part of a `Document` and gives an [`ImportedCamera`], or says
-//! what it cannot take over. What a camera here cannot express (skew, thin-prism terms, other lens models) is
-//! an error, never left out. Its table of keys says what becomes of each; a number that no table knows is
-//! named in a note.
+//! Each importer is a module that converts its part of a `Document` to an [`ImportedCamera`]. What camsim
+//! does not support (skew, thin-prism terms, other lens models) is an error. The importer's table of keys
+//! defines the treatment of each key; numbers under unknown keys are reported in notes.
 
 use std::path::{Path, PathBuf};
 
@@ -13,14 +12,13 @@ use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 mod agisoft;
 mod basalt;
 mod camodocal;
-mod choose;
 mod colmap;
 pub(crate) mod document;
 mod format;
 mod gyroflow;
 mod kalibr;
-mod keys;
-mod models;
+mod key_table;
+mod lens_models;
 mod ncamera;
 mod okvis;
 mod opencv;
@@ -29,14 +27,15 @@ mod orb_slam;
 mod reference;
 mod ros;
 mod ros_ini;
+mod selection;
 mod syntax;
-mod times;
+mod timing;
 mod vikit;
 
-use document::{Document, Problem};
+use document::{Document, KeyProblem};
 pub use format::CameraFormat;
 
-/// What can go wrong with a camera file.
+/// Why a camera file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraFileError {
     /// The file could not be read.
@@ -44,59 +43,59 @@ pub enum CameraFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The text is not what its format wants.
+    /// The text has a syntax error.
     #[error("{}{}: {message}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Syntax {
         /// The file.
         path: PathBuf,
         /// Line from 1, where known.
         line: Option<usize>,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
-    /// None of the known formats, or several.
-    #[error("{}: {what}; known are {}", path.display(), format::all_titles())]
+    /// The content matches no format, or several.
+    #[error("{}: {problem}; supported are {}", path.display(), format::all_titles())]
     Format {
         /// The file.
         path: PathBuf,
-        /// What was found.
-        what: String,
+        /// The problem.
+        problem: String,
     },
-    /// A key is missing, has a wrong value, or asks for what a camera here cannot do.
+    /// A key is missing, has an invalid value, or is not supported.
     #[error("{}: {key}: {message}", path.display())]
     Key {
         /// The file.
         path: PathBuf,
-        /// The key.
+        /// Path of the key.
         key: String,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
-    /// The numbers do not make a camera.
+    /// The values do not make a camera.
     #[error("{}: {source}", path.display())]
     Camera {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: camsim_core::camera::CameraError,
     },
 }
 
-/// What an import gives.
+/// An imported camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedCamera {
     /// The camera.
     pub spec: CameraSpec,
-    /// What the file was read as.
+    /// Format that the file was read in.
     pub format: CameraFormat,
-    /// Choices made and things left out that somebody should know.
+    /// Notes for the user about assumptions and values that are not applied.
     pub notes: Vec<String>,
 }
 
-/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Paths in it are resolved against its
+/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Relative paths are relative to its
 /// folder.
 pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     let text = read(path)?;
@@ -113,14 +112,13 @@ pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     Ok(spec)
 }
 
-/// Imports another program's calibration, whose format its content tells; see [`import_camera_as`] for the
-/// notes.
+/// Imports another program's calibration in the detected format; [`import_camera_as`] returns the notes too.
 pub fn import_camera(path: &Path) -> Result<CameraSpec, CameraFileError> {
     import_camera_as(path, None).map(|imported| imported.spec)
 }
 
-/// Imports another program's calibration, in a given format or in the one that its content tells. A file of
-/// several cameras is refused; see [`import_camera_named`].
+/// Imports another program's calibration in a given or the detected format. A file with several cameras is
+/// refused; see [`import_camera_named`].
 pub fn import_camera_as(
     path: &Path,
     format: Option<CameraFormat>,
@@ -128,31 +126,32 @@ pub fn import_camera_as(
     import_camera_named(path, format, None)
 }
 
-/// Names of the cameras in a file, by which [`import_camera_named`] finds them; one empty name if the file
-/// has one camera and no name for it.
+/// Names of the cameras in a file, for [`import_camera_named`]; one empty name for a single camera without
+/// name.
 pub fn camera_names(path: &Path, format: Option<CameraFormat>) -> Result<Vec<String>, CameraFileError> {
     let (document, format) = open(path, format)?;
-    let entries = format.entries(&document).map_err(|problem| at_key(path, problem))?;
+    let entries = format.entries(&document).map_err(|problem| key_error(path, problem))?;
     Ok(entries.into_iter().map(|entry| entry.name).collect())
 }
 
-/// As [`import_camera_as`], out of several cameras the one of that name.
+/// Like [`import_camera_as`], for the camera of a name.
 pub fn import_camera_named(
     path: &Path,
     format: Option<CameraFormat>,
     camera: Option<&str>,
 ) -> Result<ImportedCamera, CameraFileError> {
-    let asked = format.is_some();
+    let is_explicit = format.is_some();
     let (document, format) = open(path, format)?;
-    let at_key = |problem| at_key(path, problem);
-    let mut imported = import(&document, format, asked, camera).map_err(at_key)?;
-    imported.notes.extend(doubts(&imported.spec).map_err(at_key)?);
+    let to_error = |problem| key_error(path, problem);
+    let mut imported = import(&document, format, is_explicit, camera).map_err(to_error)?;
+    imported.notes.extend(plausibility_notes(&imported.spec).map_err(to_error)?);
     check(path, &imported.spec)?;
     Ok(imported)
 }
 
+/// Parses a file and detects its format if none is given.
 fn open(path: &Path, format: Option<CameraFormat>) -> Result<(Document, CameraFormat), CameraFileError> {
-    refuse_own_files(path)?;
+    refuse_other_files(path)?;
     let text = read(path)?;
     let document = Document::parse(&text).map_err(|problem| CameraFileError::Syntax {
         path: path.to_owned(),
@@ -161,131 +160,142 @@ fn open(path: &Path, format: Option<CameraFormat>) -> Result<(Document, CameraFo
     })?;
     let format = match format {
         Some(format) => format,
-        None => detect(&document).map_err(|what| CameraFileError::Format { path: path.to_owned(), what })?,
+        None => {
+            detect(&document).map_err(|problem| CameraFileError::Format { path: path.to_owned(), problem })?
+        }
     };
-    let document = if format == CameraFormat::Reference { reference::in_force(&document) } else { document };
+    let document =
+        if format == CameraFormat::Reference { reference::effective_document(&document) } else { document };
     Ok((document, format))
 }
 
-fn at_key(path: &Path, problem: Problem) -> CameraFileError {
+fn key_error(path: &Path, problem: KeyProblem) -> CameraFileError {
     CameraFileError::Key { path: path.to_owned(), key: problem.key, message: problem.message }
 }
 
 fn import(
     document: &Document,
     format: CameraFormat,
-    asked: bool,
+    is_explicit: bool,
     camera: Option<&str>,
-) -> Result<ImportedCamera, Problem> {
+) -> Result<ImportedCamera, KeyProblem> {
     let entries = format.entries(document)?;
-    let entry = &entries[choose::choose(&entries, camera)?];
-    let parts = format.parts(document, &entries, entry);
+    let entry = &entries[selection::select(&entries, camera)?];
+    let parts = format.table_leaves(document, &entries, entry);
     for part in &parts {
-        keys::refuse(part.keys, &part.leaves)?;
+        key_table::refuse(part.keys, &part.leaves)?;
     }
-    let mut imported =
-        format.import(document, entry, asked).map_err(|problem| entry.placed(document, problem))?;
-    let mut done =
-        if format == CameraFormat::Reference { Vec::new() } else { times::apply(&parts, &mut imported)? };
-    done.extend(entry.roots.iter().cloned());
+    let mut imported = format
+        .import(document, entry, is_explicit)
+        .map_err(|problem| entry.with_full_key(document, problem))?;
+    let mut applied =
+        if format == CameraFormat::Reference { Vec::new() } else { timing::apply(&parts, &mut imported)? };
+    applied.extend(entry.roots.iter().cloned());
     for part in &parts {
-        imported.notes.extend(keys::left_out(part.keys, &part.leaves, &done));
+        imported.notes.extend(key_table::unapplied_notes(part.keys, &part.leaves, &applied));
     }
     Ok(imported)
 }
 
-/// A CAMERA.toml needs no import; binary files of programs whose text is known get a word on how to convert
-/// them.
-fn refuse_own_files(path: &Path) -> Result<(), CameraFileError> {
+/// Refuses CAMERA.toml, which needs no import, and binary files, with the command that converts them.
+fn refuse_other_files(path: &Path) -> Result<(), CameraFileError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let what = match ending.as_str() {
+    let message = match ending.as_str() {
         "toml" => {
             read_camera_toml(path)?;
-            "this is a CAMERA.toml, and a good one: give it to a scenario as it is"
+            "this is a valid CAMERA.toml, which needs no import: use it in a scenario"
         }
         "bin" => {
-            "this is binary; of COLMAP, run `colmap model_converter --output_type TXT` and import cameras.txt"
+            "this is a binary file: if it is from COLMAP, run `colmap model_converter --output_type TXT` and \
+             import cameras.txt"
         }
         _ => return Ok(()),
     };
-    Err(CameraFileError::Syntax { path: path.to_owned(), line: None, message: what.to_owned() })
+    Err(CameraFileError::Syntax { path: path.to_owned(), line: None, message: message.to_owned() })
 }
 
-/// The one format whose marks the document bears.
+/// The only format that a document matches.
 fn detect(document: &Document) -> Result<CameraFormat, String> {
-    let fitting: Vec<CameraFormat> =
-        CameraFormat::ALL.into_iter().filter(|format| format.fits(document)).collect();
-    match fitting[..] {
+    let matching: Vec<CameraFormat> =
+        CameraFormat::ALL.into_iter().filter(|format| format.matches(document)).collect();
+    match matching[..] {
         [format] => Ok(format),
-        [] => {
-            Err(format::hint(document)
-                .unwrap_or_else(|| "this is no camera file that is known here".to_owned()))
-        }
+        [] => Err(format::unsupported_hint(document)
+            .unwrap_or_else(|| "this is not a known camera file".to_owned())),
         _ => {
-            let names: Vec<&str> = fitting.iter().map(|format| format.name()).collect();
+            let names: Vec<&str> = matching.iter().map(|format| format.name()).collect();
             Err(format!(
-                "the content fits several formats ({}): name the one that is meant with `--format`",
+                "the content matches several formats ({}): select one with `--format`",
                 names.join(", ")
             ))
         }
     }
 }
 
-/// Numbers that are no camera's in pixels are refused; those that are odd are spoken of.
-fn doubts(spec: &CameraSpec) -> Result<Vec<String>, Problem> {
+/// Notes about implausible values; focal lengths that cannot be in pixels are refused.
+fn plausibility_notes(spec: &CameraSpec) -> Result<Vec<String>, KeyProblem> {
     let [width, height] = spec.size_px.map(f64::from);
     let [fx, fy] = spec.focal_px;
     if fx > 0.0 && fy > 0.0 && fx.min(fy) < 0.02 * width.max(height) {
         let text = format!(
-            "is {fx} and {fy} for a picture of {width} x {height}: too short for pixels. Are these fractions of a side, or millimetres?"
+            "is {fx} and {fy} for a picture of {width} x {height}, which is too short for pixels: check \
+             whether it is a fraction of a side or in millimetres"
         );
-        return Err(Problem::new("the focal length", text));
+        return Err(KeyProblem::new("the focal length", text));
     }
     let mut notes = Vec::new();
     if fx > 0.0 && fy > 0.0 && !(0.5..=2.0).contains(&(fx / fy)) {
         notes.push(format!(
-            "the focal lengths {fx} and {fy} px differ by more than a factor of two: are they right?"
+            "the focal lengths {fx} and {fy} px differ by more than a factor of two: check them"
         ));
     }
     if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
         let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
-        notes.push(format!("the picture spans about {degrees:.0} degrees across, a lot for a lens that is no fisheye: is the focal length of {fx} in pixels?"));
+        notes.push(format!(
+            "the horizontal field of view is about {degrees:.0} degrees, which is large for a lens that is \
+             not a fisheye: check that the focal length of {fx} is in pixels"
+        ));
     }
-    notes.extend(spec.principal_point_px.and_then(|point| doubt_of_middle([width, height], point)));
+    notes.extend(spec.principal_point_px.and_then(|point| principal_point_note([width, height], point)));
     Ok(notes)
 }
 
-/// A principal point that would be the middle of a picture of another size, or is nowhere in this one.
-fn doubt_of_middle([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
-    let there = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
+/// A note about a principal point that would be the centre of another size, or is outside of the picture.
+fn principal_point_note([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
+    let centred_size = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
     let size = |[x, y]: [f64; 2]| format!("{x:.0} x {y:.0}");
-    let [across, down] = [there[0] / width, there[1] / height];
-    let turned = [there[0] / height, there[1] / width].iter().all(|ratio| (0.92..=1.08).contains(ratio));
-    if turned && !(0.9..=1.1).contains(&(width / height)) {
+    let [across, down] = [centred_size[0] / width, centred_size[1] / height];
+    let is_rotated =
+        [centred_size[0] / height, centred_size[1] / width].iter().all(|ratio| (0.92..=1.08).contains(ratio));
+    if is_rotated && !(0.9..=1.1).contains(&(width / height)) {
         let text = format!(
-            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, but the size is {}: is it turned?",
-            size(there),
+            "the principal point ({cx}, {cy}) would be the centre of a picture of about {}, but the size is \
+             {}: check whether it is rotated",
+            size(centred_size),
             size([width, height])
         );
         return Some(text);
     }
     if (across.max(down) < 0.85 || across.min(down) > 1.15) && (0.95..=1.05).contains(&(across / down)) {
         let text = format!(
-            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, not of {}: is the calibration of another size?",
-            size(there),
+            "the principal point ({cx}, {cy}) would be the centre of a picture of about {}, not of {}: check \
+             whether the calibration has another size",
+            size(centred_size),
             size([width, height])
         );
         return Some(text);
     }
-    let inside = (-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy);
-    (!inside).then(|| {
+    let is_inside = (-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy);
+    (!is_inside).then(|| {
         format!(
-            "the principal point ({cx}, {cy}) is outside of the picture of {}: is the size that of the calibration?",
+            "the principal point ({cx}, {cy}) is outside of the picture of {}: check that the size is that \
+             of the calibration",
             size([width, height])
         )
     })
 }
 
+/// Checks that the values make a camera.
 fn check(path: &Path, spec: &CameraSpec) -> Result<(), CameraFileError> {
     let failed = |source| CameraFileError::Camera { path: path.to_owned(), source };
     CameraModel::from_spec(spec).map_err(failed)?;
@@ -299,29 +309,31 @@ fn check(path: &Path, spec: &CameraSpec) -> Result<(), CameraFileError> {
     }
 }
 
+/// Reads a text file without byte-order mark.
 fn read(path: &Path) -> Result<String, CameraFileError> {
     let bytes =
         std::fs::read(path).map_err(|source| CameraFileError::Read { path: path.to_owned(), source })?;
     let text = String::from_utf8(bytes).map_err(|_| CameraFileError::Syntax {
         path: path.to_owned(),
         line: None,
-        message: "this is no text in UTF-8: is it a camera file?".to_owned(),
+        message: "this is not UTF-8 text: check that it is a camera file".to_owned(),
     })?;
     Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
 }
 
+/// Line from 1 of a byte offset.
 fn line_of(text: &str, offset: usize) -> usize {
     text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
 }
 
-/// Adds to serde's "unknown field `a`, expected one of `b`, `c`" which of them is nearest to `a`.
+/// Adds the nearest known key to serde's "unknown field `a`, expected one of `b`, `c`".
 fn with_nearest_key(message: &str) -> String {
     let mut words = message.split('`').skip(1).step_by(2);
     if !message.starts_with("unknown") {
         return message.to_owned();
     }
     let nearest = words.next().and_then(|unknown| {
-        // Times of rows are all told by the readout, however they are spelt.
+        // All row times are given by readout_ms in a CAMERA.toml.
         let is_readout = ["line_delay", "readout", "rolling"].iter().any(|part| unknown.contains(part));
         let known: Vec<&str> = words.collect();
         let readout = known.iter().copied().find(|known| is_readout && *known == "readout_ms");
@@ -330,7 +342,7 @@ fn with_nearest_key(message: &str) -> String {
     nearest.map_or_else(|| message.to_owned(), |nearest| format!("{message}; did you mean `{nearest}`?"))
 }
 
-/// A camera of plain numbers; the rest is as by default.
+/// A camera of intrinsics and lens; the other values are defaults.
 fn camera(
     format: CameraFormat,
     size_px: [u32; 2],
@@ -340,7 +352,7 @@ fn camera(
     mut coefficients: Vec<f64>,
 ) -> ImportedCamera {
     let used = coefficients.iter().rposition(|k| *k != 0.0).map_or(0, |last| last + 1);
-    // Three would be k1, k2 and p1, but could be taken for k1, k2 and k3.
+    // Three coefficients k1, k2, p1 could be mistaken for k1, k2, k3.
     coefficients.truncate(if used == 3 && model == LensModel::BrownConrady { 4 } else { used });
     let mut spec = CameraSpec {
         size_px,

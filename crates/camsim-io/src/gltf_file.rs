@@ -1,9 +1,9 @@
 //! glTF 2.0 models: the triangles of one of a file's scenes, posed at one of its times.
 //!
-//! A model's own axes are glTF's: x left, y up, z ahead, metres. [`Model::place`] stands it in
-//! north-east-down. Colour is albedo: base colour times vertex colour, plus what is emitted; light and shade
-//! are the scene's matter, which normals are read for if it asks. What cannot be shown is refused, with its
-//! name, or noted.
+//! A model's own axes are glTF's: x left, y up, z forward, metres. [`Model::place`] transforms it to
+//! north-east-down. Colour is albedo: base colour times vertex colour, plus emissive light. The scene's light
+//! is applied elsewhere; normals are read for it on request. Unsupported content is refused or noted, by
+//! name.
 
 use std::{
     cell::Cell,
@@ -16,21 +16,23 @@ use camsim_core::scene::{Material, Mesh, Shape, Texture, Wrap};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
-mod checks;
-mod emitted;
+mod asset;
+mod bake;
+mod emissive;
 mod material;
-mod mend;
 mod normals;
 mod pose;
+mod preprocess;
 mod primitive;
-mod source;
 mod treatments;
+mod validation;
 
-use emitted::Bake;
-use material::Materials;
+use asset::Asset;
+pub(crate) use asset::referenced_files;
+use bake::{BakeInput, Baked};
+use material::{Materials, VertexRule};
 use pose::Pose;
-use source::Source;
-pub(crate) use source::files_beside;
+use primitive::{ShapeReader, TriangleMode};
 
 /// Why a model cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -40,10 +42,10 @@ pub enum GltfError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// Not glTF 2.0, or damaged.
+    /// The file is not glTF 2.0, damaged, or asks for more than it has.
     #[error("{}: {message}", path.display())]
     Broken {
         /// The file.
@@ -51,41 +53,40 @@ pub enum GltfError {
         /// What is wrong, and where.
         message: String,
     },
-    /// Needs an extension that is not there.
+    /// The file needs an extension that is not supported.
     #[error("{}: needs the extension {extension}, which is not supported: {fix}", path.display())]
     Extension {
         /// The file.
         path: PathBuf,
-        /// Its name.
+        /// Name of the extension.
         extension: String,
         /// What to do.
         fix: &'static str,
     },
 }
 
-/// Which of a file's scenes, and when.
+/// Selects a scene of the file and an instant of its animations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GltfOptions {
-    /// Number of the scene; the file's own choice if left out.
+    /// Index of the scene; `None` for the file's default scene.
     pub scene: Option<usize>,
-    /// Seconds within the animations; as the file's nodes stand if left out. Before the first key and after
-    /// the last one nothing moves.
+    /// Time in the animations, seconds, clamped to their key frames; `None` for the nodes' static transforms.
     pub time_s: Option<f64>,
-    /// Number of the animation; all of them together if left out.
+    /// Index of the animation; `None` for all of them together.
     pub animation: Option<usize>,
-    /// Whether corners get normals, for light to fall on them: the file's own, or where it has none those of
-    /// flat triangles.
+    /// Whether vertices get normals, for lighting: the file's own, or where it has none those of flat
+    /// triangles.
     pub normals: bool,
 }
 
-/// A model's surfaces.
+/// A model: shapes with materials in the model's axes.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     parts: Vec<Part>,
-    /// What of the file is not shown, or not as it is meant.
+    /// Notes for the user about parts of the file that are not shown, or not as stored.
     pub notes: Vec<String>,
-    /// No point is farther from its origin.
-    pub reach_m: f64,
+    /// Radius about the model's origin that contains all points, metres.
+    pub radius_m: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -95,33 +96,34 @@ struct Part {
     model_from_shape: DAffine3,
 }
 
-/// From a model's axes (x left, y up, z ahead) to forward, right, down.
+/// Rotation from the model's axes (x left, y up, z forward) to forward, right, down.
 const BODY_FROM_MODEL: DMat3 =
     DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
 
-/// Texels that are made where base colour and emitted light lie in different ways, at most: half a gigabyte.
-const MOST_BAKED: usize = 1 << 27;
-/// Parts of a scene, at most: a slip in a number must not fill the memory.
-const MOST_PARTS: usize = 1 << 20;
-/// No point of a model is farther from its origin, metres: what claims to be is a slip in a number.
-pub(crate) const FARTHEST_M: f64 = 1e9;
-/// Nodes within nodes, at most.
-const DEEPEST: usize = 1024;
+/// Largest number of baked texels of a model: half a gigabyte.
+const MAX_BAKED_TEXELS: usize = 1 << 27;
+/// Largest number of parts of a model, so that a wrong number does not fill the memory.
+const MAX_PARTS: usize = 1 << 20;
+/// Largest distance of a point from the model's origin, metres; a larger one is taken as a wrong number.
+pub(crate) const MAX_RADIUS_M: f64 = 1e9;
+/// Largest depth of the node tree.
+const MAX_NODE_DEPTH: usize = 1024;
 
 impl Model {
-    /// Meshes for a model whose origin is at `at_ned_m` and whose z looks `heading_rad` east of north.
-    pub fn place(&self, at_ned_m: DVec3, heading_rad: f64, scale: f64) -> impl Iterator<Item = Mesh> {
+    /// Meshes of the model with its origin at `origin_ned_m`, its z axis `heading_rad` clockwise from north,
+    /// and its lengths times `scale`.
+    pub fn place(&self, origin_ned_m: DVec3, heading_rad: f64, scale: f64) -> impl Iterator<Item = Mesh> {
         let ned_from_model = DMat3::from_rotation_z(heading_rad) * BODY_FROM_MODEL * scale;
         self.parts.iter().map(move |part| Mesh {
             shape: part.shape.clone(),
             material: part.material.clone(),
-            origin_ned_m: at_ned_m + ned_from_model * part.model_from_shape.translation,
+            origin_ned_m: origin_ned_m + ned_from_model * part.model_from_shape.translation,
             ned_from_shape: ned_from_model * part.model_from_shape.matrix3,
             object: 0,
         })
     }
 
-    /// Triangles of one placed model.
+    /// Number of triangles.
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.parts.iter().map(|part| part.shape.indices.len() / 3).sum()
@@ -131,18 +133,17 @@ impl Model {
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
-/// [`GltfError`] names the file, or the extension that it would need.
+/// [`GltfError`] names the file and the place in it, or the extension that it needs.
 pub fn read_gltf(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
-    // The glTF crate takes some of what a damaged file says for granted. Nothing outlives the call that it
-    // could leave half done.
+    // The glTF crate panics on some damaged files. No state outlives the call.
     let damaged = |_| Err(GltfError::Broken { path: path.into(), message: "is damaged".into() });
     std::panic::catch_unwind(|| read(path, options)).unwrap_or_else(damaged)
 }
 
 fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
-    let source = Source::read(path)?;
+    let asset = Asset::read(path)?;
     let broken = |message: String| GltfError::Broken { path: path.into(), message };
-    let document = &source.document;
+    let document = &asset.document;
     let Some(scene) = options
         .scene
         .map_or_else(|| document.default_scene().or(document.scenes().next()), |n| document.scenes().nth(n))
@@ -155,80 +156,83 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
             None => Ok(Model {
                 parts: Vec::new(),
                 notes: vec!["has no scene: nothing of it is shown".into()],
-                reach_m: 0.0,
+                radius_m: 0.0,
             }),
         };
     };
     let mut reader = Reader {
-        pose: Pose::new(&source, options)?,
-        materials: Materials::new(&source),
-        source: &source,
+        pose: Pose::new(&asset, options)?,
+        materials: Materials::new(&asset),
+        asset: &asset,
         options,
         shapes: HashMap::new(),
         baked: HashMap::new(),
-        texels_left: MOST_BAKED,
+        texels_left: MAX_BAKED_TEXELS,
         parts: Vec::new(),
-        met: HashSet::new(),
+        visited: HashSet::new(),
         notes: Vec::new(),
-        reach_m: 0.0,
+        radius_m: 0.0,
     };
     for node in scene.nodes() {
         reader.node(&node, DAffine3::IDENTITY, false, 0)?;
     }
-    let Reader { parts, mut notes, materials, reach_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
+    let Reader { parts, mut notes, materials, radius_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
     if parts.is_empty() {
-        notes.push(match &source.hidden_nodes()[..] {
+        notes.push(match &asset.hidden_nodes()[..] {
             [] => "has no triangles: nothing of it is shown".into(),
             hidden => format!(
-                "has no triangles that are visible: KHR_node_visibility hides {}, and nothing is shown",
+                "has no visible triangles: KHR_node_visibility hides {}, and nothing is shown",
                 hidden.join(", ")
             ),
         });
     }
     if options.time_s.is_some() && document.animations().next().is_none() {
-        notes.push("has no animation for time_s to be a time of: its nodes are as they stand".into());
+        notes.push("has no animation for time_s: its nodes keep their static transforms".into());
     }
     if options.time_s.is_none() && options.animation.is_some() {
-        notes.push("animation says nothing without time_s: its nodes are as they stand; give the time of the file that is meant".into());
-    }
-    if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
         notes.push(
-            "has animations, and no time_s says which instant of them is meant: its nodes are as they stand"
-                .into(),
+            "animation has no effect without time_s: nodes keep their static transforms; set time_s".into(),
         );
     }
-    notes.extend(source.notes.iter().cloned());
+    if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
+        notes.push("has animations, but time_s is not set: its nodes keep their static transforms".into());
+    }
+    notes.extend(asset.notes.iter().cloned());
     notes.extend(pose_notes);
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();
-    Ok(Model { parts, notes, reach_m })
+    Ok(Model { parts, notes, radius_m })
 }
 
-/// A shape, and the picture of its base colour and its emitted light.
+/// A shape with its baked texture of base colour and emissive light.
 type BakedPart = (Arc<Shape>, Arc<Texture>);
 
+/// Mesh index, primitive index, and whether the node mirrors.
+type ShapeKey = (usize, usize, bool);
+
+/// Walks the node tree and collects parts.
 struct Reader<'a> {
-    source: &'a Source,
+    asset: &'a Asset,
     options: GltfOptions,
     pose: Pose,
     materials: Materials<'a>,
-    /// By mesh, primitive and whether it is mirrored: those that no node changes.
-    shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
-    /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture,
-    /// or that there is none.
-    baked: HashMap<(usize, usize, bool), Option<BakedPart>>,
-    /// Texels that further ones may have.
+    /// Shapes without skin and morph targets.
+    shapes: HashMap<ShapeKey, Arc<Shape>>,
+    /// Baked shapes without skin and morph targets; `None` where baking was not possible.
+    baked: HashMap<ShapeKey, Option<BakedPart>>,
+    /// Number of texels that further baked textures may have.
     texels_left: usize,
     parts: Vec<Part>,
-    /// Nodes that have been met: a tree comes by each of them once.
-    met: HashSet<usize>,
+    /// Indices of visited nodes: a valid tree visits each once.
+    visited: HashSet<usize>,
     notes: Vec<String>,
-    /// No point so far is farther from the model's origin.
-    reach_m: f64,
+    /// Radius about the model's origin that contains all points so far, metres.
+    radius_m: f64,
 }
 
 impl Reader<'_> {
+    /// Adds the meshes of a node and its descendants.
     fn node(
         &mut self,
         node: &gltf::Node<'_>,
@@ -236,19 +240,19 @@ impl Reader<'_> {
         is_hidden: bool,
         depth: usize,
     ) -> Result<(), GltfError> {
-        if depth > DEEPEST {
+        if depth > MAX_NODE_DEPTH {
             return Err(self
-                .source
-                .broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
+                .asset
+                .error(format!("nodes.{}: is within itself, or {MAX_NODE_DEPTH} nodes deep", node.index())));
         }
-        if !self.met.insert(node.index()) {
-            return Err(self.source.broken(format!("nodes.{}: has two parents", node.index())));
+        if !self.visited.insert(node.index()) {
+            return Err(self.asset.error(format!("nodes.{}: has two parents", node.index())));
         }
-        // What is not seen must be no tree of its own either.
-        let is_hidden = is_hidden || !self.source.is_visible(node.index());
+        // Hidden nodes are walked too, so that malformed trees are refused.
+        let is_hidden = is_hidden || !self.asset.is_visible(node.index());
         let model_from_node = model_from_parent * self.pose.parent_from_node(node);
         if let Some(mesh) = node.mesh().filter(|_| !is_hidden) {
-            let instances = self.source.instances(node.index())?;
+            let instances = self.asset.instances(node.index())?;
             for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, &mesh, model_from_node * node_from_instance)?;
             }
@@ -256,6 +260,7 @@ impl Reader<'_> {
         node.children().try_for_each(|child| self.node(&child, model_from_node, is_hidden, depth + 1))
     }
 
+    /// Adds the primitives of a node's mesh.
     fn mesh(
         &mut self,
         node: &gltf::Node<'_>,
@@ -263,135 +268,181 @@ impl Reader<'_> {
         model_from_node: DAffine3,
     ) -> Result<(), GltfError> {
         for primitive in mesh.primitives() {
-            if self.parts.len() >= MOST_PARTS {
-                return Err(self.source.broken(format!("has more than {MOST_PARTS} parts")));
+            if self.parts.len() >= MAX_PARTS {
+                return Err(self.asset.error(format!("has more than {MAX_PARTS} parts")));
             }
-            let Some(triangles) = primitive::triangle_mode(primitive.mode()) else {
-                self.notes.push("points and lines are not shown".into());
-                continue;
-            };
-            let weights = self.pose.weights(node, mesh);
-            let joints = node.skin().map(|skin| self.pose.joints(self.source, &skin)).transpose()?;
-            // What a skin moves stands in the model's axes.
-            let model_from_shape = if joints.is_some() { DAffine3::IDENTITY } else { model_from_node };
-            let mirrored = model_from_shape.matrix3.determinant() < 0.0;
-            let own = joints.is_some() || primitive.morph_targets().next().is_some();
-            let key = (mesh.index(), primitive.index(), mirrored);
-            let (material, uv) = self.materials.of(&primitive.material())?;
-            if self.options.normals && uv.loses_colors {
-                self.notes.push(
-                    "what has a picture of emitted light keeps its colours: light does not fall on it".into(),
-                );
-            }
-            if uv.loses_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
-                self.notes.push("vertex colours under a picture of emitted light are left out".into());
-            }
-            if uv.has_picture() && primitive.get(&gltf::Semantic::TexCoords(uv.set)).is_none() {
-                let (number, set) = (mesh.index(), uv.set);
-                self.notes.push(format!("meshes.{number}: has no TEXCOORD_{set} for its picture to lie by: one texel of it is all over"));
-            }
-            let beyond = Cell::new(false);
-            let made = primitive::Making {
-                source: self.source,
-                mesh,
-                triangles,
-                mirrored,
-                uv: &uv,
-                weights: &weights,
-                joints: joints.as_deref(),
-                normals: self.options.normals && uv.takes_light,
-                beyond: &beyond,
-            };
-            let baked = match self.materials.bake_of(&primitive.material()) {
-                None => None,
-                Some(bake) => match self.baked.get(&key).filter(|_| !own) {
-                    Some(known) => known.clone(),
-                    None => {
-                        let found = self.bake(&made, &primitive, &bake)?;
-                        if !own {
-                            self.baked.insert(key, found.clone());
-                        }
-                        found
-                    }
-                },
-            };
-            let (shape, material) = match (baked, self.shapes.get(&key).filter(|_| !own)) {
-                (Some((shape, texture)), _) => {
-                    (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material })
-                }
-                (None, Some(shape)) => (shape.clone(), material),
-                (None, None) => {
-                    let shape = Arc::new(made.shape(&primitive)?);
-                    if !own {
-                        self.shapes.insert(key, shape.clone());
-                    }
-                    (shape, material)
-                }
-            };
-            if beyond.get() {
-                let number = mesh.index();
-                self.notes.push(format!(
-                    "meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"
-                ));
-            }
-            let corner_m = shape
-                .vertices
-                .iter()
-                .map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length())
-                .fold(0.0, f64::max);
-            let reach_m = model_from_shape.translation.length() + corner_m * norm(&model_from_shape.matrix3);
-            if reach_m.is_nan() || reach_m > FARTHEST_M {
-                let (node, mesh) = (node.index(), mesh.index());
-                return Err(self.source.broken(format!(
-                    "nodes.{node}: with it meshes.{mesh} reaches {reach_m:.1e} m from the model's origin, more than {FARTHEST_M:.0e}: check its \
-                     positions, and translation, rotation and scale of its nodes"
-                )));
-            }
-            self.reach_m = self.reach_m.max(reach_m);
-            if !shape.indices.is_empty() {
-                let material = self.materials.on(&shape, material);
-                self.parts.push(Part { shape, material, model_from_shape });
+            match primitive::triangle_mode(primitive.mode()) {
+                Some(mode) => self.primitive((node, mesh), &primitive, mode, model_from_node)?,
+                None => self.notes.push("points and lines are not shown".into()),
             }
         }
         Ok(())
     }
 
-    /// A shape under one picture of its base colour and its emitted light, which lie in different ways on it.
+    /// Adds one primitive of a node's mesh.
+    fn primitive(
+        &mut self,
+        (node, mesh): (&gltf::Node<'_>, &gltf::Mesh<'_>),
+        primitive: &gltf::Primitive<'_>,
+        triangle_mode: TriangleMode,
+        model_from_node: DAffine3,
+    ) -> Result<(), GltfError> {
+        let weights = self.pose.weights(node, mesh);
+        let joints = node.skin().map(|skin| self.pose.joints(self.asset, &skin)).transpose()?;
+        // Joint matrices already transform to the model's axes.
+        let model_from_shape = if joints.is_some() { DAffine3::IDENTITY } else { model_from_node };
+        let is_mirrored = model_from_shape.matrix3.determinant() < 0.0;
+        let is_deformed = joints.is_some() || primitive.morph_targets().next().is_some();
+        let key = Some((mesh.index(), primitive.index(), is_mirrored)).filter(|_| !is_deformed);
+        let (material, rule) = self.materials.get(&primitive.material())?;
+        self.note_ignored_attributes(mesh, primitive, &rule);
+        let has_clamped_colors = Cell::new(false);
+        let shape_reader = ShapeReader {
+            asset: self.asset,
+            mesh,
+            triangle_mode,
+            is_mirrored,
+            rule: &rule,
+            weights: &weights,
+            joints: joints.as_deref(),
+            with_normals: self.options.normals && rule.is_lit,
+            has_clamped_colors: &has_clamped_colors,
+        };
+        let (shape, material) = match self.baked_part(&shape_reader, primitive, key)? {
+            Some((shape, texture)) => {
+                (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material })
+            }
+            None => (self.shape(&shape_reader, primitive, key)?, material),
+        };
+        if has_clamped_colors.get() {
+            self.notes.push(format!("meshes.{}: COLOR_0 is clamped to 0 to 1", mesh.index()));
+        }
+        self.extend_radius(node, mesh, &shape, &model_from_shape)?;
+        if !shape.indices.is_empty() {
+            let material = self.materials.for_shape(&shape, material);
+            self.parts.push(Part { shape, material, model_from_shape });
+        }
+        Ok(())
+    }
+
+    fn note_ignored_attributes(
+        &mut self,
+        mesh: &gltf::Mesh<'_>,
+        primitive: &gltf::Primitive<'_>,
+        rule: &VertexRule,
+    ) {
+        if self.options.normals && rule.ignores_vertex_colors {
+            self.notes.push(EMISSIVE_TEXTURE_UNLIT.into());
+        }
+        if rule.ignores_vertex_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
+            self.notes.push("vertex colours of surfaces with an emissive texture are ignored".into());
+        }
+        if rule.has_texture() && primitive.get(&gltf::Semantic::TexCoords(rule.set)).is_none() {
+            let (number, set) = (mesh.index(), rule.set);
+            self.notes.push(format!(
+                "meshes.{number}: has no TEXCOORD_{set} for its texture: one texel covers the whole surface"
+            ));
+        }
+    }
+
+    /// The shape of a primitive, from the cache if it has a key and has been read before.
+    fn shape(
+        &mut self,
+        shape_reader: &ShapeReader<'_>,
+        primitive: &gltf::Primitive<'_>,
+        key: Option<ShapeKey>,
+    ) -> Result<Arc<Shape>, GltfError> {
+        if let Some(shape) = key.and_then(|key| self.shapes.get(&key)) {
+            return Ok(shape.clone());
+        }
+        let shape = Arc::new(shape_reader.shape(primitive)?);
+        self.shapes.extend(key.map(|key| (key, shape.clone())));
+        Ok(shape)
+    }
+
+    /// The baked shape of a primitive whose base colour and emissive texture have different coordinates, from
+    /// the cache if it has a key and has been baked before.
+    fn baked_part(
+        &mut self,
+        shape_reader: &ShapeReader<'_>,
+        primitive: &gltf::Primitive<'_>,
+        key: Option<ShapeKey>,
+    ) -> Result<Option<BakedPart>, GltfError> {
+        let Some(input) = self.materials.bake_input(&primitive.material()) else { return Ok(None) };
+        if let Some(part) = key.and_then(|key| self.baked.get(&key)) {
+            return Ok(part.clone());
+        }
+        let part = self.bake(shape_reader, primitive, &input)?;
+        self.baked.extend(key.map(|key| (key, part.clone())));
+        Ok(part)
+    }
+
+    /// Refuses shapes whose points are too far from the model's origin; else extends the radius.
+    fn extend_radius(
+        &mut self,
+        node: &gltf::Node<'_>,
+        mesh: &gltf::Mesh<'_>,
+        shape: &Shape,
+        model_from_shape: &DAffine3,
+    ) -> Result<(), GltfError> {
+        let shape_radius_m = shape
+            .vertices
+            .iter()
+            .map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length())
+            .fold(0.0, f64::max);
+        let radius_m =
+            model_from_shape.translation.length() + shape_radius_m * norm(&model_from_shape.matrix3);
+        if radius_m.is_nan() || radius_m > MAX_RADIUS_M {
+            let (node, mesh) = (node.index(), mesh.index());
+            return Err(self.asset.error(format!(
+                "nodes.{node}: places points of meshes.{mesh} {radius_m:.1e} m from the model's origin, more \
+                 than {MAX_RADIUS_M:.0e} m: check the mesh's positions and the translation, rotation and \
+                 scale of its nodes"
+            )));
+        }
+        self.radius_m = self.radius_m.max(radius_m);
+        Ok(())
+    }
+
+    /// Bakes base colour and emissive texture of a primitive into one texture; `None`, with a note, where
+    /// that is not possible.
     fn bake(
         &mut self,
-        made: &primitive::Making<'_>,
+        shape_reader: &ShapeReader<'_>,
         primitive: &gltf::Primitive<'_>,
-        of: &Bake,
+        input: &BakeInput,
     ) -> Result<Option<BakedPart>, GltfError> {
-        // What has emitted light on top is not lit: one picture cannot hold both.
-        let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
-        let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;
-        let name = self.source.material_name(primitive.material().index());
-        let Some(emitted::Baked { shape, texture, coarser }) =
-            emitted::bake(&shape, &light_uvs, of, self.texels_left)
+        // The scene's light would apply to the baked emissive light as well, so the shape is not lit.
+        let shape = ShapeReader { with_normals: false, ..*shape_reader }.shape(primitive)?;
+        let emissive_uvs = shape_reader.uvs(primitive, &input.emissive.rule, shape.vertices.len())?;
+        let name = self.asset.material_name(primitive.material().index());
+        let Some(Baked { shape, texture, coarser }) =
+            bake::bake(&shape, &emissive_uvs, input, self.texels_left)
         else {
             self.notes.push(format!(
-                "{name}: its picture of emitted light is left out: it lies otherwise than the base colour, and in neither layout each place of the surface has a place of \
-                 its own, or one picture of both would be too large; give it the base colour's texture coordinates"
+                "{name}: emissiveTexture is ignored: its texture coordinates differ from the base colour's, \
+                 and triangles overlap in both layouts, or one texture for both would be too large; give it \
+                 the base colour's texture coordinates"
             ));
             return Ok(None);
         };
         self.texels_left -= texture.rgba8.len() / 4;
         if coarser > 1.25 {
             self.notes.push(format!(
-                "{name}: base colour and emitted light lie in different ways, and are shown {coarser:.1} times coarser than they are"
+                "{name}: base colour and emissive texture have different texture coordinates; they are \
+                 combined {coarser:.1} times coarser than stored"
             ));
         }
         if self.options.normals {
-            self.notes.push(
-                "what has a picture of emitted light keeps its colours: light does not fall on it".into(),
-            );
+            self.notes.push(EMISSIVE_TEXTURE_UNLIT.into());
         }
         Ok(Some((Arc::new(shape), Arc::new(texture))))
     }
 }
 
-/// At least how much longer a matrix makes anything.
+const EMISSIVE_TEXTURE_UNLIT: &str = "surfaces with an emissive texture are not lit by the scene's light";
+
+/// Frobenius norm: an upper bound on how much a matrix lengthens a vector.
 fn norm(matrix: &DMat3) -> f64 {
     (matrix.x_axis.length_squared() + matrix.y_axis.length_squared() + matrix.z_axis.length_squared()).sqrt()
 }

@@ -11,7 +11,7 @@ use std::{
 use camsim_core::scenario::Scenario;
 use rayon::prelude::*;
 
-use crate::{gltf_file::files_beside, terrain::files_beside_raster};
+use crate::{gltf_file::referenced_files, terrain::sidecar_files};
 
 /// Fingerprints of files by their paths.
 pub type Inputs = BTreeMap<String, String>;
@@ -29,13 +29,13 @@ pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
     paths.extend(scenario.camera.zoom_track.clone());
     for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
         paths.push(picture.clone());
-        paths.extend(files_beside_raster(picture));
+        paths.extend(sidecar_files(picture));
     }
     paths.extend(scene.pattern.iter().map(|pattern| pattern.image.clone()));
     paths.extend(scene.board.iter().filter_map(|board| board.target.clone()));
     for model in &scene.gltf {
         paths.push(model.file.clone());
-        paths.extend(files_beside(&model.file));
+        paths.extend(referenced_files(&model.file));
         paths.extend(model.placements.clone());
     }
     file_fingerprints(paths)

@@ -16,7 +16,7 @@ use glam::DVec2;
 use crate::{
     board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
-    gltf_file::{FARTHEST_M, GltfError},
+    gltf_file::{GltfError, MAX_RADIUS_M},
     pictures::{PictureError, read_gray_image},
     terrain::{TerrainFileError, TerrainSummary},
 };
@@ -94,8 +94,12 @@ pub enum LoadError {
     },
     /// A model is farther away than [`FARTHEST_M`].
     #[error(
+<<<<<<< HEAD
         "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
             {FARTHEST_M:.0e}: check its place and scale"
+=======
+        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than {MAX_RADIUS_M:.0e}: check its place and scale"
+>>>>>>> n-iob
     )]
     TooFar {
         /// The model.

@@ -9,7 +9,7 @@ use camsim_core::{
 };
 use image::{DynamicImage, ImageDecoder, ImageReader, metadata::Orientation};
 
-use crate::terrain::raster::{Raster, is_tiff, most_decoded};
+use crate::terrain::raster::{Raster, is_tiff, max_decoded_bytes};
 
 /// Why a picture cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -126,9 +126,15 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
     if is_tiff(path)? {
         let raster = Raster::read(path)?;
         let pixels = raster.size[0] as usize * raster.size[1] as usize;
+<<<<<<< HEAD
         // Float values up to 255 would all be clipped to white.
         let max = if raster.depth_is_whole() == Some(false) {
             (0..pixels).map(|pixel| raster.value(pixel)).fold(0.0, f64::max)
+=======
+        // Floats of 0 to 255 would be white throughout.
+        let most = if raster.is_integer_depth() == Some(false) {
+            (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max)
+>>>>>>> n-iob
         } else {
             0.0
         };
@@ -205,7 +211,7 @@ pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
         .with_guessed_format()
         .map_err(|error| error.to_string())?;
     let mut limits = image::Limits::default();
-    limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes.len() as u64)));
+    limits.max_alloc = limits.max_alloc.map(|least| least.max(max_decoded_bytes(bytes.len() as u64)));
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| error.to_string())?;
     if picture.width() == 0 || picture.height() == 0 {
@@ -227,7 +233,7 @@ fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     let decode_error = |error: image::ImageError| PictureError::decode(path, error.to_string());
     // The default limit of 512 MiB is raised in proportion to the size of the file.
     let mut limits = image::Limits::default();
-    limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes)));
+    limits.max_alloc = limits.max_alloc.map(|least| least.max(max_decoded_bytes(bytes)));
     reader.limits(limits.clone());
     let mut decoder = reader.into_decoder().map_err(decode_error)?;
     let orientation = decoder.orientation().map_err(decode_error)?;

@@ -1,22 +1,24 @@
-//! Terrain from a GeoTIFF of heights and a picture of the ground.
+//! Terrain from a file of heights (DEM) and an ortho-image.
 
 mod arc_prj;
 mod bands;
-mod beside;
 mod crs;
 mod dem;
-mod docs;
+mod descriptions;
+mod documentation;
 mod geo_tags;
 mod georeference;
 mod height_files;
+mod hillshade;
 mod metadata;
 mod ortho;
 pub(crate) mod raster;
-mod shade;
-mod systems;
+mod sidecar;
+mod stated_crs;
 mod tiff_file;
+mod units;
+mod vertical_crs;
 mod wkt;
-mod words;
 
 use std::{
     path::PathBuf,
@@ -33,40 +35,37 @@ use camsim_core::{
 use glam::DVec3;
 
 use crate::pictures::PictureError;
-pub(crate) use beside::{
-    files as files_beside_raster, read_mask as read_mask_beside, read_tags as read_tags_beside,
-};
-pub use docs::documentation;
+pub use documentation::documentation;
+pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
+pub(crate) use units::metres_per_unit_name;
 
-pub(crate) use systems::unit_of_name;
-
-use dem::{Dem, EMPTY_RANGE, Heights, widened};
+use dem::{Dem, EMPTY_RANGE, HeightStatistics, widened};
 use ortho::Ortho;
 
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
 pub type NedFromGeodetic<'a> = &'a (dyn Fn(f64, f64, f64) -> DVec3 + Sync);
 
-/// Metres to add to a height at latitude, longitude (radians): the geoid's undulation, where DEM and log
-/// differ in datum.
+/// Metres to add to a height at latitude, longitude (radians): the geoid undulation, where DEM and flight log
+/// have different vertical datums.
 pub type HeightShift<'a> = &'a (dyn Fn(f64, f64) -> f64 + Sync);
 
-/// A terrain and what to say about it.
+/// A terrain with its summary and notes.
 #[derive(Clone, Debug)]
 pub struct LoadedTerrain {
     /// Chunks and texture.
     pub terrain: Terrain,
-    /// Where it lies.
+    /// Location and repairs.
     pub summary: TerrainSummary,
-    /// What a user should know of its files.
+    /// Notes for the user about its files.
     pub notes: Vec<String>,
 }
 
-/// Where a terrain lies, and what was repaired.
+/// Location of a terrain, and what was repaired.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerrainSummary {
-    /// Coordinate system of the DEM.
+    /// EPSG code of the DEM's coordinate system.
     pub epsg: u16,
-    /// Heights from west to east and from north to south.
+    /// Number of columns (west to east) and rows (north to south).
     pub size: [u32; 2],
     /// Latitude, longitude of the south-western corner of the bounding rectangle, radians.
     pub south_west_rad: [f64; 2],
@@ -78,53 +77,53 @@ pub struct TerrainSummary {
     pub centre_ned_m: DVec3,
     /// Lowest and highest valid height of the file, metres.
     pub height_range_m: [f64; 2],
-    /// Heights that are missing or not plausible.
+    /// Number of heights that are missing or implausible.
     pub void_heights: u64,
-    /// Heights for which the ortho-image has nothing: `scene.terrain.beyond` says what is seen there.
+    /// Number of heights without ortho-image; `scene.terrain.beyond` defines the ground there.
     pub outside_ortho: u64,
-    /// Texture coordinates of the ortho-image's own corners, which is larger where the ground goes on in
-    /// grey.
-    pub picture_uv: [[f64; 2]; 2],
-    /// How many times finer along each side the picture was made, so that it holds the light on each height;
-    /// 1 without light.
-    pub picture_times: u32,
+    /// Texture coordinates of the ortho-image's corners; inside of 0 to 1 where the texture has a grey
+    /// margin.
+    pub ortho_uv: [[f64; 2]; 2],
+    /// Factor by which the texture was enlarged along each side to hold the baked light; 1 without light.
+    pub texture_scale: u32,
 }
 
 /// Why a terrain cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum TerrainFileError {
-    /// A file that cannot be read or decoded.
+    /// A file cannot be read or decoded.
     #[error("{source}; check {key}")]
     Picture {
-        /// Which one it is.
+        /// Key of the file.
         key: &'static str,
-        /// What is wrong.
+        /// The cause.
         source: PictureError,
     },
-    /// A picture where heights are wanted.
+    /// The DEM is a picture.
     #[error(
-        "{path}: has {bands} bands, so it is a picture and no DEM: heights are one band (scene.terrain.ortho takes the picture)"
+        "{path}: has {bands} bands, so it is a picture, not a DEM: give it as scene.terrain.ortho, and \
+         heights of one band as the DEM"
     )]
     NotHeights {
         /// The file.
         path: PathBuf,
-        /// Its bands.
+        /// Number of bands.
         bands: usize,
     },
-    /// The DEM says nothing about where it is.
+    /// The DEM has no georeference.
     #[error(
-        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it{more}. \
+        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it{details}. \
          Add them, for example with `gdal_translate -a_srs EPSG:CODE -a_ullr WEST NORTH EAST SOUTH IN OUT`"
     )]
     NoGeoreference {
         /// The DEM.
         path: PathBuf,
-        /// Name of the world file that would do.
+        /// Name of the world file that was looked for.
         world: String,
-        /// What there is in its place.
-        more: String,
+        /// Further details.
+        details: String,
     },
-    /// A world file that cannot be understood.
+    /// A world file is invalid.
     #[error("{path}: a world file has six numbers, one a line: {reason}")]
     WorldFile {
         /// The world file.
@@ -132,7 +131,7 @@ pub enum TerrainFileError {
         /// What is wrong.
         reason: String,
     },
-    /// A degenerate transformation.
+    /// The georeference is degenerate.
     #[error("{path}: the georeference is degenerate (pixel size zero or not finite)")]
     DegenerateGeoreference {
         /// The file.
@@ -140,91 +139,95 @@ pub enum TerrainFileError {
     },
     /// The coordinate system is not stated.
     #[error(
-        "{path}: the file does not state its coordinate system: set scene.terrain.epsg, for example scene.terrain.epsg = 32632"
+        "{path}: the file does not state its coordinate system: set scene.terrain.epsg, for example \
+         scene.terrain.epsg = 32632"
     )]
     NoCrs {
         /// The file.
         path: PathBuf,
     },
-    /// The coordinate system is not known.
+    /// The coordinate system is not supported.
     #[error(
-        "{path}: EPSG:{epsg} is not supported (docs/inputs/TERRAIN.md has those that are): \
-         reproject with `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a wrong code"
+        "{path}: EPSG:{epsg} is not supported (docs/inputs/TERRAIN.md has those that are): reproject with \
+         `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a wrong code"
     )]
     UnsupportedCrs {
         /// The file.
         path: PathBuf,
-        /// Its code, 32767 if it defines its own.
+        /// EPSG code, 32767 for a user-defined system.
         epsg: u16,
     },
-    /// The file and the scenario disagree.
+    /// The file and scene.terrain.epsg state different systems.
     #[error(
-        "{path}: the file states EPSG:{stated} but scene.terrain.epsg = {wanted}: remove the key, or reproject the file"
+        "{path}: the file states EPSG:{stated} but scene.terrain.epsg = {key}: remove the key, or reproject \
+         the file"
     )]
     CrsConflict {
         /// The file.
         path: PathBuf,
-        /// In the file.
+        /// EPSG code in the file.
         stated: u16,
-        /// In the scenario.
-        wanted: u16,
+        /// EPSG code in the scenario.
+        key: u16,
     },
-    /// A definition without a code.
+    /// The coordinate system is user-defined, without an EPSG code.
     #[error(
-        "{path}: defines a coordinate system of its own ({name}), without an EPSG code: give it one with `gdalwarp -t_srs EPSG:CODE IN OUT`, \
-         or, for a DEM whose system has a code, set scene.terrain.epsg"
+        "{path}: has a user-defined coordinate system ({name}) without an EPSG code: convert it with \
+         `gdalwarp -t_srs EPSG:CODE IN OUT`, or, for a DEM whose system has a code, set scene.terrain.epsg"
     )]
-    OwnCrs {
+    UserDefinedCrs {
         /// The file.
         path: PathBuf,
-        /// What the file calls it.
+        /// Name of the system in the file.
         name: String,
     },
-    /// Something that changes the numbers and cannot be applied.
+    /// Metadata that change the values cannot be applied.
     #[error("{path}: {problem}")]
     Meaning {
         /// The file.
         path: PathBuf,
-        /// What it is and what to do.
+        /// The problem and the remedy.
         problem: String,
     },
-    /// A unit that is not known, or not that of the coordinate system.
+    /// A unit is unknown, or not that of the coordinate system.
     #[error(
-        "{path}: the {what} unit has EPSG code {code}, which is not known, or not that of its coordinate system: convert the file with `gdalwarp -t_srs EPSG:CODE IN OUT` \
-         (for heights, scene.terrain.height_unit says it)"
+        "{path}: the {kind} unit has EPSG code {code}, which is unknown, or not that of its coordinate \
+         system: convert the file with `gdalwarp -t_srs EPSG:CODE IN OUT` (for heights, set \
+         scene.terrain.height_unit)"
     )]
     Unit {
         /// The file.
         path: PathBuf,
         /// "horizontal", "angular" or "vertical".
-        what: &'static str,
+        kind: &'static str,
         /// EPSG code of the unit.
         code: u16,
     },
-    /// No grid.
+    /// The heights do not make a terrain.
     #[error("{path}: {source}")]
     Grid {
         /// The DEM.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         source: TerrainError,
     },
-    /// Coordinates that the projection has no answer for.
+    /// Heights lie outside of the projection's domain.
     #[error(
-        "{path}: {count} heights lie outside of the domain of EPSG:{epsg}: check scene.terrain.epsg and the georeference"
+        "{path}: {count} heights lie outside of the domain of EPSG:{epsg}: check scene.terrain.epsg and the \
+         georeference"
     )]
     OutsideCrs {
         /// The DEM.
         path: PathBuf,
-        /// Coordinate system.
+        /// EPSG code.
         epsg: u16,
-        /// Such heights.
+        /// Number of such heights.
         count: u64,
     },
-    /// Two files of different places.
+    /// DEM and ortho-image do not overlap.
     #[error("{ortho}: does not overlap {dem}: check scene.terrain.ortho")]
     NoOverlap {
-        /// The picture.
+        /// The ortho-image.
         ortho: PathBuf,
         /// The DEM.
         dem: PathBuf,
@@ -232,18 +235,20 @@ pub enum TerrainFileError {
 }
 
 impl TerrainFileError {
-    fn of_dem(source: PictureError) -> Self {
+    /// An error of reading scene.terrain.dem.
+    fn dem(source: PictureError) -> Self {
         Self::Picture { key: "scene.terrain.dem", source }
     }
 
-    fn of_ortho(source: PictureError) -> Self {
+    /// An error of reading scene.terrain.ortho.
+    fn ortho(source: PictureError) -> Self {
         Self::Picture { key: "scene.terrain.ortho", source }
     }
 }
 
-/// Reads `scene.terrain`. Paths are used as they stand. `height_shift` is added to the heights of the file
-/// where its vertical datum is not that of the flight log; horizontal datum transformations never touch
-/// heights.
+/// Reads `scene.terrain`; relative paths are relative to the working directory. `height_shift` is added to
+/// the file's heights where its vertical datum is not that of the flight log. Horizontal datum
+/// transformations leave heights unchanged.
 ///
 /// # Errors
 ///
@@ -256,11 +261,11 @@ pub fn read_terrain(
     read_terrain_in_light(spec, ned_from_geodetic, height_shift, None)
 }
 
-/// As [`read_terrain`], with light on the ground.
+/// Like [`read_terrain`], with the scene's light baked into the texture.
 ///
 /// # Errors
 ///
-/// As [`read_terrain`].
+/// Those of [`read_terrain`].
 pub fn read_terrain_in_light(
     spec: &TerrainSpec,
     ned_from_geodetic: NedFromGeodetic<'_>,
@@ -268,19 +273,21 @@ pub fn read_terrain_in_light(
     light: Option<&Light>,
 ) -> Result<LoadedTerrain, TerrainFileError> {
     let dem = Dem::read(spec, height_shift.is_some())?;
-    let heights = dem.heights();
+    let heights = dem.statistics();
     let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, spec, &dem)).transpose()?;
     let mut notes = dem.notes.clone();
     if heights.implausible > 0 {
         notes.push(format!(
-            "{}: {} of its numbers are no heights in metres (-11 500 to 9500) and are taken as missing: if they are of another unit, set scene.terrain.height_unit",
+            "{}: {} of its values are no plausible heights in metres (-11 500 to 9500) and are read as \
+             missing: if they have another unit, set scene.terrain.height_unit",
             spec.dem.display(),
             heights.implausible
         ));
     }
     if heights.unlikely > 0 {
         notes.push(format!(
-            "{}: {} of its heights are below -500 m or above 9000 m: where that is not the floor of a sea, check scene.terrain.height_unit and the file's mark of missing values",
+            "{}: {} of its heights are below -500 m or above 9000 m: unless they are sea floor, check \
+             scene.terrain.height_unit and the file's no-data value",
             spec.dem.display(),
             heights.unlikely
         ));
@@ -294,42 +301,43 @@ pub fn read_terrain_in_light(
         is_void,
         outside_crs: AtomicBool::new(false),
     };
-    let without_picture = ortho
+    let outside_ortho = ortho
         .as_ref()
-        .map_or(0, |ortho| dem.count(|at| !dem.height_m(at).is_nan() && !ortho.shows(&dem, at)));
+        .map_or(0, |ortho| dem.count(|post| !dem.height_m(post).is_nan() && !ortho.covers(&dem, post)));
     if let Some(path) =
-        spec.ortho.as_ref().filter(|_| without_picture > 0 && without_picture == dem.points() - heights.voids)
+        spec.ortho.as_ref().filter(|_| outside_ortho > 0 && outside_ortho == dem.post_count() - heights.voids)
     {
         return Err(TerrainFileError::NoOverlap { ortho: path.clone(), dem: dem.path.clone() });
     }
     let texture = match &ortho {
         Some(ortho) => {
             notes.extend(ortho.notes.iter().cloned());
-            notes.extend(spec.ortho.as_ref().filter(|_| without_picture > 0).map(|path| {
-                let share = 100.0 * without_picture as f64 / (dem.points() - heights.voids) as f64;
+            notes.extend(spec.ortho.as_ref().filter(|_| outside_ortho > 0).map(|path| {
+                let share = 100.0 * outside_ortho as f64 / (dem.post_count() - heights.voids) as f64;
                 let (is, others) = match spec.beyond {
                     Beyond::Grey => ("grey", "\"edge\" or \"void\""),
                     Beyond::Edge => ("of the colours at its border", "\"grey\" or \"void\""),
                     Beyond::Void => ("left out", "\"grey\" or \"edge\""),
                 };
                 format!(
-                    "{}: {share:.2} % of the terrain's area has no picture and is {is} (scene.terrain.beyond, else {others})",
+                    "{}: {share:.2} % of the terrain's area has no ortho-image and is {is} \
+                     (scene.terrain.beyond; alternatives: {others})",
                     path.display()
                 )
             }));
             ortho.texture.clone()
         }
-        // Colours of heights have a light of their own, but for that of the scene.
-        None => shade::relief(
+        // Hypsometric tints are hillshaded unless the scene has light.
+        None => hillshade::shaded_relief(
             dem.size,
             heights.range_m,
-            &|at| dem.height_m(at),
-            &|at| grid.point_ned_m(at),
+            &|post| dem.height_m(post),
+            &|post| grid.point_ned_m(post),
             light.is_none(),
         ),
     };
     let [cols, rows] = dem.size;
-    let made = Terrain::from_grid(cols, rows, &grid, Arc::new(texture));
+    let terrain = Terrain::from_grid(cols, rows, &grid, Arc::new(texture));
     if grid.outside_crs.load(Ordering::Relaxed) {
         return Err(TerrainFileError::OutsideCrs {
             path: dem.path.clone(),
@@ -337,33 +345,33 @@ pub fn read_terrain_in_light(
             count: dem.count_outside_crs(),
         });
     }
-    let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
-    terrain.beyond = ortho.as_ref().and_then(Ortho::color_beyond);
-    let picture_times = light.map_or(1, |light| terrain.bake_light(light));
-    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, without_picture) };
+    let mut terrain = terrain.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
+    terrain.beyond = ortho.as_ref().and_then(Ortho::margin_color);
+    let texture_scale = light.map_or(1, |light| terrain.bake_light(light));
+    let summary = TerrainSummary { texture_scale, ..grid.summary(&heights, outside_ortho) };
     Ok(LoadedTerrain { terrain, summary, notes })
 }
 
-/// What a terrain is made of: points are found when they are asked for.
+/// Posts of a DEM as NED points, computed on demand.
 struct Grid<'a> {
     dem: &'a Dem,
     ned_from_geodetic: NedFromGeodetic<'a>,
     height_shift: Option<HeightShift<'a>>,
     ortho: Option<&'a Ortho>,
-    /// Whether there is ground only where there is a picture.
+    /// Whether ground without ortho-image is void.
     is_void: bool,
-    /// Whether a point was found for which the projection has no answer.
+    /// Whether a point outside of the projection's domain was requested.
     outside_crs: AtomicBool,
 }
 
 impl TerrainGrid for Grid<'_> {
-    fn point_ned_m(&self, at: [u32; 2]) -> DVec3 {
-        let Some([lat, lon]) = self.dem.geodetic_rad(at) else {
+    fn point_ned_m(&self, post: [u32; 2]) -> DVec3 {
+        let Some([lat, lon]) = self.dem.geodetic_rad(post) else {
             self.outside_crs.store(true, Ordering::Relaxed);
             return DVec3::NAN;
         };
-        let height_m = self.dem.height_m(at);
-        let is_left_out = self.is_void && self.ortho.is_some_and(|ortho| !ortho.shows(self.dem, at));
+        let height_m = self.dem.height_m(post);
+        let is_left_out = self.is_void && self.ortho.is_some_and(|ortho| !ortho.covers(self.dem, post));
         if height_m.is_nan() || is_left_out {
             DVec3::NAN
         } else {
@@ -371,11 +379,11 @@ impl TerrainGrid for Grid<'_> {
         }
     }
 
-    fn uv(&self, at: [u32; 2]) -> [f32; 2] {
-        let centre = Dem::pixel_centre(at);
-        match self.ortho.and_then(|ortho| ortho.place.as_ref()) {
-            Some(place) => place.uv(self.dem, at),
-            // It covers the DEM's extent.
+    fn uv(&self, post: [u32; 2]) -> [f32; 2] {
+        let centre = Dem::pixel_centre(post);
+        match self.ortho.and_then(|ortho| ortho.georeference.as_ref()) {
+            Some(georeference) => georeference.uv(self.dem, post),
+            // An ortho-image without georeference covers the DEM's extent.
             None => [0, 1].map(|k| (centre[k] / f64::from(self.dem.size[k])) as f32),
         }
     }
@@ -386,17 +394,17 @@ impl Grid<'_> {
         self.height_shift.map_or(0.0, |shift| shift(lat, lon))
     }
 
-    fn summary(&self, heights: &Heights, outside_ortho: u64) -> TerrainSummary {
+    fn summary(&self, heights: &HeightStatistics, outside_ortho: u64) -> TerrainSummary {
         let dem = self.dem;
-        // No projection has its extremes anywhere but on the border.
+        // The extremes of latitude and longitude lie on the border.
         let [[south, north], [west, east]] = dem
             .border()
-            .filter_map(|at| dem.geodetic_rad(at))
-            .fold([EMPTY_RANGE; 2], |ranges, place| [0, 1].map(|k: usize| widened(ranges[k], place[k])));
-        let middle = dem.model_from_pixel.apply(dem.size.map(|n| 0.5 * f64::from(n)));
+            .filter_map(|post| dem.geodetic_rad(post))
+            .fold([EMPTY_RANGE; 2], |ranges, point| [0, 1].map(|k: usize| widened(ranges[k], point[k])));
+        let centre = dem.model_from_pixel.apply(dem.size.map(|n| 0.5 * f64::from(n)));
         let centre_rad =
-            dem.crs.geodetic_from_model(middle).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
-        // 190 degrees east are 170 degrees west.
+            dem.crs.geodetic_from_model(centre).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
+        // 190 degrees east is 170 degrees west.
         let turns = std::f64::consts::TAU * (centre_rad[1] / std::f64::consts::TAU).round();
         let [west, east, centre_lon] = [west, east, centre_rad[1]].map(|lon| lon - turns);
         let centre_rad = [centre_rad[0], centre_lon];
@@ -411,8 +419,8 @@ impl Grid<'_> {
             height_range_m: heights.range_m,
             void_heights: heights.voids,
             outside_ortho,
-            picture_uv: self.ortho.map_or([[0.0; 2], [1.0; 2]], Ortho::own_uv),
-            picture_times: 1,
+            ortho_uv: self.ortho.map_or([[0.0; 2], [1.0; 2]], Ortho::image_uv),
+            texture_scale: 1,
         }
     }
 }

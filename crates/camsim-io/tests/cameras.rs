@@ -1,24 +1,24 @@
-//! Importers of calibrations: the right value of every format, and hostile files of every kind.
+//! Importers of calibrations: values of every format, and malformed files.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
-#[path = "cameras/conventions.rs"]
-mod conventions;
 #[path = "cameras/formats.rs"]
 mod formats;
-#[path = "cameras/models.rs"]
-mod models;
-#[path = "cameras/regions.rs"]
-mod regions;
-#[path = "cameras/several.rs"]
-mod several;
-#[path = "cameras/times.rs"]
-mod times;
+#[path = "cameras/opencv.rs"]
+mod opencv;
+#[path = "cameras/ros.rs"]
+mod ros;
+#[path = "cameras/selection.rs"]
+mod selection;
+#[path = "cameras/syntax.rs"]
+mod syntax;
+#[path = "cameras/timing.rs"]
+mod timing;
 
 use camsim_core::scenario::{CameraSpec, LensModel};
 use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_named};
 
-/// Imports a text as a file of that name.
+/// Imports a text as a file of a name.
 fn import(
     name: &str,
     text: &str,
@@ -31,17 +31,18 @@ fn import(
     import_camera_named(&path, format, camera).map_err(|error| error.to_string())
 }
 
+/// Imports with the detected format.
 fn read(name: &str, text: &str) -> ImportedCamera {
     import(name, text, None, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What is wanted of an import.
-enum Want {
-    /// fx fy cx cy.
+/// An expected property of an imported camera.
+enum Expected {
+    /// fx fy cx cy, pixels.
     Intrinsics([f64; 4]),
     Size([u32; 2]),
     Lens(LensModel, &'static [f64]),
-    /// ms.
+    /// Readout time, milliseconds.
     Readout(f64),
     Fps(f64),
     /// A note with this text.
@@ -59,42 +60,43 @@ fn intrinsics(spec: &CameraSpec) -> [f64; 4] {
     [fx, fy, cx, cy]
 }
 
-fn check(what: &str, imported: &ImportedCamera, wants: &[Want]) {
+/// Asserts all expectations.
+fn check(name: &str, imported: &ImportedCamera, expectations: &[Expected]) {
     let spec = &imported.spec;
-    for want in wants {
-        match want {
-            Want::Intrinsics(wanted) => {
-                let found = intrinsics(spec);
+    for expectation in expectations {
+        match expectation {
+            Expected::Intrinsics(expected) => {
+                let actual = intrinsics(spec);
                 assert!(
-                    found.iter().zip(wanted).all(|(a, b)| near(*a, *b)),
-                    "{what}: {found:?} instead of {wanted:?}"
+                    actual.iter().zip(expected).all(|(a, b)| near(*a, *b)),
+                    "{name}: {actual:?} instead of {expected:?}"
                 );
             }
-            Want::Size(wanted) => assert_eq!(spec.size_px, *wanted, "{what}"),
-            Want::Lens(model, coefficients) => {
+            Expected::Size(expected) => assert_eq!(spec.size_px, *expected, "{name}"),
+            Expected::Lens(model, coefficients) => {
                 assert_eq!(
                     (spec.lens.model, spec.lens.coefficients.as_slice()),
                     (*model, *coefficients),
-                    "{what}"
+                    "{name}"
                 );
             }
-            Want::Readout(ms) => assert!(
+            Expected::Readout(ms) => assert!(
                 near(spec.shutter.readout_ms, *ms),
-                "{what}: {} ms instead of {ms}",
+                "{name}: {} ms instead of {ms}",
                 spec.shutter.readout_ms
             ),
-            Want::Fps(fps) => assert!(near(spec.fps, *fps), "{what}: {} fps", spec.fps),
-            Want::Note(text) => {
+            Expected::Fps(fps) => assert!(near(spec.fps, *fps), "{name}: {} fps", spec.fps),
+            Expected::Note(text) => {
                 assert!(
                     imported.notes.iter().any(|note| note.contains(text)),
-                    "{what}: `{text}` is not in {:?}",
+                    "{name}: `{text}` is not in {:?}",
                     imported.notes
                 )
             }
-            Want::Without(text) => {
+            Expected::Without(text) => {
                 assert!(
                     imported.notes.iter().all(|note| !note.contains(text)),
-                    "{what}: `{text}` is in {:?}",
+                    "{name}: `{text}` is in {:?}",
                     imported.notes
                 )
             }
@@ -102,10 +104,10 @@ fn check(what: &str, imported: &ImportedCamera, wants: &[Want]) {
     }
 }
 
-/// A text that must be refused with these words.
-fn refused(what: &str, name: &str, text: &str, words: &[&str]) {
+/// Asserts that a text is refused with a message that contains all `words`.
+fn refused(case: &str, name: &str, text: &str, words: &[&str]) {
     match import(name, text, None, None) {
-        Ok(imported) => panic!("{what}: read as {imported:?}"),
-        Err(error) => assert!(words.iter().all(|word| error.contains(word)), "{what}: {error}"),
+        Ok(imported) => panic!("{case}: read as {imported:?}"),
+        Err(error) => assert!(words.iter().all(|word| error.contains(word)), "{case}: {error}"),
     }
 }

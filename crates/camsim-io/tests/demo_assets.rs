@@ -1,7 +1,6 @@
-//! The files in `assets/` can be read with the crates that camsim uses, and belong together: the flight is
-//! over its terrain.
+//! The files in `assets/` are readable and consistent: the flight is over its terrain.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{fs, path::PathBuf};
 
@@ -26,14 +25,14 @@ fn scenario(name: &str) -> Scenario {
 }
 
 #[test]
-fn scenarios_name_files_that_exist() {
+fn files_of_the_scenarios_exist() {
     for name in ["demo.toml", "pattern.toml"] {
         let scenario = scenario(name);
         let mut files = vec![scenario.flight.log];
         files.extend(scenario.camera.photometric.vignette);
         files.extend(scenario.scene.pattern.map(|pattern| pattern.image));
         if let Some(terrain) = scenario.scene.terrain {
-            // Equal references need no geoid: the demo must not depend on one.
+            // With equal height references the demo needs no geoid.
             assert_eq!(
                 (scenario.flight.height, terrain.height),
                 (HeightReference::Msl, HeightReference::Msl)
@@ -50,7 +49,7 @@ fn scenarios_name_files_that_exist() {
 }
 
 #[test]
-fn the_flight_stays_over_its_terrain() {
+fn flight_stays_over_its_terrain() {
     let mut dem =
         Decoder::new(fs::File::open(asset("demo_dem.tif")).unwrap()).unwrap().with_limits(Limits::default());
     let (cols, rows) = dem.dimensions().unwrap();
@@ -72,7 +71,7 @@ fn the_flight_stays_over_its_terrain() {
         let [t_s, lat_deg, lon_deg, height_m, ..] = row[..] else { panic!("seven columns: {line}") };
         let row = ((tie[4] - lat_deg) / scale[1]).floor();
         let col = ((lon_deg - tie[3]) / scale[0]).floor();
-        // 500 m from the border: the picture is not of the terrain's edge.
+        // 500 m from the border, so that the terrain's edge is not in the picture.
         assert!(
             (50.0..f64::from(rows) - 50.0).contains(&row) && (62.0..f64::from(cols) - 62.0).contains(&col),
             "{line}"

@@ -1,7 +1,7 @@
-//! Calibrations as users' files look when they go wrong (`tests/data/field/calib`): the right value, or a
-//! refusal that helps.
+//! Problematic calibration files of users (`tests/data/field/calib`): each is imported correctly or refused
+//! with a remedy.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::PathBuf;
 
@@ -21,16 +21,16 @@ fn refused(name: &str) -> String {
     import_camera_as(&field(name), None).unwrap_err().to_string()
 }
 
-fn near(a: [f64; 2], b: [f64; 2]) {
+fn assert_near(a: [f64; 2], b: [f64; 2]) {
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{a:?} instead of {b:?}");
 }
 
-fn says(imported: &ImportedCamera, text: &str) -> bool {
+fn has_note(imported: &ImportedCamera, text: &str) -> bool {
     imported.notes.iter().any(|note| note.contains(text))
 }
 
 #[test]
-fn a_rolling_shutter_of_vins_is_33_ms() {
+fn vins_rolling_shutter_is_33_ms() {
     let imported = read("vins_rs.yaml");
     let spec = &imported.spec;
     assert!((spec.shutter.readout_ms - 33.0).abs() < 1e-12);
@@ -40,12 +40,12 @@ fn a_rolling_shutter_of_vins_is_33_ms() {
         ([640, 480], [610.0, 609.0], Some([319.0, 235.5]))
     );
     assert_eq!(spec.lens.coefficients, [9.2e-2, -1.8e-1, -6.5e-4, -3.5e-4]);
-    assert!(says(&imported, "left out: td = 0.007"), "{:?}", imported.notes);
-    assert!(!says(&imported, "no shutter times"), "{:?}", imported.notes);
+    assert!(has_note(&imported, "not applied: td = 0.007"), "{:?}", imported.notes);
+    assert!(!has_note(&imported, "no shutter times"), "{:?}", imported.notes);
 }
 
 #[test]
-fn a_mirror_parameter_is_no_brown_conrady_lens() {
+fn mirror_parameter_is_refused() {
     let error = refused("omni_sample.yml");
     assert!(error.contains("xi: is 1.4") && error.contains("MEI (omnidirectional)"), "{error}");
     let forced =
@@ -54,7 +54,7 @@ fn a_mirror_parameter_is_no_brown_conrady_lens() {
 }
 
 #[test]
-fn four_coefficients_without_a_model_are_asked_about() {
+fn four_coefficients_without_model_need_a_format() {
     let error = refused("fisheye_K_D.yml");
     assert!(error.contains("`--format opencv`") && error.contains("`--format opencv-fisheye`"), "{error}");
     let coefficients = [-0.0077, 0.0419, -0.0391, 0.0067];
@@ -72,25 +72,25 @@ fn four_coefficients_without_a_model_are_asked_about() {
 }
 
 #[test]
-fn camera_info_messages_with_a_region_of_interest() {
+fn camera_info_message_with_region_is_imported() {
     let imported = read("baxter2.yaml");
     let spec = &imported.spec;
     assert_eq!((imported.format, spec.size_px), (CameraFormat::RosCameraInfo, [640, 400]));
-    near(spec.focal_px, [403.911583563, 403.911583563]);
-    near(spec.principal_point_px.unwrap(), [631.065444573 - 320.0, 375.688877091 - 200.0]);
+    assert_near(spec.focal_px, [403.911583563, 403.911583563]);
+    assert_near(spec.principal_point_px.unwrap(), [631.065444573 - 320.0, 375.688877091 - 200.0]);
     assert_eq!(
         spec.lens.coefficients,
         [0.0153369206277, -0.0432553402055, -0.00118657118488, -0.00147661359656, 0.00896220693898]
     );
     assert!(
-        says(&imported, "the picture is the region [640.0, 400.0] px from [320.0, 200.0]"),
+        has_note(&imported, "the picture is the region [640.0, 400.0] px from [320.0, 200.0]"),
         "{:?}",
         imported.notes
     );
 }
 
 #[test]
-fn camera_info_messages_of_ros_2() {
+fn ros_2_camera_info_message_is_imported() {
     let imported = read("ros2b.yaml");
     let spec = &imported.spec;
     assert_eq!((imported.format, spec.size_px), (CameraFormat::RosCameraInfo, [640, 480]));
@@ -110,16 +110,16 @@ fn binning_divides_matrix_and_size() {
     .unwrap();
     let imported = import_camera_as(&path, None).unwrap();
     assert_eq!(imported.spec.size_px, [160, 100]);
-    near(imported.spec.focal_px, [403.911583563 / 4.0, 403.911583563 / 4.0]);
-    near(
+    assert_near(imported.spec.focal_px, [403.911583563 / 4.0, 403.911583563 / 4.0]);
+    assert_near(
         imported.spec.principal_point_px.unwrap(),
         [(631.065444573 - 320.0) / 4.0, (375.688877091 - 200.0) / 4.0],
     );
-    assert!(says(&imported, "binned by [4.0, 4.0]"), "{:?}", imported.notes);
+    assert!(has_note(&imported, "binned by [4.0, 4.0]"), "{:?}", imported.notes);
 }
 
 #[test]
-fn ros_ini() {
+fn ros_ini_is_imported() {
     let imported = read("ic33.ini");
     let spec = &imported.spec;
     assert_eq!((imported.format, spec.size_px), (CameraFormat::RosIni, [640, 480]));
@@ -132,18 +132,18 @@ fn ros_ini() {
         spec.lens.coefficients,
         [0.189544, -0.018229, -0.000630, 0.000054, -0.000212, 0.543582, -0.027892]
     );
-    assert!(says(&imported, "projection_matrix, which differs"), "{:?}", imported.notes);
+    assert!(has_note(&imported, "projection_matrix, which differs"), "{:?}", imported.notes);
 }
 
 #[test]
-fn a_region_of_interest_in_a_file() {
+fn camera_info_file_with_region_is_imported() {
     let spec = read("roi_yaml.yaml").spec;
     assert_eq!((spec.size_px, spec.focal_px), ([640, 400], [403.9, 403.9]));
-    near(spec.principal_point_px.unwrap(), [631.06 - 320.0, 375.7 - 200.0]);
+    assert_near(spec.principal_point_px.unwrap(), [631.06 - 320.0, 375.7 - 200.0]);
 }
 
 #[test]
-fn a_symmetrical_gyroflow_profile_has_its_principal_point_in_the_middle() {
+fn symmetrical_gyroflow_profile_has_a_central_principal_point() {
     let imported = read("gyro_min.json");
     let spec = &imported.spec;
     assert_eq!(
@@ -152,11 +152,11 @@ fn a_symmetrical_gyroflow_profile_has_its_principal_point_in_the_middle() {
     );
     assert_eq!((spec.shutter.readout_ms, spec.shutter.readout), (15.2, Readout::TopToBottom));
     assert_eq!((spec.lens.model, spec.lens.coefficients.as_slice()), (LensModel::KannalaBrandt, &[0.1][..]));
-    assert!(says(&imported, "[565.6, 1206.0]"), "{:?}", imported.notes);
+    assert!(has_note(&imported, "[565.6, 1206.0]"), "{:?}", imported.notes);
 }
 
 #[test]
-fn three_coefficients_could_be_two_things() {
+fn three_coefficients_are_refused_as_ambiguous() {
     let path = field("three_coefficients.toml");
     for error in [
         read_camera_toml(&path).unwrap_err().to_string(),
@@ -168,19 +168,19 @@ fn three_coefficients_could_be_two_things() {
 }
 
 #[test]
-fn cameras_of_a_metashape_project() {
+fn metashape_project_is_imported() {
     let imported = read("metashape_cams.xml");
     let spec = &imported.spec;
     assert_eq!(
         (imported.format, spec.size_px, spec.focal_px),
         (CameraFormat::Agisoft, [5472, 3648], [3666.2, 3666.2])
     );
-    near(spec.principal_point_px.unwrap(), [2736.0 - 11.7 - 0.5, 1824.0 + 18.2 - 0.5]);
+    assert_near(spec.principal_point_px.unwrap(), [2736.0 - 11.7 - 0.5, 1824.0 + 18.2 - 0.5]);
     assert_eq!(spec.lens.coefficients, [0.0093, -0.03, 0.0012, 0.0004, 0.029]);
 }
 
 #[test]
-fn a_matrix_as_a_list_of_rows() {
+fn matrix_as_list_of_rows_is_imported() {
     let spec = read("py_nested.yaml").spec;
     assert_eq!(
         (spec.size_px, spec.focal_px, spec.principal_point_px),
@@ -190,7 +190,7 @@ fn a_matrix_as_a_list_of_rows() {
 }
 
 #[test]
-fn no_word_on_extrinsics_that_are_not_there() {
+fn absent_extrinsics_are_not_reported() {
     let imported = read("kal_none.yaml");
     let spec = &imported.spec;
     assert_eq!(
@@ -200,7 +200,7 @@ fn no_word_on_extrinsics_that_are_not_there() {
     assert_eq!(spec.lens.model, LensModel::Pinhole);
     assert_eq!(
         imported.notes,
-        ["no frame rate and no shutter times are in the file: fps is 30, the shutter global"]
+        ["the file has no frame rate and no shutter times: fps is 30, the shutter global"]
     );
 }
 

@@ -1,7 +1,6 @@
-//! Models and RGB-D frames as users have them: each gives the value that it states, or is refused with what
-//! helps.
+//! Models and RGB-D frames as users have them: each is read as it states, or refused with a remedy.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::{Path, PathBuf};
 
@@ -41,7 +40,7 @@ fn meshes(name: &str) -> (Vec<Mesh>, Vec<String>) {
 }
 
 #[test]
-fn depth_of_carla_is_asked_for_and_read() {
+fn carla_depth_needs_its_encoding_and_is_decoded() {
     let error = read_frame(&field("apply/carla_auto.toml")).unwrap_err().to_string();
     for part in [
         "carla.png: is an 8-bit RGB picture",
@@ -52,15 +51,15 @@ fn depth_of_carla_is_asked_for_and_read() {
     }
     let text = std::fs::read_to_string(field("apply/carla_auto.toml")).unwrap();
     let folder = field("apply");
-    let path = tempfile::tempdir().unwrap();
-    let path = path.path().join("FRAME.toml");
-    let named = text.replace("\"c.png\"", &format!("{:?}", folder.join("c.png"))).replace(
+    let temporary = tempfile::tempdir().unwrap();
+    let path = temporary.path().join("FRAME.toml");
+    let with_encoding = text.replace("\"c.png\"", &format!("{:?}", folder.join("c.png"))).replace(
         "depth = \"carla.png\"",
         &format!("depth = {:?}\ndepth_encoding = \"carla\"", folder.join("carla.png")),
     );
-    std::fs::write(&path, named).unwrap();
+    std::fs::write(&path, with_encoding).unwrap();
     let file = read_frame(&path).unwrap();
-    // 167 772 of 16 777 215 parts of a kilometre, everywhere.
+    // 167 772 / 16 777 215 of a kilometre everywhere.
     let expected = 1000.0 * 167_772.0 / 16_777_215.0;
     assert!(
         file.frame.inverse_depth.iter().all(|w| (1.0 / f64::from(*w) - expected).abs() < 1e-5),
@@ -71,9 +70,8 @@ fn depth_of_carla_is_asked_for_and_read() {
 }
 
 #[test]
-fn what_is_said_to_be_packed_otherwise_is_read_so() {
-    // It is CARLA's, and the file says that it is the other: its formula is in the docs, and the far picture
-    // is what was asked for.
+fn stated_depth_encoding_is_used() {
+    // The picture has CARLA's encoding, but FRAME.toml states packed24: the stated one is used.
     let file = read_frame(&field("apply/carla_packed24.toml")).unwrap();
     assert!(
         (1.0 / f64::from(file.frame.inverse_depth[0]) - (92.0 * 255.0 + 143.0 + 2.0 / 255.0)).abs() < 0.01
@@ -81,32 +79,32 @@ fn what_is_said_to_be_packed_otherwise_is_read_so() {
 }
 
 #[test]
-fn the_scale_of_a_pfm_is_applied_and_told() {
+fn pfm_scale_is_applied_with_a_note() {
     let file = read_frame(&field("apply/pfm_scale01.toml")).unwrap();
-    // 100 stored, times 0.1.
+    // The stored depth is 100, the scale 0.1.
     assert!(file.frame.inverse_depth.iter().all(|w| (f64::from(*w) - 0.1).abs() < 1e-7));
     assert!(
         file.notes.len() == 1 && file.notes[0].contains("d01.pfm: the scale -0.1 of its header is applied"),
         "{:?}",
         file.notes
     );
-    // Its order of rows is asked for.
+    // The order of rows must be given.
     let error = frame_error("color = \"c.png\"\nfocal_px = [60, 60]\ndepth = \"d01.pfm\"\n");
     assert!(error.contains("depth_rows: is missing"), "{error}");
 }
 
 #[test]
-fn nodes_that_are_not_visible_show_nothing() {
+fn invisible_nodes_show_nothing() {
     let (meshes, warnings) = meshes("invisible.toml");
     assert!(meshes.is_empty());
     assert!(
-        warnings.iter().any(|warning| warning.contains("invisible.gltf: has no triangles")),
+        warnings.iter().any(|warning| warning.contains("invisible.gltf: has no visible triangles")),
         "{warnings:?}"
     );
 }
 
 #[test]
-fn accessors_without_data_are_zeros() {
+fn accessors_without_data_are_zero() {
     let (meshes, warnings) = meshes("uv_nobufferview.toml");
     assert_eq!(meshes.len(), 1);
     let shape = &meshes[0].shape;
@@ -115,18 +113,19 @@ fn accessors_without_data_are_zeros() {
         "{:?}",
         shape.vertices
     );
-    // The square of 10 m is where it is, with heading 180 its x east and its -z north.
+    // The square is 10 m wide; with heading 180 its x points east and its -z north.
     let corner = meshes[0].position_ned_m(0);
     assert!(corner.distance(DVec3::new(5.0, -5.0, 0.0)) < 1e-9, "{corner}");
     assert!(
-        warnings.iter().any(|warning| warning.contains("accessors.1: has no bufferView: its numbers are 0")),
+        warnings.iter().any(|warning| warning.contains("accessors.1: has no bufferView: its values are 0")),
         "{warnings:?}"
     );
 }
 
 #[test]
-fn compressed_buffers_are_named_by_their_extension() {
+fn compressed_buffers_are_refused_by_extension_name() {
     let error = load("meshopt_fallback_nouri.toml").unwrap_err();
-    let wanted = "meshopt_fallback_nouri.gltf: needs the extension EXT_meshopt_compression, which is not supported: write the file again without compression";
-    assert!(error.contains(wanted), "{error}");
+    let expected = "meshopt_fallback_nouri.gltf: needs the extension EXT_meshopt_compression, which is not \
+                    supported: export the file without compression";
+    assert!(error.contains(expected), "{error}");
 }

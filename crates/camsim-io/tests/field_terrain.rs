@@ -1,8 +1,8 @@
-//! Terrain from the field: heights and colours at known places. In all of tests/data/field the true height at
-//! the centre of pixel (column, row) is 400 + 0.7 column + 0.3 row metres, and the true colour (40 + 2
-//! column, 30 + 2 row, 100).
+//! Terrain files as users have them, compared with known values. In tests/data/field the height at the centre
+//! of pixel (column, row) is 400 + 0.7 column + 0.3 row metres, and the colour (40 + 2 column, 30 + 2 row,
+//! 100).
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::{Path, PathBuf};
 
@@ -25,52 +25,52 @@ fn with_ortho(ortho: &str) -> TerrainSpec {
     TerrainSpec { ortho: Some(field(ortho)), ..spec("ortho/dem.tif") }
 }
 
-/// A frame in which down is just the height turned over, near 47 N, 9 E.
+/// Reads with a local frame near 47 N, 9 E whose down is the negative height.
 fn read(spec: &TerrainSpec) -> Result<LoadedTerrain, TerrainFileError> {
     let ned =
         |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.82) * 6.37e6, (lon - 0.157) * 6.37e6, -height);
     read_terrain(spec, &ned, None)
 }
 
-/// Metres above the datum at the centre of a pixel; `None` for a void.
+/// Height at the centre of a pixel, metres; `None` for a void.
 fn height_m(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> Option<f64> {
     let terrain = &loaded.terrain;
-    let chunk = |at: u32, cells: u32| at.min(cells - 1) / 64;
+    let chunk = |post: u32, cells: u32| post.min(cells - 1) / 64;
     let [x, y] = [chunk(column, terrain.cells[0]), chunk(row, terrain.cells[1])];
     let down = terrain.position_ned_m(y * terrain.chunk_grid[0] + x, column - 64 * x, row - 64 * y).z;
     (!down.is_nan()).then_some(-down)
 }
 
-/// Every height is the true one, but for those of a rectangle of pixels, which are missing.
+/// Asserts that every height is the known one, or void.
 fn assert_heights(loaded: &LoadedTerrain, is_void: impl Fn(u32, u32) -> bool) {
     assert_eq!(loaded.summary.size, [96, 96]);
     for (column, row) in (0..96).flat_map(|row| (0..96).map(move |column| (column, row))) {
         let expected =
             (!is_void(column, row)).then(|| 400.0 + 0.7 * f64::from(column) + 0.3 * f64::from(row));
-        let found = height_m(loaded, [column, row]);
-        let near = match (found, expected) {
-            (Some(found), Some(expected)) => (found - expected).abs() < 1e-3,
-            (found, expected) => found == expected,
+        let height = height_m(loaded, [column, row]);
+        let near = match (height, expected) {
+            (Some(height), Some(expected)) => (height - expected).abs() < 1e-3,
+            (height, expected) => height == expected,
         };
-        assert!(near, "({column}, {row}): {found:?} {expected:?}");
+        assert!(near, "({column}, {row}): {height:?} {expected:?}");
     }
 }
 
 fn color(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> [u8; 3] {
     let texture = &loaded.terrain.texture;
-    let at = 4 * (row * texture.size_px[0] + column) as usize;
-    [0, 1, 2].map(|k| texture.rgba8[at + k])
+    let start = 4 * (row * texture.size_px[0] + column) as usize;
+    [0, 1, 2].map(|k| texture.rgba8[start + k])
 }
 
-/// Every colour is the true one, within `most` of 255.
-fn assert_colors(loaded: &LoadedTerrain, columns: std::ops::Range<u32>, most: u8) {
+/// Asserts that every colour is the known one within a tolerance.
+fn assert_colors(loaded: &LoadedTerrain, columns: std::ops::Range<u32>, tolerance: u8) {
     assert_eq!(loaded.terrain.texture.size_px, [96, 96]);
     for (column, row) in (0..96).flat_map(|row| columns.clone().map(move |column| (column, row))) {
-        let (found, expected) =
+        let (color, expected) =
             (color(loaded, [column, row]), [40 + 2 * column as u8, 30 + 2 * row as u8, 100]);
         assert!(
-            (0..3).all(|k| found[k].abs_diff(expected[k]) <= most),
-            "({column}, {row}): {found:?} {expected:?}"
+            (0..3).all(|k| color[k].abs_diff(expected[k]) <= tolerance),
+            "({column}, {row}): {color:?} {expected:?}"
         );
     }
 }
@@ -89,16 +89,16 @@ fn scale_offset_and_unit_of_heights_are_applied() {
 }
 
 #[test]
-fn a_vertical_system_gives_the_unit_and_warns_where_it_contradicts() {
-    for (name, says) in
+fn vertical_system_gives_the_unit_and_is_reported_if_contradicting() {
+    for (name, expected) in
         [("comp_6360", "EPSG:6360, NAVD88 height (ftUS)"), ("egm96", "EPSG:5773, EGM96 height")]
     {
         let path = format!("dem-scale-unit/d_{name}.tif");
         let loaded = read(&spec(&path)).unwrap();
         assert_heights(&loaded, never);
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
-        assert!(note.contains(says) && note.contains("scene.terrain.height = \"msl\""), "{note}");
-        // Which is what it asks for.
+        assert!(note.contains(expected) && note.contains("scene.terrain.height = \"msl\""), "{note}");
+        // With the suggested key there is no note.
         let loaded = read(&TerrainSpec { height: HeightReference::Msl, ..spec(&path) }).unwrap();
         assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
         assert_heights(&loaded, never);
@@ -106,7 +106,7 @@ fn a_vertical_system_gives_the_unit_and_warns_where_it_contradicts() {
 }
 
 #[test]
-fn the_key_for_the_unit_may_not_contradict_the_file() {
+fn height_unit_key_must_not_contradict_the_file() {
     let unit = |name: &str, unit: HeightUnit| {
         read(&TerrainSpec { height_unit: Some(unit), ..spec(&format!("dem-scale-unit/d_{name}.tif")) })
     };
@@ -116,13 +116,13 @@ fn the_key_for_the_unit_may_not_contradict_the_file() {
         error.contains("unit `ft` of 0.3048 m") && error.contains("scene.terrain.height_unit"),
         "{error}"
     );
-    // Where the file says nothing, it says it.
+    // The key applies to files without a unit.
     let loaded = read(&TerrainSpec { height_unit: Some(HeightUnit::Ft), ..spec("ortho/dem.tif") }).unwrap();
     assert!((height_m(&loaded, [50, 50]).unwrap() - 450.0 * 0.3048).abs() < 1e-3);
 }
 
 #[test]
-fn blocks_that_are_left_out_are_void() {
+fn sparse_blocks_are_void() {
     for name in ["d_sp_lzw", "d_sp_none", "d_sparse"] {
         let loaded = read(&spec(&format!("dem-sparse/{name}.tif"))).unwrap();
         assert_heights(&loaded, |column, row| column < 32 && row < 32);
@@ -131,7 +131,7 @@ fn blocks_that_are_left_out_are_void() {
 }
 
 #[test]
-fn a_mask_makes_voids() {
+fn masked_heights_are_void() {
     let loaded = read(&spec("dem-mask/d_internalmask.tif")).unwrap();
     let masked = |n: u32| (40..56).contains(&n);
     assert_heights(&loaded, |column, row| masked(column) && masked(row));
@@ -139,22 +139,21 @@ fn a_mask_makes_voids() {
 }
 
 #[test]
-fn a_masked_picture_shows_nothing_there() {
+fn masked_ortho_pixels_are_grey() {
     let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
     assert_colors(&loaded, 48..96, 0);
-    // Not black: what is seen of ground without a picture.
-    assert_eq!([[0, 0], [47, 95], [20, 50]].map(|at| color(&loaded, at)), [[118; 3]; 3]);
+    assert_eq!([[0, 0], [47, 95], [20, 50]].map(|pixel| color(&loaded, pixel)), [[118; 3]; 3]);
 }
 
 #[test]
-fn dark_pictures_of_more_than_8_bits_are_named_with_their_scale() {
+fn dark_16_bit_pictures_are_reported_with_a_white_level() {
     let loaded = read(&with_ortho("ortho/o_u16_11bit.tif")).unwrap();
     let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
     assert!(
-        note.contains("end at 1840 of 65535") && note.contains("scene.terrain.ortho_white = 2047"),
+        note.contains("reach only 1840 of 65535") && note.contains("scene.terrain.ortho_white = 2047"),
         "{note}"
     );
-    // The files were made by times 8.
+    // The file stores colours times 8.
     let loaded =
         read(&TerrainSpec { ortho_white: Some(2040.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
     assert_colors(&loaded, 0..96, 0);
@@ -165,9 +164,9 @@ fn dark_pictures_of_more_than_8_bits_are_named_with_their_scale() {
 }
 
 #[test]
-fn what_agencies_ship_is_read() {
-    // Both are lossy: GDAL itself finds colours of up to 6 and 10 away from the true ones.
-    for (name, most, by_gdal) in [
+fn lossy_compressions_are_read() {
+    // With GDAL the errors are up to 6 and 10.
+    for (name, tolerance, gdal_colors) in [
         (
             "jpeg_ycbcr",
             6,
@@ -190,13 +189,13 @@ fn what_agencies_ship_is_read() {
         ),
     ] {
         let loaded = read(&with_ortho(&format!("ortho/o_{name}.tif"))).unwrap();
-        assert_colors(&loaded, 0..96, most);
-        // Decoders may round otherwise, and make smaller colour planes larger in their own ways.
-        for (at, expected) in by_gdal {
-            let found = color(&loaded, at);
+        assert_colors(&loaded, 0..96, tolerance);
+        // Decoders differ in rounding and in chroma upsampling.
+        for (pixel, expected) in gdal_colors {
+            let color = color(&loaded, pixel);
             assert!(
-                (0..3).all(|k| found[k].abs_diff(expected[k]) <= 2),
-                "{name} {at:?}: {found:?} {expected:?}"
+                (0..3).all(|k| color[k].abs_diff(expected[k]) <= 2),
+                "{name} {pixel:?}: {color:?} {expected:?}"
             );
         }
         assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
@@ -204,7 +203,7 @@ fn what_agencies_ship_is_read() {
 }
 
 #[test]
-fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
+fn longitudes_of_190_and_minus_170_degrees_are_equal() {
     let loaded = read_terrain(
         &TerrainSpec { ortho: Some(field("ortho/o_170.tif")), ..spec("ortho/d_190.tif") },
         &|lat, lon, height| {
@@ -216,10 +215,10 @@ fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
     assert_eq!(loaded.summary.outside_ortho, 0);
     assert_eq!(height_m(&loaded, [50, 50]), Some(100.0));
     assert_colors(&loaded, 0..96, 0);
-    // Each height is in the middle of its own pixel.
-    for (index, at) in [(0, [0, 0]), (64, [64, 0]), (65 * 64 + 10, [10, 64])] {
+    // Each post is in the centre of its pixel.
+    for (index, pixel) in [(0, [0, 0]), (64, [64, 0]), (65 * 64 + 10, [10, 64])] {
         let uv = loaded.terrain.vertices[index].uv;
-        assert!((0..2).all(|k| (uv[k] * 96.0 - at[k] as f32 - 0.5).abs() < 1e-3), "{uv:?} {at:?}");
+        assert!((0..2).all(|k| (uv[k] * 96.0 - pixel[k] as f32 - 0.5).abs() < 1e-3), "{uv:?} {pixel:?}");
     }
     assert!(
         (loaded.summary.centre_rad[1].to_degrees() - -169.9952).abs() < 1e-9,
@@ -228,8 +227,7 @@ fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
     );
 }
 
-/// The field's ground of 96 x 96 cells of 10 m, with a picture of 20 x 20 pixels of 10 m whose first one is
-/// that in column 30, row 40.
+/// An ortho-image of 20 x 20 pixels on the DEM of 96 x 96 posts; its first pixel is at column 30, row 40.
 fn small_picture(folder: &Path) -> PathBuf {
     let path = folder.join("small.png");
     image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([200, 10 * x as u8, 10 * y as u8]))
@@ -240,12 +238,12 @@ fn small_picture(folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn ground_beyond_its_picture_is_what_the_key_says() {
+fn ground_outside_of_the_ortho_image_follows_the_key() {
     let folder = tempfile::tempdir().unwrap();
     let spec = TerrainSpec { ortho: Some(small_picture(folder.path())), ..spec("ortho/dem.tif") };
     let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
     let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
-    for (beyond, says) in [
+    for (beyond, expected) in [
         (Beyond::Grey, "is grey"),
         (Beyond::Edge, "of the colours at its border"),
         (Beyond::Void, "left out"),
@@ -253,15 +251,14 @@ fn ground_beyond_its_picture_is_what_the_key_says() {
         let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
         assert!(
-            note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(says),
+            note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(expected),
             "{note}"
         );
         assert_eq!(loaded.summary.outside_ortho, 96 * 96 - 400);
         assert_heights(&loaded, |column, row| beyond == Beyond::Void && !inside(column, row));
-        // In the middle of the picture's pixel (3, 5), and far beyond it, at full size and in every smaller
-        // version.
+        // Colours in the centre of the image's pixel (3, 5), and outside of the image in every mip level.
         let texture = &loaded.terrain.texture;
-        let at = |column: u32, row: u32| {
+        let uv_of_post = |column: u32, row: u32| {
             let [x, y] = [column, row].map(|n| n / 64);
             let vertex = loaded.terrain.chunks[(2 * y + x) as usize].first_vertex
                 + (row - 64 * y) * (if x == 0 { 65 } else { 32 })
@@ -272,19 +269,23 @@ fn ground_beyond_its_picture_is_what_the_key_says() {
         let pixel = |uv: [f32; 2], size: [u32; 2]| {
             [0, 1].map(|k| (uv[k] * size[k] as f32).clamp(0.0, size[k] as f32 - 1.0) as u32)
         };
-        let [x, y] = pixel(at(33, 45), texture.size_px);
+        let [x, y] = pixel(uv_of_post(33, 45), texture.size_px);
         let stored =
             |bytes: &[u8], [x, y]: [u32; 2], width: u32| bytes[4 * (y * width + x) as usize..][..3].to_vec();
         assert_eq!(stored(&texture.rgba8, [x, y], texture.size_px[0]), [200, 30, 50]);
         if beyond == Beyond::Grey {
             assert_eq!(
-                stored(&texture.rgba8, pixel(at(0, 0), texture.size_px), texture.size_px[0]),
+                stored(&texture.rgba8, pixel(uv_of_post(0, 0), texture.size_px), texture.size_px[0]),
                 [118; 3]
             );
             for level in texture.mips_with_border(TexelForm::Stored, loaded.terrain.beyond) {
-                for place in [[0, 0], [95, 3], [5, 95], [95, 95]] {
+                for post in [[0, 0], [95, 3], [5, 95], [95, 95]] {
                     assert_eq!(
-                        stored(&level.texels, pixel(at(place[0], place[1]), level.size_px), level.size_px[0]),
+                        stored(
+                            &level.texels,
+                            pixel(uv_of_post(post[0], post[1]), level.size_px),
+                            level.size_px[0]
+                        ),
                         [118; 3],
                         "{:?}",
                         level.size_px
@@ -296,15 +297,15 @@ fn ground_beyond_its_picture_is_what_the_key_says() {
 }
 
 #[test]
-fn a_picture_that_holds_the_ground_stays_as_it_is() {
+fn ortho_image_that_contains_the_dem_gets_no_margin() {
     let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
     assert_eq!(
-        (loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.picture_uv),
+        (loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.ortho_uv),
         ([96, 96], None, [[0.0; 2], [1.0; 2]])
     );
-    // Half of it is masked.
+    // Half of the image is masked.
     assert!(
-        loaded.notes[0].contains("50.00 % of the terrain's area has no picture and is grey"),
+        loaded.notes[0].contains("50.00 % of the terrain's area has no ortho-image and is grey"),
         "{:?}",
         loaded.notes
     );
@@ -312,9 +313,8 @@ fn a_picture_that_holds_the_ground_stays_as_it_is() {
     assert_heights(&loaded, |column, _| column < 48);
 }
 
-/// What is read is documented, out of the tables that the readers have.
 #[test]
-fn the_documentation_is_what_the_tables_say() {
+fn documentation_page_matches_the_tables() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/TERRAIN.md");
     let page = camsim_io::terrain::documentation();
     if std::env::var_os("CAMSIM_BLESS").is_some() {
@@ -328,15 +328,15 @@ fn the_documentation_is_what_the_tables_say() {
     );
 }
 
-/// Heights and colours of real terrains at three places each, as GDAL reads them.
+/// Heights and colours of published terrains at three pixels each, compared with GDAL's.
 #[test]
-fn real_terrains_are_what_gdal_reads() {
+fn published_terrains_agree_with_gdal() {
     let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
-        eprintln!("CAMSIM_DATA is not set: real terrain is not read");
+        eprintln!("CAMSIM_DATA is not set: published terrains are not tested");
         return;
     };
-    type Places<T> = [([u32; 2], T); 3];
-    type Case<'a> = (&'a str, Places<f64>, Option<(&'a str, Places<[u8; 3]>)>);
+    type Samples<T> = [([u32; 2], T); 3];
+    type Case<'a> = (&'a str, Samples<f64>, Option<(&'a str, Samples<[u8; 3]>)>);
     let cases: [Case<'_>; 7] = [
         (
             "duebendorf/duebendorf.tif",
@@ -388,14 +388,16 @@ fn real_terrains_are_what_gdal_reads() {
         let spec = TerrainSpec { dem: data.join("terrain").join(dem), ortho, ..TerrainSpec::default() };
         let ned = |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.8) * 1e6, lon * 1e6, -height);
         let loaded = read_terrain(&spec, &ned, None).unwrap();
-        for (at, expected) in heights {
-            match height_m(&loaded, at) {
-                None => assert!(expected.is_nan(), "{dem} {at:?}"),
-                Some(found) => assert!((found - expected).abs() < 1e-3, "{dem} {at:?}: {found} {expected}"),
+        for (pixel, expected) in heights {
+            match height_m(&loaded, pixel) {
+                None => assert!(expected.is_nan(), "{dem} {pixel:?}"),
+                Some(height) => {
+                    assert!((height - expected).abs() < 1e-3, "{dem} {pixel:?}: {height} {expected}")
+                }
             }
         }
-        for (at, expected) in colors.iter().flat_map(|(_, places)| places) {
-            assert_eq!(color(&loaded, *at), *expected, "{dem} {at:?}");
+        for (pixel, expected) in colors.iter().flat_map(|(_, samples)| samples) {
+            assert_eq!(color(&loaded, *pixel), *expected, "{dem} {pixel:?}");
         }
         eprintln!("{dem}: {:?}", loaded.notes);
     }

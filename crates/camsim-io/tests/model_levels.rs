@@ -1,7 +1,6 @@
-//! Levels of detail of real models: how far their surfaces are from the full ones, by a search that knows
-//! nothing of how they were made.
+//! Levels of detail of published models: distance between their surfaces and the full ones, by brute force.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{
     collections::HashSet,
@@ -18,39 +17,40 @@ use glam::{DVec3, Vec3};
 
 type Triangle = [DVec3; 3];
 
-/// Of a level's triangles those that have an area.
+/// The triangles of a level that have an area.
 fn triangles(shape: &Shape, indices: &[u32]) -> Vec<Triangle> {
-    let at = |corner: u32| Vec3::from(shape.vertices[corner as usize].position_m).as_dvec3();
-    let all = indices.as_chunks::<3>().0.iter().map(|corners| corners.map(at));
+    let position_m = |corner: u32| Vec3::from(shape.vertices[corner as usize].position_m).as_dvec3();
+    let all = indices.as_chunks::<3>().0.iter().map(|corners| corners.map(position_m));
     all.filter(|[a, b, c]| (b - a).cross(c - a) != DVec3::ZERO).collect()
 }
 
-fn away_m(point: DVec3, [a, b, c]: Triangle) -> f64 {
+/// Distance of a point from a triangle, metres.
+fn distance_m(point: DVec3, [a, b, c]: Triangle) -> f64 {
     let normal = (b - a).cross(c - a).normalize();
     let sides = [(a, b), (b, c), (c, a)];
     if sides.iter().all(|&(from, to)| normal.cross(to - from).dot(point - from) >= 0.0) {
         return normal.dot(point - a).abs();
     }
-    let beside = |(from, to): (DVec3, DVec3)| {
-        let share = ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
-        point.distance(from.lerp(to, share))
+    let edge_distance_m = |(from, to): (DVec3, DVec3)| {
+        let t = ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+        point.distance(from.lerp(to, t))
     };
-    sides.map(beside).into_iter().fold(f64::INFINITY, f64::min)
+    sides.map(edge_distance_m).into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// How far the farthest of some random points of one surface is from another.
-fn farthest_m(from: &[Triangle], to: &[Triangle]) -> f64 {
-    let mut farthest_m = 0.0_f64;
+/// Largest distance of random points of one surface from another, metres.
+fn max_distance_m(from: &[Triangle], to: &[Triangle]) -> f64 {
+    let mut max_m = 0.0_f64;
     for (k, [a, b, c]) in (0..).zip(from) {
         for n in 0..3 {
             let [s, t, ..] = pcg4d([k, n, 5, 0]).map(|bits| f64::from(bits) / 2_f64.powi(32));
             let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
             let point = a + s * (b - a) + t * (c - a);
-            farthest_m = farthest_m
-                .max(to.iter().map(|triangle| away_m(point, *triangle)).fold(f64::INFINITY, f64::min));
+            max_m = max_m
+                .max(to.iter().map(|triangle| distance_m(point, *triangle)).fold(f64::INFINITY, f64::min));
         }
     }
-    farthest_m
+    max_m
 }
 
 fn models(folder: &Path) -> Vec<PathBuf> {
@@ -66,37 +66,38 @@ fn models(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn levels_of_real_models_are_within_their_errors() {
+fn levels_of_published_models_are_within_their_errors() {
     let Some(data) = std::env::var_os("CAMSIM_DATA") else {
         return eprintln!("skipped: CAMSIM_DATA is not set");
     };
-    let (mut levels_seen, mut of_houses) = (0, Vec::new());
+    let (mut level_count, mut house_parts) = (0, Vec::new());
     for path in models(&Path::new(&data).join("gltf")) {
         for normals in [false, true] {
-            // Some are malformed on purpose.
+            // Some files are malformed on purpose.
             let Ok(model) = read_gltf(&path, GltfOptions { normals, ..GltfOptions::default() }) else {
                 continue;
             };
-            let mut known = HashSet::new();
+            let mut visited = HashSet::new();
             for mesh in
-                model.place(DVec3::ZERO, 0.0, 1.0).filter(|mesh| known.insert(Arc::as_ptr(&mesh.shape)))
+                model.place(DVec3::ZERO, 0.0, 1.0).filter(|mesh| visited.insert(Arc::as_ptr(&mesh.shape)))
             {
                 let levels = ShapeLods::new(&mesh.shape);
                 let full = triangles(&mesh.shape, &levels.levels()[0].indices);
                 for level in &levels.levels()[1..] {
-                    let some = triangles(&mesh.shape, &level.indices);
-                    let found_m = farthest_m(&full, &some).max(farthest_m(&some, &full));
+                    let simplified = triangles(&mesh.shape, &level.indices);
+                    let distance_m =
+                        max_distance_m(&full, &simplified).max(max_distance_m(&simplified, &full));
                     assert!(
-                        found_m <= level.error_m * (1.0 + 1e-9) + 1e-9,
-                        "{path:?}: {found_m} of {}",
+                        distance_m <= level.error_m * (1.0 + 1e-9) + 1e-9,
+                        "{path:?}: {distance_m} of {}",
                         level.error_m
                     );
-                    levels_seen += 1;
+                    level_count += 1;
                 }
                 if path.ends_with("house-3-0.glb") && !normals {
                     let within_m =
-                        0.02 * (full.iter().flatten().fold(0.0_f64, |most, at| most.max(at.length())));
-                    of_houses.push([
+                        0.02 * (full.iter().flatten().fold(0.0_f64, |max, corner| max.max(corner.length())));
+                    house_parts.push([
                         full.len(),
                         levels.levels()[levels.coarsest_within(within_m)].indices.len() / 3,
                     ]);
@@ -104,11 +105,13 @@ fn levels_of_real_models_are_within_their_errors() {
             }
         }
     }
-    assert!(levels_seen > 100, "{levels_seen}");
-    // The first of its parts are frames around windows and walls, which were once not made simpler before a
-    // fifth of the house.
-    assert!(of_houses.iter().any(|&[full, left]| full > 300 && 3 * left < 2 * full), "{of_houses:?}");
+    assert!(level_count > 100, "{level_count}");
+    // The house's first parts are frames around windows and walls, which must be simplified too.
+    assert!(
+        house_parts.iter().any(|&[full, simplified]| full > 300 && 3 * simplified < 2 * full),
+        "{house_parts:?}"
+    );
     eprintln!(
-        "{levels_seen} levels; parts of a house, and what is left of them at 2 % of its size: {of_houses:?}"
+        "{level_count} levels; triangles of a house's parts, full and within 2 % of its size: {house_parts:?}"
     );
 }

@@ -1,18 +1,21 @@
-//! Models and boards of a scenario, where it puts them.
+//! Placement of a scenario's models and boards.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{path::Path, sync::Arc};
 
 use camsim_io::{load::load_sequence, scenario_file::parse_scenario};
 use glam::DVec3;
 
-/// A triangle of half a metre, its corners in a data URI.
-const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+/// A triangle of half a metre, with its positions in a data URI.
+const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }],
+    "nodes": [{ "mesh": 0 }],
   "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
-  "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [0.5, 0.5, 0] }],
+  "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0],
+      "max": [0.5, 0.5, 0] }],
   "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
-  "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAPwAAAAAAAAAAAAAAAAAAAD8AAAAA" }] }"#;
+  "buffers": [{ "byteLength": 36,
+      "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAPwAAAAAAAAAAAAAAAAAAAD8AAAAA" }] }"#;
 
 fn load(folder: &Path, log: &str, scene: &str) -> Result<Vec<camsim_core::scene::Mesh>, String> {
     std::fs::write(folder.join("model.gltf"), MODEL).unwrap();
@@ -24,26 +27,27 @@ fn load(folder: &Path, log: &str, scene: &str) -> Result<Vec<camsim_core::scene:
 }
 
 const LOCAL: &str = "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n0,0,0,-50,0,0,0\n1,1,0,-50,0,0,0\n";
-const ON_EARTH: &str =
+const GEODETIC: &str =
     "t_s,lat_deg,lon_deg,height_m,roll_deg,pitch_deg,yaw_deg\n0,47,8,500,0,0,0\n1,47.0001,8,500,0,0,0\n";
 
 #[test]
-fn models_stand_where_the_scenario_puts_them() {
+fn models_are_placed_at_their_positions_and_headings() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("places.csv"),
         "n_m,e_m,d_m,heading_deg,scale\n10,20,-1,90,2\n30,40,-2,0,1\n",
     )
     .unwrap();
-    let scene = "gltf = [{ file = \"model.gltf\", at = [1, 2, 3] }, { file = \"model.gltf\", placements = \"places.csv\", scale = 3 }]";
+    let scene = "gltf = [{ file = \"model.gltf\", at = [1, 2, 3] }, { file = \"model.gltf\", placements = \
+                 \"places.csv\", scale = 3 }]";
     let meshes = load(folder.path(), LOCAL, scene).unwrap();
     let origins: Vec<DVec3> = meshes.iter().map(|mesh| mesh.origin_ned_m).collect();
     assert_eq!(
         origins,
         [DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, -1.0), DVec3::new(30.0, 40.0, -2.0)]
     );
-    assert!(Arc::ptr_eq(&meshes[1].shape, &meshes[2].shape), "copies share their triangles");
-    // Half a metre to the left of a model that looks east is north of it, six times as large.
+    assert!(Arc::ptr_eq(&meshes[1].shape, &meshes[2].shape), "copies share their shape");
+    // A vertex half a metre to the left of a model that faces east lies north of it, at scale 2 x 3.
     assert!(
         meshes[1].position_ned_m(1).distance(DVec3::new(13.0, 20.0, -1.0)) < 1e-9,
         "{}",
@@ -52,12 +56,12 @@ fn models_stand_where_the_scenario_puts_them() {
 }
 
 #[test]
-fn places_on_earth_are_those_of_the_log() {
+fn geodetic_placements_use_the_frame_of_the_log() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = "gltf = [{ file = \"model.gltf\", geodetic = [47.001, 8.0, 450.0] }]\n\
-        [scene.board]\nkind = \"circles\"\ncolumns = 4\nrows = 3\nsize_m = 0.1\ngeodetic = [47.0, 8.0, 480.0]";
-    let meshes = load(folder.path(), ON_EARTH, scene).unwrap();
-    // The board first; 20 m below the log's first row, and the model 111 m north of it.
+    let scene = "gltf = [{ file = \"model.gltf\", geodetic = [47.001, 8.0, 450.0] }]\n[scene.board]\nkind = \
+                 \"circles\"\ncolumns = 4\nrows = 3\nsize_m = 0.1\ngeodetic = [47.0, 8.0, 480.0]";
+    let meshes = load(folder.path(), GEODETIC, scene).unwrap();
+    // The board comes first, 20 m below the log's first row; the model is 111 m north of it.
     assert!(meshes[0].origin_ned_m.distance(DVec3::new(0.0, 0.0, 20.0)) < 1e-6, "{}", meshes[0].origin_ned_m);
     let model = meshes[1].origin_ned_m;
     assert!(
@@ -69,9 +73,9 @@ fn places_on_earth_are_those_of_the_log() {
 }
 
 #[test]
-fn what_cannot_stand_is_named() {
+fn invalid_placements_and_files_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    for (scene, wanted) in [
+    for (scene, expected) in [
         ("gltf = [{ file = \"model.gltf\", on_ground = true }]", "scene.gltf.0.on_ground: needs a terrain"),
         ("gltf = [{ file = \"none.glb\" }]", "none.glb: cannot be read"),
         ("gltf = [{ file = \"log.csv\" }]", "log.csv: is no glTF"),
@@ -86,6 +90,6 @@ fn what_cannot_stand_is_named() {
         ("gltf = [{ file = \"model.gltf\", at = [1e300, 0, 0] }]", "check its place and scale"),
     ] {
         let error = load(folder.path(), LOCAL, scene).unwrap_err();
-        assert!(error.contains(wanted), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
 }

@@ -1,7 +1,6 @@
-//! Every published calibration file of the data folder, through its importer: value or reason. Runs where
-//! CAMSIM_DATA names the folder.
+//! Published calibration files in the folder CAMSIM_DATA: the imported values, or the reason of the refusal.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,14 +13,14 @@ const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/inputs/CAME
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("CAMSIM_DATA").map(PathBuf::from);
     if data.is_none() {
-        eprintln!("CAMSIM_DATA is not set: published calibrations are not read");
+        eprintln!("CAMSIM_DATA is not set: published calibrations are not tested");
     }
     data
 }
 
-/// Files below a folder that may be calibrations, in order.
+/// Possible calibration files below a folder, sorted.
 fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
+    let mut paths = Vec::new();
     let mut open = vec![folder.to_owned()];
     while let Some(path) = open.pop() {
         if path.is_dir() {
@@ -30,20 +29,21 @@ fn files(folder: &Path) -> Vec<PathBuf> {
             .extension()
             .is_some_and(|ending| ["yaml", "yml", "xml", "json"].iter().any(|known| ending == *known))
         {
-            found.push(path);
+            paths.push(path);
         }
     }
-    found.sort();
-    found
+    paths.sort();
+    paths
 }
 
-/// An error without the path at its beginning, which differs from machine to machine.
+/// An error without its path, which depends on the machine.
 fn reason(error: &CameraFileError, path: &Path) -> String {
     error.to_string().replace(&path.display().to_string(), "").trim_start_matches(": ").to_owned()
 }
 
+/// Writes a row of the table.
 fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Option<CameraSpec> {
-    let named = camera.map_or(String::new(), |name| format!(" `{name}`"));
+    let label = camera.map_or(String::new(), |name| format!(" `{name}`"));
     match import_camera_named(path, None, camera) {
         Ok(imported) => {
             let spec = &imported.spec;
@@ -61,7 +61,8 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
             let notes = imported.notes.join(". ").replace('|', "/");
             writeln!(
                 table,
-                "| {file}{named} | {} | {} x {} | {:.4}, {:.4} | {cx:.4}, {cy:.4} | {model} {} | {} | {readout} | {notes} |",
+                "| {file}{label} | {} | {} x {} | {:.4}, {:.4} | {cx:.4}, {cy:.4} | {model} {} | {} | \
+                 {readout} | {notes} |",
                 imported.format.name(),
                 spec.size_px[0],
                 spec.size_px[1],
@@ -76,7 +77,7 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
         Err(error) => {
             writeln!(
                 table,
-                "| {file}{named} | refused | | | | | | | {} |",
+                "| {file}{label} | refused | | | | | | | {} |",
                 reason(&error, path).replace('|', "/")
             )
             .unwrap();
@@ -86,12 +87,14 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
 }
 
 #[test]
-fn every_file_gives_a_value_or_a_reason() {
+fn published_files_give_the_documented_results() {
     let Some(data) = data() else { return };
     let mut table = String::from(
-        "# Published calibrations, file by file\n\nMade from the code by `CAMSIM_DATA=... CAMSIM_BLESS=1 cargo test -p camsim-io --test published_cameras`. What each key becomes is in \
-         [CAMERAS.md](CAMERAS.md).\n\n| file and camera | read as | size, px | focal, px | principal point, px | model, coefficients | fps | readout, ms | said, or why it is refused |\n\
-         |---|---|---|---|---|---|---|---|---|\n",
+        "# Published calibrations, file by file\n\nMade from the code by `CAMSIM_DATA=... CAMSIM_BLESS=1 \
+         cargo test -p camsim-io --test published_cameras`. The treatment of each key is in \
+         [CAMERAS.md](CAMERAS.md).\n\n| file and camera | read as | size, px | focal, px | principal point, \
+         px | model, coefficients | fps | readout, ms | notes, or reason of refusal \
+         |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     let (mut read, mut refused) = (0, 0);
     for folder in ["calib/cameras", "calib/opencv_chessboard", "calib/gyroflow", "camsim"] {
@@ -119,11 +122,12 @@ fn every_file_gives_a_value_or_a_reason() {
     let written = std::fs::read_to_string(TABLE).unwrap_or_default();
     assert!(
         written == table,
-        "docs/inputs/CAMERAS-MEASURED.md is not what the code gives: run with CAMSIM_BLESS=1 and look at the difference"
+        "docs/inputs/CAMERAS-MEASURED.md differs from the result: run with CAMSIM_BLESS=1 and review the \
+         difference"
     );
 }
 
-/// A row of the tables of real calibrations.
+/// A row of the tables of published calibrations.
 struct Row {
     name: String,
     size_px: [u32; 2],
@@ -140,9 +144,9 @@ fn rows(path: &Path, model: LensModel) -> Vec<Row> {
     let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     let source = header.iter().position(|name| *name == "source").unwrap();
     for line in text.lines().skip(1) {
-        // Names and sources have no commas; the note, which is last, may have.
+        // Only the note, the last cell, may have commas.
         let cells: Vec<&str> = line.splitn(header.len(), ',').collect();
-        let number = |at: usize| cells[at].parse::<f64>().unwrap();
+        let number = |column: usize| cells[column].parse::<f64>().unwrap();
         rows.push(Row {
             name: cells[0].to_owned(),
             size_px: [number(1) as u32, number(2) as u32],
@@ -160,21 +164,20 @@ fn near(a: f64, b: f64) -> bool {
 }
 
 fn agrees(spec: &CameraSpec, row: &Row) -> bool {
-    // The table has the number that stands in the file; half a pixel is between that program's corners and
-    // our centres.
+    // The table has the number in the file, which counts from the corner instead of the pixel centre.
     let shift = if row.name == "camsim_S3_fisheye_agisoft" { 0.5 } else { 0.0 };
     let [cx, cy] = spec.principal_point_px.unwrap();
     let [fx, fy] = spec.focal_px;
     let intrinsics = [fx, fy, cx + shift, cy + shift].iter().zip(row.intrinsics).all(|(a, b)| near(*a, b));
-    let coefficient = |at: usize| spec.lens.coefficients.get(at).copied().unwrap_or(0.0);
+    let coefficient = |index: usize| spec.lens.coefficients.get(index).copied().unwrap_or(0.0);
     let undistorted = spec.lens.model == LensModel::Pinhole && row.model == LensModel::BrownConrady;
     let count = spec.lens.coefficients.len().max(row.coefficients.len());
     let coefficients =
-        (0..count).all(|at| near(coefficient(at), row.coefficients.get(at).copied().unwrap_or(0.0)));
+        (0..count).all(|index| near(coefficient(index), row.coefficients.get(index).copied().unwrap_or(0.0)));
     spec.size_px == row.size_px && intrinsics && coefficients && (undistorted || spec.lens.model == row.model)
 }
 
-/// Every camera of a file that can be read.
+/// Cameras of a file that can be imported.
 fn cameras(path: &Path) -> Vec<CameraSpec> {
     let names = camera_names(path, None).unwrap_or_default();
     names
@@ -186,8 +189,8 @@ fn cameras(path: &Path) -> Vec<CameraSpec> {
         .collect()
 }
 
-/// Files that say too little alone: with what their refusal asks for they give what the tables have.
-fn mended(data: &Path, row: &Row, folder: &Path) -> Option<PathBuf> {
+/// For incomplete files, a copy with the values that the error asks for.
+fn completed_file(data: &Path, row: &Row, folder: &Path) -> Option<PathBuf> {
     let (width, height) = (row.size_px[0], row.size_px[1]);
     let source = data.join("calib").join(&row.source);
     let (name, text) = if row.source.contains("ORB_SLAM2") {
@@ -197,7 +200,7 @@ fn mended(data: &Path, row: &Row, folder: &Path) -> Option<PathBuf> {
         let text = std::fs::read_to_string(source).unwrap();
         ("intrinsics.yml", format!("{text}\nimage_width: {width}\nimage_height: {height}\n"))
     } else if row.source.contains("OpenSfM") {
-        let model = open_sfm(&row.name);
+        let model = opensfm_camera(&row.name);
         (
             "camera_models.json",
             format!(
@@ -213,12 +216,14 @@ fn mended(data: &Path, row: &Row, folder: &Path) -> Option<PathBuf> {
     Some(path)
 }
 
-/// The entries of OpenSfM's data base, copied out of it by hand, as its refusal says.
-fn open_sfm(name: &str) -> &'static str {
+/// Cameras copied from OpenSfM's camera database.
+fn opensfm_camera(name: &str) -> &'static str {
     match name {
         "opensfm_gopro_hero8_black" => {
-            r#""projection_type": "brown", "focal_x": 0.47720253548498875, "focal_y": 0.4776476227437118, "k1": -0.004417272934201867,
-               "k2": 0.0026456102958567146, "c_x": -0.0017664444590190724, "c_y": 0.006393052002726844, "p1": 0.0, "p2": 0.0, "k3": 0.0"#
+            r#""projection_type": "brown", "focal_x": 0.47720253548498875, "focal_y": 0.4776476227437118,
+                "k1": -0.004417272934201867,
+               "k2": 0.0026456102958567146, "c_x": -0.0017664444590190724, "c_y": 0.006393052002726844,
+                   "p1": 0.0, "p2": 0.0, "k3": 0.0"#
         }
         "opensfm_gopro_hero3_7mp_medium" => r#""focal": 0.625, "k1": -0.37, "k2": 0.28"#,
         "opensfm_gopro_hero3_7mp_wide" => r#""focal": 0.466, "k1": -0.195, "k2": 0.030"#,
@@ -231,41 +236,45 @@ fn open_sfm(name: &str) -> &'static str {
             r#""focal": 0.5930666527479901, "k1": -0.012137318698010527, "k2": 0.016199087342953698"#
         }
         "opensfm_dji_zenmuse_p1" => {
-            r#""projection_type": "brown", "focal_x": 0.993855582350662, "focal_y": 0.993855582350662, "c_x": -0.000890260610982073,
-               "c_y": 0.0017658361729384116, "k1": -0.04734574598470396, "k2": 0.00875629525446153, "p1": 0.002032062604630639,
+            r#""projection_type": "brown", "focal_x": 0.993855582350662, "focal_y": 0.993855582350662,
+                "c_x": -0.000890260610982073,
+               "c_y": 0.0017658361729384116, "k1": -0.04734574598470396, "k2": 0.00875629525446153,
+                   "p1": 0.002032062604630639,
                "p2": -0.0007921675594001833, "k3": -0.06874708730325006"#
         }
         "opensfm_skydio_2" => {
-            r#""projection_type": "brown", "focal_x": 0.5890650637205782, "focal_y": 0.5893009528604379, "c_x": 0.006414544008217537,
-               "c_y": 0.007804076177596079, "k1": 0.007400489742572139, "k2": -0.01564249925934293, "p1": -0.007885887470989788,
+            r#""projection_type": "brown", "focal_x": 0.5890650637205782, "focal_y": 0.5893009528604379,
+                "c_x": 0.006414544008217537,
+               "c_y": 0.007804076177596079, "k1": 0.007400489742572139, "k2": -0.01564249925934293,
+                   "p1": -0.007885887470989788,
                "p2": 0.007514503550147163, "k3": -0.0019150459181816895"#
         }
-        other => panic!("{other} is new in the table"),
+        other => panic!("{other} is missing here"),
     }
 }
 
 #[test]
-fn cameras_are_those_of_the_tables() {
+fn imported_cameras_equal_the_published_tables() {
     let Some(data) = data() else { return };
     let calib = data.join("calib");
     let mut all = rows(&calib.join("brown_conrady_real.csv"), LensModel::BrownConrady);
     all.extend(rows(&calib.join("fisheye_kb4_real.csv"), LensModel::KannalaBrandt));
-    let (mut compared, mut elsewhere, mut wrong) = (0, 0, Vec::new());
+    let (mut compared, mut skipped, mut wrong) = (0, 0, Vec::new());
     for row in &all {
         let source = calib.join(&row.source);
-        // Pictures, and files that are not in the folder.
+        // Rows from pictures, or from files that are not in the folder.
         if !source.is_file() {
-            elsewhere += 1;
+            skipped += 1;
             continue;
         }
         compared += 1;
         let folder = tempfile::tempdir().unwrap();
-        let path = mended(&data, row, folder.path()).unwrap_or(source);
+        let path = completed_file(&data, row, folder.path()).unwrap_or(source);
         if !cameras(&path).iter().any(|spec| agrees(spec, row)) {
             wrong.push(row.name.as_str());
         }
     }
-    eprintln!("{compared} rows compared, {elsewhere} come from no calibration file");
-    assert!(wrong.is_empty(), "other than the tables: {wrong:?}");
+    eprintln!("{compared} rows compared, {skipped} skipped");
+    assert!(wrong.is_empty(), "different from the tables: {wrong:?}");
     assert!(compared >= 60, "{compared} rows compared");
 }

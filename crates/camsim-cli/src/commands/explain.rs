@@ -398,7 +398,7 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
     let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
         (Some(summary), Some(terrain)) => {
             let [width, height] = terrain.texture.size_px;
-            let finer = match summary.picture_times {
+            let finer = match summary.texture_scale {
                 1 => String::new(),
                 times => format!(", upsampled {times} times"),
             };

@@ -1,98 +1,98 @@
-//! Agisoft XML: Metashape and PhotoScan since 1.2 (`f`, principal point from the image centre, P1 and P2 the
-//! other way round than in OpenCV), and Agisoft Lens (`fx`, `fy`, absolute principal point, P1 and P2 as in
-//! OpenCV). Image corners are at whole pixels in both. Either a calibration alone, or the cameras of a
-//! project (`cameras.xml`), whose sensors hold one each.
+//! Agisoft XML: Metashape and PhotoScan since 1.2 (`f`, principal point from the image centre, P1 and P2
+//! swapped against OpenCV), and Agisoft Lens (`fx`, `fy`, absolute principal point, P1 and P2 as in OpenCV).
+//! Image corners are at integers in both. A file is a single calibration, or the cameras of a project
+//! (`cameras.xml`), with one calibration per sensor.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::choose::Entry;
-use super::document::{Document, Problem, find, number, optional_number, size, word};
-use super::keys::{Key, Neutral, Use};
+use super::document::{Document, KeyProblem, find, number, optional_number, size, word};
+use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera};
 
-const SKEW: &str = "skew, which a camera here cannot have: recalibrate without";
-const TANGENTIAL: &str = "a tangential term of higher order, which no lens here has: recalibrate without";
+const SKEW: &str = "skew, which is not supported: recalibrate without it";
+const TANGENTIAL: &str = "a tangential term of higher order, which is not supported: recalibrate without it";
 
-/// Of a calibration alone.
-pub(super) const KEYS: &[Key] = &[
-    Key::new("projection", Use::Applied, "frame or fisheye; others are refused. Also `type`"),
-    Key::new("type", Use::Applied, "as projection"),
-    Key::new("width", Use::Applied, "width"),
-    Key::new("height", Use::Applied, "height"),
-    Key::new("resolution.*", Use::Applied, "width and height"),
-    Key::new("f", Use::Applied, "fy; fx is f + b1"),
-    Key::new("fx", Use::Applied, "Agisoft Lens; without `f` alone"),
-    Key::new("fy", Use::Applied, "Agisoft Lens; without `f` alone"),
-    Key::new(
+/// Keys of a single calibration.
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new("projection", Treatment::Applied, "frame or fisheye; others are refused. Also `type`"),
+    KeyRow::new("type", Treatment::Applied, "as projection"),
+    KeyRow::new("width", Treatment::Applied, "width"),
+    KeyRow::new("height", Treatment::Applied, "height"),
+    KeyRow::new("resolution.*", Treatment::Applied, "width and height"),
+    KeyRow::new("f", Treatment::Applied, "fy; fx is f + b1"),
+    KeyRow::new("fx", Treatment::Applied, "Agisoft Lens; used only without `f`"),
+    KeyRow::new("fy", Treatment::Applied, "Agisoft Lens; used only without `f`"),
+    KeyRow::new(
         "cx",
-        Use::Applied,
-        "from the middle of the picture; with fx and fy from its corner. Half a pixel is taken off",
+        Treatment::Applied,
+        "from the centre of the picture; with fx and fy from its corner. Half a pixel is subtracted",
     ),
-    Key::new("cy", Use::Applied, "as cx"),
-    Key::new("b1", Use::Applied, "fx - fy"),
-    Key::new("b2", Use::Refused(Neutral::Zero), SKEW),
-    Key::new("skew", Use::Refused(Neutral::Zero), SKEW),
-    Key::new("k1", Use::Applied, "coefficient"),
-    Key::new("k2", Use::Applied, "coefficient"),
-    Key::new("k3", Use::Applied, "coefficient"),
-    Key::new("k4", Use::Applied, "coefficient of a fisheye; refused in a frame camera unless zero"),
-    Key::new("p1", Use::Applied, "OpenCV's p2; with fx and fy OpenCV's p1"),
-    Key::new("p2", Use::Applied, "OpenCV's p1; with fx and fy OpenCV's p2"),
-    Key::new("p3", Use::Refused(Neutral::Zero), TANGENTIAL),
-    Key::new("p4", Use::Refused(Neutral::Zero), TANGENTIAL),
-    Key::new("date", Use::Silent, "when it was made"),
-    Key::new("class", Use::Silent, "initial or adjusted"),
-    Key::new("covariance.**", Use::Silent, "how well it fitted"),
-    Key::new("*.covariance*.**", Use::Silent, "how well it fitted"),
+    KeyRow::new("cy", Treatment::Applied, "as cx"),
+    KeyRow::new("b1", Treatment::Applied, "fx - fy"),
+    KeyRow::new("b2", Treatment::Refused(Neutral::Zero), SKEW),
+    KeyRow::new("skew", Treatment::Refused(Neutral::Zero), SKEW),
+    KeyRow::new("k1", Treatment::Applied, "coefficient"),
+    KeyRow::new("k2", Treatment::Applied, "coefficient"),
+    KeyRow::new("k3", Treatment::Applied, "coefficient"),
+    KeyRow::new("k4", Treatment::Applied, "coefficient of a fisheye; refused in a frame camera unless zero"),
+    KeyRow::new("p1", Treatment::Applied, "OpenCV's p2; with fx and fy OpenCV's p1"),
+    KeyRow::new("p2", Treatment::Applied, "OpenCV's p1; with fx and fy OpenCV's p2"),
+    KeyRow::new("p3", Treatment::Refused(Neutral::Zero), TANGENTIAL),
+    KeyRow::new("p4", Treatment::Refused(Neutral::Zero), TANGENTIAL),
+    KeyRow::new("date", Treatment::Ignored, "date or version"),
+    KeyRow::new("class", Treatment::Ignored, "initial or adjusted"),
+    KeyRow::new("covariance.**", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("*.covariance*.**", Treatment::Ignored, "calibration residual"),
 ];
 
-/// Of a sensor, below its place.
-pub(super) const SENSOR_KEYS: &[Key] = &[
-    Key::new(
+/// Keys of a sensor, relative to it.
+pub(super) const SENSOR_KEYS: &[KeyRow] = &[
+    KeyRow::new(
         "calibration.**",
-        Use::Applied,
-        "as a calibration alone; of several the one of class `adjusted`",
+        Treatment::Applied,
+        "as a single calibration; of several, the one of class `adjusted`",
     ),
-    Key::new("type", Use::Applied, "where the calibration names none"),
-    Key::new(
+    KeyRow::new("type", Treatment::Applied, "used if the calibration has none"),
+    KeyRow::new(
         "rolling_shutter",
-        Use::Named(Neutral::Zero),
+        Treatment::Reported(Neutral::Zero),
         "Metashape solved for a rolling shutter, but its file has no readout time: set shutter.readout_ms",
     ),
-    Key::new("resolution.*", Use::Applied, "where the calibration has none"),
-    Key::new("label", Use::Silent, "the name by which `--camera` finds it"),
-    Key::new("id", Use::Silent, "also finds it"),
-    Key::new("property", Use::Silent, "size of a pixel and focal length in mm, fixed or not"),
-    Key::new("property.**", Use::Silent, "size of a pixel and focal length in mm, fixed or not"),
-    Key::new("*_width", Use::Silent, "size of a pixel, mm"),
-    Key::new("*_height", Use::Silent, "size of a pixel, mm"),
-    Key::new("focal_length", Use::Silent, "mm"),
-    Key::new("bands.**", Use::Silent, "colour bands"),
-    Key::new("data_type", Use::Silent, "uint8"),
-    Key::new("layer_index", Use::Silent, "place in a rig"),
-    Key::new("master_id", Use::Named(Neutral::Never), "place in a rig: set mount by hand"),
-    Key::new("rotation.**", Use::Named(Neutral::Never), "place in a rig: set mount by hand"),
-    Key::new("location.**", Use::Named(Neutral::Never), "place in a rig: set mount by hand"),
-    Key::new("black_level", Use::Silent, "radiometry"),
-    Key::new("sensitivity", Use::Silent, "radiometry"),
-    Key::new(
+    KeyRow::new("resolution.*", Treatment::Applied, "used if the calibration has none"),
+    KeyRow::new("label", Treatment::Ignored, "the name for `--camera`"),
+    KeyRow::new("id", Treatment::Ignored, "works for `--camera` too"),
+    KeyRow::new("property", Treatment::Ignored, "pixel size and focal length in mm"),
+    KeyRow::new("property.**", Treatment::Ignored, "pixel size and focal length in mm"),
+    KeyRow::new("*_width", Treatment::Ignored, "pixel size, mm"),
+    KeyRow::new("*_height", Treatment::Ignored, "pixel size, mm"),
+    KeyRow::new("focal_length", Treatment::Ignored, "mm"),
+    KeyRow::new("bands.**", Treatment::Ignored, "colour bands"),
+    KeyRow::new("data_type", Treatment::Ignored, "uint8"),
+    KeyRow::new("layer_index", Treatment::Ignored, "position in a rig"),
+    KeyRow::new("master_id", Treatment::Reported(Neutral::Never), "position in a rig: set mount instead"),
+    KeyRow::new("rotation.**", Treatment::Reported(Neutral::Never), "position in a rig: set mount instead"),
+    KeyRow::new("location.**", Treatment::Reported(Neutral::Never), "position in a rig: set mount instead"),
+    KeyRow::new("black_level", Treatment::Ignored, "radiometry"),
+    KeyRow::new("sensitivity", Treatment::Ignored, "radiometry"),
+    KeyRow::new(
         "vignetting.**",
-        Use::Named(Neutral::Never),
-        "draw it as a picture and set photometric.vignette",
+        Treatment::Reported(Neutral::Never),
+        "convert it to a picture and set photometric.vignette",
     ),
-    Key::new("covariance.**", Use::Silent, "how well it fitted"),
-    Key::new("meta.**", Use::Silent, "free text"),
+    KeyRow::new("covariance.**", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("meta.**", Treatment::Ignored, "free text"),
 ];
 
-pub(super) fn fits(document: &Document) -> bool {
-    let alone =
+pub(super) fn matches(document: &Document) -> bool {
+    let is_single =
         document.root == "calibration" && ["f", "fx"].iter().any(|key| find(&document.value, key).is_some());
-    alone || document.root == "document" && find(&document.value, "chunk").is_some()
+    is_single || document.root == "document" && find(&document.value, "chunk").is_some()
 }
 
-/// An element that may be there once or several times.
-fn each<'a>(value: &'a Value, key: &str) -> Vec<(String, &'a Value)> {
+/// Elements of a name with their paths.
+fn elements<'a>(value: &'a Value, key: &str) -> Vec<(String, &'a Value)> {
     match value.get(key) {
         Some(Value::Array(list)) => {
             list.iter().enumerate().map(|(index, item)| (format!("{key}[{index}]"), item)).collect()
@@ -102,77 +102,77 @@ fn each<'a>(value: &'a Value, key: &str) -> Vec<(String, &'a Value)> {
     }
 }
 
-pub(super) fn entries(document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
+pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
     if document.root == "calibration" {
-        return Ok(Entry::only(&document.value));
+        return Ok(CameraEntry::single(&document.value));
     }
     let mut entries = Vec::new();
-    for (chunk_at, chunk) in each(&document.value, "chunk") {
-        for (sensors_at, sensors) in each(chunk, "sensors") {
-            for (at, sensor) in each(sensors, "sensor") {
+    for (chunk_path, chunk) in elements(&document.value, "chunk") {
+        for (sensors_path, sensors) in elements(chunk, "sensors") {
+            for (sensor_path, sensor) in elements(sensors, "sensor") {
                 let id = sensor.get("id").map(Value::to_string).unwrap_or_default();
                 let id = id.trim_end_matches(".0").to_owned();
                 let name = word(sensor, "label").map_or_else(|| format!("sensor {id}"), str::to_owned);
-                entries.push(Entry {
+                entries.push(CameraEntry {
                     name,
-                    also: vec![id],
+                    aliases: vec![id],
                     value: sensor,
-                    roots: vec![format!("{chunk_at}.{sensors_at}.{at}")],
+                    roots: vec![format!("{chunk_path}.{sensors_path}.{sensor_path}")],
                 });
             }
         }
     }
     if entries.is_empty() {
-        return Err(Problem::new(
+        return Err(KeyProblem::new(
             "chunk.sensors",
-            "there is none: export the cameras after they are aligned, or the calibration alone",
+            "is empty: align the cameras before exporting, or export a single calibration",
         ));
     }
     Ok(entries)
 }
 
-pub(super) fn import(document: &Document, value: &Value) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(document: &Document, value: &Value) -> Result<ImportedCamera, KeyProblem> {
     if document.root == "calibration" {
         return calibration(value, None);
     }
-    let found = calibration_of(value)
-        .ok_or_else(|| Problem::new("calibration", "is missing: align the cameras before you export them"))?;
-    calibration(found, Some(value))
-        .map_err(|problem| Problem { key: format!("calibration.{}", problem.key), ..problem })
+    let sensor_calibration = calibration_of(value)
+        .ok_or_else(|| KeyProblem::new("calibration", "is missing: align the cameras before exporting"))?;
+    calibration(sensor_calibration, Some(value))
+        .map_err(|problem| KeyProblem { key: format!("calibration.{}", problem.key), ..problem })
 }
 
-/// Of several the adjusted one.
+/// The adjusted calibration of a sensor, else its last.
 pub(super) fn calibration_of(sensor: &Value) -> Option<&Value> {
-    let all = each(sensor, "calibration");
+    let all = elements(sensor, "calibration");
     let adjusted =
         all.iter().rfind(|(_, calibration)| word(calibration, "class") == Some("adjusted")).or(all.last());
-    adjusted.map(|(_, found)| *found)
+    adjusted.map(|(_, calibration)| *calibration)
 }
 
 /// Width and height of a calibration or a sensor.
-fn resolution(value: &Value) -> Option<Result<[f64; 2], Problem>> {
-    let of = |prefix: &str| {
+fn resolution(value: &Value) -> Option<Result<[f64; 2], KeyProblem>> {
+    let pair = |prefix: &str| {
         Ok([number(value, &format!("{prefix}width"))?, number(value, &format!("{prefix}height"))?])
     };
     if find(value, "resolution").is_some() {
-        return Some(of("resolution."));
+        return Some(pair("resolution."));
     }
-    (find(value, "width").is_some() || find(value, "height").is_some()).then(|| of(""))
+    (find(value, "width").is_some() || find(value, "height").is_some()).then(|| pair(""))
 }
 
-fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, Problem> {
-    let or_zero = |key: &str| optional_number(value, key).map(|found| found.unwrap_or(0.0));
+fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, KeyProblem> {
+    let or_zero = |key: &str| optional_number(value, key).map(|number| number.unwrap_or(0.0));
     for (key, why) in [("b2", SKEW), ("skew", SKEW), ("p3", TANGENTIAL), ("p4", TANGENTIAL)] {
         if or_zero(key)? != 0.0 {
-            return Err(Problem::new(key, format!("is not zero: {why}")));
+            return Err(KeyProblem::new(key, format!("is not zero: {why}")));
         }
     }
     let dimensions = resolution(value).or_else(|| sensor.and_then(resolution));
-    let [width, height] = dimensions.unwrap_or_else(|| Err(Problem::new("width", "is missing")))?;
+    let [width, height] = dimensions.unwrap_or_else(|| Err(KeyProblem::new("width", "is missing")))?;
     let size_px = size("width", [width, height])?;
     let [k1, k2, k3, k4] = [or_zero("k1")?, or_zero("k2")?, or_zero("k3")?, or_zero("k4")?];
     let (p1, p2) = (or_zero("p1")?, or_zero("p2")?);
-    // Where both are given (files that serve both programs), the newer one's keys count.
+    // Files for both programs have both sets of keys; the newer program's are used.
     let (focal_px, corner_based, [p1, p2]) = if find(value, "f").is_some() {
         let f = number(value, "f")?;
         ([f + or_zero("b1")?, f], [0.5 * width + or_zero("cx")?, 0.5 * height + or_zero("cy")?], [p2, p1])
@@ -180,26 +180,26 @@ fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, 
         ([number(value, "fx")?, number(value, "fy")?], [number(value, "cx")?, number(value, "cy")?], [p1, p2])
     };
     let principal_point_px = [corner_based[0] - 0.5, corner_based[1] - 0.5];
-    let named = word(value, "projection")
+    let projection = word(value, "projection")
         .or_else(|| word(value, "type"))
         .or_else(|| sensor.and_then(|sensor| word(sensor, "type")));
-    let (model, coefficients) = match named.unwrap_or("frame") {
+    let (model, coefficients) = match projection.unwrap_or("frame") {
         "frame" if k4 != 0.0 => {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 "k4",
-                "is not zero: a radial term in r^8 is not modelled; recalibrate with K4 off",
+                "is not zero: a radial term of r^8 is not supported; recalibrate without K4",
             ));
         }
         "frame" => (LensModel::BrownConrady, vec![k1, k2, p1, p2, k3]),
         "fisheye" | "equidistant_fisheye" if p1 != 0.0 || p2 != 0.0 => {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 "p1",
-                "is not zero: a fisheye here has no tangential terms; recalibrate with P1 and P2 off",
+                "is not zero: tangential terms of a fisheye are not supported; recalibrate without P1 and P2",
             ));
         }
         "fisheye" | "equidistant_fisheye" => (LensModel::KannalaBrandt, vec![k1, k2, k3, k4]),
         other => {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 "projection",
                 format!("is `{other}`: frame and fisheye (equidistant) can be imported"),
             ));

@@ -3,120 +3,120 @@
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::choose::Entry;
-use super::document::{Document, Problem, find, number, optional_number, size, word};
-use super::keys::{Key, Neutral, Use};
-use super::{CameraFormat, ImportedCamera, camera, models};
+use super::document::{Document, KeyProblem, find, number, optional_number, size, word};
+use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
 const IMU: &str = "the IMU";
-const CLOCK: &str = "clock of one sensor against another's, ns: it shifts all stamps alike";
+const CLOCK: &str = "clock offset between sensors, ns, which shifts all stamps";
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new(
         "value0.intrinsics.camera_type",
-        Use::Applied,
+        Treatment::Applied,
         "pinhole, kb4, pinhole-radtan8; ds, eucm, ucm, fov are refused",
     ),
-    Key::new("value0.intrinsics.intrinsics.fx", Use::Applied, "px"),
-    Key::new("value0.intrinsics.intrinsics.fy", Use::Applied, "px"),
-    Key::new("value0.intrinsics.intrinsics.cx", Use::Applied, "px"),
-    Key::new("value0.intrinsics.intrinsics.cy", Use::Applied, "px"),
-    Key::new(
+    KeyRow::new("value0.intrinsics.intrinsics.fx", Treatment::Applied, "px"),
+    KeyRow::new("value0.intrinsics.intrinsics.fy", Treatment::Applied, "px"),
+    KeyRow::new("value0.intrinsics.intrinsics.cx", Treatment::Applied, "px"),
+    KeyRow::new("value0.intrinsics.intrinsics.cy", Treatment::Applied, "px"),
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k1",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k2",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k3",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k4",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k5",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.k6",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.p1",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.p2",
-        Use::Applied,
-        "coefficient; refused unless zero where camera_type has it not",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.intrinsics.intrinsics.rpmax",
-        Use::Named(Neutral::Zero),
-        "radius up to which that program believes the model; where the lens folds is found by itself",
+        Treatment::Reported(Neutral::Zero),
+        "radius limit of the model; camsim computes the limit itself",
     ),
-    Key::new("value0.intrinsics.intrinsics.xi", Use::Applied, "of models that are refused"),
-    Key::new("value0.intrinsics.intrinsics.alpha", Use::Applied, "of models that are refused"),
-    Key::new("value0.intrinsics.intrinsics.beta", Use::Applied, "of models that are refused"),
-    Key::new("value0.intrinsics.intrinsics.w", Use::Applied, "of models that are refused"),
-    Key::new("value0.resolution", Use::Applied, "width and height of each camera"),
-    Key::new(
+    KeyRow::new("value0.intrinsics.intrinsics.xi", Treatment::Applied, "parameter of unsupported models"),
+    KeyRow::new("value0.intrinsics.intrinsics.alpha", Treatment::Applied, "parameter of unsupported models"),
+    KeyRow::new("value0.intrinsics.intrinsics.beta", Treatment::Applied, "parameter of unsupported models"),
+    KeyRow::new("value0.intrinsics.intrinsics.w", Treatment::Applied, "parameter of unsupported models"),
+    KeyRow::new("value0.resolution", Treatment::Applied, "width and height of each camera"),
+    KeyRow::new(
         "value0.vignette.**",
-        Use::Named(Neutral::Never),
-        "a spline of the vignette over the radius: draw it as a picture and set photometric.vignette",
+        Treatment::Reported(Neutral::Never),
+        "radial vignette spline: convert it to a picture and set photometric.vignette",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.vignette",
-        Use::Named(Neutral::Never),
-        "a spline of the vignette over the radius: draw it as a picture and set photometric.vignette",
+        Treatment::Reported(Neutral::Never),
+        "radial vignette spline: convert it to a picture and set photometric.vignette",
     ),
-    Key::new(
+    KeyRow::new(
         "value0.T_imu_cam.**",
-        Use::Named(Neutral::Never),
-        "pose of the camera to the IMU: set mount by hand",
+        Treatment::Reported(Neutral::Never),
+        "pose of the camera to the IMU: set mount instead",
     ),
-    Key::new("value0.cam_time_offset_ns", Use::Named(Neutral::Zero), CLOCK),
-    Key::new("value0.mocap_*", Use::Named(Neutral::Zero), CLOCK),
-    Key::new("value0.T_mocap_world.**", Use::Silent, "motion capture"),
-    Key::new("value0.T_imu_marker.**", Use::Silent, "motion capture"),
-    Key::new("value0.calib_*", Use::Silent, IMU),
-    Key::new("value0.imu_update_rate", Use::Silent, IMU),
-    Key::new("value0.accel_*", Use::Silent, IMU),
-    Key::new("value0.gyro_*", Use::Silent, IMU),
-    Key::new("value0.view_offset", Use::Silent, "a setting of that program"),
+    KeyRow::new("value0.cam_time_offset_ns", Treatment::Reported(Neutral::Zero), CLOCK),
+    KeyRow::new("value0.mocap_*", Treatment::Reported(Neutral::Zero), CLOCK),
+    KeyRow::new("value0.T_mocap_world.**", Treatment::Ignored, "motion capture"),
+    KeyRow::new("value0.T_imu_marker.**", Treatment::Ignored, "motion capture"),
+    KeyRow::new("value0.calib_*", Treatment::Ignored, IMU),
+    KeyRow::new("value0.imu_update_rate", Treatment::Ignored, IMU),
+    KeyRow::new("value0.accel_*", Treatment::Ignored, IMU),
+    KeyRow::new("value0.gyro_*", Treatment::Ignored, IMU),
+    KeyRow::new("value0.view_offset", Treatment::Ignored, "a setting of that program"),
 ];
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     document.root.is_empty() && find(&document.value, "value0.intrinsics").is_some_and(Value::is_array)
 }
 
-pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
     let list =
         find(&document.value, "value0.intrinsics").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let roots = |index: usize| {
         ["intrinsics", "T_imu_cam", "vignette"].map(|key| format!("value0.{key}[{index}]")).to_vec()
     };
-    let entry = |(index, value): (usize, _)| Entry {
+    let entry = |(index, value): (usize, _)| CameraEntry {
         name: format!("cam{index}"),
-        also: vec![index.to_string()],
+        aliases: vec![index.to_string()],
         value,
         roots: roots(index),
     };
     list.iter().enumerate().map(entry).collect()
 }
 
-pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<ImportedCamera, KeyProblem> {
     let value = entry.value;
     let index: usize = entry.name.trim_start_matches("cam").parse().unwrap_or(0);
     let get = |key: &str| number(value, &format!("intrinsics.{key}"));
@@ -127,10 +127,13 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
         "kb4" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"]),
         "pinhole-radtan8" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
         other => {
-            let which = models::unknown(other).map_or(String::new(), |name| format!(" ({name})"));
-            return Err(Problem::new(
+            let full_name =
+                lens_models::unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
+            return Err(KeyProblem::new(
                 "camera_type",
-                format!("is `{other}`{which}, which no lens here is: calibrate with kb4 or pinhole-radtan8"),
+                format!(
+                    "is `{other}`{full_name}, which is not supported: calibrate with kb4 or pinhole-radtan8"
+                ),
             ));
         }
     };
@@ -141,21 +144,19 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
     {
         let key = format!("intrinsics.{key}");
         if optional_number(value, &key)?.is_some_and(|number| number != 0.0) {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 key,
-                format!(
-                    "is not zero, but camera_type `{kind}` has no such parameter: name the model that is meant"
-                ),
+                format!("is not zero, but camera_type `{kind}` has no such parameter: correct camera_type"),
             ));
         }
     }
     let sizes = find(&document.value, "value0.resolution").and_then(Value::as_array);
-    let of_camera = sizes
-        .and_then(|list| list.get(index))
-        .ok_or_else(|| Problem::new("value0.resolution", format!("has no entry {index}, counted from 0")))?;
-    let pair = as_pair(of_camera)?;
+    let camera_size = sizes.and_then(|list| list.get(index)).ok_or_else(|| {
+        KeyProblem::new("value0.resolution", format!("has no entry {index}, counted from 0"))
+    })?;
+    let pair = as_pair(camera_size)?;
     let [width, height] = pair[..] else {
-        return Err(Problem::new(
+        return Err(KeyProblem::new(
             "value0.resolution",
             format!("has {} numbers for camera {index} instead of width and height", pair.len()),
         ));
@@ -171,7 +172,7 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
     ))
 }
 
-fn as_pair(value: &Value) -> Result<Vec<f64>, Problem> {
+fn as_pair(value: &Value) -> Result<Vec<f64>, KeyProblem> {
     let list: Option<Vec<f64>> = value.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
-    list.ok_or_else(|| Problem::new("value0.resolution", "is not a list of width and height"))
+    list.ok_or_else(|| KeyProblem::new("value0.resolution", "is not a list of width and height"))
 }

@@ -1,132 +1,132 @@
-//! camodocal's camera YAML, as VINS-Mono and VINS-Fusion read it: a model's name, and its parameters under
-//! names of their own.
+//! camodocal's camera YAML, which VINS-Mono and VINS-Fusion read: a model name and its parameters.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::document::{Document, Problem, find, number, size, word};
-use super::keys::{Key, Neutral, Use};
+use super::document::{Document, KeyProblem, find, number, size, word};
+use super::key_table::{KeyRow, Neutral, Treatment};
 use super::{CameraFormat, ImportedCamera, camera};
 
 const ESTIMATOR: &str = "a setting of the estimator";
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new(
         "model_type",
-        Use::Applied,
+        Treatment::Applied,
         "PINHOLE, PINHOLE_FULL, KANNALA_BRANDT; MEI (omnidirectional) and SCARAMUZZA are refused",
     ),
-    Key::new("image_width", Use::Applied, "width"),
-    Key::new("image_height", Use::Applied, "height"),
-    Key::new("distortion_parameters.k1", Use::Applied, "in OpenCV's meaning"),
-    Key::new("distortion_parameters.k2", Use::Applied, "in OpenCV's meaning"),
-    Key::new("distortion_parameters.p1", Use::Applied, "in OpenCV's meaning"),
-    Key::new("distortion_parameters.p2", Use::Applied, "in OpenCV's meaning"),
-    Key::new(
+    KeyRow::new("image_width", Treatment::Applied, "width"),
+    KeyRow::new("image_height", Treatment::Applied, "height"),
+    KeyRow::new("distortion_parameters.k1", Treatment::Applied, "as in OpenCV"),
+    KeyRow::new("distortion_parameters.k2", Treatment::Applied, "as in OpenCV"),
+    KeyRow::new("distortion_parameters.p1", Treatment::Applied, "as in OpenCV"),
+    KeyRow::new("distortion_parameters.p2", Treatment::Applied, "as in OpenCV"),
+    KeyRow::new(
         "distortion_parameters.k3",
-        Use::Applied,
-        "PINHOLE_FULL alone; refused in PINHOLE, which does not read it, unless zero",
+        Treatment::Applied,
+        "PINHOLE_FULL only; refused in PINHOLE unless zero",
     ),
-    Key::new(
+    KeyRow::new(
         "distortion_parameters.k4",
-        Use::Applied,
-        "PINHOLE_FULL alone; refused in PINHOLE, which does not read it, unless zero",
+        Treatment::Applied,
+        "PINHOLE_FULL only; refused in PINHOLE unless zero",
     ),
-    Key::new(
+    KeyRow::new(
         "distortion_parameters.k5",
-        Use::Applied,
-        "PINHOLE_FULL alone; refused in PINHOLE, which does not read it, unless zero",
+        Treatment::Applied,
+        "PINHOLE_FULL only; refused in PINHOLE unless zero",
     ),
-    Key::new(
+    KeyRow::new(
         "distortion_parameters.k6",
-        Use::Applied,
-        "PINHOLE_FULL alone; refused in PINHOLE, which does not read it, unless zero",
+        Treatment::Applied,
+        "PINHOLE_FULL only; refused in PINHOLE unless zero",
     ),
-    Key::new("projection_parameters.fx", Use::Applied, "px"),
-    Key::new("projection_parameters.fy", Use::Applied, "px"),
-    Key::new("projection_parameters.cx", Use::Applied, "px"),
-    Key::new("projection_parameters.cy", Use::Applied, "px"),
-    Key::new(
+    KeyRow::new("projection_parameters.fx", Treatment::Applied, "px"),
+    KeyRow::new("projection_parameters.fy", Treatment::Applied, "px"),
+    KeyRow::new("projection_parameters.cx", Treatment::Applied, "px"),
+    KeyRow::new("projection_parameters.cy", Treatment::Applied, "px"),
+    KeyRow::new(
         "projection_parameters.k2",
-        Use::Applied,
-        "KANNALA_BRANDT: Kannala-Brandt's k1 here, whose first is 1 there",
+        Treatment::Applied,
+        "KANNALA_BRANDT: k1 in camsim, because camodocal's first coefficient is 1",
     ),
-    Key::new("projection_parameters.k3", Use::Applied, "k2 here"),
-    Key::new("projection_parameters.k4", Use::Applied, "k3 here"),
-    Key::new("projection_parameters.k5", Use::Applied, "k4 here"),
-    Key::new("projection_parameters.mu", Use::Applied, "fx of a KANNALA_BRANDT"),
-    Key::new("projection_parameters.mv", Use::Applied, "fy of a KANNALA_BRANDT"),
-    Key::new("projection_parameters.u0", Use::Applied, "cx of a KANNALA_BRANDT"),
-    Key::new("projection_parameters.v0", Use::Applied, "cy of a KANNALA_BRANDT"),
-    Key::new("rolling_shutter", Use::Rolling, "1: rows are read one after another"),
-    Key::new(
+    KeyRow::new("projection_parameters.k3", Treatment::Applied, "k2 in camsim"),
+    KeyRow::new("projection_parameters.k4", Treatment::Applied, "k3 in camsim"),
+    KeyRow::new("projection_parameters.k5", Treatment::Applied, "k4 in camsim"),
+    KeyRow::new("projection_parameters.mu", Treatment::Applied, "fx of a KANNALA_BRANDT"),
+    KeyRow::new("projection_parameters.mv", Treatment::Applied, "fy of a KANNALA_BRANDT"),
+    KeyRow::new("projection_parameters.u0", Treatment::Applied, "cx of a KANNALA_BRANDT"),
+    KeyRow::new("projection_parameters.v0", Treatment::Applied, "cy of a KANNALA_BRANDT"),
+    KeyRow::new("rolling_shutter", Treatment::RollingShutter, "1: rolling shutter"),
+    KeyRow::new(
         "rolling_shutter_tr",
-        Use::Readout(1e3),
+        Treatment::Readout(1e3),
         "s a frame; named and left out where rolling_shutter is 0",
     ),
-    Key::new(
+    KeyRow::new(
         "td",
-        Use::Named(Neutral::Zero),
-        "clock of the camera against that of the IMU, s: it shifts all stamps alike; set shutter.delay_ms (-1000 td) if the pictures are to lag",
+        Treatment::Reported(Neutral::Zero),
+        "clock offset between camera and IMU, s, which shifts all stamps; set shutter.delay_ms (-1000 td) if \
+         the pictures are to lag",
     ),
-    Key::new(
+    KeyRow::new(
         "extrinsicRotation",
-        Use::Named(Neutral::Identity),
-        "pose of the camera to the IMU: set mount by hand",
+        Treatment::Reported(Neutral::Identity),
+        "pose of the camera to the IMU: set mount instead",
     ),
-    Key::new(
+    KeyRow::new(
         "extrinsicTranslation",
-        Use::Named(Neutral::Zero),
-        "pose of the camera to the IMU: set mount by hand",
+        Treatment::Reported(Neutral::Zero),
+        "pose of the camera to the IMU: set mount instead",
     ),
-    Key::new(
+    KeyRow::new(
         "body_T_cam*",
-        Use::Named(Neutral::Identity),
-        "pose of the camera to the IMU: set mount by hand",
+        Treatment::Reported(Neutral::Identity),
+        "pose of the camera to the IMU: set mount instead",
     ),
-    Key::new(
+    KeyRow::new(
         "fisheye",
-        Use::Named(Neutral::Zero),
+        Treatment::Reported(Neutral::Zero),
         "a round mask over the picture: set photometric.vignette if the border is dark",
     ),
-    Key::new(
+    KeyRow::new(
         "fisheye_mask",
-        Use::Named(Neutral::Never),
+        Treatment::Reported(Neutral::Never),
         "a mask over the picture: set photometric.vignette if the border is dark",
     ),
-    Key::new("camera_name", Use::Silent, "a name"),
-    Key::new("imu*", Use::Silent, "the IMU"),
-    Key::new("image*_topic", Use::Silent, "a name"),
-    Key::new("acc_*", Use::Silent, "the IMU"),
-    Key::new("gyr_*", Use::Silent, "the IMU"),
-    Key::new("g_norm", Use::Silent, "gravity"),
-    Key::new("freq", Use::Silent, "how often the estimator publishes"),
-    Key::new("max_*", Use::Silent, ESTIMATOR),
-    Key::new("min_dist", Use::Silent, ESTIMATOR),
-    Key::new("F_threshold", Use::Silent, ESTIMATOR),
-    Key::new("show_*", Use::Silent, ESTIMATOR),
-    Key::new("equalize", Use::Silent, ESTIMATOR),
-    Key::new("flow_back", Use::Silent, ESTIMATOR),
-    Key::new("keyframe_parallax", Use::Silent, ESTIMATOR),
-    Key::new("estimate_*", Use::Silent, ESTIMATOR),
-    Key::new("loop_closure", Use::Silent, ESTIMATOR),
-    Key::new("fast_relocalization", Use::Silent, ESTIMATOR),
-    Key::new("load_previous_pose_graph", Use::Silent, ESTIMATOR),
-    Key::new("save_image", Use::Silent, ESTIMATOR),
-    Key::new("visualize_*", Use::Silent, ESTIMATOR),
-    Key::new("num_of_cam", Use::Silent, ESTIMATOR),
-    Key::new("multiple_thread", Use::Silent, ESTIMATOR),
-    Key::new("use_gpu*", Use::Silent, ESTIMATOR),
+    KeyRow::new("camera_name", Treatment::Ignored, "a name"),
+    KeyRow::new("imu*", Treatment::Ignored, "the IMU"),
+    KeyRow::new("image*_topic", Treatment::Ignored, "a name"),
+    KeyRow::new("acc_*", Treatment::Ignored, "the IMU"),
+    KeyRow::new("gyr_*", Treatment::Ignored, "the IMU"),
+    KeyRow::new("g_norm", Treatment::Ignored, "gravity"),
+    KeyRow::new("freq", Treatment::Ignored, "how often the estimator publishes"),
+    KeyRow::new("max_*", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("min_dist", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("F_threshold", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("show_*", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("equalize", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("flow_back", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("keyframe_parallax", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("estimate_*", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("loop_closure", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("fast_relocalization", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("load_previous_pose_graph", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("save_image", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("visualize_*", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("num_of_cam", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("multiple_thread", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("use_gpu*", Treatment::Ignored, ESTIMATOR),
 ];
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     let parameters = ["projection_parameters", "mirror_parameters", "affine_parameters", "poly_parameters"];
     document.root.is_empty()
         && find(&document.value, "model_type").is_some()
         && parameters.iter().any(|key| find(&document.value, key).is_some())
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let size_px = size("image_width", [number(value, "image_width")?, number(value, "image_height")?])?;
     let all = |table: &str, keys: &[&str]| {
         keys.iter().map(|key| number(value, &format!("{table}.{key}"))).collect::<Result<Vec<f64>, _>>()
@@ -136,9 +136,10 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         "PINHOLE" => {
             for key in ["k3", "k4", "k5", "k6"].map(|key| format!("distortion_parameters.{key}")) {
                 if find(value, &key).is_some() && number(value, &key)? != 0.0 {
-                    return Err(Problem::new(
+                    return Err(KeyProblem::new(
                         key,
-                        "is not zero: PINHOLE has k1, k2, p1 and p2 alone and would not read it; name PINHOLE_FULL if that is meant",
+                        "is not zero: PINHOLE has k1, k2, p1 and p2 alone and would not read it; name \
+                         PINHOLE_FULL if that is meant",
                     ));
                 }
             }
@@ -156,12 +157,13 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
             (LensModel::KannalaBrandt, projection(["mu", "mv", "u0", "v0"])?, coefficients)
         }
         other => {
-            let which = super::models::unknown(&other.to_ascii_lowercase())
+            let full_name = super::lens_models::unsupported_model_name(&other.to_ascii_lowercase())
                 .map_or(String::new(), |name| format!(" ({name})"));
             let text = format!(
-                "is `{other}`{which}, which no lens here is: PINHOLE, PINHOLE_FULL and KANNALA_BRANDT can be imported; calibrate with one of them"
+                "is `{other}`{full_name}, which is not supported: PINHOLE, PINHOLE_FULL and KANNALA_BRANDT \
+                 can be imported; calibrate with one of them"
             );
-            return Err(Problem::new("model_type", text));
+            return Err(KeyProblem::new("model_type", text));
         }
     };
     let (focal_px, principal_point_px) = ([numbers[0], numbers[1]], [numbers[2], numbers[3]]);

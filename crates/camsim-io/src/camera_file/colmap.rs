@@ -1,26 +1,28 @@
-//! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. There the centre of the first pixel is
-//! (0.5, 0.5).
+//! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. In COLMAP the centre of the first pixel
+//! is (0.5, 0.5).
 
 use camsim_core::scenario::LensModel;
 use serde_json::{Value, json};
 
-use super::choose::Entry;
-use super::document::{Document, Problem, SyntaxProblem, number, numbers, size, word};
-use super::keys::{Key, Use};
+use super::document::{Document, KeyProblem, SyntaxProblem, number, numbers, size, word};
+use super::key_table::{KeyRow, Treatment};
+use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera};
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new("cameras.id", Use::Silent, "CAMERA_ID, by which `--camera` names it"),
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new("cameras.id", Treatment::Ignored, "CAMERA_ID, for `--camera`"),
+    KeyRow::new(
         "cameras.model",
-        Use::Applied,
-        "MODEL: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE; others are refused",
+        Treatment::Applied,
+        "MODEL: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, \
+         SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE; others are refused",
     ),
-    Key::new("cameras.width", Use::Applied, "WIDTH"),
-    Key::new("cameras.height", Use::Applied, "HEIGHT"),
-    Key::new("cameras.params", Use::Applied, "PARAMS; half a pixel is taken off cx and cy"),
+    KeyRow::new("cameras.width", Treatment::Applied, "WIDTH"),
+    KeyRow::new("cameras.height", Treatment::Applied, "HEIGHT"),
+    KeyRow::new("cameras.params", Treatment::Applied, "PARAMS; half a pixel is subtracted from cx and cy"),
 ];
 
+/// Lines with content, with their numbers.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -30,15 +32,15 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 fn is_camera(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
-    let whole = |word: &str| word.bytes().all(|byte| byte.is_ascii_digit());
+    let is_integer = |word: &str| word.bytes().all(|byte| byte.is_ascii_digit());
     words.len() > 4
-        && whole(words[0])
+        && is_integer(words[0])
         && words[1].starts_with(|c: char| c.is_ascii_uppercase())
         && words[1].bytes().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_')
         && words[2..].iter().all(|word| word.parse::<f64>().is_ok())
 }
 
-pub(super) fn looks_so(text: &str) -> bool {
+pub(super) fn matches_text(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, line)| is_camera(line))
 }
 
@@ -47,31 +49,33 @@ pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
     for (line_number, line) in lines(text) {
         if !is_camera(line) {
             let message = format!(
-                "`{line}` is no camera: CAMERA_ID MODEL WIDTH HEIGHT and the parameters, with blanks between"
+                "`{line}` is not a camera: CAMERA_ID MODEL WIDTH HEIGHT and the parameters, separated by \
+                 blanks"
             );
             return Err(SyntaxProblem { line: Some(line_number), message });
         }
         let words: Vec<&str> = line.split_whitespace().collect();
         let numbers: Vec<f64> = words[2..].iter().filter_map(|word| word.parse().ok()).collect();
-        cameras.push(json!({"id": words[0], "model": words[1], "width": numbers[0], "height": numbers[1], "params": &numbers[2..]}));
+        cameras.push(json!({"id": words[0], "model": words[1], "width": numbers[0], "height": numbers[1],
+            "params": &numbers[2..]}));
     }
     Ok(Document { root: "colmap".to_owned(), value: json!({ "cameras": cameras }) })
 }
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     document.root == "colmap"
 }
 
-pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
     let list = document.value.get("cameras").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let entry = |(index, value): (usize, _)| {
-        Entry::new(word(value, "id").unwrap_or_default().to_owned(), value, format!("cameras[{index}]"))
+        CameraEntry::new(word(value, "id").unwrap_or_default().to_owned(), value, format!("cameras[{index}]"))
     };
     list.iter().enumerate().map(entry).collect()
 }
 
-/// Names of the parameters, as COLMAP's own source lists them; `None` is a model that a camera here has not.
-fn names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
+/// Lens model and names of the parameters, from COLMAP's source; `None` for unsupported models.
+fn parameter_names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
     use LensModel::{BrownConrady, KannalaBrandt};
     Some(match model {
         "SIMPLE_PINHOLE" => (BrownConrady, &["f", "cx", "cy"]),
@@ -89,13 +93,14 @@ fn names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
     })
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let model = word(value, "model").unwrap_or_default();
-    let (lens, names) = names(model).ok_or_else(|| {
-        Problem::new(
+    let (lens, names) = parameter_names(model).ok_or_else(|| {
+        KeyProblem::new(
             "MODEL",
             format!(
-                "is {model}, which no lens here is: reconstruct with OPENCV, FULL_OPENCV or OPENCV_FISHEYE (or one of their short forms)"
+                "is {model}, which is not supported: reconstruct with OPENCV, FULL_OPENCV or OPENCV_FISHEYE \
+                 (or a model with fewer parameters)"
             ),
         )
     })?;
@@ -107,10 +112,11 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
             names.len(),
             names.join(", ")
         );
-        return Err(Problem::new("PARAMS", text));
+        return Err(KeyProblem::new("PARAMS", text));
     }
-    let get =
-        |name: &str| names.iter().position(|known| *known == name).and_then(|at| params.get(at).copied());
+    let get = |name: &str| {
+        names.iter().position(|known| *known == name).and_then(|index| params.get(index).copied())
+    };
     let or_zero = |name: &str| get(name).unwrap_or(0.0);
     let f = or_zero("f");
     let coefficients = match lens {
@@ -128,8 +134,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         coefficients,
     );
     imported.notes.push(
-        "the principal point was shifted by half a pixel: COLMAP's image corners are at whole numbers"
-            .to_owned(),
+        "the principal point was shifted by half a pixel: COLMAP has image corners at integers".to_owned(),
     );
     Ok(imported)
 }

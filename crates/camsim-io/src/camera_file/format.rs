@@ -1,10 +1,10 @@
-//! The formats: their names, and which importer serves which.
+//! Supported formats and their importers.
 
 use serde_json::Value;
 
-use super::choose::Entry;
-use super::document::{Document, Problem, find};
-use super::keys::{Key, Part, leaves};
+use super::document::{Document, KeyProblem, find};
+use super::key_table::{KeyRow, TableLeaves, leaves};
+use super::selection::CameraEntry;
 use super::{
     ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, okvis, opencv, opensfm,
     orb_slam, reference, ros, vikit,
@@ -15,7 +15,7 @@ use super::{
 pub enum CameraFormat {
     /// OpenCV FileStorage, YAML, XML or JSON; four coefficients are `k1 k2 p1 p2`.
     OpenCv,
-    /// The same with the coefficients of OpenCV's fisheye module. Never detected.
+    /// OpenCV FileStorage with coefficients of the fisheye module; never detected automatically.
     OpenCvFisheye,
     /// Kalibr camchain YAML, also OpenVINS'.
     Kalibr,
@@ -71,7 +71,7 @@ impl CameraFormat {
         Self::OpenSfm,
     ];
 
-    /// Its name for people and for `--format`.
+    /// Name, as in `--format`.
     pub fn name(self) -> &'static str {
         match self {
             Self::OpenCv => "opencv",
@@ -94,7 +94,7 @@ impl CameraFormat {
         }
     }
 
-    /// What it is called where formats are listed.
+    /// Title in lists of formats.
     pub fn title(self) -> &'static str {
         match self {
             Self::OpenCv => "OpenCV YAML/XML",
@@ -117,35 +117,36 @@ impl CameraFormat {
         }
     }
 
-    pub(super) fn fits(self, document: &Document) -> bool {
+    /// Whether a document has this format.
+    pub(super) fn matches(self, document: &Document) -> bool {
         match self {
-            Self::OpenCv => opencv::fits(document),
+            Self::OpenCv => opencv::matches(document),
             Self::OpenCvFisheye => false,
-            Self::Kalibr => kalibr::fits_camchain(document),
-            Self::Euroc => kalibr::fits_euroc(document),
-            Self::RosCameraInfo => document.root.is_empty() && ros::fits(document),
+            Self::Kalibr => kalibr::matches_camchain(document),
+            Self::Euroc => kalibr::matches_euroc(document),
+            Self::RosCameraInfo => document.root.is_empty() && ros::matches(document),
             Self::RosIni => document.root == "ini",
-            Self::Camodocal => camodocal::fits(document),
-            Self::Reference => reference::fits(document),
-            Self::Agisoft => agisoft::fits(document),
-            Self::Gyroflow => gyroflow::fits(document),
-            Self::Colmap => colmap::fits(document),
-            Self::OrbSlam => orb_slam::fits(document),
-            Self::Basalt => basalt::fits(document),
-            Self::Okvis => okvis::fits(document),
-            Self::NCamera => ncamera::fits(document),
-            Self::Vikit => vikit::fits(document),
-            Self::OpenSfm => opensfm::fits(document),
+            Self::Camodocal => camodocal::matches(document),
+            Self::Reference => reference::matches(document),
+            Self::Agisoft => agisoft::matches(document),
+            Self::Gyroflow => gyroflow::matches(document),
+            Self::Colmap => colmap::matches(document),
+            Self::OrbSlam => orb_slam::matches(document),
+            Self::Basalt => basalt::matches(document),
+            Self::Okvis => okvis::matches(document),
+            Self::NCamera => ncamera::matches(document),
+            Self::Vikit => vikit::matches(document),
+            Self::OpenSfm => opensfm::matches(document),
         }
     }
 
     /// The cameras of a file.
-    pub(super) fn entries(self, document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
+    pub(super) fn entries(self, document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
         Ok(match self {
             Self::OpenCv | Self::OpenCvFisheye => {
                 let entries = opencv::entries(document);
                 if entries.is_empty() {
-                    return Err(Problem::new("camera_matrix", "is missing, or is not 3 x 3"));
+                    return Err(KeyProblem::new("camera_matrix", "is missing, or is not 3 x 3"));
                 }
                 entries
             }
@@ -163,12 +164,12 @@ impl CameraFormat {
             | Self::Camodocal
             | Self::Reference
             | Self::Gyroflow
-            | Self::Vikit => Entry::only(&document.value),
+            | Self::Vikit => CameraEntry::single(&document.value),
         })
     }
 
-    /// Its tables of keys, each with what it is about.
-    pub(super) fn tables(self) -> &'static [(&'static str, &'static [Key])] {
+    /// Tables of keys, each with its scope.
+    pub(super) fn tables(self) -> &'static [(&'static str, &'static [KeyRow])] {
         match self {
             Self::OpenCv | Self::OpenCvFisheye => &[("", opencv::KEYS)],
             Self::Kalibr => &[("", kalibr::KEYS)],
@@ -179,7 +180,7 @@ impl CameraFormat {
             Self::Reference => &[("", reference::KEYS)],
             Self::Agisoft => &[
                 ("a calibration", agisoft::KEYS),
-                ("a sensor of a project, below its place", agisoft::SENSOR_KEYS),
+                ("a sensor of a project, relative to the sensor", agisoft::SENSOR_KEYS),
             ],
             Self::Gyroflow => &[("", gyroflow::KEYS)],
             Self::Colmap => &[("", colmap::KEYS)],
@@ -188,49 +189,49 @@ impl CameraFormat {
             Self::Okvis => &[("", okvis::KEYS)],
             Self::NCamera => &[("", ncamera::KEYS)],
             Self::Vikit => &[("", vikit::KEYS)],
-            Self::OpenSfm => &[("a camera, below its name", opensfm::KEYS)],
+            Self::OpenSfm => &[("a camera, relative to its name", opensfm::KEYS)],
         }
     }
 
-    /// What of the file is about the chosen camera, with the tables that it is judged by.
-    pub(super) fn parts<'a>(
+    /// Leaves of the selected camera and common leaves, with their tables.
+    pub(super) fn table_leaves<'a>(
         self,
         document: &'a Document,
-        entries: &[Entry<'a>],
-        chosen: &Entry<'a>,
-    ) -> Vec<Part<'a>> {
+        entries: &[CameraEntry<'a>],
+        chosen: &CameraEntry<'a>,
+    ) -> Vec<TableLeaves<'a>> {
         let keys = self.tables()[0].1;
         match self {
-            // What else is in such a file are poses and points.
-            Self::OpenSfm => vec![Part { keys, leaves: leaves(chosen.value) }],
+            // The rest of the file is poses and points.
+            Self::OpenSfm => vec![TableLeaves { keys, leaves: leaves(chosen.value) }],
             Self::Agisoft if document.root == "document" => {
-                let calibration =
-                    agisoft::calibration_of(chosen.value).map(|value| Part { keys, leaves: leaves(value) });
+                let calibration = agisoft::calibration_of(chosen.value)
+                    .map(|value| TableLeaves { keys, leaves: leaves(value) });
                 calibration
                     .into_iter()
-                    .chain([Part { keys: agisoft::SENSOR_KEYS, leaves: leaves(chosen.value) }])
+                    .chain([TableLeaves { keys: agisoft::SENSOR_KEYS, leaves: leaves(chosen.value) }])
                     .collect()
             }
             _ => {
                 let mut leaves = leaves(&document.value);
                 leaves.retain(|leaf| {
-                    chosen.holds(&leaf.path) || !entries.iter().any(|other| other.holds(&leaf.path))
+                    chosen.contains(&leaf.path) || !entries.iter().any(|other| other.contains(&leaf.path))
                 });
-                vec![Part { keys, leaves }]
+                vec![TableLeaves { keys, leaves }]
             }
         }
     }
 
-    /// `asked` is whether the user named the format.
+    /// Imports a camera. `is_explicit` is whether the user named the format.
     pub(super) fn import(
         self,
         document: &Document,
-        entry: &Entry<'_>,
-        asked: bool,
-    ) -> Result<ImportedCamera, Problem> {
+        entry: &CameraEntry<'_>,
+        is_explicit: bool,
+    ) -> Result<ImportedCamera, KeyProblem> {
         let value = entry.value;
         match self {
-            Self::OpenCv | Self::OpenCvFisheye => opencv::import(entry, self, asked),
+            Self::OpenCv | Self::OpenCvFisheye => opencv::import(entry, self, is_explicit),
             Self::Kalibr | Self::Euroc => kalibr::import(value, self),
             Self::RosCameraInfo => ros::import(value, false),
             Self::RosIni => ros::import(value, true),
@@ -249,45 +250,50 @@ impl CameraFormat {
     }
 }
 
-/// Every format's title, with commas between.
+/// Titles of all formats, separated by commas.
 pub(super) fn all_titles() -> String {
     CameraFormat::ALL.map(CameraFormat::title).join(", ")
 }
 
-/// A word on files that are near a camera file.
-pub(super) fn hint(document: &Document) -> Option<String> {
+/// A message for known files that are not supported.
+pub(super) fn unsupported_hint(document: &Document) -> Option<String> {
     let value = &document.value;
     let calibrations: Vec<&str> = (0..8)
         .filter_map(|index| find(value, &format!("cam{index}_calib")).and_then(Value::as_str))
         .collect();
     if !calibrations.is_empty() {
         return Some(format!(
-            "this names its cameras in files of their own: import one of those ({})",
+            "this refers to a file for each camera: import one of those ({})",
             calibrations.join(", ")
         ));
     }
     if document.root == "lensdatabase" {
-        return Some("this is a data base of lenses without the size of a picture, not a camera".to_owned());
+        return Some("this is a lens database without image sizes, not a camera".to_owned());
     }
     if find(value, "fl_x").is_some() && find(value, "w").is_some() {
-        let text = "this is nerfstudio's transforms.json, whose documents have pixel centres at whole numbers and whose program at halves: write camera_matrix, \
-                    distortion_coefficients, image_width and image_height in a YAML file, half a pixel less in cx and cy if COLMAP gave them";
+        let text = "this is nerfstudio's transforms.json, whose documentation has pixel centres at integers \
+                    and whose code at half-integers: write camera_matrix, distortion_coefficients, \
+                    image_width and image_height to a YAML file; subtract half a pixel from cx and cy if \
+                    they are from COLMAP";
         return Some(text.to_owned());
     }
     if find(value, "ppx").is_some() {
-        let text = "these are a RealSense's intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), distortion_coefficients, image_width and \
-                    image_height in a YAML file";
+        let text = "these are RealSense intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), \
+                    distortion_coefficients, image_width and image_height to a YAML file";
         return Some(text.to_owned());
     }
     if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some()
     {
-        let text = "there is a matrix of another program's (MATLAB's is transposed and counts pixels from 1, KITTI's P0 to P3 are of rectified pictures): write \
-                    camera_matrix, distortion_coefficients, image_width and image_height in a YAML file";
+        let text = "this is a matrix of another program (MATLAB's is transposed and counts pixels from 1, \
+                    KITTI's P0 to P3 are for rectified pictures): write camera_matrix, \
+                    distortion_coefficients, image_width and image_height to a YAML file";
         return Some(text.to_owned());
     }
     if find(value, "distortion_model").is_some() || find(value, "distortion_coefficients").is_some() {
         return Some(
-            "there is a distortion, but no camera matrix of 3 x 3 under a name that is known here (camera_matrix, K, k)".to_owned(),
+            "there are distortion coefficients, but no 3 x 3 camera matrix under a known name \
+             (camera_matrix, K, k)"
+                .to_owned(),
         );
     }
     None

@@ -4,157 +4,163 @@ use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
 use super::document::{
-    Document, Problem, at_most, camera_matrix, find, flag, number, numbers, optional_number, size, word,
+    Document, KeyProblem, at_most_coefficients, camera_matrix, find, flag, number, numbers, optional_number,
+    size, word,
 };
-use super::keys::{Key, Neutral, Use};
+use super::key_table::{KeyRow, Neutral, Treatment};
 use super::{CameraFormat, ImportedCamera, camera};
 
-const BENT: &str = "what the camera's own software bends is not modelled: film without it";
+const IN_CAMERA_CORRECTION: &str =
+    "lens correction by the camera's software is not supported: record without it";
 const STRETCHED: &str = "stretched (anamorphic) recordings are not supported";
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new("calib_dimension.w", Use::Applied, "width: the matrix belongs to this size"),
-    Key::new("calib_dimension.h", Use::Applied, "height"),
-    Key::new("orig_dimension.*", Use::Applied, "named where it differs from calib_dimension"),
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new("calib_dimension.w", Treatment::Applied, "width of the calibration pictures"),
+    KeyRow::new("calib_dimension.h", Treatment::Applied, "height"),
+    KeyRow::new("orig_dimension.*", Treatment::Applied, "reported where it differs from calib_dimension"),
+    KeyRow::new(
         "fisheye_params.camera_matrix",
-        Use::Applied,
-        "focal lengths; the principal point counts where `asymmetrical` is true, as in Gyroflow",
+        Treatment::Applied,
+        "focal lengths; the principal point is used if `asymmetrical` is true, as in Gyroflow",
     ),
-    Key::new("fisheye_params.distortion_coeffs", Use::Applied, "k1 k2 k3 k4"),
-    Key::new(
+    KeyRow::new("fisheye_params.distortion_coeffs", Treatment::Applied, "k1 k2 k3 k4"),
+    KeyRow::new(
         "fisheye_params.radial_distortion_limit",
-        Use::Named(Neutral::Never),
-        "where the lens folds is found by itself",
+        Treatment::Reported(Neutral::Never),
+        "camsim computes the limit itself",
     ),
-    Key::new(
+    KeyRow::new(
         "calib_params.camera_matrix",
-        Use::Applied,
-        "used in place of fisheye_params where use_opencv_standard is true",
+        Treatment::Applied,
+        "used instead of fisheye_params if use_opencv_standard is true",
     ),
-    Key::new("calib_params.distortion_coeffs", Use::Applied, "k1 k2 p1 p2 k3 k4 k5 k6"),
-    Key::new(
+    KeyRow::new("calib_params.distortion_coeffs", Treatment::Applied, "k1 k2 p1 p2 k3 k4 k5 k6"),
+    KeyRow::new(
         "calib_params.radial_distortion_limit",
-        Use::Named(Neutral::Never),
-        "where the lens folds is found by itself",
+        Treatment::Reported(Neutral::Never),
+        "camsim computes the limit itself",
     ),
-    Key::new("use_opencv_standard", Use::Applied, "which of the two counts"),
-    Key::new("use_opencv_fisheye", Use::Applied, "false, without use_opencv_standard, is refused"),
-    Key::new(
+    KeyRow::new("use_opencv_standard", Treatment::Applied, "selects calib_params"),
+    KeyRow::new("use_opencv_fisheye", Treatment::Applied, "false, without use_opencv_standard, is refused"),
+    KeyRow::new(
         "asymmetrical",
-        Use::Applied,
-        "false or missing: the principal point is the middle (w/2, h/2), whatever the matrix says",
+        Treatment::Applied,
+        "false or missing: the principal point is the centre (w/2, h/2), not the matrix's",
     ),
-    Key::new("crop", Use::Applied, "divides the focal lengths"),
-    Key::new("distortion_model", Use::Applied, "opencv_fisheye; others are refused"),
-    Key::new(
+    KeyRow::new("crop", Treatment::Applied, "divides the focal lengths"),
+    KeyRow::new("distortion_model", Treatment::Applied, "opencv_fisheye; others are refused"),
+    KeyRow::new(
         "distortion_model_id",
-        Use::Refused(Neutral::Zero),
+        Treatment::Refused(Neutral::Zero),
         "not OpenCV's fisheye, the only model of Gyroflow that can be imported",
     ),
-    Key::new("digital_lens", Use::Refused(Neutral::Never), BENT),
-    Key::new("digital_lens_params", Use::Named(Neutral::Never), BENT),
-    Key::new("is_superview", Use::Refused(Neutral::Zero), BENT),
-    Key::new("input_horizontal_stretch", Use::Refused(Neutral::UpToOne), STRETCHED),
-    Key::new("input_vertical_stretch", Use::Refused(Neutral::UpToOne), STRETCHED),
-    Key::new("fps", Use::Rate, "frames a second"),
-    Key::new("frame_readout_time", Use::Readout(1.0), "ms a frame; negative: from the last row to the first"),
-    Key::new(
+    KeyRow::new("digital_lens", Treatment::Refused(Neutral::Never), IN_CAMERA_CORRECTION),
+    KeyRow::new("digital_lens_params", Treatment::Reported(Neutral::Never), IN_CAMERA_CORRECTION),
+    KeyRow::new("is_superview", Treatment::Refused(Neutral::Zero), IN_CAMERA_CORRECTION),
+    KeyRow::new("input_horizontal_stretch", Treatment::Refused(Neutral::ZeroOrOne), STRETCHED),
+    KeyRow::new("input_vertical_stretch", Treatment::Refused(Neutral::ZeroOrOne), STRETCHED),
+    KeyRow::new("fps", Treatment::FrameRate, "frames per second"),
+    KeyRow::new(
+        "frame_readout_time",
+        Treatment::Readout(1.0),
+        "ms per frame; negative: from the last row to the first",
+    ),
+    KeyRow::new(
         "interpolations",
-        Use::Named(Neutral::Never),
-        "calibrations at other focal lengths; the profile's own is taken",
+        Treatment::Reported(Neutral::Never),
+        "calibrations at other focal lengths; the profile's own is used",
     ),
-    Key::new(
+    KeyRow::new(
         "interpolations.**",
-        Use::Named(Neutral::Never),
-        "calibrations at other focal lengths; the profile's own is taken",
+        Treatment::Reported(Neutral::Never),
+        "calibrations at other focal lengths; the profile's own is used",
     ),
-    Key::new(
+    KeyRow::new(
         "compatible_settings.**",
-        Use::Named(Neutral::Never),
-        "other sizes and rates with readout times of their own: set fps and shutter.readout_ms if one of them is meant",
+        Treatment::Reported(Neutral::Never),
+        "other sizes and frame rates with their readout times: set fps and shutter.readout_ms for one of \
+         them",
     ),
-    Key::new("compatible_settings", Use::Silent, "none"),
-    Key::new("output_dimension.*", Use::Silent, "size of the stabilised video"),
-    Key::new("focal_length", Use::Silent, "mm, for people"),
-    Key::new("crop_factor", Use::Silent, "for people"),
-    Key::new("num_images", Use::Silent, "how many pictures were used"),
-    Key::new("fisheye_params.RMS_error", Use::Silent, "how well it fitted"),
-    Key::new("calib_params.RMS_error", Use::Silent, "how well it fitted"),
-    Key::new("sync_settings", Use::Silent, "a setting of that program"),
-    Key::new("sync_settings.**", Use::Silent, "a setting of that program"),
-    Key::new("gyro_lpf", Use::Silent, "a setting of that program"),
-    Key::new("official", Use::Silent, "where it comes from"),
-    Key::new("date", Use::Silent, "when it was made"),
-    Key::new("calibrator_version", Use::Silent, "when it was made"),
-    Key::new("name", Use::Silent, "a name"),
-    Key::new("identifier", Use::Silent, "a name"),
-    Key::new("note", Use::Silent, "free text"),
-    Key::new("calibrated_by", Use::Silent, "where it comes from"),
-    Key::new("camera_brand", Use::Silent, "a name"),
-    Key::new("camera_model", Use::Silent, "a name"),
-    Key::new("camera_setting", Use::Silent, "a name"),
-    Key::new("lens_model", Use::Silent, "a name"),
+    KeyRow::new("compatible_settings", Treatment::Ignored, "none"),
+    KeyRow::new("output_dimension.*", Treatment::Ignored, "size of the stabilised video"),
+    KeyRow::new("focal_length", Treatment::Ignored, "mm, informative"),
+    KeyRow::new("crop_factor", Treatment::Ignored, "informative"),
+    KeyRow::new("num_images", Treatment::Ignored, "number of pictures"),
+    KeyRow::new("fisheye_params.RMS_error", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("calib_params.RMS_error", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("sync_settings", Treatment::Ignored, "a setting of that program"),
+    KeyRow::new("sync_settings.**", Treatment::Ignored, "a setting of that program"),
+    KeyRow::new("gyro_lpf", Treatment::Ignored, "a setting of that program"),
+    KeyRow::new("official", Treatment::Ignored, "origin"),
+    KeyRow::new("date", Treatment::Ignored, "date or version"),
+    KeyRow::new("calibrator_version", Treatment::Ignored, "date or version"),
+    KeyRow::new("name", Treatment::Ignored, "a name"),
+    KeyRow::new("identifier", Treatment::Ignored, "a name"),
+    KeyRow::new("note", Treatment::Ignored, "free text"),
+    KeyRow::new("calibrated_by", Treatment::Ignored, "origin"),
+    KeyRow::new("camera_brand", Treatment::Ignored, "a name"),
+    KeyRow::new("camera_model", Treatment::Ignored, "a name"),
+    KeyRow::new("camera_setting", Treatment::Ignored, "a name"),
+    KeyRow::new("lens_model", Treatment::Ignored, "a name"),
 ];
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     let has = |key: &str| find(&document.value, key).is_some();
     document.root.is_empty() && has("calib_dimension") && (has("fisheye_params") || has("calib_params"))
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     if let Some(model) = word(value, "distortion_model")
         && model != "opencv_fisheye"
     {
-        return Err(Problem::new(
+        return Err(KeyProblem::new(
             "distortion_model",
             format!("is `{model}`: only opencv_fisheye can be imported"),
         ));
     }
     let [width, height] = [number(value, "calib_dimension.w")?, number(value, "calib_dimension.h")?];
     let size_px = size("calib_dimension", [width, height])?;
-    let (standard, fisheye) =
+    let (is_standard, is_fisheye) =
         (flag(value, "use_opencv_standard")?.unwrap_or(false), flag(value, "use_opencv_fisheye")?);
-    let (section, model, max) = match (standard, fisheye) {
+    let (section, model, max) = match (is_standard, is_fisheye) {
         (true, Some(true)) => {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 "use_opencv_standard",
-                "is true, and so is use_opencv_fisheye: which of the two is meant?",
+                "is true, and so is use_opencv_fisheye: set one of them to false",
             ));
         }
         (true, _) => ("calib_params", LensModel::BrownConrady, 8),
         (false, Some(false)) => {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 "use_opencv_fisheye",
-                "is false, and so is use_opencv_standard: no model is left",
+                "is false, and so is use_opencv_standard: set one of them to true",
             ));
         }
         (false, _) => ("fisheye_params", LensModel::KannalaBrandt, 4),
     };
-    let (focal_px, in_matrix) = camera_matrix(value, &format!("{section}.camera_matrix"))?;
+    let (focal_px, matrix_point) = camera_matrix(value, &format!("{section}.camera_matrix"))?;
     let key = format!("{section}.distortion_coeffs");
-    let mut coefficients = at_most(&key, numbers(value, &key)?, max, "more coefficients than its model has")?;
+    let mut coefficients =
+        at_most_coefficients(&key, numbers(value, &key)?, max, "more coefficients than its model has")?;
     if model == LensModel::KannalaBrandt && coefficients.len() < 4 {
-        let text = format!(
-            "has {} numbers: k1 k2 k3 k4 are meant; write the ones that are zero too",
-            coefficients.len()
-        );
-        return Err(Problem::new(key, text));
+        let text = format!("has {} numbers instead of k1 k2 k3 k4; write zeros too", coefficients.len());
+        return Err(KeyProblem::new(key, text));
     }
     if model == LensModel::BrownConrady {
-        coefficients = super::models::radial_tangential(&key, coefficients, 8)?;
+        coefficients = super::lens_models::radial_tangential(&key, coefficients, 8)?;
     }
-    let asymmetrical = flag(value, "asymmetrical")?.unwrap_or(false);
-    let point = if asymmetrical { in_matrix } else { [0.5 * width, 0.5 * height] };
+    let is_asymmetrical = flag(value, "asymmetrical")?.unwrap_or(false);
+    let point = if is_asymmetrical { matrix_point } else { [0.5 * width, 0.5 * height] };
     let crop = optional_number(value, "crop")?.unwrap_or(1.0);
     if crop <= 0.0 {
-        return Err(Problem::new("crop", format!("is {crop}: a factor above 0 is meant")));
+        return Err(KeyProblem::new("crop", format!("is {crop}, not a positive factor")));
     }
     let mut imported =
         camera(CameraFormat::Gyroflow, size_px, focal_px.map(|f| f / crop), point, model, coefficients);
-    if !asymmetrical && in_matrix != point {
+    if !is_asymmetrical && matrix_point != point {
         let text = format!(
-            "the principal point is the middle, {point:?}, as `asymmetrical` is not true: Gyroflow does not use the matrix's {in_matrix:?} then"
+            "the principal point is the centre {point:?}, because `asymmetrical` is not true: like Gyroflow, \
+             camsim ignores the matrix's {matrix_point:?}"
         );
         imported.notes.push(text);
     }
@@ -165,7 +171,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         let original = [number(value, "orig_dimension.w")?, number(value, "orig_dimension.h")?];
         if original != [width, height] {
             let text = format!(
-                "orig_dimension is {original:?}, but the calibration is of {:?}, which is the size here",
+                "orig_dimension is {original:?}, but the size is that of the calibration, {:?}",
                 [width, height]
             );
             imported.notes.push(text);

@@ -2,77 +2,77 @@
 
 use serde_json::Value;
 
-use super::choose::Entry;
-use super::document::{Document, Problem, find, numbers_n, size, word};
-use super::keys::{Key, Neutral, Use};
-use super::{CameraFormat, ImportedCamera, camera, models};
+use super::document::{Document, KeyProblem, find, numbers_n, size, word};
+use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
-const DELAY: &str = "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag";
+const DELAY: &str = "delay of the pictures against the IMU, s: set shutter.delay_ms if the pictures lag";
 const ESTIMATOR: &str = "a setting of the estimator";
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new("cameras.image_dimension", Use::Applied, "width, height"),
-    Key::new("cameras.focal_length", Use::Applied, "fx, fy"),
-    Key::new("cameras.principal_point", Use::Applied, "cx, cy"),
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new("cameras.image_dimension", Treatment::Applied, "width, height"),
+    KeyRow::new("cameras.focal_length", Treatment::Applied, "fx, fy"),
+    KeyRow::new("cameras.principal_point", Treatment::Applied, "cx, cy"),
+    KeyRow::new(
         "cameras.distortion_type",
-        Use::Applied,
+        Treatment::Applied,
         "radialtangential, radialtangential8, equidistant, none; others are refused",
     ),
-    Key::new("cameras.distortion_coefficients", Use::Applied, "in OpenCV's order"),
-    Key::new(
+    KeyRow::new("cameras.distortion_coefficients", Treatment::Applied, "in OpenCV's order"),
+    KeyRow::new(
         "cameras.T_SC",
-        Use::Named(Neutral::Identity),
-        "pose of the camera to the IMU: set mount by hand",
+        Treatment::Reported(Neutral::Identity),
+        "pose of the camera to the IMU: set mount instead",
     ),
-    Key::new("cameras.cam_model", Use::Applied, "pinhole; others are refused"),
-    Key::new("cameras.camera_model", Use::Applied, "pinhole; others are refused"),
-    Key::new("cameras.slam_use", Use::Silent, ESTIMATOR),
-    Key::new("camera_params.camera_rate", Use::Rate, "frames a second"),
-    Key::new("camera_params.image_delay", Use::Named(Neutral::Zero), DELAY),
-    Key::new("imageDelay", Use::Named(Neutral::Zero), DELAY),
-    Key::new("camera_parameters.image_delay", Use::Named(Neutral::Zero), DELAY),
-    Key::new("camera_parameters.camera_rate", Use::Rate, "frames a second"),
-    Key::new("camera_params.sigma_*", Use::Silent, ESTIMATOR),
-    Key::new("camera_params.timestamp_tolerance", Use::Silent, ESTIMATOR),
-    Key::new("camera_params.sync_cameras", Use::Silent, ESTIMATOR),
-    Key::new("camera_params.online_calibration.**", Use::Silent, ESTIMATOR),
-    Key::new("imu_params.**", Use::Silent, "the IMU"),
-    Key::new("numKeyframes", Use::Silent, ESTIMATOR),
-    Key::new("numImuFrames", Use::Silent, ESTIMATOR),
-    Key::new("ceres_options.**", Use::Silent, ESTIMATOR),
-    Key::new("*_options.**", Use::Silent, ESTIMATOR),
-    Key::new("*_parameters.**", Use::Silent, ESTIMATOR),
-    Key::new("displayImages", Use::Silent, ESTIMATOR),
-    Key::new("useDriver", Use::Silent, ESTIMATOR),
+    KeyRow::new("cameras.cam_model", Treatment::Applied, "pinhole; others are refused"),
+    KeyRow::new("cameras.camera_model", Treatment::Applied, "pinhole; others are refused"),
+    KeyRow::new("cameras.slam_use", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("camera_params.camera_rate", Treatment::FrameRate, "frames per second"),
+    KeyRow::new("camera_params.image_delay", Treatment::Reported(Neutral::Zero), DELAY),
+    KeyRow::new("imageDelay", Treatment::Reported(Neutral::Zero), DELAY),
+    KeyRow::new("camera_parameters.image_delay", Treatment::Reported(Neutral::Zero), DELAY),
+    KeyRow::new("camera_parameters.camera_rate", Treatment::FrameRate, "frames per second"),
+    KeyRow::new("camera_params.sigma_*", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("camera_params.timestamp_tolerance", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("camera_params.sync_cameras", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("camera_params.online_calibration.**", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("imu_params.**", Treatment::Ignored, "the IMU"),
+    KeyRow::new("numKeyframes", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("numImuFrames", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("ceres_options.**", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("*_options.**", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("*_parameters.**", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("displayImages", Treatment::Ignored, ESTIMATOR),
+    KeyRow::new("useDriver", Treatment::Ignored, ESTIMATOR),
 ];
 
 fn list(document: &Document) -> &[Value] {
     find(&document.value, "cameras").and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     let is_camera =
         |value: &Value| find(value, "focal_length").is_some() || find(value, "image_dimension").is_some();
     document.root.is_empty() && list(document).iter().any(is_camera)
 }
 
-pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
-    let entry = |(index, value): (usize, _)| Entry {
+pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
+    let entry = |(index, value): (usize, _)| CameraEntry {
         name: format!("cam{index}"),
-        also: vec![index.to_string()],
+        aliases: vec![index.to_string()],
         value,
         roots: vec![format!("cameras[{index}]")],
     };
     list(document).iter().enumerate().map(entry).collect()
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     for key in ["cam_model", "camera_model"] {
         if let Some(model) = word(value, key)
             && model != "pinhole"
         {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 key,
                 format!("is `{model}`: only `pinhole` can be imported; calibrate with it"),
             ));
@@ -80,8 +80,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     }
     let size_px = size("image_dimension", numbers_n(value, "image_dimension")?)?;
     let kind = word(value, "distortion_type").unwrap_or_default();
-    let list = models::stated(value, "distortion_type", kind, Some("distortion_coefficients"))?;
-    let (model, list) = models::by_name("distortion_type", kind, "distortion_coefficients", list)?;
+    let list = lens_models::coefficients(value, "distortion_type", kind, Some("distortion_coefficients"))?;
+    let (model, list) = lens_models::lens_by_name("distortion_type", kind, "distortion_coefficients", list)?;
     Ok(camera(
         CameraFormat::Okvis,
         size_px,

@@ -4,221 +4,231 @@
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::choose::Entry;
 use super::document::{
-    Document, Problem, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size, word,
+    Document, KeyProblem, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size, word,
 };
-use super::keys::{Key, Neutral, Use};
-use super::{CameraFormat, ImportedCamera, camera, models, ros};
+use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
+use super::{CameraFormat, ImportedCamera, camera, lens_models, ros};
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new(
         "camera_matrix",
-        Use::Applied,
-        "3 x 3; also with 0, 1, 2, L, R, _left, _right, Left, Right behind the name, for a stereo pair",
+        Treatment::Applied,
+        "3 x 3; also with the suffix 0, 1, 2, L, R, _left, _right, Left, Right for a stereo pair",
     ),
-    Key::new("Camera_Matrix", Use::Applied, "as camera_matrix"),
-    Key::new("cameraMatrix", Use::Applied, "as camera_matrix"),
-    Key::new("CameraMatrix", Use::Applied, "as camera_matrix"),
-    Key::new("CameraMat", Use::Applied, "as camera_matrix"),
-    Key::new("camera_intrinsics", Use::Applied, "as camera_matrix"),
-    Key::new("intrinsic_matrix", Use::Applied, "as camera_matrix"),
-    Key::new("intrinsics_matrix", Use::Applied, "as camera_matrix"),
-    Key::new("mtx", Use::Applied, "as camera_matrix"),
-    Key::new("K", Use::Applied, "as camera_matrix"),
-    Key::new("M", Use::Applied, "as camera_matrix"),
-    Key::new("intrinsics", Use::Applied, "as camera_matrix"),
-    Key::new(
+    KeyRow::new("Camera_Matrix", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("cameraMatrix", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("CameraMatrix", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("CameraMat", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("camera_intrinsics", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("intrinsic_matrix", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("intrinsics_matrix", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("mtx", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("K", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("M", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("intrinsics", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new(
         "distortion_coefficients",
-        Use::Applied,
-        "5, 8, or up to 14 of which those after the eighth are zero: k1 k2 p1 p2 k3 k4 k5 k6. Four need a word on the model, or --format",
+        Treatment::Applied,
+        "5, 8, or up to 14 with zeros after the eighth: k1 k2 p1 p2 k3 k4 k5 k6. Four need a model, or \
+         --format",
     ),
-    Key::new("Distortion_Coefficients", Use::Applied, "as distortion_coefficients"),
-    Key::new("distortion_coeffs", Use::Applied, "as distortion_coefficients"),
-    Key::new("distortionCoefficients", Use::Applied, "as distortion_coefficients"),
-    Key::new("distCoeffs", Use::Applied, "as distortion_coefficients"),
-    Key::new("dist_coeffs", Use::Applied, "as distortion_coefficients"),
-    Key::new("DistCoeffs", Use::Applied, "as distortion_coefficients"),
-    Key::new("dist_coeff", Use::Applied, "as distortion_coefficients"),
-    Key::new("distCoeff", Use::Applied, "as distortion_coefficients"),
-    Key::new("DistCoeff", Use::Applied, "as distortion_coefficients"),
-    Key::new("distortion", Use::Applied, "as distortion_coefficients"),
-    Key::new("dist_coefs", Use::Applied, "as distortion_coefficients"),
-    Key::new("dist", Use::Applied, "as distortion_coefficients"),
-    Key::new("D", Use::Applied, "as distortion_coefficients"),
-    Key::new("image_width", Use::Applied, "width of the picture"),
-    Key::new("image_height", Use::Applied, "height of the picture"),
-    Key::new("image_Width", Use::Applied, "width of the picture"),
-    Key::new("image_Height", Use::Applied, "height of the picture"),
-    Key::new("imageWidth", Use::Applied, "width of the picture"),
-    Key::new("imageHeight", Use::Applied, "height of the picture"),
-    Key::new("width", Use::Applied, "width of the picture"),
-    Key::new("height", Use::Applied, "height of the picture"),
-    Key::new("img_width", Use::Applied, "width of the picture"),
-    Key::new("img_height", Use::Applied, "height of the picture"),
-    Key::new("camera_width", Use::Applied, "width of the picture"),
-    Key::new("camera_height", Use::Applied, "height of the picture"),
-    Key::new("image_size", Use::Applied, "width and height, in this order"),
-    Key::new("imageSize", Use::Applied, "width and height, in this order"),
-    Key::new("ImageSize", Use::Applied, "width and height, in this order"),
-    Key::new("img_size", Use::Applied, "width and height, in this order"),
-    Key::new("size", Use::Applied, "width and height, in this order"),
-    Key::new("resolution", Use::Applied, "width and height, in this order"),
-    Key::new("image_resolution", Use::Applied, "width and height, in this order"),
-    Key::new("fisheye_model", Use::Applied, "1: the coefficients are a fisheye's"),
-    Key::new("fisheye", Use::Applied, "the same"),
-    Key::new("is_fisheye", Use::Applied, "the same"),
-    Key::new(
+    KeyRow::new("Distortion_Coefficients", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("distortion_coeffs", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("distortionCoefficients", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("distCoeffs", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("dist_coeffs", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("DistCoeffs", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("dist_coeff", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("distCoeff", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("DistCoeff", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("distortion", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("dist_coefs", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("dist", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("D", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("image_width", Treatment::Applied, "width of the picture"),
+    KeyRow::new("image_height", Treatment::Applied, "height of the picture"),
+    KeyRow::new("image_Width", Treatment::Applied, "width of the picture"),
+    KeyRow::new("image_Height", Treatment::Applied, "height of the picture"),
+    KeyRow::new("imageWidth", Treatment::Applied, "width of the picture"),
+    KeyRow::new("imageHeight", Treatment::Applied, "height of the picture"),
+    KeyRow::new("width", Treatment::Applied, "width of the picture"),
+    KeyRow::new("height", Treatment::Applied, "height of the picture"),
+    KeyRow::new("img_width", Treatment::Applied, "width of the picture"),
+    KeyRow::new("img_height", Treatment::Applied, "height of the picture"),
+    KeyRow::new("camera_width", Treatment::Applied, "width of the picture"),
+    KeyRow::new("camera_height", Treatment::Applied, "height of the picture"),
+    KeyRow::new("image_size", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("imageSize", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("ImageSize", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("img_size", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("size", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("resolution", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("image_resolution", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("fisheye_model", Treatment::Applied, "1: fisheye coefficients"),
+    KeyRow::new("fisheye", Treatment::Applied, "as above"),
+    KeyRow::new("is_fisheye", Treatment::Applied, "as above"),
+    KeyRow::new(
         "model_type",
-        Use::Applied,
-        "a word that names the model: fisheye, equidistant, Kannala-Brandt; radtan, plumb_bob, Brown, rational, standard",
+        Treatment::Applied,
+        "name of the model: fisheye, equidistant, Kannala-Brandt; radtan, plumb_bob, Brown, rational, \
+         standard",
     ),
-    Key::new("camera_model", Use::Applied, "the same; other words (a product's name) are no model"),
-    Key::new("distortion_type", Use::Applied, "the same"),
-    Key::new("lens_model", Use::Applied, "the same"),
-    Key::new("projection_type", Use::Applied, "the same"),
-    Key::new("model", Use::Applied, "the same"),
-    Key::new("DistModel", Use::Applied, "the same"),
-    Key::new("dist_model", Use::Applied, "the same"),
-    Key::new(
+    KeyRow::new(
+        "camera_model",
+        Treatment::Applied,
+        "as model_type; other texts, such as a product name, are ignored",
+    ),
+    KeyRow::new("distortion_type", Treatment::Applied, "as above"),
+    KeyRow::new("lens_model", Treatment::Applied, "as above"),
+    KeyRow::new("projection_type", Treatment::Applied, "as above"),
+    KeyRow::new("model", Treatment::Applied, "as above"),
+    KeyRow::new("DistModel", Treatment::Applied, "as above"),
+    KeyRow::new("dist_model", Treatment::Applied, "as above"),
+    KeyRow::new(
         "image_shape",
-        Use::Refused(Neutral::Never),
-        "rows first or columns first? Write image_width and image_height instead",
+        Treatment::Refused(Neutral::Never),
+        "the order of rows and columns is ambiguous: write image_width and image_height instead",
     ),
-    Key::new(
+    KeyRow::new(
         "img_shape",
-        Use::Refused(Neutral::Never),
-        "rows first or columns first? Write image_width and image_height instead",
+        Treatment::Refused(Neutral::Never),
+        "the order of rows and columns is ambiguous: write image_width and image_height instead",
     ),
-    Key::new(
+    KeyRow::new(
         "shape",
-        Use::Refused(Neutral::Never),
-        "rows first or columns first? Write image_width and image_height instead",
+        Treatment::Refused(Neutral::Never),
+        "the order of rows and columns is ambiguous: write image_width and image_height instead",
     ),
-    Key::new(
+    KeyRow::new(
         "new_camera_matrix",
-        Use::Named(Neutral::Never),
-        "the matrix of undistorted pictures; those that come out are distorted",
+        Treatment::Reported(Neutral::Never),
+        "the matrix of undistorted pictures; camsim renders distorted ones",
     ),
-    Key::new(
+    KeyRow::new(
         "newcameramtx",
-        Use::Named(Neutral::Never),
-        "the matrix of undistorted pictures; those that come out are distorted",
+        Treatment::Reported(Neutral::Never),
+        "the matrix of undistorted pictures; camsim renders distorted ones",
     ),
-    Key::new(
+    KeyRow::new(
         "roi",
-        Use::Named(Neutral::Zero),
-        "the valid part of undistorted pictures; those that come out are distorted",
+        Treatment::Reported(Neutral::Zero),
+        "the valid region of undistorted pictures; camsim renders distorted ones",
     ),
-    Key::new(
+    KeyRow::new(
         "R",
-        Use::Named(Neutral::Identity),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Identity),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "R1",
-        Use::Named(Neutral::Identity),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Identity),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "R2",
-        Use::Named(Neutral::Identity),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Identity),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "R_L",
-        Use::Named(Neutral::Identity),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Identity),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "R_R",
-        Use::Named(Neutral::Identity),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Identity),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "P",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "P2",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "P_L",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "P_R",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "T_L",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "T_R",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "T",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "E",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "F",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "P1",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "Q",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new(
+    KeyRow::new(
         "*_projection",
-        Use::Named(Neutral::Zero),
-        "stereo or rectification geometry, which a single camera has not",
+        Treatment::Reported(Neutral::Zero),
+        "stereo or rectification geometry, which does not apply to a single camera",
     ),
-    Key::new("CameraExtrinsicMat", Use::Named(Neutral::Identity), "pose of the camera: set mount by hand"),
-    Key::new("extrinsic_parameters", Use::Silent, "poses of the calibration board"),
-    Key::new("image_points", Use::Silent, "corners that were found"),
-    Key::new("grid_points", Use::Silent, "corners of the board"),
-    Key::new("per_view_reprojection_errors", Use::Silent, "how well it fitted"),
-    Key::new("avg_reprojection_error", Use::Silent, "how well it fitted"),
-    Key::new("*reprojection_error*", Use::Silent, "how well it fitted"),
-    Key::new("ReprojectionError", Use::Silent, "how well it fitted"),
-    Key::new("rms", Use::Silent, "how well it fitted"),
-    Key::new("rvecs", Use::Silent, "poses of the calibration board"),
-    Key::new("tvecs", Use::Silent, "poses of the calibration board"),
-    Key::new("flags", Use::Silent, "options of the calibration"),
-    Key::new("n*rames", Use::Silent, "how many pictures were used"),
-    Key::new("n*rames*", Use::Silent, "how many pictures were used"),
-    Key::new("nr_of_frames", Use::Silent, "how many pictures were used"),
-    Key::new("board_*", Use::Silent, "the calibration board"),
-    Key::new("square_size", Use::Silent, "the calibration board"),
-    Key::new("marker_size", Use::Silent, "the calibration board"),
-    Key::new("aspectRatio", Use::Silent, "an option of the calibration"),
-    Key::new("fix_aspect_ratio", Use::Silent, "an option of the calibration"),
-    Key::new("calibration_time", Use::Silent, "when it was made"),
+    KeyRow::new(
+        "CameraExtrinsicMat",
+        Treatment::Reported(Neutral::Identity),
+        "pose of the camera: set mount instead",
+    ),
+    KeyRow::new("extrinsic_parameters", Treatment::Ignored, "poses of the calibration board"),
+    KeyRow::new("image_points", Treatment::Ignored, "detected corners"),
+    KeyRow::new("grid_points", Treatment::Ignored, "corners of the board"),
+    KeyRow::new("per_view_reprojection_errors", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("avg_reprojection_error", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("*reprojection_error*", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("ReprojectionError", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("rms", Treatment::Ignored, "calibration residual"),
+    KeyRow::new("rvecs", Treatment::Ignored, "poses of the calibration board"),
+    KeyRow::new("tvecs", Treatment::Ignored, "poses of the calibration board"),
+    KeyRow::new("flags", Treatment::Ignored, "options of the calibration"),
+    KeyRow::new("n*rames", Treatment::Ignored, "number of pictures"),
+    KeyRow::new("n*rames*", Treatment::Ignored, "number of pictures"),
+    KeyRow::new("nr_of_frames", Treatment::Ignored, "number of pictures"),
+    KeyRow::new("board_*", Treatment::Ignored, "the calibration board"),
+    KeyRow::new("square_size", Treatment::Ignored, "the calibration board"),
+    KeyRow::new("marker_size", Treatment::Ignored, "the calibration board"),
+    KeyRow::new("aspectRatio", Treatment::Ignored, "an option of the calibration"),
+    KeyRow::new("fix_aspect_ratio", Treatment::Ignored, "an option of the calibration"),
+    KeyRow::new("calibration_time", Treatment::Ignored, "date or version"),
 ];
 
-/// What OpenCV's samples and the projects after them call the camera matrix.
+/// Names of the camera matrix in OpenCV's samples and other projects.
 pub(super) const MATRICES: [&str; 12] = [
     "camera_matrix",
     "Camera_Matrix",
@@ -234,7 +244,7 @@ pub(super) const MATRICES: [&str; 12] = [
     "intrinsics",
 ];
 
-/// And the coefficients.
+/// Names of the distortion coefficients.
 pub(super) const COEFFICIENTS: [&str; 14] = [
     "distortion_coefficients",
     "Distortion_Coefficients",
@@ -252,10 +262,10 @@ pub(super) const COEFFICIENTS: [&str; 14] = [
     "D",
 ];
 
-/// How the cameras of a stereo pair are told apart.
+/// Suffixes of the cameras of a stereo pair.
 const SUFFIXES: [&str; 11] = ["", "1", "2", "0", "L", "R", "_left", "_right", "Left", "Right", "_1"];
 
-/// Image sizes: width and height apart, and both in one list.
+/// Names of width and height.
 pub(super) const SIZES: [(&str, &str); 6] = [
     ("image_width", "image_height"),
     ("image_Width", "image_Height"),
@@ -264,13 +274,14 @@ pub(super) const SIZES: [(&str, &str); 6] = [
     ("img_width", "img_height"),
     ("camera_width", "camera_height"),
 ];
+/// Names of lists of width and height.
 pub(super) const SIZE_LISTS: [&str; 7] =
     ["image_size", "imageSize", "ImageSize", "img_size", "size", "resolution", "image_resolution"];
 
-/// Names of matrix and coefficients of each camera. Two sets of one camera are refused by `entries`.
-fn pairs(document: &Document) -> Vec<(String, Option<String>)> {
+/// Names of matrix and coefficients of each camera.
+fn matrix_and_coefficients(document: &Document) -> Vec<(String, Option<String>)> {
     let value = &document.value;
-    let mut found = Vec::new();
+    let mut pairs = Vec::new();
     for suffix in SUFFIXES {
         for matrix in MATRICES.map(|name| format!("{name}{suffix}")) {
             if numbers(value, &matrix).is_ok_and(|list| list.len() == 9) {
@@ -278,91 +289,92 @@ fn pairs(document: &Document) -> Vec<(String, Option<String>)> {
                     .map(|name| format!("{name}{suffix}"))
                     .into_iter()
                     .find(|name| find(value, name).is_some());
-                found.push((matrix, coefficients));
+                pairs.push((matrix, coefficients));
             }
         }
     }
-    // A matrix of its own camera has coefficients of its own, if any has.
-    if found.iter().any(|(_, coefficients)| coefficients.is_some()) {
-        found.retain(|(_, coefficients)| coefficients.is_some());
+    // If any camera has coefficients, matrices without them belong to no camera.
+    if pairs.iter().any(|(_, coefficients)| coefficients.is_some()) {
+        pairs.retain(|(_, coefficients)| coefficients.is_some());
     }
-    found
+    pairs
 }
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     let container = document.root.is_empty() || document.root == "opencv_storage";
-    container && !ros::fits(document) && !pairs(document).is_empty()
+    container && !ros::matches(document) && !matrix_and_coefficients(document).is_empty()
 }
 
-pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
     let entry = |(matrix, coefficients): (String, Option<String>)| {
         let roots = [Some(matrix.clone()), coefficients].into_iter().flatten().collect();
-        Entry { name: matrix, also: Vec::new(), value: &document.value, roots }
+        CameraEntry { name: matrix, aliases: Vec::new(), value: &document.value, roots }
     };
-    pairs(document).into_iter().map(entry).collect()
+    matrix_and_coefficients(document).into_iter().map(entry).collect()
 }
 
-/// `asked` is whether the user named the format: then four coefficients without a model's name are
+/// Imports a camera. If the user named the format (`is_explicit`), four coefficients without a model are
 /// radial-tangential.
 pub(super) fn import(
-    entry: &Entry<'_>,
+    entry: &CameraEntry<'_>,
     format: CameraFormat,
-    asked: bool,
-) -> Result<ImportedCamera, Problem> {
+    is_explicit: bool,
+) -> Result<ImportedCamera, KeyProblem> {
     let value = entry.value;
     let matrix = entry.name.as_str();
     let (focal_px, principal_point_px) = camera_matrix(value, matrix)?;
     let key = entry.roots.get(1).ok_or_else(|| {
-        Problem::new(
+        KeyProblem::new(
             "distortion_coefficients",
-            format!("is missing, beside {matrix}: add it, as [0, 0, 0, 0, 0] if there is no distortion"),
+            format!("is missing for {matrix}: add it, as [0, 0, 0, 0, 0] if there is no distortion"),
         )
     })?;
-    // Another list of the same camera under another name.
+    // Several lists of one camera must be equal.
     let suffix = MATRICES.iter().find_map(|name| matrix.strip_prefix(name)).unwrap_or_default();
     let names = COEFFICIENTS.map(|name| format!("{name}{suffix}"));
     one_of(value, &names.each_ref().map(String::as_str))?;
     let size_px = image_size(value)?;
     let list = numbers(value, key)?;
-    let named = model(value)?;
-    let lens = match (format, named) {
-        (CameraFormat::OpenCvFisheye, Some((said_by, LensModel::BrownConrady))) => {
-            return Err(Problem::new(
-                said_by,
-                "says that the model is no fisheye: use `--format opencv`, or correct the file",
+    let stated_model = model(value)?;
+    let lens = match (format, stated_model) {
+        (CameraFormat::OpenCvFisheye, Some((model_key, LensModel::BrownConrady))) => {
+            return Err(KeyProblem::new(
+                model_key,
+                "states a model that is not a fisheye: use `--format opencv`, or correct the file",
             ));
         }
         (CameraFormat::OpenCvFisheye, _) => LensModel::KannalaBrandt,
         (_, Some((_, model))) => model,
-        (_, None) if list.len() == 4 && !asked => {
-            let text = "has four coefficients, and nothing in the file says of which model: k1 k2 p1 p2 of OpenCV's calib3d (then `--format opencv`) or \
-                        k1 k2 k3 k4 of its fisheye module (then `--format opencv-fisheye`)";
-            return Err(Problem::new(key, text));
+        (_, None) if list.len() == 4 && !is_explicit => {
+            let text = "has four coefficients, and the file does not state their model: k1 k2 p1 p2 of \
+                        OpenCV's calib3d (then `--format opencv`) or k1 k2 k3 k4 of its fisheye module (then \
+                        `--format opencv-fisheye`)";
+            return Err(KeyProblem::new(key, text));
         }
         (_, None) => LensModel::BrownConrady,
     };
     let list = match lens {
-        LensModel::KannalaBrandt => models::equidistant(key, list)?,
-        _ => models::radial_tangential(key, list, 8)?,
+        LensModel::KannalaBrandt => lens_models::equidistant(key, list)?,
+        _ => lens_models::radial_tangential(key, list, 8)?,
     };
     Ok(camera(format, size_px, focal_px, principal_point_px, lens, list))
 }
 
-/// The model that the file names, and where.
-fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
-    let mut named: Option<(&'static str, LensModel)> = None;
-    let mut say = |key: &'static str, model: LensModel| match named {
+/// The stated model and its key.
+fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, KeyProblem> {
+    let mut stated: Option<(&'static str, LensModel)> = None;
+    let mut set = |key: &'static str, model: LensModel| match stated {
         Some((before, other)) if other != model => {
-            Err(Problem::new(key, format!("says another model than {before}: delete one")))
+            Err(KeyProblem::new(key, format!("contradicts the model of {before}: delete one")))
         }
         _ => {
-            named = Some((key, model));
+            stated = Some((key, model));
             Ok(())
         }
     };
     for key in ["fisheye_model", "fisheye", "is_fisheye"] {
         if let Some(fisheye) = flag(value, key)? {
-            say(key, if fisheye { LensModel::KannalaBrandt } else { LensModel::BrownConrady })?;
+            set(key, if fisheye { LensModel::KannalaBrandt } else { LensModel::BrownConrady })?;
         }
     }
     for key in [
@@ -379,51 +391,53 @@ fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
         let plain: String =
             word.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
         let has = |parts: &[&str]| parts.iter().any(|part| plain.contains(part));
-        if let Some(other) = models::unknown(&plain) {
-            return Err(Problem::new(
+        if let Some(other) = lens_models::unsupported_model_name(&plain) {
+            return Err(KeyProblem::new(
                 key,
                 format!(
-                    "is `{word}` ({other}), which no lens here is: calibrate with OpenCV's calib3d or fisheye model"
+                    "is `{word}` ({other}), which is not supported: calibrate with OpenCV's calib3d or \
+                     fisheye model"
                 ),
             ));
         } else if has(&["fisheye", "equidist", "kannala", "kb4"]) {
-            say(key, LensModel::KannalaBrandt)?;
+            set(key, LensModel::KannalaBrandt)?;
         } else if has(&["radtan", "radialtang", "plumb", "brown", "rational", "standard"]) {
-            say(key, LensModel::BrownConrady)?;
+            set(key, LensModel::BrownConrady)?;
         }
     }
-    Ok(named)
+    Ok(stated)
 }
 
-/// The size, however it is called; two that differ are refused.
-pub(super) fn image_size(value: &Value) -> Result<[u32; 2], Problem> {
-    let mut found: Option<(&str, [u32; 2])> = None;
-    let apart =
+/// The image size under any of its names; different ones are refused.
+pub(super) fn image_size(value: &Value) -> Result<[u32; 2], KeyProblem> {
+    let mut stated: Option<(&str, [u32; 2])> = None;
+    let pairs =
         SIZES.iter().filter(|(width, height)| find(value, width).is_some() || find(value, height).is_some());
-    let apart = apart
+    let pairs = pairs
         .map(|(width, height)| Ok((*width, size(width, [number(value, width)?, number(value, height)?])?)));
     let lists = SIZE_LISTS
         .iter()
         .filter(|key| find(value, key).is_some())
         .map(|key| Ok((*key, size(key, numbers_n(value, key)?)?)));
-    for one in apart.chain(lists) {
-        let (key, size_px): (&str, [u32; 2]) = one?;
-        match found {
+    for item in pairs.chain(lists) {
+        let (key, size_px): (&str, [u32; 2]) = item?;
+        match stated {
             Some((before, other)) if other != size_px => {
                 let text = format!(
-                    "is {} x {}, but {before} says {} x {}: delete the one that is not the calibrated pictures'",
+                    "is {} x {}, but {before} is {} x {}: delete the one that is not the size of the \
+                     calibration pictures",
                     size_px[0], size_px[1], other[0], other[1]
                 );
-                return Err(Problem::new(key, text));
+                return Err(KeyProblem::new(key, text));
             }
-            _ => found = Some((key, size_px)),
+            _ => stated = Some((key, size_px)),
         }
     }
     let missing = || {
-        Problem::new(
+        KeyProblem::new(
             "image_width",
-            "is missing: add `image_width` and `image_height` of the pictures that were calibrated",
+            "is missing: add `image_width` and `image_height` of the calibration pictures",
         )
     };
-    found.map(|(_, size_px)| size_px).ok_or_else(missing)
+    stated.map(|(_, size_px)| size_px).ok_or_else(missing)
 }

@@ -1,52 +1,49 @@
 //! OpenSfM and OpenDroneMap: `camera_models.json`, `cameras.json`, `reconstruction.json`. Lengths are
-//! fractions of the longer side, counted from the middle of the picture.
+//! fractions of the longer side, from the centre of the picture.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::choose::Entry;
-use super::document::{Document, Problem, find, number, one_of, optional_number, size, word};
-use super::keys::{Key, Use};
-use super::{CameraFormat, ImportedCamera, camera, models};
+use super::document::{Document, KeyProblem, find, number, one_of, optional_number, size, word};
+use super::key_table::{KeyRow, Treatment};
+use super::selection::CameraEntry;
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
 const FRACTION: &str = "fraction of the longer side";
 
-/// Paths below the camera's name.
-pub(super) const KEYS: &[Key] = &[
-    Key::new(
+/// Keys of a camera, relative to its name.
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new(
         "projection_type",
-        Use::Applied,
-        "perspective (also where it is missing), simple_radial, radial, brown, fisheye, fisheye_opencv; others are refused",
+        Treatment::Applied,
+        "perspective (also if missing), simple_radial, radial, brown, fisheye, fisheye_opencv; others are \
+         refused",
     ),
-    Key::new(
-        "width",
-        Use::Applied,
-        "must be there; the data base of cameras that ships with OpenSfM has none",
-    ),
-    Key::new("height", Use::Applied, "must be there"),
-    Key::new("focal", Use::Applied, FRACTION),
-    Key::new("focal_x", Use::Applied, FRACTION),
-    Key::new("focal_y", Use::Applied, "fraction of the longer side, of fx and fy alike"),
-    Key::new("c_x", Use::Applied, "fraction of the longer side, from the middle"),
-    Key::new("c_y", Use::Applied, "fraction of the longer side, from the middle"),
-    Key::new(
+    KeyRow::new("width", Treatment::Applied, "required; OpenSfM's camera database has none"),
+    KeyRow::new("height", Treatment::Applied, "required"),
+    KeyRow::new("focal", Treatment::Applied, FRACTION),
+    KeyRow::new("focal_x", Treatment::Applied, FRACTION),
+    KeyRow::new("focal_y", Treatment::Applied, "fraction of the longer side, for fx and fy"),
+    KeyRow::new("c_x", Treatment::Applied, "fraction of the longer side, from the centre"),
+    KeyRow::new("c_y", Treatment::Applied, "fraction of the longer side, from the centre"),
+    KeyRow::new(
         "k1",
-        Use::Applied,
-        "coefficient; refused unless zero where the projection has it not, like the following",
+        Treatment::Applied,
+        "coefficient; refused unless zero if the projection does not have it, like the following",
     ),
-    Key::new("k2", Use::Applied, "coefficient"),
-    Key::new("k3", Use::Applied, "coefficient"),
-    Key::new("k4", Use::Applied, "coefficient"),
-    Key::new("p1", Use::Applied, "coefficient"),
-    Key::new("p2", Use::Applied, "coefficient"),
-    Key::new("*_prior", Use::Silent, "starting values"),
+    KeyRow::new("k2", Treatment::Applied, "coefficient"),
+    KeyRow::new("k3", Treatment::Applied, "coefficient"),
+    KeyRow::new("k4", Treatment::Applied, "coefficient"),
+    KeyRow::new("p1", Treatment::Applied, "coefficient"),
+    KeyRow::new("p2", Treatment::Applied, "coefficient"),
+    KeyRow::new("*_prior", Treatment::Ignored, "starting values"),
 ];
 
 fn is_camera(value: &Value) -> bool {
     ["focal", "focal_x"].iter().any(|key| value.get(key).is_some_and(Value::is_number))
 }
 
-/// The part of the tree in which cameras stand by name, and where it is.
+/// The map of cameras by name, and its path.
 fn cameras(document: &Document) -> Option<(&serde_json::Map<String, Value>, &'static str)> {
     let value = &document.value;
     let list = value.as_array().and_then(|list| list.first());
@@ -59,43 +56,45 @@ fn cameras(document: &Document) -> Option<(&serde_json::Map<String, Value>, &'st
     }
 }
 
-/// OpenSfM's data base of cameras, by maker and model, without sizes.
-fn is_data_base(document: &Document) -> bool {
+/// Whether the document is OpenSfM's camera database, by maker and model, without image sizes.
+fn is_camera_database(document: &Document) -> bool {
     let first = if let Value::Array(list) = &document.value { list.first() } else { Some(&document.value) };
     let makers = first.and_then(Value::as_object).into_iter().flatten();
     makers.into_iter().any(|(_, maker)| ["MODEL", "FOCAL", "ALL"].iter().any(|key| maker.get(key).is_some()))
 }
 
-pub(super) fn fits(document: &Document) -> bool {
-    let named = cameras(document).is_some_and(|(map, _)| map.values().any(is_camera));
+pub(super) fn matches(document: &Document) -> bool {
+    let has_cameras = cameras(document).is_some_and(|(map, _)| map.values().any(is_camera));
     document.root.is_empty()
-        && (named
+        && (has_cameras
             || is_camera(&document.value) && find(&document.value, "projection_type").is_some()
-            || is_data_base(document))
+            || is_camera_database(document))
 }
 
-pub(super) fn entries(document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
-    if is_data_base(document) {
-        let text = "are OpenSfM's by maker and model, without the size of a picture, and all lengths are fractions of its longer side: copy the one that is \
-                    meant into a file of its own, as {\"my camera\": {\"projection_type\": ..., \"width\": ..., \"height\": ..., ...}}";
-        return Err(Problem::new("cameras", text));
+pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
+    if is_camera_database(document) {
+        let text = "are OpenSfM's camera database, without image sizes, while all lengths are fractions of \
+                    the longer side: copy one camera to a file of its own, as {\"my camera\": \
+                    {\"projection_type\": ..., \"width\": ..., \"height\": ..., ...}}";
+        return Err(KeyProblem::new("cameras", text));
     }
     if is_camera(&document.value) {
-        return Ok(Entry::only(&document.value));
+        return Ok(CameraEntry::single(&document.value));
     }
-    let (map, prefix) =
-        cameras(document).ok_or_else(|| Problem::new("cameras", "there is none in the file"))?;
+    let (map, prefix) = cameras(document).ok_or_else(|| KeyProblem::new("cameras", "the file has none"))?;
     let cameras = map.iter().filter(|(_, value)| is_camera(value));
-    Ok(cameras.map(|(name, value)| Entry::new(name.clone(), value, format!("{prefix}{name}"))).collect())
+    Ok(cameras
+        .map(|(name, value)| CameraEntry::new(name.clone(), value, format!("{prefix}{name}")))
+        .collect())
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
-    let or_zero = |key: &str| optional_number(value, key).map(|found| found.unwrap_or(0.0));
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
+    let or_zero = |key: &str| optional_number(value, key).map(|number| number.unwrap_or(0.0));
     for key in ["width", "height"] {
         if find(value, key).is_none() {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 key,
-                "is missing: all lengths are fractions of the longer side; add width and height of the pictures",
+                "is missing: all lengths are fractions of the longer side; add width and height",
             ));
         }
     }
@@ -110,20 +109,20 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         "fisheye" => (LensModel::KannalaBrandt, &["k1", "k2"], "k1, k2"),
         "fisheye_opencv" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"], "k1 to k4"),
         other => {
-            let which = models::unknown(other).map_or(String::new(), |name| format!(" ({name})"));
+            let full_name =
+                lens_models::unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
             let text = format!(
-                "is `{other}`{which}, which no lens here is: reconstruct with perspective, brown or fisheye_opencv"
+                "is `{other}`{full_name}, which is not supported: reconstruct with perspective, brown or \
+                 fisheye_opencv"
             );
-            return Err(Problem::new("projection_type", text));
+            return Err(KeyProblem::new("projection_type", text));
         }
     };
     for key in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s0", "s1", "s2", "s3"] {
         if !coefficients.contains(&key) && or_zero(key)? != 0.0 {
-            return Err(Problem::new(
+            return Err(KeyProblem::new(
                 key,
-                format!(
-                    "is not zero, but `{kind}` has {names} alone: delete it, or name the projection that is meant"
-                ),
+                format!("is not zero, but `{kind}` has only {names}: delete it, or correct projection_type"),
             ));
         }
     }
@@ -131,7 +130,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         Some(key) => {
             [number(value, key)?, optional_number(value, "focal_y")?.map_or_else(|| number(value, key), Ok)?]
         }
-        None => return Err(Problem::new("focal", "is missing")),
+        None => return Err(KeyProblem::new("focal", "is missing")),
     };
     let order: &[&str] = if model == LensModel::KannalaBrandt {
         &["k1", "k2", "k3", "k4"]
@@ -139,7 +138,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         &["k1", "k2", "p1", "p2", "k3"]
     };
     let list = order.iter().map(|key| or_zero(key)).collect::<Result<Vec<f64>, _>>()?;
-    let middle = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
-    let point = [middle[0] + longer * or_zero("c_x")?, middle[1] + longer * or_zero("c_y")?];
+    let centre = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
+    let point = [centre[0] + longer * or_zero("c_x")?, centre[1] + longer * or_zero("c_y")?];
     Ok(camera(CameraFormat::OpenSfm, size_px, focal.map(|f| f * longer), point, model, list))
 }

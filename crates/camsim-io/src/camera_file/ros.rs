@@ -1,160 +1,169 @@
 //! ROS camera_info: the YAML file of `camera_calibration`, the message as `rostopic echo` and `ros2 topic
 //! echo` print it, and the `.ini` file.
 //!
-//! Matrix and region of interest are those of the full sensor; the pictures are the region, binned.
+//! Matrix and region of interest refer to the full sensor; the picture is the region, binned.
 
 use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::choose::Entry;
 use super::document::{
-    Document, Problem, camera_matrix, find, flag, number, numbers, one_of, optional_number, size, word,
+    Document, KeyProblem, camera_matrix, find, flag, number, numbers, one_of, optional_number, size, word,
 };
-use super::keys::{Key, Neutral, Use};
-use super::{CameraFormat, ImportedCamera, camera, models};
+use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
-const RECTIFIED: &str = "of the rectified pictures: those that come out are the raw ones";
+const RECTIFIED: &str = "for rectified pictures; camsim renders raw ones";
 
-pub(super) const KEYS: &[Key] = &[
-    Key::new("image_width", Use::Applied, "width of the full sensor; `width` in a message"),
-    Key::new("image_height", Use::Applied, "height of the full sensor; `height` in a message"),
-    Key::new("width", Use::Applied, "as image_width"),
-    Key::new("height", Use::Applied, "as image_height"),
-    Key::new(
+pub(super) const KEYS: &[KeyRow] = &[
+    KeyRow::new("image_width", Treatment::Applied, "width of the full sensor; `width` in a message"),
+    KeyRow::new("image_height", Treatment::Applied, "height of the full sensor; `height` in a message"),
+    KeyRow::new("width", Treatment::Applied, "as image_width"),
+    KeyRow::new("height", Treatment::Applied, "as image_height"),
+    KeyRow::new(
         "camera_matrix",
-        Use::Applied,
+        Treatment::Applied,
         "focal lengths and principal point of the full sensor; `K` or `k` in a message",
     ),
-    Key::new("K", Use::Applied, "as camera_matrix"),
-    Key::new("k", Use::Applied, "as camera_matrix"),
-    Key::new(
+    KeyRow::new("K", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new("k", Treatment::Applied, "as camera_matrix"),
+    KeyRow::new(
         "distortion_model",
-        Use::Applied,
+        Treatment::Applied,
         "plumb_bob, rational_polynomial, equidistant; others are refused",
     ),
-    Key::new("distortion_coefficients", Use::Applied, "`D` or `d` in a message"),
-    Key::new("D", Use::Applied, "as distortion_coefficients"),
-    Key::new("d", Use::Applied, "as distortion_coefficients"),
-    Key::new("roi.x_offset", Use::Applied, "the picture is this part of the sensor"),
-    Key::new("roi.y_offset", Use::Applied, "the picture is this part of the sensor"),
-    Key::new("roi.width", Use::Applied, "0: all of it"),
-    Key::new("roi.height", Use::Applied, "0: all of it"),
-    Key::new("roi.do_rectify", Use::Named(Neutral::Zero), RECTIFIED),
-    Key::new("binning_x", Use::Applied, "divides width, fx and cx, as ROS's own reader does"),
-    Key::new("binning_y", Use::Applied, "divides height, fy and cy, as ROS's own reader does"),
-    Key::new("rectification_matrix", Use::Named(Neutral::Identity), RECTIFIED),
-    Key::new("R", Use::Named(Neutral::Identity), RECTIFIED),
-    Key::new("r", Use::Named(Neutral::Identity), RECTIFIED),
-    Key::new(
+    KeyRow::new("distortion_coefficients", Treatment::Applied, "`D` or `d` in a message"),
+    KeyRow::new("D", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("d", Treatment::Applied, "as distortion_coefficients"),
+    KeyRow::new("roi.x_offset", Treatment::Applied, "region of the sensor that is the picture"),
+    KeyRow::new("roi.y_offset", Treatment::Applied, "region of the sensor that is the picture"),
+    KeyRow::new("roi.width", Treatment::Applied, "0: the full size"),
+    KeyRow::new("roi.height", Treatment::Applied, "0: the full size"),
+    KeyRow::new("roi.do_rectify", Treatment::Reported(Neutral::Zero), RECTIFIED),
+    KeyRow::new("binning_x", Treatment::Applied, "divides width, fx and cx, as ROS's own reader does"),
+    KeyRow::new("binning_y", Treatment::Applied, "divides height, fy and cy, as ROS's own reader does"),
+    KeyRow::new("rectification_matrix", Treatment::Reported(Neutral::Identity), RECTIFIED),
+    KeyRow::new("R", Treatment::Reported(Neutral::Identity), RECTIFIED),
+    KeyRow::new("r", Treatment::Reported(Neutral::Identity), RECTIFIED),
+    KeyRow::new(
         "projection_matrix",
-        Use::Applied,
-        "named where it differs from camera_matrix: it is that of the rectified pictures",
+        Treatment::Applied,
+        "reported where it differs from camera_matrix: it applies to rectified pictures",
     ),
-    Key::new("P", Use::Applied, "as projection_matrix"),
-    Key::new("p", Use::Applied, "as projection_matrix"),
-    Key::new("camera_name", Use::Silent, "a name"),
-    Key::new("header.**", Use::Silent, "stamp and frame of a message"),
-    Key::new("T_cam_imu", Use::Named(Neutral::Identity), "pose of the camera: set mount by hand"),
+    KeyRow::new("P", Treatment::Applied, "as projection_matrix"),
+    KeyRow::new("p", Treatment::Applied, "as projection_matrix"),
+    KeyRow::new("camera_name", Treatment::Ignored, "a name"),
+    KeyRow::new("header.**", Treatment::Ignored, "stamp and frame of a message"),
+    KeyRow::new("T_cam_imu", Treatment::Reported(Neutral::Identity), "pose of the camera: set mount instead"),
 ];
 
 const MATRICES: [&str; 3] = ["camera_matrix", "K", "k"];
 
-pub(super) fn fits(document: &Document) -> bool {
+pub(super) fn matches(document: &Document) -> bool {
     let has = |key: &str| find(&document.value, key).is_some();
     (document.root.is_empty() && MATRICES.iter().any(|key| has(key)) && has("distortion_model"))
         || document.root == "ini"
 }
 
-pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
     match find(&document.value, "cameras").and_then(Value::as_array) {
         Some(list) if document.root == "ini" => {
             let name = |value: &Value| word(value, "camera_name").unwrap_or_default().to_owned();
             list.iter()
                 .enumerate()
-                .map(|(index, value)| Entry::new(name(value), value, format!("cameras[{index}]")))
+                .map(|(index, value)| CameraEntry::new(name(value), value, format!("cameras[{index}]")))
                 .collect()
         }
-        _ => Entry::only(&document.value),
+        _ => CameraEntry::single(&document.value),
     }
 }
 
-pub(super) const INI_KEYS: &[Key] = &[
-    Key::new("cameras.image_width", Use::Applied, "`width` in `[image]`"),
-    Key::new("cameras.image_height", Use::Applied, "`height` in `[image]`"),
-    Key::new("cameras.camera_name", Use::Silent, "the section's name, by which `--camera` names it"),
-    Key::new("cameras.camera_matrix", Use::Applied, "`camera matrix`"),
-    Key::new(
+pub(super) const INI_KEYS: &[KeyRow] = &[
+    KeyRow::new("cameras.image_width", Treatment::Applied, "`width` in `[image]`"),
+    KeyRow::new("cameras.image_height", Treatment::Applied, "`height` in `[image]`"),
+    KeyRow::new("cameras.camera_name", Treatment::Ignored, "the section's name, for `--camera`"),
+    KeyRow::new("cameras.camera_matrix", Treatment::Applied, "`camera matrix`"),
+    KeyRow::new(
         "cameras.distortion_coefficients",
-        Use::Applied,
-        "`distortion`: five are plumb_bob, eight rational_polynomial; four are refused, as nothing says what they are",
+        Treatment::Applied,
+        "`distortion`: five are plumb_bob, eight rational_polynomial; four are refused, because their model \
+         is not stated",
     ),
-    Key::new("cameras.rectification_matrix", Use::Named(Neutral::Identity), RECTIFIED),
-    Key::new(
+    KeyRow::new("cameras.rectification_matrix", Treatment::Reported(Neutral::Identity), RECTIFIED),
+    KeyRow::new(
         "cameras.projection_matrix",
-        Use::Applied,
-        "named where it differs from the camera matrix: it is that of the rectified pictures",
+        Treatment::Applied,
+        "reported where it differs from the camera matrix: it applies to rectified pictures",
     ),
-    Key::new("externals.**", Use::Named(Neutral::Zero), "pose of the camera: set mount by hand"),
+    KeyRow::new("externals.**", Treatment::Reported(Neutral::Zero), "pose of the camera: set mount instead"),
 ];
 
-pub(super) fn import(value: &Value, ini: bool) -> Result<ImportedCamera, Problem> {
-    let matrix = one_of(value, &MATRICES)?.ok_or_else(|| Problem::new("camera_matrix", "is missing"))?;
+pub(super) fn import(value: &Value, is_ini: bool) -> Result<ImportedCamera, KeyProblem> {
+    let matrix = one_of(value, &MATRICES)?.ok_or_else(|| KeyProblem::new("camera_matrix", "is missing"))?;
     if numbers(value, matrix)?.iter().all(|x| *x == 0.0) {
-        return Err(Problem::new(
+        return Err(KeyProblem::new(
             matrix,
-            "is all zeros, which means in ROS that the camera was never calibrated",
+            "is all zeros, which in ROS means that the camera is not calibrated",
         ));
     }
     let (focal_px, principal_point_px) = camera_matrix(value, matrix)?;
     let [width, height] = [&["image_width", "width"], &["image_height", "height"]]
         .map(|names| one_of(value, names).map(|name| name.unwrap_or(names[0])));
-    let full = [number(value, width?)?, number(value, height?)?];
-    size("image_width", full)?;
+    let full_size = [number(value, width?)?, number(value, height?)?];
+    size("image_width", full_size)?;
     let coefficients = one_of(value, &["distortion_coefficients", "D", "d"])?;
     let key = coefficients.unwrap_or("distortion_coefficients");
     let list = match coefficients {
         Some(key) => numbers(value, key)?,
-        None if ini => return Err(Problem::new("distortion", "is missing: five zeros are no distortion")),
-        None => models::stated(
+        None if is_ini => {
+            return Err(KeyProblem::new("distortion", "is missing: five zeros are no distortion"));
+        }
+        None => lens_models::coefficients(
             value,
             "distortion_model",
             word(value, "distortion_model").unwrap_or_default(),
             Some(key),
         )?,
     };
-    let (model, list) = if ini {
+    let (model, list) = if is_ini {
         by_count(list)?
     } else {
-        models::by_name("distortion_model", word(value, "distortion_model").unwrap_or_default(), key, list)?
+        lens_models::lens_by_name(
+            "distortion_model",
+            word(value, "distortion_model").unwrap_or_default(),
+            key,
+            list,
+        )?
     };
-    let region = Region::read(value, full)?;
+    let region = Region::read(value, full_size)?;
     let size_px =
         size("roi and binning", [region.size[0] / region.binning[0], region.size[1] / region.binning[1]])?;
     let focal_px = [focal_px[0] / region.binning[0], focal_px[1] / region.binning[1]];
     let point = [0, 1].map(|axis| (principal_point_px[axis] - region.offset[axis]) / region.binning[axis]);
-    let format = if ini { CameraFormat::RosIni } else { CameraFormat::RosCameraInfo };
+    let format = if is_ini { CameraFormat::RosIni } else { CameraFormat::RosCameraInfo };
     let mut imported = camera(format, size_px, focal_px, point, model, list);
-    imported.notes.extend(region.notes(full));
-    imported.notes.extend(rectified(value, matrix)?);
+    imported.notes.extend(region.notes(full_size));
+    imported.notes.extend(projection_note(value, matrix)?);
     Ok(imported)
 }
 
-/// The `.ini` file names no model; ROS's own reader goes by the number of coefficients.
-fn by_count(list: Vec<f64>) -> Result<(LensModel, Vec<f64>), Problem> {
+/// Model by the number of coefficients, as in ROS: `.ini` files state no model.
+fn by_count(list: Vec<f64>) -> Result<(LensModel, Vec<f64>), KeyProblem> {
     match list.len() {
         5 => Ok((LensModel::BrownConrady, list)),
         8 => Ok((LensModel::BrownConrady, list)),
         count => {
             let text = format!(
-                "has {count} numbers, and the file cannot name a model: ROS reads five as plumb_bob and eight as rational_polynomial. Write k1 k2 p1 p2 0 for a \
-                 plumb_bob, and a fisheye in a YAML file, with `distortion_model: equidistant`"
+                "has {count} numbers, and the format cannot state a model: ROS reads five as plumb_bob and \
+                 eight as rational_polynomial. Write k1 k2 p1 p2 0 for a plumb_bob, and a fisheye in a YAML \
+                 file, with `distortion_model: equidistant`"
             );
-            Err(Problem::new("distortion", text))
+            Err(KeyProblem::new("distortion", text))
         }
     }
 }
 
-/// The part of the sensor that the picture is.
+/// Region of the sensor that is the picture, pixels of the full sensor.
 struct Region {
     offset: [f64; 2],
     size: [f64; 2],
@@ -162,39 +171,43 @@ struct Region {
 }
 
 impl Region {
-    fn read(value: &Value, full: [f64; 2]) -> Result<Self, Problem> {
-        let or_zero = |key: &str| optional_number(value, key).map(|found| found.unwrap_or(0.0));
+    fn read(value: &Value, full: [f64; 2]) -> Result<Self, KeyProblem> {
+        let or_zero = |key: &str| optional_number(value, key).map(|number| number.unwrap_or(0.0));
         let offset = [or_zero("roi.x_offset")?, or_zero("roi.y_offset")?];
         let size = [or_zero("roi.width")?, or_zero("roi.height")?];
         flag(value, "roi.do_rectify")?;
-        // 0 is as good as 1 there.
+        // In ROS 0 means 1.
         let binning = [or_zero("binning_x")?, or_zero("binning_y")?]
             .map(|binning| if binning == 0.0 { 1.0 } else { binning });
         let size = match size {
             [0.0, 0.0] if offset == [0.0, 0.0] => full,
             [0.0, 0.0] => {
-                return Err(Problem::new(
+                return Err(KeyProblem::new(
                     "roi",
-                    "has an offset but no size: write its width and height, or no region at all",
+                    "has an offset but no size: write its width and height, or remove it",
                 ));
             }
             size => size,
         };
-        let inside = |axis: usize| {
+        let is_inside = |axis: usize| {
             offset[axis] >= 0.0
                 && size[axis] > 0.0
                 && offset[axis] + size[axis] <= full[axis]
                 && offset[axis].fract() == 0.0
         };
-        if !(inside(0) && inside(1)) {
+        if !(is_inside(0) && is_inside(1)) {
             let text = format!(
-                "reaches from {offset:?} over {size:?} px, not within the sensor of {full:?}: offsets and sizes are in pixels of the full, unbinned sensor"
+                "at {offset:?} with {size:?} px is not within the sensor of {full:?}: offsets and sizes are \
+                 in pixels of the full, unbinned sensor"
             );
-            return Err(Problem::new("roi", text));
+            return Err(KeyProblem::new("roi", text));
         }
         for (key, binning, size) in [("binning_x", binning[0], size[0]), ("binning_y", binning[1], size[1])] {
             if binning < 1.0 || binning.fract() != 0.0 || size % binning != 0.0 {
-                return Err(Problem::new(key, format!("is {binning}, which does not divide {size} pixels")));
+                return Err(KeyProblem::new(
+                    key,
+                    format!("is {binning}, which does not divide {size} pixels"),
+                ));
             }
         }
         Ok(Self { offset, size, binning })
@@ -204,24 +217,28 @@ impl Region {
         let cropped = (self.size != full || self.offset != [0.0, 0.0])
             .then(|| format!("the region {:?} px from {:?} of {full:?}", self.size, self.offset));
         let binned = (self.binning != [1.0, 1.0]).then(|| {
-            format!("binned by {:?} (matrix divided as ROS's image_geometry does, without a shift by half a pixel)", self.binning)
+            format!(
+                "binned by {:?} (matrix divided as ROS's image_geometry does, without a shift by half a \
+                 pixel)",
+                self.binning
+            )
         });
-        let both: Vec<String> = [cropped, binned].into_iter().flatten().collect();
-        (!both.is_empty()).then(|| format!("the picture is {}", both.join(", ")))
+        let parts: Vec<String> = [cropped, binned].into_iter().flatten().collect();
+        (!parts.is_empty()).then(|| format!("the picture is {}", parts.join(", ")))
     }
 }
 
-/// A word on a projection matrix that is not the camera's.
-fn rectified(value: &Value, matrix: &str) -> Result<Option<String>, Problem> {
+/// A note about a projection matrix that differs from the camera matrix.
+fn projection_note(value: &Value, matrix: &str) -> Result<Option<String>, KeyProblem> {
     let Some(key) = one_of(value, &["projection_matrix", "P", "p"])? else { return Ok(None) };
     let (camera, projection) = (numbers(value, matrix)?, numbers(value, key)?);
     if projection.len() != 12 {
-        return Err(Problem::new(key, format!("has {} numbers instead of 3 x 4", projection.len())));
+        return Err(KeyProblem::new(key, format!("has {} numbers instead of 3 x 4", projection.len())));
     }
-    let same = (0..3).all(|row| {
+    let is_same = (0..3).all(|row| {
         (0..3).all(|column| (projection[4 * row + column] - camera[3 * row + column]).abs() < 1e-6)
     }) && projection[3] == 0.0
         && projection[7] == 0.0;
-    let unused = same || projection.iter().all(|x| *x == 0.0);
-    Ok((!unused).then(|| format!("left out: {key}, which differs from {matrix} ({RECTIFIED})")))
+    let is_unused = is_same || projection.iter().all(|x| *x == 0.0);
+    Ok((!is_unused).then(|| format!("not applied: {key}, which differs from {matrix} ({RECTIFIED})")))
 }

@@ -1,13 +1,13 @@
-//! ROS `.ini` (`camera_calibration_parsers`): a section of the image, then one of each camera, in which a
-//! name stands above its numbers.
+//! ROS `.ini` (`camera_calibration_parsers`): a section for the image, then one for each camera; names are
+//! followed by lines of numbers.
 //!
-//! The tree that comes out has the keys of ROS's YAML file, so that `ros` reads both.
+//! The parsed document has the keys of ROS's YAML file, so that `ros` imports both.
 
 use serde_json::{Map, Value, json};
 
 use super::document::{Document, SyntaxProblem};
 
-/// Names in the file, and those of the YAML file. Others keep theirs.
+/// Names in the file and in the YAML file. Others are equal.
 const NAMES: [(&str, &str); 6] = [
     ("width", "image_width"),
     ("height", "image_height"),
@@ -17,7 +17,7 @@ const NAMES: [(&str, &str); 6] = [
     ("projection", "projection_matrix"),
 ];
 
-/// Lines that say something.
+/// Lines with content, with their numbers.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -25,6 +25,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', ';']))
 }
 
+/// Name of a section header.
 fn section(line: &str) -> Option<&str> {
     line.strip_prefix('[')?
         .strip_suffix(']')
@@ -32,41 +33,44 @@ fn section(line: &str) -> Option<&str> {
         .map(str::trim)
 }
 
-pub(super) fn looks_so(text: &str) -> bool {
+pub(super) fn matches_text(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, line)| section(line).is_some())
         && lines(text).any(|(_, line)| line == "camera matrix")
 }
 
-/// `{cameras: [{camera_name, image_width, camera_matrix, ...}]}`; what stands in a section of no camera keeps
-/// the section's name.
+/// Parses to `{cameras: [{camera_name, image_width, camera_matrix, ...}]}`; sections without camera keep
+/// their names.
 pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
     let mut sections: Vec<(String, Map<String, Value>)> = Vec::new();
     let mut key: Option<(usize, String)> = None;
     let mut numbers: Vec<f64> = Vec::new();
-    let stray = |line: usize, text: &str| SyntaxProblem {
+    let error = |line: usize, text: &str| SyntaxProblem {
         line: Some(line),
         message: format!(
-            "`{text}`: numbers stand below a name (`width`, `camera matrix`, `distortion`, ...) in a section `[name]`"
+            "`{text}`: numbers must follow a name (`width`, `camera matrix`, `distortion`, ...) in a section \
+             `[name]`"
         ),
     };
     for (number, line) in lines(text).chain([(0, "[]")]) {
         let parsed: Option<Vec<f64>> =
             line.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
         if let Some(parsed) = parsed {
-            key.as_ref().ok_or_else(|| stray(number, line))?;
+            key.as_ref().ok_or_else(|| error(number, line))?;
             numbers.extend(parsed);
             continue;
         }
-        if let Some((at, name)) = key.take() {
-            let (_, map) = sections.last_mut().ok_or_else(|| stray(at, &name))?;
+        if let Some((name_line, name)) = key.take() {
+            let (_, map) = sections.last_mut().ok_or_else(|| error(name_line, &name))?;
             let value = if let [single] = numbers[..] { json!(single) } else { json!(numbers) };
             numbers.clear();
-            let known =
-                NAMES.iter().find(|(there, _)| *there == name).map_or(name.as_str(), |(_, here)| here);
+            let known = NAMES
+                .iter()
+                .find(|(ini_name, _)| *ini_name == name)
+                .map_or(name.as_str(), |(_, yaml_name)| yaml_name);
             if map.insert(known.to_owned(), value).is_some() {
                 return Err(SyntaxProblem {
-                    line: Some(at),
-                    message: format!("`{name}` is there twice in its section: delete one"),
+                    line: Some(name_line),
+                    message: format!("duplicate `{name}` in its section: delete one"),
                 });
             }
         }
@@ -78,6 +82,7 @@ pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
     Ok(Document { root: "ini".to_owned(), value: cameras(sections) })
 }
 
+/// The document of parsed sections.
 fn cameras(sections: Vec<(String, Map<String, Value>)>) -> Value {
     let (mut image, mut cameras, mut rest) = (Map::new(), Vec::new(), Map::new());
     for (name, map) in sections {

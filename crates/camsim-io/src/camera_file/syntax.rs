@@ -1,5 +1,5 @@
-//! Text into a tree of values: YAML (OpenCV's dialect too), JSON, XML; ROS `.ini` and COLMAP's `cameras.txt`
-//! in files of their own.
+//! Parses YAML (also OpenCV's dialect), JSON and XML into a tree of values. ROS `.ini` and COLMAP's
+//! `cameras.txt` have their own modules.
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
@@ -8,19 +8,19 @@ use super::document::{Document, SyntaxProblem};
 use super::{colmap, ros_ini};
 
 impl Document {
-    /// Parses by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a COLMAP camera line
-    /// COLMAP; anything else YAML.
+    /// Detects the syntax by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a camera
+    /// line COLMAP; else it is YAML.
     pub(crate) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
-        if ros_ini::looks_so(text) {
+        if ros_ini::matches_text(text) {
             return ros_ini::parse(text);
         }
-        if colmap::looks_so(text) {
+        if colmap::matches_text(text) {
             return colmap::parse(text);
         }
         match text.trim_start().chars().next() {
             Some('<') => Self::parse_xml(text),
             Some('{') => Self::parse_json(text),
-            // OpenSfM's reconstruction; YAML also begins so.
+            // OpenSfM's reconstruction is JSON; YAML can begin like this too.
             Some('[') => Self::parse_json(text).or_else(|_| Self::parse_yaml(text)),
             Some(_) => Self::parse_yaml(text),
             None => Err(SyntaxProblem { line: None, message: "the file is empty".to_owned() }),
@@ -29,20 +29,20 @@ impl Document {
 
     fn parse_json(text: &str) -> Result<Self, SyntaxProblem> {
         serde_json::from_str(text)
-            .map(|Unique(value)| Self { root: String::new(), value })
+            .map(|UniqueKeys(value)| Self { root: String::new(), value })
             .map_err(|error| SyntaxProblem { line: Some(error.line()), message: format!("JSON: {error}") })
     }
 
-    /// Several documents, as `rostopic echo` prints them, are one if they say the same beside their header.
+    /// Several documents, as `rostopic echo` prints them, must be equal except for their headers.
     fn parse_yaml(text: &str) -> Result<Self, SyntaxProblem> {
         let mut parsed: Option<Value> = None;
         for (first_line, part) in documents(text) {
             let value: Value = serde_saphyr::from_str(&part).map_err(|error| {
                 let line = error.location().map(|location| first_line + location.line() as usize);
-                // Its own text draws the place over several lines; the first says what is wrong.
+                // The first line of the error is the message; the others show the location.
                 let text = error.without_snippet().to_string();
                 let first = text.lines().next().unwrap_or_default();
-                // It counts lines from the document's beginning; `line` does from the file's.
+                // The message counts lines within the document; `line` counts from the start of the file.
                 SyntaxProblem {
                     line,
                     message: format!("YAML: {}", first.split(" at line ").next().unwrap_or(first)),
@@ -52,7 +52,8 @@ impl Document {
                 None => parsed = Some(value),
                 Some(first) if without_header(first) == without_header(&value) => {}
                 Some(_) => {
-                    let message = "the file holds several YAML documents (between lines `---`) that differ: keep the one that is meant";
+                    let message =
+                        "the file has several different YAML documents (separated by `---`): keep one";
                     return Err(SyntaxProblem { line: Some(first_line), message: message.to_owned() });
                 }
             }
@@ -71,11 +72,11 @@ impl Document {
     }
 }
 
-/// The documents of a YAML text with the lines before each, as plain YAML: OpenCV's first line `%YAML:1.0` is
-/// no YAML directive (those have a space), its matrix tag is no type that matters here, and its own reader
-/// wants no blank after a colon.
+/// Documents of a YAML text as standard YAML, with the number of lines before each. OpenCV's dialect is
+/// converted: the first line `%YAML:1.0` and the matrix tag are removed, and a blank is inserted after
+/// colons.
 fn documents(text: &str) -> Vec<(usize, String)> {
-    let opencv =
+    let is_opencv =
         text.lines().next().is_some_and(|line| line.trim_start_matches('\u{feff}').starts_with("%YAML"));
     let mut parts = vec![(0, String::new())];
     for (index, line) in text.lines().enumerate() {
@@ -86,7 +87,7 @@ fn documents(text: &str) -> Vec<(usize, String)> {
         let plain = if line.starts_with("%YAML") { "" } else { line };
         let plain = plain.replace("!!opencv-matrix", "");
         if let Some((_, part)) = parts.last_mut() {
-            part.push_str(&if opencv { blank_after_colon(plain) } else { plain });
+            part.push_str(&if is_opencv { blank_after_colon(plain) } else { plain });
             part.push('\n');
         }
     }
@@ -118,18 +119,18 @@ fn without_header(value: &Value) -> Value {
     value
 }
 
-/// A JSON value in which no key comes twice: of two the last one would count, and nobody would know.
-struct Unique(Value);
+/// A JSON value without duplicate keys: serde_json would silently keep the last.
+struct UniqueKeys(Value);
 
-impl<'de> Deserialize<'de> for Unique {
+impl<'de> Deserialize<'de> for UniqueKeys {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(UniqueVisitor).map(Self)
+        deserializer.deserialize_any(UniqueKeysVisitor).map(Self)
     }
 }
 
-struct UniqueVisitor;
+struct UniqueKeysVisitor;
 
-impl<'de> Visitor<'de> for UniqueVisitor {
+impl<'de> Visitor<'de> for UniqueKeysVisitor {
     type Value = Value;
 
     fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -162,7 +163,7 @@ impl<'de> Visitor<'de> for UniqueVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
         let mut list = Vec::new();
-        while let Some(Unique(item)) = items.next_element()? {
+        while let Some(UniqueKeys(item)) = items.next_element()? {
             list.push(item);
         }
         Ok(Value::Array(list))
@@ -170,21 +171,20 @@ impl<'de> Visitor<'de> for UniqueVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
         let mut map = Map::new();
-        while let Some((key, Unique(value))) = entries.next_entry::<String, Unique>()? {
+        while let Some((key, UniqueKeys(value))) = entries.next_entry::<String, UniqueKeys>()? {
             if map.insert(key.clone(), value).is_some() {
-                return Err(A::Error::custom(format!("`{key}` is there twice: delete one")));
+                return Err(A::Error::custom(format!("duplicate key `{key}`: delete one")));
             }
         }
         Ok(Value::Object(map))
     }
 }
 
-/// Deeper elements are ignored: no calibration file nests that far, and a hostile one must not exhaust the
-/// stack.
+/// Depth below which XML elements are ignored, so that a malicious file cannot exhaust the stack.
 const MAX_DEPTH: usize = 64;
 
-/// An element without attributes and children is its text, as a number where it is one; else a map, repeated
-/// names being a list.
+/// Value of an element: without attributes and children its text or number, else a map in which repeated
+/// names become a list.
 fn xml_value(element: roxmltree::Node<'_, '_>, depth: usize) -> Value {
     let children = || element.children().filter(roxmltree::Node::is_element);
     if element.attributes().len() == 0 && children().next().is_none() {
@@ -207,6 +207,7 @@ fn xml_value(element: roxmltree::Node<'_, '_>, depth: usize) -> Value {
     Value::Object(map)
 }
 
+/// A number if the text is one, else the text.
 fn scalar(text: &str) -> Value {
     let text = text.trim();
     match text.parse::<f64>().ok().and_then(serde_json::Number::from_f64) {

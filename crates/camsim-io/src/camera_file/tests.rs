@@ -1,4 +1,4 @@
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use camsim_core::scenario::{FieldOr, Readout};
 
 use super::*;
 
-fn file(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
+fn write_file(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
@@ -14,17 +14,17 @@ fn file(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn import(name: &str, text: &str) -> Result<ImportedCamera, CameraFileError> {
-    let (_folder, path) = file(name, text);
+    let (_folder, path) = write_file(name, text);
     import_camera_as(&path, None)
 }
 
-fn import_of(name: &str, text: &str, camera: &str) -> Result<ImportedCamera, CameraFileError> {
-    let (_folder, path) = file(name, text);
+fn import_named(name: &str, text: &str, camera: &str) -> Result<ImportedCamera, CameraFileError> {
+    let (_folder, path) = write_file(name, text);
     import_camera_named(&path, None, Some(camera))
 }
 
 fn toml(text: &str) -> Result<CameraSpec, CameraFileError> {
-    let (_folder, path) = file("camera.toml", text);
+    let (_folder, path) = write_file("camera.toml", text);
     read_camera_toml(&path)
 }
 
@@ -41,8 +41,12 @@ cam1:
 ";
 
 #[test]
-fn a_camera_toml_has_the_keys_of_camera_at_its_root() {
-    let spec = toml("size_px = [100, 80]\nfocal_px = [90.0, 91.0]\n[lens]\nmodel = \"brown-conrady\"\ncoefficients = [-0.1]\n").unwrap();
+fn camera_toml_has_the_keys_of_camera_at_its_root() {
+    let spec = toml(
+        "size_px = [100, 80]\nfocal_px = [90.0, 91.0]\n[lens]\nmodel = \"brown-conrady\"\ncoefficients = \
+         [-0.1]\n",
+    )
+    .unwrap();
     assert_eq!((spec.size_px, spec.lens.coefficients), ([100, 80], vec![-0.1]));
     let error = toml("size_px = [100, 80]\nfocal_pix = [90.0, 91.0]\n").unwrap_err().to_string();
     assert!(error.contains("camera.toml:2") && error.contains("did you mean `focal_px`"), "{error}");
@@ -57,14 +61,14 @@ fn a_camera_toml_has_the_keys_of_camera_at_its_root() {
 }
 
 #[test]
-fn kalibr_and_euroc() {
-    // Several cameras: which one is asked for, not guessed.
+fn kalibr_and_euroc_are_imported() {
+    // Several cameras: which one is is_explicit for, not guessed.
     let which = import("chain.yaml", EUROC_CHAIN).unwrap_err().to_string();
     assert!(which.contains("there are 2 (`cam0`, `cam1`)") && which.contains("`--camera cam0`"), "{which}");
-    let imported = import_of("chain.yaml", EUROC_CHAIN, "cam0").unwrap();
+    let imported = import_named("chain.yaml", EUROC_CHAIN, "cam0").unwrap();
     assert_eq!(imported.format, CameraFormat::Kalibr);
-    let other = import_of("chain.yaml", EUROC_CHAIN, "cam2").unwrap_err().to_string();
-    assert!(other.contains("none is called `cam2`; there are `cam0`, `cam1`"), "{other}");
+    let other = import_named("chain.yaml", EUROC_CHAIN, "cam2").unwrap_err().to_string();
+    assert!(other.contains("there is no `cam2`; the names are `cam0`, `cam1`"), "{other}");
     assert_eq!(imported.spec.size_px, [752, 480]);
     assert_eq!(imported.spec.principal_point_px, Some([367.215, 248.375]));
     assert_eq!(imported.spec.lens.coefficients, [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]);
@@ -74,18 +78,18 @@ fn kalibr_and_euroc() {
     let euroc = import("sensor.yaml", sensor).unwrap();
     assert_eq!((euroc.format, euroc.spec.fps), (CameraFormat::Euroc, 20.0));
     assert_eq!(euroc.spec.lens, imported.spec.lens);
-    let fisheye = import_of("chain.yaml", &EUROC_CHAIN.replace("radtan", "equidistant"), "cam0").unwrap();
+    let fisheye = import_named("chain.yaml", &EUROC_CHAIN.replace("radtan", "equidistant"), "cam0").unwrap();
     assert_eq!(fisheye.spec.lens.model, LensModel::KannalaBrandt);
     let error =
-        import_of("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni"), "cam0").unwrap_err().to_string();
+        import_named("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni"), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.camera_model") && error.contains("omni"), "{error}");
     let error =
-        import_of("chain.yaml", &EUROC_CHAIN.replace("458.654, ", ""), "cam0").unwrap_err().to_string();
+        import_named("chain.yaml", &EUROC_CHAIN.replace("458.654, ", ""), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.intrinsics: has 3 numbers"), "{error}");
 }
 
 #[test]
-fn ros_and_opencv_share_keys_but_are_told_apart() {
+fn ros_and_opencv_are_distinguished() {
     let body = "image_width: 410\nimage_height: 308\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
         data: [322.07, 0, 199.27, 0, 320.87, 155.25, 0, 0, 1]\n\
         distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0.16, -0.27, 0.001, -0.0017, 0]\n";
@@ -108,7 +112,7 @@ fn ros_and_opencv_share_keys_but_are_told_apart() {
 }
 
 #[test]
-fn opencv_xml() {
+fn opencv_xml_is_imported() {
     let xml = r#"<?xml version="1.0"?>
 <opencv_storage>
 <image_Width>640</image_Width><image_Height>480</image_Height>
@@ -125,11 +129,13 @@ fn opencv_xml() {
 }
 
 #[test]
-fn the_reference_programs_pixels_are_half_a_pixel_off() {
+fn reference_program_pixels_are_shifted_by_half_a_pixel() {
     let xml = r#"<simParams>
         <idealParams0 width="1" height="1" f="1"/>
-        <idealParams resolutionScale="1." width="640" height="480" oxOffset="-14.401" oyOffset="-13.264" f="307.6075" />
-        <staticParams k1="-0.390024" k2="0.111124" t1="-0.0012744" t2="-0.0081517" k3="-0.00842763" k4="0.000000" />
+        <idealParams resolutionScale="1." width="640" height="480" oxOffset="-14.401" oyOffset="-13.264"
+            f="307.6075" />
+        <staticParams k1="-0.390024" k2="0.111124" t1="-0.0012744" t2="-0.0081517" k3="-0.00842763"
+            k4="0.000000" />
         <vignetParams vignetFile="vignet-S3LowOffset.bmp" vignetThresh1="0.05" vignetThresh2="0.5" />
         <camInAcEu roll="84.0" pitch="-20.0" yaw="0."/>
         <sensorParams cameraFps="30." phasePercent="0.8"/>
@@ -143,7 +149,7 @@ fn the_reference_programs_pixels_are_half_a_pixel_off() {
     assert!((spec.shutter.delay_ms - 10.0).abs() < 1e-9 && (spec.shutter.readout_ms - 33.0).abs() < 1e-9);
     assert!(matches!(spec.shutter.interlace_ms, FieldOr::Ms(ms) if (ms - 20.0).abs() < 1e-9));
     assert_eq!(spec.photometric.vignette, Some(PathBuf::from("vignet-S3LowOffset.bmp")));
-    // A 70 degree field over 640 px, scaled down to a quarter of the pixels.
+    // A field of view of 70 degrees over 640 px, scaled by one half.
     let fov = import(
         "ideal.xml",
         r#"<simParams><idealParams resolutionScale="0.5" width="640" height="480" fovX="70."/></simParams>"#,
@@ -159,14 +165,16 @@ fn the_reference_programs_pixels_are_half_a_pixel_off() {
 }
 
 #[test]
-fn agisofts_two_dialects() {
-    let metashape = "<calibration><projection>frame</projection><width>2256</width><height>1504</height><f>1940.5</f>\
-        <cx>13.25</cx><cy>9.75</cy><k1>-0.1</k1><k2>0.18</k2><k3>-0.06</k3><p1>0.002</p1><p2>0.0005</p2></calibration>";
+fn both_agisoft_dialects_are_imported() {
+    let metashape = "<calibration><projection>frame</projection><width>2256</width><height>1504</height>\
+        <f>1940.5</f><cx>13.25</cx><cy>9.75</cy><k1>-0.1</k1><k2>0.18</k2><k3>-0.06</k3><p1>0.002</p1>\
+        <p2>0.0005</p2></calibration>";
     let spec = import("m.xml", metashape).unwrap().spec;
     assert_eq!(spec.principal_point_px, Some([1128.0 + 13.25 - 0.5, 752.0 + 9.75 - 0.5]));
     assert_eq!(spec.lens.coefficients, [-0.1, 0.18, 0.0005, 0.002, -0.06]);
-    let lens = "<calibration><projection>frame</projection><width>640</width><height>480</height><fx>307</fx><fy>308</fy>\
-        <cx>305.599</cx><cy>226.736</cy><k1>-0.39</k1><p1>-0.001</p1><p2>-0.008</p2></calibration>";
+    let lens = "<calibration><projection>frame</projection><width>640</width><height>480</height>\
+        <fx>307</fx><fy>308</fy><cx>305.599</cx><cy>226.736</cy><k1>-0.39</k1><p1>-0.001</p1><p2>-0.008</p2>\
+        </calibration>";
     let spec = import("l.xml", lens).unwrap().spec;
     assert_eq!((spec.focal_px, spec.lens.coefficients), ([307.0, 308.0], vec![-0.39, 0.0, -0.001, -0.008]));
     let k4 = import("m.xml", &metashape.replace("<p1>", "<k4>0.1</k4><p1>")).unwrap_err().to_string();
@@ -174,8 +182,9 @@ fn agisofts_two_dialects() {
 }
 
 #[test]
-fn gyroflow_profiles_bring_their_readout() {
-    let json = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97, "digital_lens": null,
+fn gyroflow_readout_is_imported() {
+    let json = r#"{"calib_dimension": {"w": 2704, "h": 2028}, "frame_readout_time": -11.5, "fps": 29.97,
+        "digital_lens": null,
         "fisheye_params": {"camera_matrix": [[1340.9, 0.0, 1353.5], [0.0, 1345.0, 1022.9], [0.0, 0.0, 1.0]],
         "distortion_coeffs": [0.041, 0.027, -0.015, 0.002]}}"#;
     let spec = import("p.json", json).unwrap().spec;
@@ -186,7 +195,7 @@ fn gyroflow_profiles_bring_their_readout() {
 }
 
 #[test]
-fn what_is_no_camera_is_refused() {
+fn files_without_camera_are_refused() {
     for (name, text) in [
         ("empty.yaml", ""),
         ("list.yaml", "- 1\n- 2\n"),
@@ -197,15 +206,18 @@ fn what_is_no_camera_is_refused() {
         ("mei.yaml", "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nmirror_parameters:\n   xi: 1.8\n"),
         (
             "nan.yaml",
-            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [.nan, 1, 1, 1]\n  resolution: [4, 4]\n",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [.nan, 1, 1, 1]\n  \
+             resolution: [4, 4]\n",
         ),
         (
             "zero.yaml",
-            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [0, 1, 1, 1]\n  resolution: [4, 4]\n",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [0, 1, 1, 1]\n  \
+             resolution: [4, 4]\n",
         ),
         (
             "size.yaml",
-            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [1, 1, 1, 1]\n  resolution: [-4, 4.5]\n",
+            "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [1, 1, 1, 1]\n  \
+             resolution: [-4, 4.5]\n",
         ),
     ] {
         let error = import(name, text).unwrap_err().to_string();
@@ -216,9 +228,10 @@ fn what_is_no_camera_is_refused() {
 }
 
 #[test]
-fn camodocal() {
-    let pinhole = "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   \
-                   k1: -0.295\n   k2: 0.0866\n   p1: 2.0e-06\n   p2: 1.4e-05\nprojection_parameters:\n   fx: 461.1\n   fy: 459.7\n   cx: 362.6\n   cy: 248.5\n";
+fn camodocal_is_imported() {
+    let pinhole = "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: \
+                   480\ndistortion_parameters:\n   k1: -0.295\n   k2: 0.0866\n   p1: 2.0e-06\n   p2: \
+                   1.4e-05\nprojection_parameters:\n   fx: 461.1\n   fy: 459.7\n   cx: 362.6\n   cy: 248.5\n";
     let imported = import("cam0_pinhole.yaml", pinhole).unwrap();
     assert_eq!(imported.format, CameraFormat::Camodocal);
     let spec = &imported.spec;
@@ -230,28 +243,30 @@ fn camodocal() {
         (spec.lens.model, spec.lens.coefficients.as_slice()),
         (LensModel::BrownConrady, &[-0.295, 0.0866, 2e-6, 1.4e-5][..])
     );
-    // TUM VI's first camera as VINS has it, whose numbers are those of the data set's own Kalibr file
-    // (equidistant).
-    let fisheye = "%YAML:1.0\nimu_topic: \"/imu0\"\nmodel_type: KANNALA_BRANDT\nimage_width: 512\nimage_height: 512\nprojection_parameters:\n   \
-                   k2: 0.0034823894022493434\n   k3: 0.0007150348452162257\n   k4: -0.0020532361418706202\n   k5: 0.00020293673591811182\n   \
-                   mu: 190.97847715128717\n   mv: 190.9733070521226\n   u0: 254.93170605935475\n   v0: 256.8974428996504\n\
-                   extrinsicRotation: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0, 0, -1 ]\n";
-    let kalibr = "cam0:\n  camera_model: pinhole\n  distortion_model: equidistant\n  resolution: [512, 512]\n  \
-                  distortion_coeffs: [0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182]\n  \
-                  intrinsics: [190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504]\n";
+    // TUM VI's first camera in VINS's file has the numbers of the data set's Kalibr file (equidistant).
+    let fisheye = "%YAML:1.0\nimu_topic: \"/imu0\"\nmodel_type: KANNALA_BRANDT\nimage_width: \
+                   512\nimage_height: 512\nprojection_parameters:\n   k2: 0.0034823894022493434\n   k3: \
+                   0.0007150348452162257\n   k4: -0.0020532361418706202\n   k5: 0.00020293673591811182\n   \
+                   mu: 190.97847715128717\n   mv: 190.9733070521226\n   u0: 254.93170605935475\n   v0: \
+                   256.8974428996504\nextrinsicRotation: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: \
+                   d\n   data: [ 0, 0, -1 ]\n";
+    let kalibr = "cam0:\n  camera_model: pinhole\n  distortion_model: equidistant\n  resolution: [512, \
+                  512]\n  distortion_coeffs: [0.0034823894022493434, 0.0007150348452162257, \
+                  -0.0020532361418706202, 0.00020293673591811182]\n  intrinsics: [190.97847715128717, \
+                  190.9733070521226, 254.93170605935475, 256.8974428996504]\n";
     assert_eq!(
         import("tum_config.yaml", fisheye).unwrap().spec,
         import("camchain.yaml", kalibr).unwrap().spec
     );
-    for (name, from, to, told) in [
+    for (name, from, to, expected) in [
         ("mirror", "PINHOLE", "MEI", "model_type: is `MEI`"),
         ("missing", "   fx: 461.1\n", "", "projection_parameters.fx: is missing"),
         ("no size", "image_width: 752\n", "", "image_width: is missing"),
-        ("no number", "k1: -0.295", "k1: nan", "distortion_parameters.k1"),
+        ("not a number", "k1: -0.295", "k1: nan", "distortion_parameters.k1"),
     ] {
         let error = import("cam.yaml", &pinhole.replace(from, to)).unwrap_err().to_string();
-        assert!(error.contains(told), "{name}: {error}");
+        assert!(error.contains(expected), "{name}: {error}");
     }
 }
 
-mod docs;
+mod documentation;

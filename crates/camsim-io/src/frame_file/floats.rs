@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::{DepthKind, DepthRows, FrameFileError, FrameSpec, images::failure};
 use crate::terrain::{
-    TerrainFileError,
+    TerrainFileError, metres_per_unit_name,
     raster::{Raster, is_tiff},
-    read_mask_beside, read_tags_beside, unit_of_name,
+    read_sidecar_mask, read_sidecar_tags,
 };
 
 /// The stored numbers of a depth picture.
@@ -62,13 +62,17 @@ pub(super) fn read(
 
 fn read_tiff(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<StoredDepth, FrameFileError> {
     let mut raster = Raster::read(path).map_err(|error| failure(path, error.reason()))?;
-    read_tags_beside(path, &mut raster.geo).map_err(|error| match error {
+    read_sidecar_tags(path, &mut raster.geo).map_err(|error| match error {
         TerrainFileError::Meaning { path, problem } => failure(&path, problem),
         other => failure(path, other.to_string()),
     })?;
-    read_mask_beside(path, &mut raster)
+    read_sidecar_mask(path, &mut raster)
         .map_err(|error| failure(path, format!("has a mask beside it that {}", error.reason())))?;
+<<<<<<< HEAD
     let Some(is_integer) = raster.depth_is_whole() else {
+=======
+    let Some(whole) = raster.is_integer_depth() else {
+>>>>>>> n-iob
         return Err(failure(
             path,
             "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of \
@@ -129,8 +133,13 @@ fn stated_scale(
     if scale == 0.0 {
         return Err(failure(path, "states a scale of 0 (GDAL_METADATA): correct the file"));
     }
+<<<<<<< HEAD
     let unit_m = band.unit.as_deref().map(unit_of_name);
     let statement = format!(
+=======
+    let unit_m = band.unit.as_deref().map(metres_per_unit_name);
+    let said = format!(
+>>>>>>> n-iob
         "SCALE {scale}, OFFSET {offset}, UNITTYPE {} (GDAL_METADATA)",
         band.unit.as_ref().map_or("none".to_owned(), |unit| format!("`{unit}`"))
     );

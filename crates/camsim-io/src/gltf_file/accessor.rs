@@ -1,61 +1,64 @@
-//! Numbers out of accessors: any component type, normalised or not, interleaved, sparse. Every reach is
-//! checked.
+//! Decodes accessors: any component type, normalised or not, interleaved or sparse, with checked bounds.
 
 use gltf::accessor::{Accessor, DataType, Dimensions};
 
-use super::{GltfError, source::Source};
+use super::{GltfError, asset::Asset};
 
-/// Elements of an accessor, at most.
-const MOST: usize = 1 << 27;
-/// And without data.
-pub(super) const MOST_EMPTY: usize = 1 << 21;
+/// Largest number of elements of an accessor.
+const MAX_ELEMENTS: usize = 1 << 27;
+/// Largest number of elements of an accessor without data (all zeros).
+pub(super) const MAX_ELEMENTS_WITHOUT_DATA: usize = 1 << 21;
 
-/// Up to four numbers an element; those that it does not have are 0.
-pub(super) fn rows(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<[f64; 4]>, GltfError> {
-    let all = numbers(source, accessor)?;
-    let width = width(accessor);
-    if width > 4 {
-        return Err(
-            source.broken(format!("accessors.{}: is of matrices where vectors should be", accessor.index()))
-        );
+/// Vectors of up to four components; absent components are 0.
+pub(super) fn vectors(asset: &Asset, accessor: &Accessor<'_>) -> Result<Vec<[f64; 4]>, GltfError> {
+    let numbers = numbers(asset, accessor)?;
+    let components = component_count(accessor);
+    if components > 4 {
+        return Err(asset.error(format!("accessors.{}: has matrices instead of vectors", accessor.index())));
     }
-    Ok(all
-        .chunks_exact(width)
+    Ok(numbers
+        .chunks_exact(components)
         .map(|row| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0)))
         .collect())
 }
 
-/// 4x4 matrices, column by column.
-pub(super) fn matrices(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<[f64; 16]>, GltfError> {
-    if width(accessor) != 16 {
-        return Err(source.broken(format!("accessors.{}: is not of 4x4 matrices", accessor.index())));
+/// 4x4 matrices in column-major order.
+pub(super) fn matrices(asset: &Asset, accessor: &Accessor<'_>) -> Result<Vec<[f64; 16]>, GltfError> {
+    if component_count(accessor) != 16 {
+        return Err(asset.error(format!("accessors.{}: does not have 4x4 matrices", accessor.index())));
     }
-    Ok(numbers(source, accessor)?.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect())
+    Ok(numbers(asset, accessor)?.chunks_exact(16).map(|row| std::array::from_fn(|k| row[k])).collect())
 }
 
-/// One number after the other.
-pub(super) fn numbers(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<f64>, GltfError> {
-    let (count, width) = (accessor.count(), width(accessor));
-    let wrong = |message: &str| source.broken(format!("accessors.{}: {message}", accessor.index()));
-    if count > MOST {
-        return Err(wrong("has more elements than can be held"));
+/// All components of all elements.
+pub(super) fn numbers(asset: &Asset, accessor: &Accessor<'_>) -> Result<Vec<f64>, GltfError> {
+    let (count, components) = (accessor.count(), component_count(accessor));
+    let error = |message: &str| asset.error(format!("accessors.{}: {message}", accessor.index()));
+    if count > MAX_ELEMENTS {
+        return Err(error("has too many elements"));
     }
-    let element = width * size_of(accessor.data_type());
+    let element_size = components * size_of(accessor.data_type());
     let mut values = match accessor.view() {
         None => {
-            // Nothing but what a sparse part may put there.
-            if count > MOST_EMPTY {
-                return Err(wrong("has very many elements and no data"));
+            // Zeros, which the sparse part may replace.
+            if count > MAX_ELEMENTS_WITHOUT_DATA {
+                return Err(error("has too many elements without data"));
             }
-            vec![0.0; count * width]
+            vec![0.0; count * components]
         }
         Some(view) => {
-            let bytes = source.view(&view, accessor.offset())?;
-            let stride = view.stride().unwrap_or(element);
-            let mut values = Vec::with_capacity((count * width).min(bytes.len()));
+            let bytes = asset.view(&view, accessor.offset())?;
+            let stride = view.stride().unwrap_or(element_size);
+            let mut values = Vec::with_capacity((count * components).min(bytes.len()));
             for i in 0..count {
-                let at = i.checked_mul(stride).and_then(|at| bytes.get(at..at.checked_add(element)?));
-                decode(at.ok_or_else(|| wrong("reaches beyond its buffer view"))?, accessor, &mut values);
+                let element_bytes = i
+                    .checked_mul(stride)
+                    .and_then(|start| bytes.get(start..start.checked_add(element_size)?));
+                decode(
+                    element_bytes.ok_or_else(|| error("reaches beyond its buffer view"))?,
+                    accessor,
+                    &mut values,
+                );
             }
             values
         }
@@ -67,29 +70,30 @@ pub(super) fn numbers(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<f6
             gltf::accessor::sparse::IndexType::U16 => DataType::U16,
             gltf::accessor::sparse::IndexType::U32 => DataType::U32,
         };
-        let places = source.view(&indices.view(), indices.offset())?;
-        let given = source.view(&sparse.values().view(), sparse.values().offset())?;
-        let mut found = Vec::new();
+        let index_bytes = asset.view(&indices.view(), indices.offset())?;
+        let value_bytes = asset.view(&sparse.values().view(), sparse.values().offset())?;
+        let mut element = Vec::new();
         for i in 0..sparse.count() {
             let size = size_of(kind);
-            let place = places
+            let index = index_bytes
                 .get(i * size..(i + 1) * size)
-                .ok_or_else(|| wrong("its sparse indices reach beyond their buffer view"))?;
-            let place = component(place, kind) as usize;
-            let bytes = given
-                .get(i * element..(i + 1) * element)
-                .ok_or_else(|| wrong("its sparse values reach beyond their buffer view"))?;
-            found.clear();
-            decode(bytes, accessor, &mut found);
-            let to = values
-                .get_mut(place * width..(place + 1) * width)
-                .ok_or_else(|| wrong("its sparse part names an element that is not there"))?;
-            to.copy_from_slice(&found);
+                .ok_or_else(|| error("its sparse indices reach beyond their buffer view"))?;
+            let index = component(index, kind) as usize;
+            let bytes = value_bytes
+                .get(i * element_size..(i + 1) * element_size)
+                .ok_or_else(|| error("its sparse values reach beyond their buffer view"))?;
+            element.clear();
+            decode(bytes, accessor, &mut element);
+            let target = values
+                .get_mut(index * components..(index + 1) * components)
+                .ok_or_else(|| error("a sparse index is out of range"))?;
+            target.copy_from_slice(&element);
         }
     }
     Ok(values)
 }
 
+/// Appends the components of one element.
 fn decode(bytes: &[u8], accessor: &Accessor<'_>, out: &mut Vec<f64>) {
     let kind = accessor.data_type();
     for part in bytes.chunks_exact(size_of(kind)) {
@@ -104,6 +108,7 @@ fn decode(bytes: &[u8], accessor: &Accessor<'_>, out: &mut Vec<f64>) {
     }
 }
 
+/// One component, without normalisation.
 fn component(bytes: &[u8], kind: DataType) -> f64 {
     let two = || [bytes[0], bytes[1]];
     let four = || [bytes[0], bytes[1], bytes[2], bytes[3]];
@@ -117,6 +122,7 @@ fn component(bytes: &[u8], kind: DataType) -> f64 {
     }
 }
 
+/// Size of a component, bytes.
 fn size_of(kind: DataType) -> usize {
     match kind {
         DataType::I8 | DataType::U8 => 1,
@@ -125,7 +131,8 @@ fn size_of(kind: DataType) -> usize {
     }
 }
 
-fn width(accessor: &Accessor<'_>) -> usize {
+/// Number of components of an element.
+fn component_count(accessor: &Accessor<'_>) -> usize {
     match accessor.dimensions() {
         Dimensions::Scalar => 1,
         Dimensions::Vec2 => 2,

@@ -1,4 +1,4 @@
-//! A primitive's triangles, with morph targets and skin applied.
+//! Reads a primitive as a shape, with morph targets and skinning applied.
 
 use std::{
     cell::Cell,
@@ -13,22 +13,22 @@ use gltf::{
     mesh::Mode,
 };
 
-use super::{GltfError, accessor, material::UvRule, normals, source::Source};
+use super::{GltfError, accessor, asset::Asset, material::VertexRule, normals};
 
-/// How indices make triangles.
+/// Topology of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Triangles {
+pub(super) enum TriangleMode {
     List,
     Strip,
     Fan,
 }
 
-/// `None` for points and lines.
-pub(super) fn triangle_mode(mode: Mode) -> Option<Triangles> {
+/// The topology; `None` for points and lines.
+pub(super) fn triangle_mode(mode: Mode) -> Option<TriangleMode> {
     match mode {
-        Mode::Triangles => Some(Triangles::List),
-        Mode::TriangleStrip => Some(Triangles::Strip),
-        Mode::TriangleFan => Some(Triangles::Fan),
+        Mode::Triangles => Some(TriangleMode::List),
+        Mode::TriangleStrip => Some(TriangleMode::Strip),
+        Mode::TriangleFan => Some(TriangleMode::Fan),
         _ => None,
     }
 }
@@ -38,108 +38,114 @@ fn is_index(accessor: &gltf::Accessor<'_>) -> bool {
         && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32)
 }
 
-/// What a primitive becomes a shape by.
-pub(super) struct Making<'a> {
-    pub source: &'a Source,
-    /// Which it is of.
+/// Reads one primitive as a shape.
+pub(super) struct ShapeReader<'a> {
+    pub asset: &'a Asset,
+    /// Mesh of the primitive.
     pub mesh: &'a gltf::Mesh<'a>,
-    pub triangles: Triangles,
-    /// Whether what it is placed by turns it inside out: its triangles are turned back.
-    pub mirrored: bool,
-    pub uv: &'a UvRule,
-    /// Of morph targets.
+    pub triangle_mode: TriangleMode,
+    /// Whether the node's transform mirrors: then triangles are reversed.
+    pub is_mirrored: bool,
+    pub rule: &'a VertexRule,
+    /// Weights of the morph targets.
     pub weights: &'a [f64],
-    /// From the bound shape to the model, by joint.
+    /// Joint matrices: from the bind pose to the model's axes.
     pub joints: Option<&'a [DAffine3]>,
-    /// Whether light will fall on it.
-    pub normals: bool,
-    /// Becomes true where a vertex colour is not within 0 to 1.
-    pub beyond: &'a Cell<bool>,
+    /// Whether the shape gets normals, because light falls on it.
+    pub with_normals: bool,
+    /// Set to true if a vertex colour is outside of 0 to 1.
+    pub has_clamped_colors: &'a Cell<bool>,
 }
 
-impl Making<'_> {
+impl ShapeReader<'_> {
+    /// The shape in its own axes, or, if skinned, in the model's.
     pub fn shape(&self, primitive: &gltf::Primitive<'_>) -> Result<Shape, GltfError> {
         let positions = self.positions(primitive)?;
         let count = positions.len();
-        let of = |semantic: &Semantic| -> Result<Option<Vec<[f64; 4]>>, GltfError> {
+        let attribute = |semantic: &Semantic| -> Result<Option<Vec<[f64; 4]>>, GltfError> {
             let Some(accessor) = primitive.get(semantic) else { return Ok(None) };
-            self.check(primitive, semantic, &accessor)?;
-            let rows = accessor::rows(self.source, &accessor)?;
+            self.check_dimensions(primitive, semantic, &accessor)?;
+            let rows = accessor::vectors(self.asset, &accessor)?;
             if rows.len() == count {
                 Ok(Some(rows))
             } else {
-                Err(self.wrong(primitive, "its attributes have different numbers of elements"))
+                Err(self.error(primitive, "its attributes have different numbers of elements"))
             }
         };
-        let uvs = of(&Semantic::TexCoords(self.uv.set))?;
-        let colors = if self.uv.vertex_colors { of(&Semantic::Colors(0))? } else { None };
-        let with_alpha =
+        let uvs = attribute(&Semantic::TexCoords(self.rule.set))?;
+        let colors = if self.rule.uses_vertex_colors { attribute(&Semantic::Colors(0))? } else { None };
+        let has_alpha =
             primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == Vec4);
         let vertex = |(i, position): (usize, &DVec3)| {
             let [u, v] = uvs.as_ref().map_or([0.0; 2], |rows| [rows[i][0], rows[i][1]]);
             let [r, g, b, a] = colors.as_ref().map_or([1.0; 4], |rows| rows[i]);
-            let color = [r, g, b, if with_alpha { a } else { 1.0 }];
+            let color = [r, g, b, if has_alpha { a } else { 1.0 }];
             if color.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.beyond.set(true);
+                self.has_clamped_colors.set(true);
             }
-            let tint = std::array::from_fn(|k| (color[k] as f32 * self.uv.factor[k]).clamp(0.0, 1.0));
-            MeshVertex { position_m: position.as_vec3().to_array(), uv: self.uv.apply([u, v]), tint }
+            let tint = std::array::from_fn(|k| (color[k] as f32 * self.rule.factor[k]).clamp(0.0, 1.0));
+            MeshVertex { position_m: position.as_vec3().to_array(), uv: self.rule.transform_uv([u, v]), tint }
         };
         let vertices: Vec<MeshVertex> = positions.iter().enumerate().map(vertex).collect();
         if vertices.iter().any(|vertex| {
             !vertex.position_m.iter().chain(&vertex.uv).chain(&vertex.tint).all(|part| part.is_finite())
         }) {
             return Err(
-                self.wrong(primitive, "a position, texture coordinate or colour is not a finite number")
+                self.error(primitive, "a position, texture coordinate or colour is not a finite number")
             );
         }
         let indices = self.indices(primitive, count)?;
-        let given = if self.normals { self.given_normals(primitive, count)? } else { None };
-        Ok(match given {
-            Some(given) => {
-                let normals = normals::mended(given, &vertices, &indices, self.mirrored);
+        let file_normals = if self.with_normals { self.file_normals(primitive, count)? } else { None };
+        Ok(match file_normals {
+            Some(file_normals) => {
+                let normals = normals::normalized(file_normals, &vertices, &indices, self.is_mirrored);
                 Shape { vertices, indices, normals }
             }
-            None if self.normals => normals::flat(&vertices, &indices, self.mirrored),
+            None if self.with_normals => normals::with_flat_normals(&vertices, &indices, self.is_mirrored),
             None => Shape { vertices, indices, normals: Vec::new() },
         })
     }
 
-    /// Texture coordinates of each corner by another rule than the shape's own.
+    /// Texture coordinates of each vertex by another rule than the shape's own.
     pub fn uvs(
         &self,
         primitive: &gltf::Primitive<'_>,
-        rule: &UvRule,
+        rule: &VertexRule,
         count: usize,
     ) -> Result<Vec<[f32; 2]>, GltfError> {
         let semantic = Semantic::TexCoords(rule.set);
-        let Some(accessor) = primitive.get(&semantic) else { return Ok(vec![rule.apply([0.0; 2]); count]) };
-        self.check(primitive, &semantic, &accessor)?;
-        let uvs: Vec<[f32; 2]> =
-            accessor::rows(self.source, &accessor)?.iter().map(|row| rule.apply([row[0], row[1]])).collect();
+        let Some(accessor) = primitive.get(&semantic) else {
+            return Ok(vec![rule.transform_uv([0.0; 2]); count]);
+        };
+        self.check_dimensions(primitive, &semantic, &accessor)?;
+        let uvs: Vec<[f32; 2]> = accessor::vectors(self.asset, &accessor)?
+            .iter()
+            .map(|row| rule.transform_uv([row[0], row[1]]))
+            .collect();
         if uvs.len() != count {
-            return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
+            return Err(self.error(primitive, "its attributes have different numbers of elements"));
         }
         if uvs.iter().flatten().any(|part| !part.is_finite()) {
-            return Err(self.wrong(primitive, "a texture coordinate is not a finite number"));
+            return Err(self.error(primitive, "a texture coordinate is not a finite number"));
         }
         Ok(uvs)
     }
 
-    /// The file's own normals, of any length.
-    fn given_normals(
+    /// The file's normals, of any length; `None` if it has none.
+    fn file_normals(
         &self,
         primitive: &gltf::Primitive<'_>,
         count: usize,
     ) -> Result<Option<Vec<DVec3>>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };
-        self.check(primitive, &Semantic::Normals, &accessor)?;
+        self.check_dimensions(primitive, &Semantic::Normals, &accessor)?;
         let mut normals = self.morphed(primitive, &accessor, |target| target.normals())?;
         if normals.len() != count {
-            return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
+            return Err(self.error(primitive, "its attributes have different numbers of elements"));
         }
         if let Some(joints) = self.joints {
-            let matrices = self.blended(primitive, joints, count, DMat3::ZERO, |joint, _| joint.matrix3)?;
+            let matrices =
+                self.blended_by_joints(primitive, joints, count, DMat3::ZERO, |joint, _| joint.matrix3)?;
             normals.iter_mut().zip(matrices).filter(|(_, (_, weight))| *weight > 0.0).for_each(
                 |(normal, (matrix, _))| {
                     *normal = transformed_normal(&matrix, *normal);
@@ -149,87 +155,88 @@ impl Making<'_> {
         Ok(Some(normals))
     }
 
-    /// Vectors, each with what the morph targets add to it.
+    /// An attribute's vectors plus the weighted morph targets.
     fn morphed<'a>(
         &self,
         primitive: &gltf::Primitive<'a>,
         accessor: &gltf::Accessor<'_>,
-        of: impl Fn(&gltf::mesh::MorphTarget<'a>) -> Option<gltf::Accessor<'a>>,
+        attribute: impl Fn(&gltf::mesh::MorphTarget<'a>) -> Option<gltf::Accessor<'a>>,
     ) -> Result<Vec<DVec3>, GltfError> {
         let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
         let mut vectors: Vec<DVec3> =
-            accessor::rows(self.source, accessor)?.into_iter().map(vector).collect();
+            accessor::vectors(self.asset, accessor)?.into_iter().map(vector).collect();
         for (target, &weight) in
             primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0)
         {
-            let Some(accessor) = of(&target) else { continue };
-            let shifts = accessor::rows(self.source, &accessor)?;
-            if shifts.len() != vectors.len() {
-                return Err(self.wrong(primitive, "a morph target has another number of elements"));
+            let Some(accessor) = attribute(&target) else { continue };
+            let displacements = accessor::vectors(self.asset, &accessor)?;
+            if displacements.len() != vectors.len() {
+                return Err(self.error(primitive, "a morph target has another number of elements"));
             }
-            vectors.iter_mut().zip(shifts).for_each(|(sum, shift)| *sum += weight * vector(shift));
+            vectors
+                .iter_mut()
+                .zip(displacements)
+                .for_each(|(sum, displacement)| *sum += weight * vector(displacement));
         }
         Ok(vectors)
     }
 
-    /// Refuses what is not of as many numbers as its meaning has.
-    fn check(
+    /// Refuses an accessor whose type the attribute cannot have.
+    fn check_dimensions(
         &self,
         primitive: &gltf::Primitive<'_>,
         semantic: &Semantic,
         accessor: &gltf::Accessor<'_>,
     ) -> Result<(), GltfError> {
-        let found = accessor.dimensions();
-        let fits = match semantic {
-            Semantic::Positions | Semantic::Normals => found == Vec3,
-            Semantic::TexCoords(_) => found == Vec2,
-            Semantic::Colors(_) => matches!(found, Vec3 | Vec4),
-            _ => found == Vec4,
+        let dimensions = accessor.dimensions();
+        let is_valid = match semantic {
+            Semantic::Positions | Semantic::Normals => dimensions == Vec3,
+            Semantic::TexCoords(_) => dimensions == Vec2,
+            Semantic::Colors(_) => matches!(dimensions, Vec3 | Vec4),
+            _ => dimensions == Vec4,
         };
         let number = accessor.index();
-        let message =
-            || format!("accessors.{number} is of {found:?}, which is nothing for {}", semantic.to_string());
-        if fits { Ok(()) } else { Err(self.wrong(primitive, &message())) }
+        let message = || {
+            format!("accessors.{number} has type {dimensions:?}, which {} cannot have", semantic.to_string())
+        };
+        if is_valid { Ok(()) } else { Err(self.error(primitive, &message())) }
     }
 
-    fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
-        self.source.broken(format!(
-            "meshes.{}.primitives.{}: {message}",
-            self.mesh.index(),
-            primitive.index()
-        ))
+    fn error(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
+        self.asset.error(format!("meshes.{}.primitives.{}: {message}", self.mesh.index(), primitive.index()))
     }
 
     fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Positions) else { return Ok(Vec::new()) };
-        self.check(primitive, &Semantic::Positions, &accessor)?;
+        self.check_dimensions(primitive, &Semantic::Positions, &accessor)?;
         let mut positions = self.morphed(primitive, &accessor, |target| target.positions())?;
         if let Some(joints) = self.joints {
-            self.bend(primitive, joints, &mut positions)?;
+            self.skin_positions(primitive, joints, &mut positions)?;
         }
         Ok(positions)
     }
 
-    fn bend(
+    fn skin_positions(
         &self,
         primitive: &gltf::Primitive<'_>,
         joints: &[DAffine3],
         positions: &mut [DVec3],
     ) -> Result<(), GltfError> {
-        let bent = self.blended(primitive, joints, positions.len(), DVec3::ZERO, |joint, corner| {
-            joint.transform_point3(positions[corner])
-        })?;
+        let skinned =
+            self.blended_by_joints(primitive, joints, positions.len(), DVec3::ZERO, |joint, vertex| {
+                joint.transform_point3(positions[vertex])
+            })?;
         positions
             .iter_mut()
-            .zip(bent)
+            .zip(skinned)
             .filter(|(_, (_, weight))| *weight > 0.0)
             .for_each(|(position, (sum, weight))| *position = sum / weight);
         Ok(())
     }
 
-    /// Each corner goes with up to four joints of each set: what they make of it, times their weights, and
-    /// the sum of those.
-    fn blended<T>(
+    /// For each vertex, the sum over its joints of weight times `by_joint(joint, vertex)`, and the sum of the
+    /// weights. A vertex has up to four joints in each set of JOINTS_n and WEIGHTS_n.
+    fn blended_by_joints<T>(
         &self,
         primitive: &gltf::Primitive<'_>,
         joints: &[DAffine3],
@@ -241,62 +248,70 @@ impl Making<'_> {
         T: Copy + Add<Output = T>,
         f64: Mul<T, Output = T>,
     {
-        let mut bent = vec![(zero, 0.0); count];
+        let mut sums = vec![(zero, 0.0); count];
         for set in 0.. {
-            let (Some(of), Some(by)) =
+            let (Some(joint_accessor), Some(weight_accessor)) =
                 (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)))
             else {
                 break;
             };
-            self.check(primitive, &Semantic::Joints(set), &of)?;
-            self.check(primitive, &Semantic::Weights(set), &by)?;
-            let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
-            if of.len() != count || by.len() != count {
-                return Err(self.wrong(primitive, "its joints or weights have another number of elements"));
+            self.check_dimensions(primitive, &Semantic::Joints(set), &joint_accessor)?;
+            self.check_dimensions(primitive, &Semantic::Weights(set), &weight_accessor)?;
+            let joint_indices = accessor::vectors(self.asset, &joint_accessor)?;
+            let weights = accessor::vectors(self.asset, &weight_accessor)?;
+            if joint_indices.len() != count || weights.len() != count {
+                return Err(self.error(primitive, "its joints or weights have another number of elements"));
             }
-            for (i, sum) in bent.iter_mut().enumerate() {
-                for k in (0..4).filter(|&k| by[i][k] > 0.0) {
-                    let joint = joints
-                        .get(of[i][k] as usize)
-                        .ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
-                    *sum = (sum.0 + by[i][k] * by_joint(joint, i), sum.1 + by[i][k]);
+            for (i, sum) in sums.iter_mut().enumerate() {
+                for k in (0..4).filter(|&k| weights[i][k] > 0.0) {
+                    let joint = joints.get(joint_indices[i][k] as usize).ok_or_else(|| {
+                        self.error(primitive, "refers to a joint that its skin does not have")
+                    })?;
+                    *sum = (sum.0 + weights[i][k] * by_joint(joint, i), sum.1 + weights[i][k]);
                 }
             }
         }
-        Ok(bent)
+        Ok(sums)
     }
 
+    /// Vertex indices of a list of triangles, without degenerate ones.
     fn indices(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Vec<u32>, GltfError> {
         let all: Vec<u32> = match primitive.indices() {
             None => (0..count as u32).collect(),
             Some(accessor) if !is_index(&accessor) => {
-                let (number, kind, many) = (accessor.index(), accessor.data_type(), accessor.dimensions());
-                return Err(self.wrong(
+                let (number, component, dimensions) =
+                    (accessor.index(), accessor.data_type(), accessor.dimensions());
+                return Err(self.error(
                     primitive,
-                    &format!("accessors.{number} is of {many:?} of {kind:?}: indices are whole numbers from 0, one each"),
+                    &format!(
+                        "accessors.{number} has type {dimensions:?} of {component:?}: indices must be scalar \
+                         unsigned integers"
+                    ),
                 ));
             }
             Some(accessor) => {
-                accessor::numbers(self.source, &accessor)?.into_iter().map(|index| index as u32).collect()
+                accessor::numbers(self.asset, &accessor)?.into_iter().map(|index| index as u32).collect()
             }
         };
         if let Some(index) = all.iter().find(|&&index| index as usize >= count) {
-            return Err(self.wrong(primitive, &format!("an index is {index}, but there are {count} corners")));
+            return Err(
+                self.error(primitive, &format!("an index is {index}, but there are {count} vertices"))
+            );
         }
-        let corners: Vec<[u32; 3]> = match self.triangles {
-            Triangles::List => all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
-            // Every other triangle of a strip turns the other way.
-            Triangles::Strip => {
-                let turned = |(k, t): (usize, &[u32])| {
+        let triangles: Vec<[u32; 3]> = match self.triangle_mode {
+            TriangleMode::List => all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+            // Every other triangle of a strip has the opposite winding.
+            TriangleMode::Strip => {
+                let wound = |(k, t): (usize, &[u32])| {
                     if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] }
                 };
-                all.windows(3).enumerate().map(turned).collect()
+                all.windows(3).enumerate().map(wound).collect()
             }
-            Triangles::Fan => {
+            TriangleMode::Fan => {
                 all.get(1..).unwrap_or_default().windows(2).map(|t| [t[0], t[1], all[0]]).collect()
             }
         };
-        let turned = |[a, b, c]: [u32; 3]| if self.mirrored { [a, c, b] } else { [a, b, c] };
-        Ok(corners.into_iter().filter(|[a, b, c]| a != b && b != c && a != c).flat_map(turned).collect())
+        let reversed = |[a, b, c]: [u32; 3]| if self.is_mirrored { [a, c, b] } else { [a, b, c] };
+        Ok(triangles.into_iter().filter(|[a, b, c]| a != b && b != c && a != c).flat_map(reversed).collect())
     }
 }

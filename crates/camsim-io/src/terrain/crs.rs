@@ -1,16 +1,16 @@
 //! Coordinate reference systems of terrain files, to and from WGS-84 latitude and longitude.
 //!
-//! Transformations are horizontal: they run at height 0 of the source datum, as in the usual 2D tools, and
-//! heights never take part.
+//! Transformations are horizontal: they run at height 0 of the source datum, as in common 2D tools, and leave
+//! heights unchanged.
 
 use proj4rs::{proj::Proj, transform::transform};
 
 /// Radius of the sphere of EPSG:3857, metres.
 const WEB_MERCATOR_RADIUS_M: f64 = 6_378_137.0;
 
-/// What the EPSG registry says of each system that is known beside WGS-84's UTM zones and 3857:
-/// kind;code;name;definition;metres by which the shift of its datum may be off. Datums without a shift are
-/// taken for WGS-84, from which they differ by a metre or two (ETRS89, NAD83 and the like).
+/// Systems of the EPSG registry that are supported besides the UTM zones of WGS-84 and 3857:
+/// kind;code;name;definition;accuracy of the datum shift in metres. Datums without a shift are taken as
+/// WGS-84, from which they differ by a metre or two (ETRS89, NAD83 and similar).
 pub(crate) const SYSTEMS: &str = include_str!("crs/systems.csv");
 
 /// A known coordinate reference system.
@@ -18,14 +18,14 @@ pub(crate) const SYSTEMS: &str = include_str!("crs/systems.csv");
 pub(crate) struct Crs {
     pub epsg: u16,
     pub name: String,
-    /// Metres by which its datum may be off.
+    /// Accuracy of its datum shift, metres.
     pub accuracy_m: Option<f64>,
     kind: Kind,
 }
 
 #[derive(Debug)]
 enum Kind {
-    /// Longitude, latitude in degrees (the order of raster files: x is longitude).
+    /// Longitude, latitude in degrees; x is longitude, as in raster files.
     Geographic,
     WebMercator,
     Projected {
@@ -39,12 +39,12 @@ enum Kind {
 pub(crate) struct VerticalCrs {
     pub epsg: u16,
     pub name: &'static str,
-    /// Metres in its unit; less than 0 where it counts downwards.
+    /// Metres per unit; negative for depths.
     pub metres_per_unit: f64,
 }
 
-/// Name, definition and accuracy in a line of [`SYSTEMS`].
-fn line_of(kind: &str, epsg: u16) -> Option<[&'static str; 3]> {
+/// Name, definition and accuracy of a system in [`SYSTEMS`].
+fn registry_line(kind: &str, epsg: u16) -> Option<[&'static str; 3]> {
     SYSTEMS.lines().find_map(|line| {
         let rest = line.strip_prefix(kind)?.strip_prefix(';')?;
         let (code, rest) = rest.split_once(';')?;
@@ -53,23 +53,23 @@ fn line_of(kind: &str, epsg: u16) -> Option<[&'static str; 3]> {
     })
 }
 
-/// The horizontal and the vertical system of a code that stands for both.
+/// Codes of the horizontal and the vertical part of a compound system.
 pub(crate) fn compound(epsg: u16) -> Option<[u16; 2]> {
-    let [_, parts, _] = line_of("compound", epsg)?;
+    let [_, parts, _] = registry_line("compound", epsg)?;
     let (horizontal, vertical) = parts.split_once(' ')?;
     Some([horizontal.parse().ok()?, vertical.parse().ok()?])
 }
 
 impl VerticalCrs {
-    /// `None` for a code that is not known.
+    /// `None` for an unknown code.
     pub fn new(epsg: u16) -> Option<Self> {
-        let [name, metres, _] = line_of("vertical", epsg)?;
+        let [name, metres, _] = registry_line("vertical", epsg)?;
         Some(Self { epsg, name, metres_per_unit: metres.parse().ok()? })
     }
 }
 
 impl Crs {
-    /// `None` for a code that is not known.
+    /// `None` for an unknown code.
     pub fn new(epsg: u16) -> Option<Self> {
         let wgs84 = |name: String, kind| Some(Self { epsg, name, accuracy_m: None, kind });
         match epsg {
@@ -88,10 +88,10 @@ impl Crs {
             }
             _ => {}
         }
-        if let Some([name, ..]) = line_of("geographic", epsg) {
+        if let Some([name, ..]) = registry_line("geographic", epsg) {
             return wgs84(name.into(), Kind::Geographic);
         }
-        let [name, definition, accuracy] = line_of("projected", epsg)?;
+        let [name, definition, accuracy] = registry_line("projected", epsg)?;
         Some(Self {
             epsg,
             name: name.into(),
@@ -100,7 +100,7 @@ impl Crs {
         })
     }
 
-    /// Metres in a unit of its coordinates; `None` for degrees.
+    /// Metres per unit of its coordinates; `None` for degrees.
     pub fn metres_per_unit(&self) -> Option<f64> {
         match &self.kind {
             Kind::Geographic => None,
@@ -109,7 +109,7 @@ impl Crs {
         }
     }
 
-    /// After how much of x the Earth begins again.
+    /// Period of x around the Earth; `None` for projections that do not repeat.
     pub fn period(&self) -> Option<f64> {
         match self.kind {
             Kind::Geographic => Some(360.0),
@@ -150,7 +150,7 @@ impl Crs {
     }
 }
 
-/// By a definition in PROJ's notation.
+/// A projection by its PROJ string.
 fn projected(definition: &str) -> Option<Kind> {
     let shift = if definition.contains("+towgs84") { "" } else { "+towgs84=0,0,0" };
     Some(Kind::Projected {
@@ -161,7 +161,7 @@ fn projected(definition: &str) -> Option<Kind> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
     fn degrees(epsg: u16, model: [f64; 2]) -> [f64; 2] {
@@ -169,14 +169,14 @@ mod tests {
     }
 
     /// Metres on the ground are about 111 km a degree.
-    fn assert_near(got: [f64; 2], expected: [f64; 2], metres: f64) {
-        let [north, east] = [0, 1].map(|k: usize| (got[k] - expected[k]) * 111_000.0);
-        assert!(north.hypot(east) < metres, "{got:?} {expected:?}: {} m", north.hypot(east));
+    fn assert_near(actual: [f64; 2], expected: [f64; 2], metres: f64) {
+        let [north, east] = [0, 1].map(|k: usize| (actual[k] - expected[k]) * 111_000.0);
+        assert!(north.hypot(east) < metres, "{actual:?} {expected:?}: {} m", north.hypot(east));
     }
 
     #[test]
-    fn published_points_are_met() {
-        // Centres of two demo flights as their makers computed them (data README).
+    fn published_points_agree() {
+        // Centres of two demo flights as their publishers state them.
         assert_near(degrees(21781, [783_249.0, 178_821.0]), [46.735383, 9.836560], 0.2);
         assert_near(degrees(2056, [2_783_249.0, 1_178_821.0]), [46.735383, 9.836560], 0.2);
         assert_near(degrees(32615, [576_702.0, 5_188_162.0]), [46.842580, -91.994050], 0.2);
@@ -188,9 +188,9 @@ mod tests {
         assert_near(degrees(32733, [500_000.0, 10_000_000.0]), [0.0, 15.0], 1e-3);
     }
 
-    /// By PROJ, two for each system: scripts/goldens/crs_table.py.
+    /// Two points for each system, computed by PROJ: scripts/goldens/crs_table.py.
     #[test]
-    fn every_system_is_where_proj_has_it() {
+    fn every_system_agrees_with_proj() {
         let points =
             std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/crs_points.csv"))
                 .unwrap();
@@ -200,19 +200,22 @@ mod tests {
             let numbers: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
             let [epsg, x, y, lat, lon] = numbers[..] else { panic!("{line}") };
             let crs = Crs::new(epsg as u16).unwrap_or_else(|| panic!("{line}"));
-            let found = crs.geodetic_from_model([x, y]).map(|place| place.map(f64::to_degrees));
+            let forward_deg = crs.geodetic_from_model([x, y]).map(|point| point.map(f64::to_degrees));
             let back = crs.model_from_geodetic([lat.to_radians(), lon.to_radians()]);
-            let (Some(found), Some(back)) = (found, back) else {
+            let (Some(forward_deg), Some(back)) = (forward_deg, back) else {
                 wrong.push(line.to_owned());
                 continue;
             };
             let unit_m = crs.metres_per_unit().unwrap();
-            let off_m = [(found[0] - lat) * 111_000.0, (found[1] - lon) * 111_000.0 * lat.to_radians().cos()];
-            let back_m = [(back[0] - x) * unit_m, (back[1] - y) * unit_m];
-            // Datum shifts drop their height, which costs some hundredths of a millimetre; series of
-            // projections are good to a millimetre.
-            if off_m.iter().chain(&back_m).any(|metres| metres.abs() > 2e-3) {
-                wrong.push(format!("{line}: off by {off_m:?} m, back by {back_m:?} m"));
+            let error_m = [
+                (forward_deg[0] - lat) * 111_000.0,
+                (forward_deg[1] - lon) * 111_000.0 * lat.to_radians().cos(),
+            ];
+            let back_error_m = [(back[0] - x) * unit_m, (back[1] - y) * unit_m];
+            // The dropped height of datum shifts costs some hundredths of a millimetre; the series of
+            // projections are accurate to a millimetre.
+            if error_m.iter().chain(&back_error_m).any(|metres| metres.abs() > 2e-3) {
+                wrong.push(format!("{line}: error {error_m:?} m, inverse {back_error_m:?} m"));
             }
             seen.insert(epsg as u16);
         }
@@ -222,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_have_their_unit_and_pairs_their_parts() {
+    fn vertical_systems_have_units_and_compound_ones_their_parts() {
         let feet = VerticalCrs::new(6360).unwrap();
         assert!(
             feet.name == "NAVD88 height (ftUS)" && (feet.metres_per_unit - 1200.0 / 3937.0).abs() < 1e-15
@@ -237,8 +240,8 @@ mod tests {
     }
 
     #[test]
-    fn every_known_system_returns() {
-        for (epsg, place) in [
+    fn inverse_transformation_returns_the_point() {
+        for (epsg, point_deg) in [
             (21781, [46.8, 8.2]),
             (2056, [46.8, 8.2]),
             (32632, [50.0, 11.0]),
@@ -248,15 +251,15 @@ mod tests {
             (4326, [10.0, 20.0]),
         ] {
             let crs = Crs::new(epsg).unwrap();
-            let place = place.map(f64::to_radians);
-            let back = crs.geodetic_from_model(crs.model_from_geodetic(place).unwrap()).unwrap();
+            let point = point_deg.map(f64::to_radians);
+            let back = crs.geodetic_from_model(crs.model_from_geodetic(point).unwrap()).unwrap();
             // 1e-9 rad is 6 mm; the datum shift drops its height, which costs some micrometres.
-            assert!((0..2).all(|k| (back[k] - place[k]).abs() < 1e-9), "{epsg} {back:?} {place:?}");
+            assert!((0..2).all(|k| (back[k] - point[k]).abs() < 1e-9), "{epsg} {back:?} {point:?}");
         }
     }
 
     #[test]
-    fn unknown_codes_and_impossible_places_have_no_answer() {
+    fn unknown_codes_and_points_outside_the_domain_give_none() {
         assert!([0, 1, 2100, 27573, 32600, 32767, 25827].iter().all(|&epsg| Crs::new(epsg).is_none()));
         assert_eq!(Crs::new(4326).unwrap().geodetic_from_model([8.0, 95.0]), None);
         for model in [[f64::NAN, 0.0], [f64::INFINITY, 1.0], [1e300, 1e300]] {

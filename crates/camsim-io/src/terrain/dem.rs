@@ -1,4 +1,4 @@
-//! A DEM as its file has it: heights are kept in the file's own type and turned into metres one by one.
+//! A digital elevation model: heights stay in the file's type and are converted to metres on access.
 
 use std::path::{Path, PathBuf};
 
@@ -9,112 +9,122 @@ use camsim_core::scenario::{HeightReference, TerrainSpec};
 use super::{
     TerrainFileError,
     bands::may_be_alpha,
-    beside,
     crs::{Crs, compound},
+    descriptions,
     geo_tags::GeoTags,
     georeference::{self, Affine, world_file},
     height_files,
     raster::Raster,
-    systems::{Datum, SAME_UNIT_M, Stated, Vertical, unit_of_code, unit_of_name},
-    tiff_file::Sample,
-    words,
+    sidecar,
+    stated_crs::StatedCrs,
+    tiff_file::SampleType,
+    units::{SAME_UNIT_M, metres_per_unit_code, metres_per_unit_name},
+    vertical_crs::{StatedVerticalCrs, VerticalDatum},
 };
 
-/// Heights outside of this are garbage or undeclared "no data" marks, metres: from below the deepest sea to
-/// above the highest mountain.
+/// Range of plausible heights, metres: from below the deepest sea to above the highest mountain. Others are
+/// undeclared no-data values.
 const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
 
-/// Heights outside of this are rare enough to be spoken of, metres.
+/// Range of common heights, metres; others are reported.
 const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
 
-/// Programs that compute with a mark miss it by as much, in parts of it. Marks that may be heights are met
-/// exactly.
-const MARK_TOLERANCE: f64 = 1e-5;
+/// Relative difference at which a value equals the no-data value, for programs that interpolate it. No-data
+/// values that may be heights are compared exactly.
+const NODATA_TOLERANCE: f64 = 1e-5;
 
-/// What lies outside of it but within this may be a height in another unit; marks lie farther away.
-const NUMBERS_NOT_MARKS: f64 = 1e6;
+/// Implausible heights below this may have another unit; undeclared no-data values are larger.
+const MAX_OTHER_UNIT: f64 = 1e6;
 
-/// The mark that most often means "no data" where the file does not declare one.
+/// The most common no-data value of files that do not declare one.
 const COMMON_NODATA: f64 = -9999.0;
 
-/// A grid of heights with its place on Earth; row 0 is the northernmost, column 0 the westernmost.
+/// A georeferenced grid of heights (posts); row 0 is the northernmost, column 0 the westernmost.
 pub(super) struct Dem {
     pub path: PathBuf,
     pub size: [u32; 2],
-    /// As the file has them: a sixth of what points in f64 would take.
+    /// Stored values: a sixth of the memory of points in f64.
     raster: Raster,
-    /// Whether its second band says where there is something.
+    /// Whether the second band is alpha.
     has_alpha: bool,
     /// Whether the file counts columns from the east, rows from the south.
     is_reversed: [bool; 2],
-    /// Metres of a stored number: this times it, and this more.
-    metres: [f64; 2],
-    /// Stored numbers of heights that are not there.
+    /// Scale and offset from stored values to metres.
+    metres_from_stored: [f64; 2],
+    /// No-data values, as stored.
     nodata: [f64; 2],
-    /// Model coordinates of pixel corners.
+    /// Model coordinates from pixel coordinates (corner convention).
     pub model_from_pixel: Affine,
     pub crs: Crs,
-    /// What there is to say about it.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// What all heights come to.
-pub(super) struct Heights {
+/// Statistics of all heights.
+pub(super) struct HeightStatistics {
+    /// Lowest and highest height, metres.
     pub range_m: [f64; 2],
+    /// Number of missing or implausible heights.
     pub voids: u64,
-    /// Of the voids: numbers that may be heights in another unit.
+    /// Number of voids whose values may be heights in another unit.
     pub implausible: u64,
-    /// Heights that are deeper or higher than nearly all land.
+    /// Number of heights outside of the common range.
     pub unlikely: u64,
 }
 
+/// A range without values.
 pub(super) const EMPTY_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
+/// A range extended to a value.
 pub(super) fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
     [low.min(value), high.max(value)]
 }
 
 impl Dem {
-    /// `converts`: whether heights go through the geoid.
-    pub fn read(spec: &TerrainSpec, converts: bool) -> Result<Self, TerrainFileError> {
+    /// Reads `scene.terrain.dem`. `uses_geoid` is whether heights are converted by the geoid.
+    pub fn read(spec: &TerrainSpec, uses_geoid: bool) -> Result<Self, TerrainFileError> {
         let path = spec.dem.as_path();
         let mut raster = height_files::read(path)?;
-        beside::read_tags(path, &mut raster.geo)?;
-        beside::read_mask(path, &mut raster).map_err(TerrainFileError::of_dem)?;
+        sidecar::read_sidecar_tags(path, &mut raster.geo)?;
+        sidecar::read_sidecar_mask(path, &mut raster).map_err(TerrainFileError::dem)?;
         let geo = &raster.geo;
-        let (found, mut notes) = georeference_of(path, geo.model_from_pixel)?;
-        let stated = Stated::of(path, geo)?;
-        // The more basic lack is reported first.
-        let model_from_pixel = found.ok_or_else(|| no_georeference(path, geo))?;
+        let (model_from_pixel, mut notes) = read_georeference(path, geo.model_from_pixel)?;
+        let stated = StatedCrs::read(path, geo)?;
+        // A missing georeference is reported before a missing coordinate system.
+        let model_from_pixel = model_from_pixel.ok_or_else(|| no_georeference(path, geo))?;
         let crs = stated.crs(path, geo, spec.epsg)?;
         if raster.bands() > 2 {
             return Err(TerrainFileError::NotHeights { path: path.into(), bands: raster.bands() });
         }
         notes.extend(geo.notes.iter().cloned());
-        let of_key = spec.epsg.and_then(compound).map(|[_, vertical]| vertical);
+        let key_vertical = spec.epsg.and_then(compound).map(|[_, vertical]| vertical);
         if let Some(problem) = &stated.problem {
             return Err(TerrainFileError::Meaning { path: path.into(), problem: problem.clone() });
         }
-        notes.extend(stated.other.clone());
-        let own_vertical =
-            stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
-        let verticals: Vec<&Vertical> = own_vertical.iter().chain(&stated.beside).collect();
-        notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, converts)));
+        notes.extend(stated.conflict_note.clone());
+        let own_vertical = stated
+            .vertical
+            .or(key_vertical)
+            .map(|code| StatedVerticalCrs::from_code(code, &geo.keys.vertical_citation));
+        let verticals: Vec<&StatedVerticalCrs> =
+            own_vertical.iter().chain(&stated.sidecar_verticals).collect();
+        notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, uses_geoid)));
         if verticals.is_empty()
             && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955)
             && spec.height == HeightReference::Msl
         {
-            let three = Vertical {
+            let ellipsoidal = StatedVerticalCrs {
                 code: Some(crs.epsg),
-                datum: Some(Datum::Ellipsoid),
+                datum: Some(VerticalDatum::Ellipsoid),
                 name: crs.name.clone(),
                 metres_per_unit: Some(1.0),
             };
-            notes.extend(three.note(spec.height, converts));
+            notes.extend(ellipsoidal.note(spec.height, uses_geoid));
         }
         notes.extend(crs.accuracy_m.filter(|metres| *metres >= 2.0).map(|metres| {
             format!(
-                "EPSG:{} ({}) comes to WGS-84 by a shift that may be off by {metres} m: the log may lie beside the terrain by as much",
+                "EPSG:{} ({}) is transformed to WGS-84 with an accuracy of {metres} m: log and terrain may \
+                 be offset by as much",
                 crs.epsg, crs.name
             )
         }));
@@ -122,38 +132,41 @@ impl Dem {
             && raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2))
             && may_be_alpha(geo.bands.get(1));
         if raster.bands() == 2 && !has_alpha {
-            notes.push("holds a second band, which is left out".to_owned());
+            notes.push("has a second band, which is ignored".to_owned());
         }
         if let Some(orientation) = geo.orientation {
-            notes.push(format!("its orientation (tag 274: {orientation}) is not used: rows and columns lie where the georeference says"));
+            notes.push(format!(
+                "its orientation (tag 274: {orientation}) is ignored: the georeference defines rows and \
+                 columns"
+            ));
         }
         let unit_m = unit_m(spec, geo, &verticals, &stated.height_units, &crs, &mut notes)?;
         let [scale, offset] = scale_and_offset(path, geo, own_vertical.is_some(), &mut notes)?;
-        notes.extend(words::notes(geo, unit_m, [scale, offset], spec.height_unit.is_some()));
-        // Where no mark is declared, the usual ones are marks.
-        let lowest = if raster.image.sample == Sample::I16 { f64::from(i16::MIN) } else { COMMON_NODATA };
-        let nodata = geo.nodata.map_or([COMMON_NODATA, lowest], |mark| [mark; 2]);
+        notes.extend(descriptions::notes(geo, unit_m, [scale, offset], spec.height_unit.is_some()));
+        // Without a declared no-data value the common ones apply.
+        let lowest = if raster.image.sample == SampleType::I16 { f64::from(i16::MIN) } else { COMMON_NODATA };
+        let nodata = geo.nodata.map_or([COMMON_NODATA, lowest], |nodata| [nodata; 2]);
         let notes = notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
-        let metres = [unit_m * scale, unit_m * offset];
+        let metres_from_stored = [unit_m * scale, unit_m * offset];
         let mut dem = Self {
             path: path.into(),
             size: raster.size,
             raster,
             has_alpha,
             is_reversed: [false; 2],
-            metres,
+            metres_from_stored,
             nodata,
             model_from_pixel,
             crs,
             notes,
         };
-        dem.turn_north_up();
+        dem.orient_north_up();
         Ok(dem)
     }
 
-    /// Some files count rows from the south (or columns from the east); the diagonals of the cells are
-    /// defined with the north on top.
-    fn turn_north_up(&mut self) {
+    /// Reverses rows that run from the south and columns that run from the east: the diagonals of cells are
+    /// defined with north up.
+    fn orient_north_up(&mut self) {
         let [cols, rows] = self.size.map(f64::from);
         if self.model_from_pixel.row[1] > 0.0 {
             self.is_reversed[1] = true;
@@ -165,58 +178,61 @@ impl Dem {
         }
     }
 
-    pub fn points(&self) -> u64 {
+    /// Number of posts.
+    pub fn post_count(&self) -> u64 {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }
 
+    /// Column and row of a post index.
     pub fn column_and_row(&self, index: usize) -> [u32; 2] {
         let cols = self.size[0] as usize;
         [(index % cols) as u32, (index / cols) as u32]
     }
 
-    /// Metres; NaN = void.
-    pub fn height_m(&self, at: [u32; 2]) -> f64 {
-        let metres = self.stored_m(at);
+    /// Height, metres; NaN for a void.
+    pub fn height_m(&self, post: [u32; 2]) -> f64 {
+        let height_m = self.stored_m(post);
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
-        if (lowest..=highest).contains(&metres) { metres } else { f64::NAN }
+        if (lowest..=highest).contains(&height_m) { height_m } else { f64::NAN }
     }
 
-    /// Whether plausible or not; NaN where the file says that there is nothing.
-    fn stored_m(&self, at: [u32; 2]) -> f64 {
+    /// Height, metres, plausible or not; NaN for no-data values and masked posts.
+    fn stored_m(&self, post: [u32; 2]) -> f64 {
         let [column, row] = [0, 1]
-            .map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
+            .map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - post[k] } else { post[k] } as usize);
         let pixel = row * self.size[0] as usize + column;
         let stored = self.raster.value(pixel);
-        let is_nodata = self.nodata.iter().any(|mark| is_mark(stored, *mark));
-        let is_clear = self.has_alpha && self.raster.image.value(pixel, 1) == 0.0;
-        if is_nodata || is_clear || !self.raster.is_valid(pixel) {
+        let is_nodata = self.nodata.iter().any(|nodata| equals_nodata(stored, *nodata));
+        let is_transparent = self.has_alpha && self.raster.image.value(pixel, 1) == 0.0;
+        if is_nodata || is_transparent || !self.raster.is_valid(pixel) {
             f64::NAN
         } else {
-            stored * self.metres[0] + self.metres[1]
+            stored * self.metres_from_stored[0] + self.metres_from_stored[1]
         }
     }
 
-    pub fn heights(&self) -> Heights {
-        let none = || Heights { range_m: EMPTY_RANGE, voids: 0, implausible: 0, unlikely: 0 };
+    /// Statistics of all heights.
+    pub fn statistics(&self) -> HeightStatistics {
+        let none = || HeightStatistics { range_m: EMPTY_RANGE, voids: 0, implausible: 0, unlikely: 0 };
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
         let rows = (0..self.size[1]).into_par_iter().map(|row| {
-            (0..self.size[0]).fold(none(), |all, column| match self.stored_m([column, row]) {
-                m if (lowest..=highest).contains(&m) => {
-                    let is_usual = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&m);
-                    Heights {
-                        range_m: widened(all.range_m, m),
-                        unlikely: all.unlikely + u64::from(!is_usual),
-                        ..all
+            (0..self.size[0]).fold(none(), |sum, column| match self.stored_m([column, row]) {
+                height_m if (lowest..=highest).contains(&height_m) => {
+                    let is_usual = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&height_m);
+                    HeightStatistics {
+                        range_m: widened(sum.range_m, height_m),
+                        unlikely: sum.unlikely + u64::from(!is_usual),
+                        ..sum
                     }
                 }
-                m => Heights {
-                    voids: all.voids + 1,
-                    implausible: all.implausible + u64::from(m.abs() < NUMBERS_NOT_MARKS),
-                    ..all
+                height_m => HeightStatistics {
+                    voids: sum.voids + 1,
+                    implausible: sum.implausible + u64::from(height_m.abs() < MAX_OTHER_UNIT),
+                    ..sum
                 },
             })
         });
-        rows.reduce(none, |a, b| Heights {
+        rows.reduce(none, |a, b| HeightStatistics {
             range_m: widened(widened(a.range_m, b.range_m[0]), b.range_m[1]),
             voids: a.voids + b.voids,
             implausible: a.implausible + b.implausible,
@@ -224,31 +240,35 @@ impl Dem {
         })
     }
 
-    /// Pixel coordinates (corner convention) of a sample.
-    pub fn pixel_centre(at: [u32; 2]) -> [f64; 2] {
-        at.map(|n| f64::from(n) + 0.5)
+    /// Pixel coordinates (corner convention) of a post.
+    pub fn pixel_centre(post: [u32; 2]) -> [f64; 2] {
+        post.map(|n| f64::from(n) + 0.5)
     }
 
-    pub fn model(&self, at: [u32; 2]) -> [f64; 2] {
-        self.model_from_pixel.apply(Self::pixel_centre(at))
+    /// Model coordinates of a post.
+    pub fn model(&self, post: [u32; 2]) -> [f64; 2] {
+        self.model_from_pixel.apply(Self::pixel_centre(post))
     }
 
-    /// Latitude, longitude; `None` outside of the projection's domain.
-    pub fn geodetic_rad(&self, at: [u32; 2]) -> Option<[f64; 2]> {
-        self.crs.geodetic_from_model(self.model(at))
+    /// Latitude, longitude of a post, radians; `None` outside of the projection's domain.
+    pub fn geodetic_rad(&self, post: [u32; 2]) -> Option<[f64; 2]> {
+        self.crs.geodetic_from_model(self.model(post))
     }
 
+    /// Number of posts outside of the projection's domain.
     pub fn count_outside_crs(&self) -> u64 {
-        self.count(|at| self.geodetic_rad(at).is_none())
+        self.count(|post| self.geodetic_rad(post).is_none())
     }
 
-    /// Samples of which something holds.
-    pub fn count(&self, holds: impl Fn([u32; 2]) -> bool + Sync) -> u64 {
-        (0..self.points() as usize).into_par_iter().filter(|&index| holds(self.column_and_row(index))).count()
-            as u64
+    /// Number of posts that fulfil a predicate.
+    pub fn count(&self, predicate: impl Fn([u32; 2]) -> bool + Sync) -> u64 {
+        (0..self.post_count() as usize)
+            .into_par_iter()
+            .filter(|&index| predicate(self.column_and_row(index)))
+            .count() as u64
     }
 
-    /// The outermost samples.
+    /// The outermost posts.
     pub fn border(&self) -> impl Iterator<Item = [u32; 2]> {
         let [cols, rows] = self.size;
         (0..cols)
@@ -257,48 +277,51 @@ impl Dem {
     }
 }
 
-/// Whether a stored number is the mark of missing values.
-fn is_mark(stored: f64, mark: f64) -> bool {
-    let may_be_height = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&mark);
-    // A float32 file may declare its mark with more digits than it holds.
-    stored == mark
-        || stored as f32 == mark as f32
-        || !may_be_height && (stored - mark).abs() <= MARK_TOLERANCE * mark.abs()
+/// Whether a stored value is the no-data value.
+fn equals_nodata(stored: f64, nodata: f64) -> bool {
+    let may_be_height = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&nodata);
+    // A float32 file may declare its no-data value with more digits.
+    stored == nodata
+        || stored as f32 == nodata as f32
+        || !may_be_height && (stored - nodata).abs() <= NODATA_TOLERANCE * nodata.abs()
 }
 
-/// Metres in the unit of the heights. Where the file says two units or where it may be one of two, the key
+/// Metres per unit of the heights. Where the file states several units or may have one of two, the key
 /// decides.
+// Long because: one list of stated units is filled from five sources and then compared.
 fn unit_m(
     spec: &TerrainSpec,
     geo: &GeoTags,
-    verticals: &[&Vertical],
+    verticals: &[&StatedVerticalCrs],
     by_name: &[(String, String)],
     crs: &Crs,
     notes: &mut Vec<String>,
 ) -> Result<f64, TerrainFileError> {
     let path = &spec.dem;
     let meaning = |problem: String| TerrainFileError::Meaning { path: path.clone(), problem };
-    let unit_of_key = spec.height_unit.map(|unit| unit.metres());
+    let key_unit_m = spec.height_unit.map(|unit| unit.metres());
     let mut stated: Vec<(String, f64)> = Vec::new();
     if let Some(name) = geo.bands.first().and_then(|band| band.unit.as_ref()) {
-        match unit_of_name(name) {
+        match metres_per_unit_name(name) {
             Some(unit) => stated.push((format!("unit `{name}`"), unit)),
-            None if unit_of_key.is_none() => {
+            None if key_unit_m.is_none() => {
                 return Err(meaning(format!(
-                    "states `{name}` as the unit of its heights, which is not known: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
+                    "states `{name}` as the unit of its heights, which is unknown: set \
+                     scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
                 )));
             }
             None => {}
         }
     }
     for (name, from) in by_name {
-        match unit_of_name(name) {
-            // ARC/INFO's feet may be either.
-            Some(unit) if unit_of_key.is_some_and(|key| (key - unit).abs() < 1e-6) => {}
+        match metres_per_unit_name(name) {
+            // ARC/INFO has one name for both feet.
+            Some(unit) if key_unit_m.is_some_and(|key| (key - unit).abs() < 1e-6) => {}
             Some(unit) => stated.push((format!("{from} {name}"), unit)),
-            None if unit_of_key.is_none() => {
+            None if key_unit_m.is_none() => {
                 return Err(meaning(format!(
-                    "{from} is `{name}`, which is no unit that is known: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
+                    "{from} is `{name}`, which is an unknown unit: set scene.terrain.height_unit = \"m\", \
+                     \"ft\" or \"us-ft\""
                 )));
             }
             None => {}
@@ -311,60 +334,66 @@ fn unit_m(
             .map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
         if *unit < 0.0 {
             return Err(meaning(format!(
-                "states depths ({}), which count downwards: turn them into heights with `gdal_calc.py -A IN --calc=-A --outfile OUT`",
+                "states depths ({}), positive downwards: negate them with `gdal_calc.py -A IN --calc=-A \
+                 --outfile OUT`",
                 vertical.label()
             )));
         }
         stated.push((label, *unit));
     }
     if let Some(code) = geo.keys.vertical_unit {
-        match unit_of_code(code) {
+        match metres_per_unit_code(code) {
             Some(unit) => stated.push((format!("VerticalUnits {code}"), unit)),
-            None if unit_of_key.is_none() => {
-                return Err(TerrainFileError::Unit { path: path.clone(), what: "vertical", code });
+            None if key_unit_m.is_none() => {
+                return Err(TerrainFileError::Unit { path: path.clone(), kind: "vertical", code });
             }
             None => {}
         }
     }
-    let of_tags = stated.len();
+    let tag_count = stated.len();
     stated.extend(
-        words::units(geo)
-            .filter_map(|(name, value)| Some((format!("item {name} `{value}`"), unit_of_name(value)?))),
+        descriptions::units(geo).filter_map(|(name, value)| {
+            Some((format!("item {name} `{value}`"), metres_per_unit_name(value)?))
+        }),
     );
     if let (0, None, Some((text, unit))) =
-        (of_tags, unit_of_key, stated.first().filter(|(_, unit)| *unit != 1.0))
+        (tag_count, key_unit_m, stated.first().filter(|(_, unit)| *unit != 1.0))
     {
         notes.push(format!(
-            "its heights are taken in units of {unit} m, by its {text}: if that is not of heights, set scene.terrain.height_unit after removing it"
+            "its heights are read in units of {unit} m, from its {text}: if that is not the unit of heights, \
+             remove it and set scene.terrain.height_unit"
         ));
     }
-    let close = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
-    let agree = stated.windows(2).all(|pair| close(pair[0].1, pair[1].1));
-    let all =
+    let is_same = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
+    let agree = stated.windows(2).all(|pair| is_same(pair[0].1, pair[1].1));
+    let listed =
         || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
-    match (unit_of_key, stated.first()) {
-        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| close(*stated, unit)) => {
+    match (key_unit_m, stated.first()) {
+        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| is_same(*stated, unit)) => {
             Err(meaning(format!(
                 "states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file",
-                all()
+                listed()
             )))
         }
         (Some(unit), _) => Ok(unit),
         (None, Some(_)) if !agree => Err(meaning(format!(
             "states {}: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
-            all()
+            listed()
         ))),
         (None, Some((_, unit))) => Ok(*unit),
-        // Who maps in feet may have heights in feet, or not.
-        (None, None) if crs.metres_per_unit().is_some_and(|unit| !close(unit, 1.0)) => Err(meaning(format!(
-            "EPSG:{} ({}) counts in feet, and nothing says whether the heights do: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
-            crs.epsg, crs.name
-        ))),
+        // Files with coordinates in feet may have heights in feet or metres.
+        (None, None) if crs.metres_per_unit().is_some_and(|unit| !is_same(unit, 1.0)) => {
+            Err(meaning(format!(
+                "EPSG:{} ({}) has coordinates in feet, and the unit of the heights is not stated: set \
+                 scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
+                crs.epsg, crs.name
+            )))
+        }
         (None, None) => Ok(1.0),
     }
 }
 
-/// `scale x stored + offset` in the unit of the heights.
+/// Scale and offset from stored values to heights in their unit: `scale x stored + offset`.
 fn scale_and_offset(
     path: &Path,
     geo: &GeoTags,
@@ -377,61 +406,58 @@ fn scale_and_offset(
         .first()
         .map(|band| (band.scale, band.offset))
         .filter(|(scale, offset)| scale.is_some() || offset.is_some());
-    let of_band = band.map(|(scale, offset)| [scale.unwrap_or(1.0), offset.unwrap_or(0.0)]);
-    if of_band.is_some_and(|[scale, _]| scale == 0.0) {
+    let band_scale = band.map(|(scale, offset)| [scale.unwrap_or(1.0), offset.unwrap_or(0.0)]);
+    if band_scale.is_some_and(|[scale, _]| scale == 0.0) {
         return Err(meaning("states a scale of 0 for its heights (GDAL_METADATA): correct the file".into()));
     }
-    match (of_band, geo.vertical_scale) {
-        (Some(band), Some(place)) if has_vertical && band != place => Err(meaning(format!(
-            "states two scales of its heights, {band:?} (GDAL_METADATA) and {place:?} (ModelPixelScale and ModelTiepoint): remove one with `gdal_translate`"
+    match (band_scale, geo.vertical_scale) {
+        (Some(band), Some(tags)) if has_vertical && band != tags => Err(meaning(format!(
+            "states two scales of its heights, {band:?} (GDAL_METADATA) and {tags:?} (ModelPixelScale and \
+             ModelTiepoint): remove one with `gdal_translate`"
         ))),
-        // It scales heights where there is a vertical system, as for GDAL; elsewhere writers leave anything
-        // there.
-        (None, Some(place)) if has_vertical => Ok(place),
-        (of_band, Some([scale, offset])) if !has_vertical => {
+        // As in GDAL, the georeference scales heights only with a vertical system; without one, writers leave
+        // arbitrary values there.
+        (None, Some(tags)) if has_vertical => Ok(tags),
+        (band_scale, Some([scale, offset])) if !has_vertical => {
             notes.push(format!(
-                "the third numbers of ModelPixelScale and ModelTiepoint (scale {scale}, offset {offset}) are not applied: the file states no vertical system"
+                "the third values of ModelPixelScale and ModelTiepoint (scale {scale}, offset {offset}) are \
+                 not applied: the file states no vertical system"
             ));
-            Ok(of_band.unwrap_or([1.0, 0.0]))
+            Ok(band_scale.unwrap_or([1.0, 0.0]))
         }
-        (of_band, _) => Ok(of_band.unwrap_or([1.0, 0.0])),
+        (band_scale, _) => Ok(band_scale.unwrap_or([1.0, 0.0])),
     }
 }
 
-/// From the file's own tags, or from a world file beside it; with what there is to say.
-pub(super) fn georeference_of(
+/// The georeference of the file's tags or of a world file, with notes.
+pub(super) fn read_georeference(
     path: &Path,
     from_tags: Option<Affine>,
 ) -> Result<(Option<Affine>, Vec<String>), TerrainFileError> {
-    let (found, notes) = match from_tags {
+    let (affine, notes) = match from_tags {
         Some(affine) => {
-            // One that cannot be read has no say, since it is not needed.
-            let other = world_file(path).ok().flatten().filter(|other| !is_same_place(&affine, other));
-            (
-                Some(affine),
-                other.map(|_| {
-                    "a world file beside it says another place than its own tags, and is not used".to_owned()
-                }),
-            )
+            // A world file that cannot be read is ignored, because it is not needed.
+            let other = world_file(path).ok().flatten().filter(|other| !is_same_georeference(&affine, other));
+            (Some(affine), other.map(|_| "a world file differs from its tags and is ignored".to_owned()))
         }
         None => (world_file(path)?, None),
     };
-    match found {
+    match affine {
         Some(affine) if affine.inverse().is_none() => {
             Err(TerrainFileError::DegenerateGeoreference { path: path.into() })
         }
-        found => Ok((found, notes.into_iter().collect())),
+        affine => Ok((affine, notes.into_iter().collect())),
     }
 }
 
-/// To a hundredth of a pixel at the corner, and a millionth in size.
-fn is_same_place(a: &Affine, b: &Affine) -> bool {
+/// Whether two georeferences agree to a hundredth of a pixel at the corner and a millionth in size.
+fn is_same_georeference(a: &Affine, b: &Affine) -> bool {
     let Some(pixel_from_model) = a.inverse() else { return true };
-    let near = |at: [f64; 2]| {
-        let there = pixel_from_model.apply(b.apply(at));
-        (0..2).all(|k| (there[k] - at[k]).abs() < 0.01 + 1e-6 * at[k])
+    let is_near = |pixel: [f64; 2]| {
+        let other_pixel = pixel_from_model.apply(b.apply(pixel));
+        (0..2).all(|k| (other_pixel[k] - pixel[k]).abs() < 0.01 + 1e-6 * pixel[k])
     };
-    near([0.0, 0.0]) && near([1000.0, 1000.0])
+    is_near([0.0, 0.0]) && is_near([1000.0, 1000.0])
 }
 
 fn no_georeference(path: &Path, geo: &GeoTags) -> TerrainFileError {
@@ -440,6 +466,6 @@ fn no_georeference(path: &Path, geo: &GeoTags) -> TerrainFileError {
     TerrainFileError::NoGeoreference {
         path: path.into(),
         world,
-        more: geo.notes.iter().map(|note| format!(" ({note})")).collect(),
+        details: geo.notes.iter().map(|note| format!(" ({note})")).collect(),
     }
 }

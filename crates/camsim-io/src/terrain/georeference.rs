@@ -8,12 +8,16 @@ use super::TerrainFileError;
 /// the top-left pixel: the centre of pixel (i, j) is (i + 0.5, j + 0.5). GeoTIFF calls this "pixel is area".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Affine {
+    /// Model coordinates of the outer corner of the top-left pixel.
     pub origin: [f64; 2],
+    /// Model vector of one column.
     pub column: [f64; 2],
+    /// Model vector of one row.
     pub row: [f64; 2],
 }
 
 impl Affine {
+    /// Model coordinates of pixel coordinates.
     pub fn apply(&self, pixel: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k: usize| self.origin[k] + pixel[0] * self.column[k] + pixel[1] * self.row[k])
     }
@@ -32,23 +36,23 @@ impl Affine {
         Some(Self { origin, column, row })
     }
 
-    /// The same raster with its last row first.
+    /// The georeference of the raster with its rows reversed.
     pub fn with_rows_reversed(&self, rows: f64) -> Self {
         Self { origin: self.apply([0.0, rows]), row: self.row.map(|x| -x), ..*self }
     }
 
-    /// The same raster with its last column first.
+    /// The georeference of the raster with its columns reversed.
     pub fn with_columns_reversed(&self, columns: f64) -> Self {
         Self { origin: self.apply([columns, 0.0]), column: self.column.map(|x| -x), ..*self }
     }
 
-    /// The same place for a transformation whose whole pixel coordinates are pixel centres.
+    /// The georeference from one whose integer pixel coordinates are pixel centres.
     pub fn with_centres_at_half(self) -> Self {
         Self { origin: self.apply([-0.5, -0.5]), ..self }
     }
 }
 
-/// `.tfw`, `.tifw`, `.wld` and upper-case versions of the first, for `.tif`.
+/// Possible world files of a picture: for `.tif`, `.tfw`, `.tifw`, `.wld` and `.TFW`.
 pub(super) fn world_file_names(path: &Path) -> Vec<PathBuf> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let letters: Vec<char> = extension.chars().collect();
@@ -64,12 +68,13 @@ pub(super) fn world_file_names(path: &Path) -> Vec<PathBuf> {
     extensions.into_iter().map(|extension| path.with_extension(extension)).collect()
 }
 
-/// World files beside a picture.
+/// Existing world files of a picture.
 pub(crate) fn world_files(path: &Path) -> impl Iterator<Item = PathBuf> {
     world_file_names(path).into_iter().filter(|name| name.is_file())
 }
 
-/// The world file beside a picture, if there is one. Its origin is the centre of the top-left pixel.
+/// The georeference of a picture's world file, if there is one. The file gives the centre of the top-left
+/// pixel.
 pub(super) fn world_file(path: &Path) -> Result<Option<Affine>, TerrainFileError> {
     let Some(path) = world_files(path).next() else { return Ok(None) };
     let error = |reason: String| TerrainFileError::WorldFile { path: path.clone(), reason };
@@ -87,11 +92,11 @@ pub(super) fn world_file(path: &Path) -> Result<Option<Affine>, TerrainFileError
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
     #[test]
-    fn the_inverse_inverts_a_rotated_transformation() {
+    fn inverse_inverts_a_rotated_transformation() {
         let affine = Affine { origin: [600_000.0, 200_000.0], column: [1.5, 0.7], row: [0.6, -1.4] };
         let inverse = affine.inverse().unwrap();
         let back = inverse.apply(affine.apply([12.25, 345.5]));
@@ -101,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn world_files_name_the_centre_of_the_first_pixel() {
+    fn world_files_give_the_centre_of_the_first_pixel() {
         let folder = tempfile::tempdir().unwrap();
         let picture = folder.path().join("a.png");
         assert_eq!(world_file(&picture).unwrap(), None);

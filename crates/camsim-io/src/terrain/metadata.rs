@@ -1,116 +1,119 @@
-//! What GDAL keeps in XML: the tag GDAL_METADATA, and `.aux.xml` files beside a raster.
+//! GDAL's XML metadata: the tag GDAL_METADATA and `.aux.xml` files.
 
 use roxmltree::{Document, Node};
 
 use super::{geo_tags::number, georeference::Affine};
 
-/// What the numbers of a band mean.
+/// Meaning of a band's values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct BandMeaning {
     pub scale: Option<f64>,
     pub offset: Option<f64>,
     pub unit: Option<String>,
-    /// "Red", "Green", "Blue", "Alpha", "Gray", "Palette" and others.
+    /// Colour interpretation: "Red", "Green", "Blue", "Alpha", "Gray", "Palette" and others.
     pub color: Option<String>,
-    /// Only in `.aux.xml`.
+    /// No-data value; only in `.aux.xml`.
     pub nodata: Option<f64>,
 }
 
-/// What there is to read.
+/// Metadata of a raster.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Metadata {
     pub bands: Vec<BandMeaning>,
+    /// Georeference.
     pub model_from_pixel: Option<Affine>,
     /// Coordinate system, as well-known text.
     pub wkt: Option<String>,
-    /// Items without a role, of the file or its first band: name and value.
+    /// Items without a defined role of the file or its first band: name and value.
     pub items: Vec<(String, String)>,
-    /// What the first band is called.
+    /// Descriptions of the first band.
     pub descriptions: Vec<String>,
 }
 
-/// Items and elements and what becomes of them.
+/// Items and elements with their treatment.
 pub(crate) const ITEMS: &[(&str, &str)] = &[
     (
         "`SCALE`, `OFFSET` of a band (`<Scale>`, `<Offset>`)",
-        "applied to heights: `scale x stored + offset`; named for pictures",
+        "applied to heights: `scale x stored + offset`; reported for pictures",
     ),
     (
         "`UNITTYPE` of a band (`<UnitType>`)",
         "applied to heights: metre, foot, US survey foot, and cm, mm, km; others are refused",
     ),
-    ("`COLORINTERP` of a band (`<ColorInterp>`)", "applied: which bands are red, green, blue, grey, alpha"),
+    ("`COLORINTERP` of a band (`<ColorInterp>`)", "applied: bands of red, green, blue, grey, alpha"),
     ("`<NoDataValue>`", "applied, before the scale"),
     ("`<GeoTransform>`, `<SRS>`", "applied where the raster itself has none"),
     (
         "`units` (also `zunits`, `vertical_units` and the like, `Band1#units`) of the file or its first band",
-        "applied to heights and named if it is no metre; named if it is not known; refused where it contradicts another",
+        "applied to heights, and reported unless metre; reported if unknown; refused where it contradicts \
+         another",
     ),
     (
         "`scale_factor`, `add_offset` of the file or its first band (names of netCDF)",
-        "named for heights, with the command that applies them, unless `SCALE` and `OFFSET` say the same: some programs leave them behind when they have applied them",
+        "reported for heights, with the command that applies them, unless `SCALE` and `OFFSET` are equal: \
+         some programs keep them after applying them",
     ),
     (
         "`DESCRIPTION` of the first band, `ImageDescription` (tag 270), `long_name`, `positive`",
-        "named for heights where they speak of feet that are not applied, or of depths",
+        "reported for heights where they mention feet that are not applied, or depths",
     ),
     ("statistics, histograms and items of other names", "not used"),
 ];
 
 impl Metadata {
-    /// The text of tag 42112.
-    pub fn of_tag(text: &str) -> Result<Self, String> {
-        let mut found = Self::default();
+    /// Parses tag 42112.
+    pub fn from_tag(text: &str) -> Result<Self, String> {
+        let mut metadata = Self::default();
         let document =
             Document::parse(text.trim_end_matches('\0').trim()).map_err(|error| error.to_string())?;
         for item in document.descendants().filter(|node| node.has_tag_name("Item")) {
-            // An item of a band in a domain of its own is none of these.
+            // Items of other metadata domains are ignored.
             if item.attribute("domain").is_some_and(|domain| !domain.is_empty()) {
                 continue;
             }
             let text = item.text().unwrap_or_default().trim();
             let role = item.attribute("role").unwrap_or_default();
             let Some(sample) = item.attribute("sample") else {
-                found.items.push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned()));
+                metadata.items.push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned()));
                 continue;
             };
             let sample: usize = sample.parse().map_err(|_| format!("an item is of sample `{sample}`"))?;
             match role {
-                "scale" => found.band(sample)?.scale = Some(finite("scale", text)?),
-                "offset" => found.band(sample)?.offset = Some(finite("offset", text)?),
+                "scale" => metadata.band(sample)?.scale = Some(finite("scale", text)?),
+                "offset" => metadata.band(sample)?.offset = Some(finite("offset", text)?),
                 "unittype" => {
-                    found.band(sample)?.unit = Some(text.to_owned()).filter(|text| !text.is_empty())
+                    metadata.band(sample)?.unit = Some(text.to_owned()).filter(|text| !text.is_empty())
                 }
-                "colorinterp" => found.band(sample)?.color = Some(text.to_owned()),
-                "description" if sample == 0 => found.descriptions.push(text.to_owned()),
-                "" if sample == 0 => {
-                    found.items.push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned()))
-                }
+                "colorinterp" => metadata.band(sample)?.color = Some(text.to_owned()),
+                "description" if sample == 0 => metadata.descriptions.push(text.to_owned()),
+                "" if sample == 0 => metadata
+                    .items
+                    .push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned())),
                 _ => {}
             }
         }
-        Ok(found)
+        Ok(metadata)
     }
 
-    /// The text of an `.aux.xml` file.
-    pub fn of_aux(text: &str) -> Result<Self, String> {
-        let mut found = Self::default();
+    /// Parses an `.aux.xml` file.
+    pub fn from_aux_xml(text: &str) -> Result<Self, String> {
+        let mut metadata = Self::default();
         let document =
             Document::parse(text.trim_start_matches('\u{feff}')).map_err(|error| error.to_string())?;
-        let inside = |node: Node<'_, '_>, name: &str| {
+        let child_text = |node: Node<'_, '_>, name: &str| {
             node.children()
                 .find(|child| child.has_tag_name(name))
                 .and_then(|child| child.text().map(|t| t.trim().to_owned()))
         };
         let root = document.root_element();
-        found.wkt = inside(root, "SRS").filter(|text| !text.is_empty());
-        found.items = items_of_aux(root);
-        if let Some(text) = inside(root, "GeoTransform") {
+        metadata.wkt = child_text(root, "SRS").filter(|text| !text.is_empty());
+        metadata.items = default_domain_items(root);
+        if let Some(text) = child_text(root, "GeoTransform") {
             let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
             let Some([x, a, b, y, d, e]) = numbers.as_deref() else {
-                return Err(format!("GeoTransform is `{text}`, and no list of six numbers"));
+                return Err(format!("GeoTransform is `{text}`, not a list of six numbers"));
             };
-            found.model_from_pixel = Some(Affine { origin: [*x, *y], column: [*a, *d], row: [*b, *e] });
+            metadata.model_from_pixel = Some(Affine { origin: [*x, *y], column: [*a, *d], row: [*b, *e] });
         }
         for band in root.children().filter(|node| node.has_tag_name("PAMRasterBand")) {
             let index: usize = band
@@ -119,27 +122,31 @@ impl Metadata {
                 .filter(|index| *index > 0)
                 .ok_or("a PAMRasterBand without a number")?;
             if index == 1 {
-                found.items.extend(items_of_aux(band));
-                found.descriptions.extend(inside(band, "Description"));
+                metadata.items.extend(default_domain_items(band));
+                metadata.descriptions.extend(child_text(band, "Description"));
             }
             let real = |name: &str| {
-                inside(band, name).filter(|text| !text.is_empty()).map(|text| finite(name, &text)).transpose()
+                child_text(band, name)
+                    .filter(|text| !text.is_empty())
+                    .map(|text| finite(name, &text))
+                    .transpose()
             };
             let (scale, offset) = (real("Scale")?, real("Offset")?);
-            let nodata = inside(band, "NoDataValue")
+            let nodata = child_text(band, "NoDataValue")
                 .map(|text| number(&text).ok_or_else(|| format!("NoDataValue is `{text}`")))
                 .transpose()?;
-            *found.band(index - 1)? = BandMeaning {
+            *metadata.band(index - 1)? = BandMeaning {
                 scale,
                 offset,
                 nodata,
-                unit: inside(band, "UnitType").filter(|text| !text.is_empty()),
-                color: inside(band, "ColorInterp"),
+                unit: child_text(band, "UnitType").filter(|text| !text.is_empty()),
+                color: child_text(band, "ColorInterp"),
             };
         }
-        Ok(found)
+        Ok(metadata)
     }
 
+    /// The band of an index, added if absent.
     fn band(&mut self, index: usize) -> Result<&mut BandMeaning, String> {
         if index >= 1 << 16 {
             return Err(format!("an item is of sample `{index}`"));
@@ -151,14 +158,14 @@ impl Metadata {
     }
 }
 
-/// Those of the domain without a name.
-fn items_of_aux(parent: Node<'_, '_>) -> Vec<(String, String)> {
-    let of_no_domain = |node: &Node<'_, '_>| {
+/// Items of the default metadata domain.
+fn default_domain_items(parent: Node<'_, '_>) -> Vec<(String, String)> {
+    let is_default_domain = |node: &Node<'_, '_>| {
         node.has_tag_name("Metadata") && node.attribute("domain").is_none_or(str::is_empty)
     };
     let items = parent
         .children()
-        .filter(of_no_domain)
+        .filter(is_default_domain)
         .flat_map(|metadata| metadata.children().filter(|node| node.has_tag_name("MDI")));
     items
         .filter_map(|item| {
@@ -167,8 +174,8 @@ fn items_of_aux(parent: Node<'_, '_>) -> Vec<(String, String)> {
         .collect()
 }
 
-fn finite(what: &str, text: &str) -> Result<f64, String> {
+fn finite(name: &str, text: &str) -> Result<f64, String> {
     number(text)
         .filter(|value| value.is_finite())
-        .ok_or_else(|| format!("{what} is `{text}`, which is no number"))
+        .ok_or_else(|| format!("{name} is `{text}`, which is not a finite number"))
 }

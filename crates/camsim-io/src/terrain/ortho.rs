@@ -1,4 +1,4 @@
-//! The picture on the ground.
+//! The ortho-image on the terrain.
 
 use std::path::Path;
 
@@ -8,60 +8,62 @@ use camsim_core::{
 };
 
 use super::{
-    TerrainFileError, beside,
+    TerrainFileError,
     crs::Crs,
-    dem::{Dem, georeference_of},
+    dem::{Dem, read_georeference},
     geo_tags::GeoTags,
     georeference::Affine,
     raster::{Raster, is_tiff},
-    systems::Stated,
+    sidecar,
+    stated_crs::StatedCrs,
     tiff_file::gdal_translate,
 };
 use crate::pictures::{PictureError, StoredPicture, read_stored};
 
-/// A picture of the ground.
+/// An ortho-image.
 pub(super) struct Ortho {
     pub texture: Texture,
-    /// `None`: it covers the DEM's extent.
-    pub place: Option<OrthoPlace>,
-    /// Whether there is something at its pixels, where it does not cover all of them.
-    content: Option<Vec<bool>>,
-    /// Whether it reaches as far as the ground does.
-    holds_ground: bool,
-    /// What there is to say about it.
+    /// `None` for an image that covers the DEM's extent.
+    pub georeference: Option<OrthoGeoreference>,
+    /// Whether each pixel has colour; `None` if all have.
+    valid: Option<Vec<bool>>,
+    /// Whether the image contains the whole DEM.
+    contains_dem: bool,
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Pixels of grey around a picture that ends before the ground does: as many as a screen's pixel may cover
-/// before the colours at the picture's very border are drawn less exactly than to a texel.
+/// Width of the grey margin around an image that does not contain the DEM, pixels. Up to this many texels per
+/// screen pixel, mip levels keep the image's border exact to a texel.
 const MARGIN_PX: u32 = 64;
 
-/// Where a picture lies.
-pub(super) struct OrthoPlace {
+/// Georeference of an ortho-image.
+pub(super) struct OrthoGeoreference {
     pixel_from_model: Affine,
     crs: Crs,
-    /// Whether that is the DEM's own.
-    is_of_dem: bool,
+    /// Whether the DEM has the same coordinate system.
+    has_dem_crs: bool,
+    /// Size without margin, pixels.
     size: [f64; 2],
-    /// Its middle, in its own coordinates.
-    middle_x: f64,
-    /// Pixels that it was made larger on each side.
+    /// x of its centre in its coordinate system.
+    centre_x: f64,
+    /// Margin on each side, pixels.
     margin_px: f64,
 }
 
-impl OrthoPlace {
-    /// Pixel coordinates of a height on the picture as it is stored.
-    fn pixel(&self, dem: &Dem, at: [u32; 2]) -> [f64; 2] {
-        let model = if self.is_of_dem {
-            Some(dem.model(at))
+impl OrthoGeoreference {
+    /// Pixel coordinates of a post in the stored image.
+    fn pixel(&self, dem: &Dem, post: [u32; 2]) -> [f64; 2] {
+        let model = if self.has_dem_crs {
+            Some(dem.model(post))
         } else {
-            dem.geodetic_rad(at).and_then(|place| self.crs.model_from_geodetic(place))
+            dem.geodetic_rad(post).and_then(|point| self.crs.model_from_geodetic(point))
         };
-        // 190 degrees east are 170 degrees west.
+        // 190 degrees east is 170 degrees west.
         let model = model.map(|[x, y]| {
-            [x - self.crs.period().map_or(0.0, |period| period * ((x - self.middle_x) / period).round()), y]
+            [x - self.crs.period().map_or(0.0, |period| period * ((x - self.centre_x) / period).round()), y]
         });
-        // A point that the picture's projection does not reach is outside of the picture.
+        // A point outside of the image's projection is outside of the image.
         model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model))
     }
 
@@ -69,152 +71,173 @@ impl OrthoPlace {
         (0..2).all(|k| (0.0..=self.size[k]).contains(&pixel[k]))
     }
 
-    /// Texture coordinates.
-    pub fn uv(&self, dem: &Dem, at: [u32; 2]) -> [f32; 2] {
-        let pixel = self.pixel(dem, at);
+    /// Texture coordinates of a post, with margin.
+    pub fn uv(&self, dem: &Dem, post: [u32; 2]) -> [f32; 2] {
+        let pixel = self.pixel(dem, post);
         [0, 1].map(|k: usize| ((pixel[k] + self.margin_px) / (self.size[k] + 2.0 * self.margin_px)) as f32)
     }
 }
 
 impl Ortho {
+    /// Reads `scene.terrain.ortho`.
     pub fn read(path: &Path, spec: &TerrainSpec, dem: &Dem) -> Result<Self, TerrainFileError> {
-        let (mut texture, geo, mut notes) = picture(path, spec)?;
-        let (found, more) = georeference_of(path, geo.model_from_pixel)?;
-        notes.extend(more);
-        let Some(model_from_pixel) = found else {
+        let (mut texture, geo, mut notes) = read_image(path, spec)?;
+        let (model_from_pixel, georeference_notes) = read_georeference(path, geo.model_from_pixel)?;
+        notes.extend(georeference_notes);
+        let Some(model_from_pixel) = model_from_pixel else {
             if let Some(orientation) = geo.orientation {
                 texture = crate::pictures::oriented(texture, orientation);
             }
             notes.extend(geo.notes);
-            let content = content_of(&texture);
-            finish(&mut texture, None, spec.beyond);
+            let valid = valid_pixels(&texture);
+            fill_invalid(&mut texture, None, spec.beyond);
             return Ok(Self {
                 texture,
-                place: None,
-                content,
-                holds_ground: true,
-                notes: with_name(path, notes),
+                georeference: None,
+                valid,
+                contains_dem: true,
+                notes: with_path(path, notes),
             });
         };
         notes.extend(geo.notes.iter().cloned());
         if let Some(orientation) = geo.orientation {
-            notes.push(format!("its orientation (EXIF or tag 274: {orientation}) is not used: its rows lie where its georeference says"));
+            notes.push(format!(
+                "its orientation (EXIF or tag 274: {orientation}) is ignored: its georeference defines rows \
+                 and columns"
+            ));
         }
-        let stated = Stated::of(path, &geo)?;
-        // A world file states no coordinate system: then it is the DEM's.
-        let assumed = (stated.horizontal.is_none() && stated.own.is_none()).then_some(dem.crs.epsg);
+        let stated = StatedCrs::read(path, &geo)?;
+        // With a world file alone, the coordinate system is the DEM's.
+        let assumed = (stated.horizontal.is_none() && stated.user_defined.is_none()).then_some(dem.crs.epsg);
         let crs = stated.crs(path, &geo, assumed)?;
         let pixel_from_model = model_from_pixel
             .inverse()
             .ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
         let size = texture.size_px.map(f64::from);
-        let content = content_of(&texture);
+        let valid = valid_pixels(&texture);
         let over_voids = over_voids(&texture, dem, &model_from_pixel);
-        finish(&mut texture, over_voids.as_deref(), spec.beyond);
-        let middle_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
-        let mut place = OrthoPlace {
+        fill_invalid(&mut texture, over_voids.as_deref(), spec.beyond);
+        let centre_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
+        let mut georeference = OrthoGeoreference {
             pixel_from_model,
-            is_of_dem: crs.epsg == dem.crs.epsg,
+            has_dem_crs: crs.epsg == dem.crs.epsg,
             crs,
             size,
-            middle_x,
+            centre_x,
             margin_px: 0.0,
         };
-        // What holds the border of the ground holds the ground.
-        let holds_ground = dem.border().all(|at| place.is_inside(place.pixel(dem, at)));
-        if spec.beyond == Beyond::Grey && !holds_ground {
+        // An image that contains the border of the DEM contains all of it.
+        let contains_dem = dem.border().all(|post| georeference.is_inside(georeference.pixel(dem, post)));
+        if spec.beyond == Beyond::Grey && !contains_dem {
             texture = texture.padded(MARGIN_PX, [GREY, GREY, GREY, 255]);
-            place.margin_px = f64::from(MARGIN_PX);
+            georeference.margin_px = f64::from(MARGIN_PX);
         }
-        Ok(Self { texture, place: Some(place), content, holds_ground, notes: with_name(path, notes) })
+        Ok(Self {
+            texture,
+            georeference: Some(georeference),
+            valid,
+            contains_dem,
+            notes: with_path(path, notes),
+        })
     }
 
-    /// The colour of ground beyond it, if that is one.
-    pub fn color_beyond(&self) -> Option<[u8; 4]> {
-        self.place.as_ref().filter(|place| place.margin_px > 0.0).map(|_| [GREY, GREY, GREY, 255])
+    /// Colour of the margin, if there is one.
+    pub fn margin_color(&self) -> Option<[u8; 4]> {
+        self.georeference
+            .as_ref()
+            .filter(|georeference| georeference.margin_px > 0.0)
+            .map(|_| [GREY, GREY, GREY, 255])
     }
 
-    /// Texture coordinates of its own corners.
-    pub fn own_uv(&self) -> [[f64; 2]; 2] {
-        let Some(OrthoPlace { size, margin_px, .. }) = &self.place else { return [[0.0; 2], [1.0; 2]] };
+    /// Texture coordinates of the image's corners, without margin.
+    pub fn image_uv(&self) -> [[f64; 2]; 2] {
+        let Some(OrthoGeoreference { size, margin_px, .. }) = &self.georeference else {
+            return [[0.0; 2], [1.0; 2]];
+        };
         let share = size.map(|side| margin_px / (side + 2.0 * margin_px));
         [share, share.map(|share| 1.0 - share)]
     }
 
-    /// Whether it shows something at a height.
-    pub fn shows(&self, dem: &Dem, at: [u32; 2]) -> bool {
-        if self.holds_ground && self.content.is_none() {
+    /// Whether the image has colour at a post.
+    pub fn covers(&self, dem: &Dem, post: [u32; 2]) -> bool {
+        if self.contains_dem && self.valid.is_none() {
             return true;
         }
-        let pixel = match &self.place {
-            Some(place) => place.pixel(dem, at),
+        let pixel = match &self.georeference {
+            Some(georeference) => georeference.pixel(dem, post),
             None => [0, 1].map(|k: usize| {
-                (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])
+                (f64::from(post[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])
             }),
         };
-        if self.place.as_ref().is_some_and(|place| !place.is_inside(pixel)) {
+        if self.georeference.as_ref().is_some_and(|georeference| !georeference.is_inside(pixel)) {
             return false;
         }
-        let Some(content) = &self.content else { return true };
-        let size = self.place.as_ref().map_or(self.texture.size_px.map(f64::from), |place| place.size);
+        let Some(valid) = &self.valid else { return true };
+        let size = self
+            .georeference
+            .as_ref()
+            .map_or(self.texture.size_px.map(f64::from), |georeference| georeference.size);
         let [x, y] = [0, 1].map(|k: usize| pixel[k].min(size[k] - 1.0) as usize);
-        content[y * size[0] as usize + x]
+        valid[y * size[0] as usize + x]
     }
 }
 
-fn content_of(texture: &Texture) -> Option<Vec<bool>> {
-    let content: Vec<bool> = texture.rgba8.chunks_exact(4).map(|pixel| pixel[3] > 0).collect();
-    content.contains(&false).then_some(content)
+/// Whether each pixel has an alpha above 0; `None` if all have.
+fn valid_pixels(texture: &Texture) -> Option<Vec<bool>> {
+    let valid: Vec<bool> = texture.rgba8.chunks_exact(4).map(|pixel| pixel[3] > 0).collect();
+    valid.contains(&false).then_some(valid)
 }
 
-fn with_name(path: &Path, notes: Vec<String>) -> Vec<String> {
+/// Prefixes notes with the path.
+fn with_path(path: &Path, notes: Vec<String>) -> Vec<String> {
     notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect()
 }
 
-/// With what a file and those beside it say about its place.
-fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<String>), TerrainFileError> {
-    let failed = TerrainFileError::of_ortho;
-    if is_tiff(path).map_err(failed)? {
-        let mut raster = Raster::read(path).map_err(failed)?;
-        beside::read_tags(path, &mut raster.geo)?;
-        beside::read_mask(path, &mut raster).map_err(failed)?;
-        let (texture, notes) = raster.to_picture(path, Encoding::Srgb, spec.ortho_white).map_err(failed)?;
+/// The image with the tags of its file and sidecar files, and notes.
+fn read_image(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<String>), TerrainFileError> {
+    let ortho_error = TerrainFileError::ortho;
+    if is_tiff(path).map_err(ortho_error)? {
+        let mut raster = Raster::read(path).map_err(ortho_error)?;
+        sidecar::read_sidecar_tags(path, &mut raster.geo)?;
+        sidecar::read_sidecar_mask(path, &mut raster).map_err(ortho_error)?;
+        let (texture, notes) =
+            raster.to_picture(path, Encoding::Srgb, spec.ortho_white).map_err(ortho_error)?;
         return Ok((texture, raster.geo, notes));
     }
     if spec.ortho_white.is_some() {
-        return Err(failed(PictureError::decode(
+        return Err(ortho_error(PictureError::decode(
             path,
             "scene.terrain.ortho_white is for TIFF files: leave it out",
         )));
     }
     let StoredPicture { texture, orientation, largest_of_16_bits } =
-        read_stored(path, Encoding::Srgb).map_err(failed)?;
+        read_stored(path, Encoding::Srgb).map_err(ortho_error)?;
     let mut geo = GeoTags { orientation, ..GeoTags::default() };
-    beside::read_tags(path, &mut geo)?;
-    let dark = largest_of_16_bits.filter(|largest| (1..1 << 14).contains(largest)).map(|largest| {
+    sidecar::read_sidecar_tags(path, &mut geo)?;
+    let dark_note = largest_of_16_bits.filter(|largest| (1..1 << 14).contains(largest)).map(|largest| {
         let white = (1_u32 << (u16::BITS - largest.leading_zeros())) - 1;
         let command = gdal_translate(&format!("-ot Byte -scale 0 {white} 0 255"), path);
         format!(
-            "its values of 16 bits end at {largest} of 65535: the picture is nearly black. If white is {white}, convert it with `{command}`"
+            "its 16 bit values reach only {largest} of 65535: the picture is nearly black. If white is \
+             {white}, convert it with `{command}`"
         )
     });
-    Ok((texture, geo, dark.into_iter().collect()))
+    Ok((texture, geo, dark_note.into_iter().collect()))
 }
 
-/// Neutral, and as bright as a card of 18 % looks: sRGB.
+/// sRGB of a neutral grey of 18 % reflectance.
 pub(super) const GREY: u8 = 118;
 
-/// Colours of pixels without content. Over ground they are what lies beyond the picture is; where there is no
-/// ground they are those of their neighbours, which they would darken.
-fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
-    let light = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+/// Fills pixels without colour: grey over ground if `beyond` is grey, else the colours of neighbours.
+fn fill_invalid(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
+    let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
     if beyond == Beyond::Grey {
         for (index, pixel) in texture.rgba8.chunks_exact_mut(4).enumerate() {
             if pixel[3] < 255 && over_voids.is_none_or(|voids| !voids[index]) {
-                let [share, grey] = [f32::from(pixel[3]) / 255.0, light(GREY)];
+                let [alpha, grey] = [f32::from(pixel[3]) / 255.0, linear(GREY)];
                 for byte in &mut pixel[..3] {
-                    *byte =
-                        (255.0 * srgb_from_linear(light(*byte) * share + grey * (1.0 - share))).round() as u8;
+                    *byte = (255.0 * srgb_from_linear(linear(*byte) * alpha + grey * (1.0 - alpha))).round()
+                        as u8;
                 }
                 pixel[3] = 255;
             }
@@ -230,11 +253,15 @@ fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
     texture.bleed_into_transparent();
 }
 
-/// Which pixels lie over voids of a DEM on the same grid: black there is no content, and would darken the rim
-/// of what is.
+/// Pixels over voids of a DEM on the same grid; black pixels there have no colour and would darken the border
+/// of the ground.
 fn over_voids(texture: &Texture, dem: &Dem, ortho_from_pixel: &Affine) -> Option<Vec<bool>> {
     if texture.size_px != dem.size || *ortho_from_pixel != dem.model_from_pixel {
         return None;
     }
-    Some((0..dem.points() as usize).map(|index| dem.height_m(dem.column_and_row(index)).is_nan()).collect())
+    Some(
+        (0..dem.post_count() as usize)
+            .map(|index| dem.height_m(dem.column_and_row(index)).is_nan())
+            .collect(),
+    )
 }

@@ -1,4 +1,4 @@
-//! Rasters as numbers and as pictures, with which of their pixels hold something.
+//! Rasters as values and as pictures, with their validity masks.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use camsim_core::{
 };
 use rayon::prelude::*;
 
-pub(crate) use super::tiff_file::{is_tiff, most_decoded};
+pub(crate) use super::tiff_file::{is_tiff, max_decoded_bytes};
 use super::{
     bands::ColorBands,
     geo_tags::GeoTags,
-    tiff_file::{Directory, Image, Sample, TiffFile, gdal_translate, tag},
+    tiff_file::{Directory, Image, SampleType, TiffFile, gdal_translate, tag},
 };
 use crate::pictures::PictureError;
 
@@ -21,147 +21,149 @@ pub(crate) struct Raster {
     pub size: [u32; 2],
     pub geo: GeoTags,
     pub image: Image,
-    /// Whether there is something at a pixel, where masks or blocks that are left out say so.
+    /// Whether each pixel has data, from masks and sparse blocks; `None` if all have.
     valid: Option<Vec<bool>>,
-    /// 16-bit R, G, B planes of a palette.
+    /// Palette: 16-bit planes of red, green and blue.
     palette: Option<Vec<u64>>,
 }
 
-/// Bits of tag 254.
+/// Bit of tag 254: an overview.
 const REDUCED: u64 = 1;
+/// Bit of tag 254: a mask.
 const MASK: u64 = 4;
 
 impl Raster {
-    /// Reads the first picture of a file, with its mask.
+    /// Reads the first picture of a TIFF file, with its mask.
     pub fn read(path: &Path) -> Result<Self, PictureError> {
         let mut tiff = TiffFile::open(path)?;
         Self::decode(&mut tiff).map_err(|reason| PictureError::decode(path, reason))
     }
 
-    /// Of numbers that come from elsewhere.
-    pub fn of_numbers(image: Image, geo: GeoTags) -> Self {
+    /// A raster of values from another format.
+    pub fn from_image(image: Image, geo: GeoTags) -> Self {
         Self { size: image.size, geo, image, valid: None, palette: None }
     }
 
     fn decode(tiff: &mut TiffFile) -> Result<Self, String> {
         let directories = tiff.directories.clone();
-        let mut kinds = Vec::new();
-        for of in &directories {
-            kinds.push(tiff.integer(of, tag::NEW_SUBFILE_TYPE)?.unwrap_or(0));
+        let mut types = Vec::new();
+        for directory in &directories {
+            types.push(tiff.integer(directory, tag::NEW_SUBFILE_TYPE)?.unwrap_or(0));
         }
-        let first = kinds.iter().position(|kind| kind & (REDUCED | MASK) == 0).unwrap_or(0);
-        let of = &directories[first];
-        let mut geo = GeoTags::read(tiff, of)?;
-        let more = kinds.iter().filter(|kind| *kind & (REDUCED | MASK) == 0).count();
-        if more > 1 {
-            geo.notes.push(format!("holds {more} pictures, of which the first is used"));
+        let is_picture = |subfile_type: &u64| subfile_type & (REDUCED | MASK) == 0;
+        let first = types.iter().position(is_picture).unwrap_or(0);
+        let directory = &directories[first];
+        let mut geo = GeoTags::read(tiff, directory)?;
+        let count = types.iter().filter(|subfile_type| is_picture(subfile_type)).count();
+        if count > 1 {
+            geo.notes.push(format!("has {count} pictures, of which the first is used"));
         }
-        let image = tiff.image(of)?;
-        let palette = tiff.integers(of, tag::COLOR_MAP)?;
+        let image = tiff.image(directory)?;
+        let palette = tiff.integers(directory, tag::COLOR_MAP)?;
         let mut raster = Self { size: image.size, geo, image, valid: None, palette };
-        raster.leave_out_absent();
-        for (kind, of) in kinds.iter().zip(&directories) {
-            if kind & MASK != 0 && kind & REDUCED == 0 {
-                let mask = mask_of(tiff, of, raster.size)?;
-                raster.leave_out(&mask);
+        raster.mask_sparse_blocks();
+        for (subfile_type, directory) in types.iter().zip(&directories) {
+            if subfile_type & MASK != 0 && subfile_type & REDUCED == 0 {
+                let mask = read_mask(tiff, directory, raster.size)?;
+                raster.apply_mask(&mask);
             }
         }
         Ok(raster)
     }
 
-    fn leave_out_absent(&mut self) {
+    fn mask_sparse_blocks(&mut self) {
         let width = self.size[0] as usize;
-        if self.image.absent.is_empty() {
+        if self.image.sparse_blocks.is_empty() {
             return;
         }
         let valid = self.valid.get_or_insert_with(|| vec![true; self.image.pixels()]);
-        for [x, y, columns, rows] in &self.image.absent {
+        for [x, y, columns, rows] in &self.image.sparse_blocks {
             for row in *y..y + rows {
-                let from = row as usize * width + *x as usize;
-                valid[from..from + *columns as usize].fill(false);
+                let start = row as usize * width + *x as usize;
+                valid[start..start + *columns as usize].fill(false);
             }
         }
     }
 
-    /// What a mask beside the file leaves out.
-    pub fn leave_out_by(&mut self, path: &Path) -> Result<(), PictureError> {
+    /// Applies a mask in another TIFF file.
+    pub fn apply_mask_file(&mut self, path: &Path) -> Result<(), PictureError> {
         let mut tiff = TiffFile::open(path)?;
-        let of = tiff.directories[0].clone();
-        let mask = mask_of(&mut tiff, &of, self.size).map_err(|reason| PictureError::decode(path, reason))?;
-        self.leave_out(&mask);
+        let directory = tiff.directories[0].clone();
+        let mask = read_mask(&mut tiff, &directory, self.size)
+            .map_err(|reason| PictureError::decode(path, reason))?;
+        self.apply_mask(&mask);
         Ok(())
     }
 
-    fn leave_out(&mut self, mask: &[bool]) {
+    fn apply_mask(&mut self, mask: &[bool]) {
         let valid = self.valid.get_or_insert_with(|| vec![true; mask.len()]);
         valid.iter_mut().zip(mask).for_each(|(valid, mask)| *valid &= mask);
     }
 
-    /// Whether masks have something to show at a pixel.
+    /// Whether a pixel has data.
     pub fn is_valid(&self, pixel: usize) -> bool {
         self.valid.as_ref().is_none_or(|valid| valid[pixel])
     }
 
-    /// Samples a pixel.
+    /// Number of bands.
     pub fn bands(&self) -> usize {
         self.image.bands
     }
 
-    /// Of a depth picture: whether it holds 16-bit whole numbers, or floats; `None` if neither, or of several
-    /// bands.
-    pub fn depth_is_whole(&self) -> Option<bool> {
+    /// For depth pictures: true for 16-bit integers, false for floats, `None` for others or several bands.
+    pub fn is_integer_depth(&self) -> Option<bool> {
         match (self.image.sample, self.image.bands, self.image.bits) {
-            (Sample::U16, 1, 16) => Some(true),
-            (Sample::F16 | Sample::F32 | Sample::F64, 1, _) => Some(false),
+            (SampleType::U16, 1, 16) => Some(true),
+            (SampleType::F16 | SampleType::F32 | SampleType::F64, 1, _) => Some(false),
             _ => None,
         }
     }
 
-    /// A value of the first band.
+    /// The value of the first band, as stored.
     pub fn value(&self, pixel: usize) -> f64 {
         self.image.value(pixel, 0)
     }
 
-    /// As a colour picture; white is the largest number that its bits can hold.
+    /// Converts to a colour picture; white is the largest value of the bits.
     pub fn to_texture(&self, path: &Path, encoding: Encoding) -> Result<Texture, PictureError> {
         self.to_picture(path, encoding, None).map(|(texture, _)| texture)
     }
 
-    /// As a colour picture, with what there is to say about it. `white` is the stored number that is full
-    /// light. Pixels without content are transparent: those of the "no data" mark, of masks, and of blocks
-    /// that are left out.
+    /// Converts to a colour picture, with notes. `white` is the stored value of white. Pixels without data
+    /// are transparent: those with the no-data value, masked ones, and those of sparse blocks.
+    // Long because: the closures that compute a pixel share the bands and levels.
     pub fn to_picture(
         &self,
         path: &Path,
         encoding: Encoding,
         white: Option<f64>,
     ) -> Result<(Texture, Vec<String>), PictureError> {
-        let wrong = |reason: String| PictureError::decode(path, reason);
+        let error = |reason: String| PictureError::decode(path, reason);
         let image = &self.image;
-        if !matches!(image.sample, Sample::U8 | Sample::U16) {
-            return Err(wrong(format!(
-                "colours must be of at most 16 bits, unsigned: convert it with `{}`",
+        if !matches!(image.sample, SampleType::U8 | SampleType::U16) {
+            return Err(error(format!(
+                "colours must be unsigned of at most 16 bits: convert it with `{}`",
                 gdal_translate("-ot Byte -scale", path)
             )));
         }
-        let bands = ColorBands::of(image, &self.geo.bands, self.palette.is_some()).map_err(|reason| {
-            wrong(format!(
+        let bands = ColorBands::new(image, &self.geo.bands, self.palette.is_some()).map_err(|reason| {
+            error(format!(
                 "{reason}: convert it with `{}`",
                 gdal_translate("-expand rgb -co PHOTOMETRIC=RGB", path)
             ))
         })?;
         let mut notes = bands.notes.clone();
-        let most = f64::from((1_u32 << image.bits) - 1);
-        notes.extend(self.say_scale(&bands, white, most));
-        let white = white.unwrap_or(most);
+        let max_value = f64::from((1_u32 << image.bits) - 1);
+        notes.extend(self.white_note(&bands, white, max_value));
+        let white = white.unwrap_or(max_value);
         let byte = |pixel: usize, band: usize| {
             (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8
         };
-        let mark = self
+        let nodata = self
             .geo
             .nodata
-            .filter(|mark| mark.fract() == 0.0 && (0.0..=most).contains(mark))
-            .map(|mark| mark as u32);
+            .filter(|nodata| nodata.fract() == 0.0 && (0.0..=max_value).contains(nodata))
+            .map(|nodata| nodata as u32);
         let color = |pixel: usize| -> [u8; 4] {
             let mut rgb = match (&self.palette, bands.is_palette) {
                 (Some(palette), true) => palette_color(palette, image.unsigned(pixel, bands.rgb[0])),
@@ -170,14 +172,14 @@ impl Raster {
             if bands.is_inverted {
                 rgb = rgb.map(|byte| 255 - byte);
             }
-            let is_void = mark
-                .is_some_and(|mark| bands.rgb.iter().all(|&band| image.unsigned(pixel, band) == mark))
+            let is_void = nodata
+                .is_some_and(|nodata| bands.rgb.iter().all(|&band| image.unsigned(pixel, band) == nodata))
                 || !self.is_valid(pixel);
             let alpha = match bands.alpha {
                 _ if is_void => 0,
                 None => 255,
                 Some(band) if bands.alpha_is_full_scale => {
-                    (f64::from(image.unsigned(pixel, band)) * 255.0 / most).round() as u8
+                    (f64::from(image.unsigned(pixel, band)) * 255.0 / max_value).round() as u8
                 }
                 Some(band) => {
                     (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8
@@ -198,41 +200,44 @@ impl Raster {
         Ok((Texture { size_px: self.size, rgba8, encoding }, notes))
     }
 
-    /// Where the largest stored number is far from what is taken for white.
-    fn say_scale(&self, bands: &ColorBands, white: Option<f64>, most: f64) -> Option<String> {
+    /// A note if the largest stored value differs much from white.
+    fn white_note(&self, bands: &ColorBands, white: Option<f64>, max_value: f64) -> Option<String> {
         let image = &self.image;
         if bands.is_palette && white.is_some() {
-            return Some(
-                "its colours are those of a palette: scene.terrain.ortho_white is not used".to_owned(),
-            );
+            return Some("its colours are from a palette: scene.terrain.ortho_white is ignored".to_owned());
         }
         if bands.is_palette || (image.bits <= 8 && white.is_none()) {
             return None;
         }
-        let mark = self.geo.nodata;
-        let largest_of = |pixel: usize| {
+        let nodata = self.geo.nodata;
+        let largest_value = |pixel: usize| {
             let stored = bands.rgb.iter().map(|&band| image.unsigned(pixel, band));
-            let is_void = !self.is_valid(pixel) || stored.clone().all(|value| mark == Some(f64::from(value)));
+            let is_void =
+                !self.is_valid(pixel) || stored.clone().all(|value| nodata == Some(f64::from(value)));
             if is_void { 0 } else { stored.max().unwrap_or(0) }
         };
-        let largest = (0..image.pixels()).into_par_iter().map(largest_of).max().unwrap_or(0);
+        let largest = (0..image.pixels()).into_par_iter().map(largest_value).max().unwrap_or(0);
         match white {
             Some(white) => {
-                let cut = (0..image.pixels())
+                let clipped = (0..image.pixels())
                     .into_par_iter()
-                    .filter(|&pixel| f64::from(largest_of(pixel)) > white)
+                    .filter(|&pixel| f64::from(largest_value(pixel)) > white)
                     .count();
-                (cut > 0).then(|| {
-                    let share = 100.0 * cut as f64 / image.pixels() as f64;
-                    format!("{share:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white}, and are cut there; the largest value is {largest}")
+                (clipped > 0).then(|| {
+                    let share = 100.0 * clipped as f64 / image.pixels() as f64;
+                    format!(
+                        "{share:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white} \
+                         and are clipped; the largest value is {largest}"
+                    )
                 })
             }
-            None if largest > 0 && 4.0 * f64::from(largest) <= most => {
+            None if largest > 0 && 4.0 * f64::from(largest) <= max_value => {
                 let bits = u32::BITS - largest.leading_zeros();
-                let full = (1_u64 << bits) - 1;
+                let suggested_white = (1_u64 << bits) - 1;
                 Some(format!(
-                    "its values of {} bits end at {largest} of {most}, as those of {bits} bits do: with white at {most} the picture is nearly black. \
-                     Set scene.terrain.ortho_white = {full} if that is white, or = {most} if it is to be as dark as this",
+                    "its {} bit values reach only {largest} of {max_value}, like {bits} bit values: with \
+                     white at {max_value} the picture is nearly black. Set scene.terrain.ortho_white = \
+                     {suggested_white} if that is white, or = {max_value} to keep it dark",
                     image.bits
                 ))
             }
@@ -240,43 +245,42 @@ impl Raster {
         }
     }
 
-    /// As a grey picture of values 0..=1: integers by their full range, floats as they are (cut to the
-    /// range).
+    /// Converts to a grey picture of values 0..=1: integers relative to their full range, floats clamped.
     pub fn to_gray(&self, path: &Path) -> Result<GrayImage, PictureError> {
         let image = &self.image;
-        let is_float = matches!(image.sample, Sample::F16 | Sample::F32 | Sample::F64);
+        let is_float = matches!(image.sample, SampleType::F16 | SampleType::F32 | SampleType::F64);
         if image.bands == 1
             && image.photometric == 1
-            && (is_float || matches!(image.sample, Sample::U8 | Sample::U16))
+            && (is_float || matches!(image.sample, SampleType::U8 | SampleType::U16))
         {
             let scale = if is_float { 1.0 } else { f64::from((1_u32 << image.bits) - 1) };
             let values: Vec<f32> =
                 (0..image.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
             if values.iter().any(|v| v.is_nan()) {
-                return Err(PictureError::decode(path, "holds NaN"));
+                return Err(PictureError::decode(path, "has NaN values"));
             }
             return Ok(GrayImage { size_px: self.size, values });
         }
-        if !matches!(image.sample, Sample::U8 | Sample::U16) {
+        if !matches!(image.sample, SampleType::U8 | SampleType::U16) {
             return Err(PictureError::decode(
                 path,
-                "grey values must be of at most 16 bits, unsigned, or floats",
+                "grey values must be unsigned of at most 16 bits, or floats",
             ));
         }
         Ok(crate::pictures::gray_from_texture(&self.to_texture(path, Encoding::Linear)?))
     }
 }
 
-/// Where a mask's picture is not zero, in any band.
-fn mask_of(tiff: &mut TiffFile, of: &Directory, size: [u32; 2]) -> Result<Vec<bool>, String> {
-    let mask = tiff.image(of)?;
+/// Whether a mask is nonzero in any band, by pixel.
+fn read_mask(tiff: &mut TiffFile, directory: &Directory, size: [u32; 2]) -> Result<Vec<bool>, String> {
+    let mask = tiff.image(directory)?;
     if mask.size != size {
-        return Err(format!("its mask has {:?} pixels, and the picture {size:?}", mask.size));
+        return Err(format!("its mask has {:?} pixels, but the picture {size:?}", mask.size));
     }
     let mut valid: Vec<bool> =
         (0..mask.pixels()).map(|pixel| (0..mask.bands).any(|band| mask.value(pixel, band) != 0.0)).collect();
-    // What a mask leaves out, it does not show.
-    for [x, y, columns, rows] in &mask.absent {
+    // Sparse blocks of the mask are zero.
+    for [x, y, columns, rows] in &mask.sparse_blocks {
         (*y..y + rows).for_each(|row| {
             valid[(row * size[0] + x) as usize..(row * size[0] + x + columns) as usize].fill(false)
         });
@@ -284,13 +288,14 @@ fn mask_of(tiff: &mut TiffFile, of: &Directory, size: [u32; 2]) -> Result<Vec<bo
     Ok(valid)
 }
 
+/// Red, green and blue of a palette entry.
 fn palette_color(palette: &[u64], index: u32) -> [u8; 3] {
     let entries = palette.len() / 3;
-    // Some writers fill bytes where words are meant.
-    let is_of_bytes = palette.iter().all(|value| *value < 256);
+    // Some writers store 8-bit values instead of 16-bit ones.
+    let is_8_bit = palette.iter().all(|value| *value < 256);
     [0, 1, 2].map(|k| {
         palette
             .get(k * entries + index as usize)
-            .map_or(0, |v| if is_of_bytes { *v as u8 } else { (v >> 8) as u8 })
+            .map_or(0, |v| if is_8_bit { *v as u8 } else { (v >> 8) as u8 })
     })
 }

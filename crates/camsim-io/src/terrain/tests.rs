@@ -1,5 +1,5 @@
-//! Small files made here, and the real ones of CAMSIM_DATA.
-#![allow(clippy::unwrap_used)]
+//! Small generated files, and published terrains in CAMSIM_DATA.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::{fs, path::Path};
 
@@ -15,8 +15,8 @@ use tiff::{
 
 use super::{crs::Crs, *};
 
-/// Exact WGS-84: geodetic -> ECEF -> tangent plane.
-fn frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> DVec3 + Sync {
+/// NED from geodetic on WGS-84: geodetic -> ECEF -> tangent plane.
+fn ned_frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> DVec3 + Sync {
     fn ecef(lat: f64, lon: f64, h: f64) -> DVec3 {
         let (a, f) = (6_378_137.0, 1.0 / 298.257_223_563);
         let e2: f64 = f * (2.0 - f);
@@ -51,7 +51,7 @@ struct Tags {
     nodata: Option<&'static str>,
 }
 
-/// UTM 32N around 9 E, 45.1 N, 10 m.
+/// UTM 32N near 9 E, 45.1 N with 10 m pixels.
 const UTM: Tags = Tags {
     scale: [10.0, 10.0, 0.0],
     tie: [0.0, 0.0, 0.0, 500_000.0, 5_000_000.0, 0.0],
@@ -80,16 +80,16 @@ fn write_dem(path: &Path, [width, height]: [u32; 2], heights: &[f32], tags: Opti
     image.write_data(heights).unwrap();
 }
 
-/// Model coordinates of the first vertex, by way of the frame at the model point (500000, 5000000).
+/// NED position of the first vertex; the frame's origin is at model coordinates (500000, 5000000).
 fn first_vertex(path: &Path) -> DVec3 {
     let [lat, lon] = Crs::new(32632).unwrap().geodetic_from_model([500_000.0, 5_000_000.0]).unwrap();
     let loaded =
-        read_terrain(&spec(path, None), &frame([lat.to_degrees(), lon.to_degrees()], 0.0), None).unwrap();
+        read_terrain(&spec(path, None), &ned_frame([lat.to_degrees(), lon.to_degrees()], 0.0), None).unwrap();
     loaded.terrain.position_ned_m(0, 0, 0)
 }
 
 #[test]
-fn pixel_centres_are_where_the_raster_type_says() {
+fn pixel_centres_follow_the_raster_type() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
     let heights = [7.0; 12];
@@ -102,23 +102,23 @@ fn pixel_centres_are_where_the_raster_type_says() {
     );
     write_dem(&path, [4, 3], &heights, Some(&Tags { raster_type: 2, ..UTM }));
     assert!((first_vertex(&path) - DVec3::new(0.0, 0.0, -7.0)).length() < 2e-3, "{}", first_vertex(&path));
-    // A world file means centres too.
+    // World files refer to centres.
     write_dem(&path, [4, 3], &heights, None);
     fs::write(folder.path().join("dem.tfw"), "10\n0\n0\n-10\n500000\n5000000\n").unwrap();
-    let error = read_terrain(&spec(&path, None), &frame([45.0, 9.0], 0.0), None).unwrap_err();
+    let error = read_terrain(&spec(&path, None), &ned_frame([45.0, 9.0], 0.0), None).unwrap_err();
     assert!(error.to_string().contains("scene.terrain.epsg"), "{error}");
     let with_epsg = TerrainSpec { epsg: Some(32632), ..spec(&path, None) };
-    let loaded = read_terrain(&with_epsg, &frame([45.0, 9.0], 0.0), Some(&|_, _| 50.0)).unwrap();
+    let loaded = read_terrain(&with_epsg, &ned_frame([45.0, 9.0], 0.0), Some(&|_, _| 50.0)).unwrap();
     assert_eq!((loaded.summary.epsg, loaded.summary.height_range_m), (32632, [7.0, 7.0]));
     let shifted = loaded.terrain.position_ned_m(0, 0, 0);
     let plain =
-        read_terrain(&with_epsg, &frame([45.0, 9.0], 0.0), None).unwrap().terrain.position_ned_m(0, 0, 0);
-    // 17 km away from the frame's origin "up" leans by a few milliradians.
+        read_terrain(&with_epsg, &ned_frame([45.0, 9.0], 0.0), None).unwrap().terrain.position_ned_m(0, 0, 0);
+    // 17 km from the frame's origin the vertical differs by a few milliradians.
     assert!((plain.z - shifted.z - 50.0).abs() < 1e-3 && (plain - shifted).truncate().length() < 0.5);
 }
 
 #[test]
-fn a_raster_from_the_south_is_turned() {
+fn raster_with_rows_from_the_south_is_reversed() {
     let folder = tempfile::tempdir().unwrap();
     let (up, down) = (folder.path().join("up.tif"), folder.path().join("down.tif"));
     let heights: Vec<f32> = (0..12).map(|n| n as f32).collect();
@@ -130,7 +130,7 @@ fn a_raster_from_the_south_is_turned() {
         &reversed,
         Some(&Tags { scale: [10.0, -10.0, 0.0], tie: [0.0, 0.0, 0.0, 500_000.0, 4_999_970.0, 0.0], ..UTM }),
     );
-    let ned = frame([45.15, 9.0], 0.0);
+    let ned = ned_frame([45.15, 9.0], 0.0);
     let [a, b] = [up, down].map(|path| read_terrain(&spec(&path, None), &ned, None).unwrap().terrain);
     for n in 0..12 {
         assert!((a.position_ned_m(0, n % 4, n / 4) - b.position_ned_m(0, n % 4, n / 4)).length() < 1e-6);
@@ -142,16 +142,16 @@ fn a_raster_from_the_south_is_turned() {
 }
 
 #[test]
-fn marks_and_garbage_are_voids() {
+fn nodata_and_implausible_values_are_voids() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
     let mut heights = vec![5.0f32; 25];
     (heights[0], heights[1], heights[2], heights[3]) = (-9999.0, f32::NAN, 1e30, -3.402_823_5e38);
     write_dem(&path, [5, 5], &heights, Some(&UTM));
-    let ned = frame([45.15, 9.0], 0.0);
+    let ned = ned_frame([45.15, 9.0], 0.0);
     let loaded = read_terrain(&spec(&path, None), &ned, None).unwrap();
     assert_eq!((loaded.summary.void_heights, loaded.terrain.void_cells), (4, 4));
-    // A declared mark is a void, and nothing else of the usual ones is.
+    // With a declared no-data value the common ones do not apply.
     heights.fill(0.0);
     heights[24] = 100.0;
     write_dem(&path, [5, 5], &heights, Some(&Tags { nodata: Some("100"), ..UTM }));
@@ -163,48 +163,47 @@ fn marks_and_garbage_are_voids() {
 }
 
 #[test]
-fn files_that_are_no_terrain_are_named() {
+fn invalid_terrain_files_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
-    let ned = frame([45.15, 9.0], 0.0);
-    let fails = |wanted: Option<u16>, text: &str| {
-        let error = read_terrain(&TerrainSpec { epsg: wanted, ..spec(&path, None) }, &ned, None)
-            .unwrap_err()
-            .to_string();
+    let ned = ned_frame([45.15, 9.0], 0.0);
+    let assert_error = |epsg: Option<u16>, text: &str| {
+        let error =
+            read_terrain(&TerrainSpec { epsg, ..spec(&path, None) }, &ned, None).unwrap_err().to_string();
         assert!(error.contains("dem.tif") && error.contains(text), "{error}");
     };
-    fails(None, "cannot be read");
+    assert_error(None, "cannot be read");
     fs::write(&path, "north,east").unwrap();
-    fails(None, "not a TIFF file");
+    assert_error(None, "is not a TIFF file");
     write_dem(&path, [1, 1], &[0.0], Some(&UTM));
-    fails(None, "at least 2 x 2");
+    assert_error(None, "at least 2 x 2");
     write_dem(&path, [2, 2], &[0.0; 4], None);
-    fails(None, "no georeference");
-    fails(Some(32632), "no georeference");
+    assert_error(None, "no georeference");
+    assert_error(Some(32632), "no georeference");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { epsg: Some(27573), ..UTM }));
-    fails(None, "EPSG:27573 is not supported");
+    assert_error(None, "EPSG:27573 is not supported");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&UTM));
-    fails(Some(32633), "states EPSG:32632 but scene.terrain.epsg = 32633");
+    assert_error(Some(32633), "states EPSG:32632 but scene.terrain.epsg = 32633");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { scale: [0.0; 3], ..UTM }));
-    fails(None, "degenerate");
+    assert_error(None, "degenerate");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { epsg: Some(4326), ..UTM }));
-    fails(None, "outside of the domain");
+    assert_error(None, "outside of the domain");
 }
 
 #[test]
-fn an_ortho_lies_where_its_georeference_says() {
+fn ortho_image_is_placed_by_its_georeference() {
     let folder = tempfile::tempdir().unwrap();
     let (dem, ortho) = (folder.path().join("dem.tif"), folder.path().join("ortho.png"));
     write_dem(&dem, [4, 3], &[1.0; 12], Some(&UTM));
     image::RgbImage::from_pixel(8, 6, image::Rgb([9, 8, 7])).save(&ortho).unwrap();
-    let ned = frame([45.15, 9.0], 0.0);
-    // No georeference: it covers the DEM's extent.
+    let ned = ned_frame([45.15, 9.0], 0.0);
+    // Without georeference the image covers the DEM's extent.
     let loaded = read_terrain(&spec(&dem, Some(&ortho)), &ned, None).unwrap();
     assert_eq!((loaded.terrain.vertices[0].uv, loaded.summary.outside_ortho), ([0.125, 1.0 / 6.0], 0));
-    // 5 m pixels that begin 10 m further west and north.
+    // 5 m pixels from 10 m further west and north.
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 499992.5 5000007.5").unwrap();
-    let as_its_edge = TerrainSpec { beyond: Beyond::Edge, ..spec(&dem, Some(&ortho)) };
-    let loaded = read_terrain(&as_its_edge, &ned, None).unwrap();
+    let with_edge = TerrainSpec { beyond: Beyond::Edge, ..spec(&dem, Some(&ortho)) };
+    let loaded = read_terrain(&with_edge, &ned, None).unwrap();
     assert_eq!(loaded.terrain.vertices[0].uv, [15.0 / 40.0, 0.5]);
     assert_eq!(loaded.summary.outside_ortho, 6);
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 599992.5 5000007.5").unwrap();
@@ -213,11 +212,11 @@ fn an_ortho_lies_where_its_georeference_says() {
 }
 
 #[test]
-fn an_ortho_may_have_another_coordinate_system() {
+fn ortho_image_can_have_another_coordinate_system() {
     let folder = tempfile::tempdir().unwrap();
     let (dem, ortho) = (folder.path().join("dem.tif"), folder.path().join("ortho.tif"));
     write_dem(&dem, [4, 3], &[1.0; 12], Some(&UTM));
-    // Web Mercator, 100 m pixels about the same place; grey floats are no colour, so write bytes.
+    // Web Mercator with 100 m pixels at the same location.
     let [lat, lon] = Crs::new(32632).unwrap().geodetic_from_model([500_005.0, 4_999_995.0]).unwrap();
     let [x, y] = Crs::new(3857).unwrap().model_from_geodetic([lat, lon]).unwrap();
     let mut encoder = TiffEncoder::new(fs::File::create(&ortho).unwrap()).unwrap();
@@ -229,16 +228,16 @@ fn an_ortho_may_have_another_coordinate_system() {
         .unwrap();
     image.encoder().write_tag(Tag::GeoKeyDirectoryTag, &[1u16, 1, 0, 1, 3072, 0, 1, 3857][..]).unwrap();
     image.write_data(&[50; 300]).unwrap();
-    let loaded = read_terrain(&spec(&dem, Some(&ortho)), &frame([45.15, 9.0], 0.0), None).unwrap();
+    let loaded = read_terrain(&spec(&dem, Some(&ortho)), &ned_frame([45.15, 9.0], 0.0), None).unwrap();
     let [u, v] = loaded.terrain.vertices[0].uv;
     assert!((u - 0.25).abs() < 1e-6 && (v - 0.75).abs() < 1e-6, "{u} {v}");
 }
 
 #[test]
-fn broken_files_fail_without_panic() {
+fn damaged_files_do_not_panic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
-    let ned = frame([45.15, 9.0], 0.0);
+    let ned = ned_frame([45.15, 9.0], 0.0);
     write_dem(&path, [6, 5], &[3.0; 30], Some(&UTM));
     let whole = fs::read(&path).unwrap();
     for length in 0..whole.len() {
@@ -246,14 +245,14 @@ fn broken_files_fail_without_panic() {
         if let Err(error) = read_terrain(&spec(&path, None), &ned, None) {
             assert!(error.to_string().contains("dem.tif"), "{error}");
         } else {
-            // Only the last bytes may be missing without harm (padding).
+            // Only padding at the end may be missing.
             assert!(length + 4 > whole.len(), "{length} of {}", whole.len());
         }
     }
-    for at in 0..whole.len() {
+    for index in 0..whole.len() {
         for value in [0, 1, 0x7f, 0xff] {
             let mut bytes = whole.clone();
-            bytes[at] = value;
+            bytes[index] = value;
             fs::write(&path, &bytes).unwrap();
             let _ = read_terrain(&spec(&path, None), &ned, None);
         }
@@ -263,17 +262,17 @@ fn broken_files_fail_without_panic() {
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("CAMSIM_DATA").map(PathBuf::from);
     if data.is_none() {
-        eprintln!("CAMSIM_DATA is not set: real terrain is not read");
+        eprintln!("CAMSIM_DATA is not set: published terrains are not tested");
     }
     data
 }
 
 #[test]
-fn sertig_lies_where_it_should() {
+fn sertig_is_georeferenced_correctly() {
     let Some(data) = data() else { return };
     let folder = data.join("terrain/sertig");
     let origin = [46.735383, 9.836560];
-    let ned = frame(origin, 0.0);
+    let ned = ned_frame(origin, 0.0);
     let begin = std::time::Instant::now();
     let loaded = read_terrain(
         &spec(&folder.join("sertig_valley.tif"), Some(&folder.join("sertig_valley_color.tif"))),
@@ -294,8 +293,8 @@ fn sertig_lies_where_it_should() {
     let (chunk, i, j) = (7 * terrain.chunk_grid[0] + 5, 0, 458 - 448);
     let centre = terrain.position_ned_m(chunk, i, j);
     assert!(centre.truncate().length() < 2.0, "{centre}");
-    // The grid turns against north by the convergence of the Swiss grid there, atan(2.4 deg * sin 46.7 deg) =
-    // 1.74 deg.
+    // The grid is rotated against north by the convergence of the Swiss grid there, atan(2.4 deg * sin 46.7
+    // deg) = 1.74 deg.
     let north = terrain.position_ned_m(2 * terrain.chunk_grid[0] + 5, 0, 0) - centre;
     assert!(
         ((-north.y).atan2(north.x).to_degrees() + 1.745).abs() < 0.03,
@@ -305,7 +304,7 @@ fn sertig_lies_where_it_should() {
     let down = terrain.down_at(0.0, 0.0).unwrap();
     assert!((-down - -centre.z).abs() < 30.0, "{down} {centre}");
 
-    // Straight down and 30 degrees below the horizon, at the height of the demo flight.
+    // Views straight down and 30 degrees below the horizon, at the height of the demo flight.
     let nadir = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let oblique = nadir * DQuat::from_rotation_x(60f64.to_radians());
     for (name, ned_from_camera) in [("nadir", nadir), ("oblique", oblique)] {
@@ -327,7 +326,7 @@ fn sertig_lies_where_it_should() {
 }
 
 #[test]
-fn all_real_terrains_load() {
+fn published_terrains_load() {
     let Some(data) = data() else { return };
     let folder = data.join("terrain");
     for (dem, ortho, origin, void_share) in [
@@ -344,13 +343,14 @@ fn all_real_terrains_load() {
         ("jacksboro/jacksboro_fault_dem.tif", None, [36.59, -84.25], 0.0),
     ] {
         let ortho = ortho.map(|name| folder.join(name));
-        let ned = frame(origin, 0.0);
+        let ned = ned_frame(origin, 0.0);
         let begin = std::time::Instant::now();
         let loaded = read_terrain(&spec(&folder.join(dem), ortho.as_deref()), &ned, None).unwrap();
         let (terrain, summary) = (&loaded.terrain, &loaded.summary);
         let cells = f64::from(terrain.cells[0]) * f64::from(terrain.cells[1]);
         eprintln!(
-            "{dem}: {:.3} s, {:?}, centre {:?}, quantum {:.1e} m, {:.1} % void cells, {} heights outside the picture",
+            "{dem}: {:.3} s, {:?}, centre {:?}, quantum {:.1e} m, {:.1} % void cells, {} heights outside the \
+             picture",
             begin.elapsed().as_secs_f64(),
             terrain.cells,
             summary.centre_rad.map(f64::to_degrees),
@@ -358,7 +358,7 @@ fn all_real_terrains_load() {
             100.0 * terrain.void_cells as f64 / cells,
             summary.outside_ortho
         );
-        // Near the place that the README names, and as large as pixels times pixel size.
+        // The centre is near the published location.
         assert!(summary.centre_ned_m.truncate().length() < 10_000.0, "{dem} {}", summary.centre_ned_m);
         let share = summary.void_heights as f64 / (f64::from(summary.size[0]) * f64::from(summary.size[1]));
         assert!((share - void_share).abs() < 0.01, "{dem} {share}");
@@ -366,31 +366,30 @@ fn all_real_terrains_load() {
             summary.south_west_rad[0] < summary.centre_rad[0]
                 && summary.centre_rad[1] < summary.north_east_rad[1]
         );
-        // The bounding box's middle has ground (unless void), at the height of the file.
-        let middle = terrain.bounds.centre();
-        match terrain.down_at(middle.x, middle.y) {
+        // The centre of the bounding box has ground within the file's range of heights, or is void.
+        let centre = terrain.bounds.centre();
+        match terrain.down_at(centre.x, centre.y) {
             Some(down) => assert!((terrain.bounds.min.z..=terrain.bounds.max.z).contains(&down)),
             None => assert!(terrain.void_cells > 0, "{dem}"),
         }
     }
 }
 
-/// Without a picture the colours of heights have a shading of their own; in the scene's light they have that
-/// instead, not on top.
+/// Hypsometric tints are hillshaded without scene light; with it they have the scene's light instead.
 #[test]
-fn the_scenes_light_takes_the_place_of_the_shading_of_heights() {
+fn scene_light_replaces_hillshading() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
-    // 40 % up to the east.
+    // A slope of 40 % up to the east.
     let heights: Vec<f32> = (0..12 * 10).map(|k| 4.0 * (k % 12) as f32).collect();
     write_dem(&path, [12, 10], &heights, Some(&UTM));
     let [lat, lon] = Crs::new(32632).unwrap().geodetic_from_model([500_000.0, 5_000_000.0]).unwrap();
-    let ned = frame([lat.to_degrees(), lon.to_degrees()], 0.0);
+    let ned = ned_frame([lat.to_degrees(), lon.to_degrees()], 0.0);
     let picture = |light: Option<Light>| {
         let loaded = read_terrain_in_light(&spec(&path, None), &ned, None, light.as_ref()).unwrap();
         loaded.terrain.texture.rgba8.clone()
     };
-    // Nothing but sky: level ground would be as it is.
+    // Sky light alone leaves level ground unchanged.
     let (open, half) = (Light::new(0.0, 0.5, 0.0, 1.0), Light::new(4.0, 0.9, 0.5, 0.25));
     let up = DVec3::new(0.0, -0.4, -1.0).normalize();
     let linear = |byte: u8| f64::from(linear_from_srgb(f32::from(byte) / 255.0));

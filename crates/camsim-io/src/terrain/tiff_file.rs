@@ -1,17 +1,17 @@
-//! TIFF and BigTIFF files: what their directories say, and their pixels as they are stored.
+//! TIFF and BigTIFF files: directories and stored pixels.
 //!
-//! Blocks (strips or tiles) are decoded here one by one, because what decides about truth is in them: blocks
-//! that are not there, bands beyond the third, masks in a directory of their own, values of 12 bits.
+//! Blocks (strips or tiles) are decoded here, because general decoders hide sparse blocks, bands after the
+//! third, masks in directories of their own, and values of 12 bits.
 
 mod blocks;
 mod compression;
 mod directory;
 
-pub(crate) use blocks::{Image, Sample, most_decoded};
+pub(crate) use blocks::{Image, SampleType, max_decoded_bytes};
 pub(crate) use compression::{COMPRESSIONS, REFUSED};
 pub(crate) use directory::{Directory, TiffFile, is_tiff};
 
-/// Numbers of tags.
+/// Tag numbers.
 pub(crate) mod tag {
     pub const NEW_SUBFILE_TYPE: u16 = 254;
     pub const IMAGE_WIDTH: u16 = 256;
@@ -46,7 +46,7 @@ pub(crate) mod tag {
     pub const RPC_COEFFICIENTS: u16 = 50844;
 }
 
-/// The command that makes of a file one that is read: `gdal_translate OPTIONS IN OUT` with its names.
+/// The command that converts a file: `gdal_translate OPTIONS IN OUT` with its paths.
 pub(crate) fn gdal_translate(options: &str, path: &std::path::Path) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let quoted = |path: &std::path::Path| {

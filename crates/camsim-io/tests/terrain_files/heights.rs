@@ -1,27 +1,33 @@
+//! Heights of TIFF files: encodings, units, scales, no-data values, coordinate systems.
+
 use camsim_core::scenario::{HeightReference, HeightUnit, TerrainSpec};
 
 use super::{
-    by_gdal, fails, height_m, pixels,
+    gdal_file, height_m, pixels,
     raster::{Tiff, Value},
-    read, spec,
+    read, read_error, spec,
 };
 
-fn assert_true(name: &str, is_void: impl Fn([u32; 2]) -> bool) {
-    let loaded = read(&spec(&by_gdal(name))).unwrap_or_else(|error| panic!("{name}: {error}"));
+/// Asserts that every height is 400 + 0.7 column + 0.3 row metres, or void.
+fn assert_heights(name: &str, is_void: impl Fn([u32; 2]) -> bool) {
+    let loaded = read(&spec(&gdal_file(name))).unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_eq!(loaded.summary.size, [40, 30], "{name}");
-    for at in pixels([40, 30]) {
-        let expected = 400.0 + 0.7 * f64::from(at[0]) + 0.3 * f64::from(at[1]);
-        match height_m(&loaded, at) {
-            None => assert!(is_void(at), "{name} {at:?}"),
-            Some(found) => {
-                assert!(!is_void(at) && (found - expected).abs() < 1e-3, "{name} {at:?}: {found} {expected}")
+    for post in pixels([40, 30]) {
+        let expected = 400.0 + 0.7 * f64::from(post[0]) + 0.3 * f64::from(post[1]);
+        match height_m(&loaded, post) {
+            None => assert!(is_void(post), "{name} {post:?}"),
+            Some(height) => {
+                assert!(
+                    !is_void(post) && (height - expected).abs() < 1e-3,
+                    "{name} {post:?}: {height} {expected}"
+                )
             }
         }
     }
 }
 
 #[test]
-fn heights_are_the_same_however_they_are_stored() {
+fn heights_are_equal_in_all_encodings() {
     for name in [
         "zstd_predictor3",
         "deflate_predictor3_f64",
@@ -34,56 +40,61 @@ fn heights_are_the_same_however_they_are_stored() {
         "overviews",
         "point",
     ] {
-        assert_true(&format!("{name}.tif"), |_| false);
+        assert_heights(&format!("{name}.tif"), |_| false);
     }
-    assert_true("beside_mask.tif", |[column, row]| column < 7 && row < 5);
-    // The mark is of stored numbers: 3000 is 400 m.
-    assert_true("beside_aux.tif", |at| at == [0, 0]);
+    assert_heights("beside_mask.tif", |[column, row]| column < 7 && row < 5);
+    // The no-data value is a stored one: 3000 is 400 m.
+    assert_heights("beside_aux.tif", |post| post == [0, 0]);
 }
 
 #[test]
-fn what_is_not_read_says_how_to_convert_it() {
-    for (name, what) in [("lerc", "LERC (34887)"), ("lzma", "LZMA (34925)")] {
-        let path = by_gdal(&format!("{name}.tif"));
-        let error = fails(&spec(&path));
-        let to = path.with_file_name(format!("{name}_converted.tif"));
-        let command = format!("gdal_translate -co COMPRESS=DEFLATE {} {}", path.display(), to.display());
-        assert!(error.contains(what) && error.contains(&command), "{error}");
+fn unsupported_compression_is_refused_with_a_command() {
+    for (name, compression) in [("lerc", "LERC (34887)"), ("lzma", "LZMA (34925)")] {
+        let path = gdal_file(&format!("{name}.tif"));
+        let error = read_error(&spec(&path));
+        let converted = path.with_file_name(format!("{name}_converted.tif"));
+        let command =
+            format!("gdal_translate -co COMPRESS=DEFLATE {} {}", path.display(), converted.display());
+        assert!(error.contains(compression) && error.contains(&command), "{error}");
     }
 }
 
-/// 4 x 3 heights of 100 and one of 140, in a file of its own with changes.
-fn made(
+/// Height of post (1, 1) and notes of a file with 4 x 3 heights of 100 and 140 at that post, after changes.
+fn read_changed(
     name: &str,
     change: impl FnOnce(Tiff) -> Tiff,
-    wish: impl FnOnce(&mut TerrainSpec),
+    edit: impl FnOnce(&mut TerrainSpec),
 ) -> Result<(Option<f64>, Vec<String>), String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("{name}.tif"));
     change(Tiff::heights([4, 3], |column, row| if (column, row) == (1, 1) { 140.0 } else { 100.0 }))
         .write(&path);
     let mut spec = spec(&path);
-    wish(&mut spec);
+    edit(&mut spec);
     read(&spec).map(|loaded| (height_m(&loaded, [1, 1]), loaded.notes)).map_err(|error| error.to_string())
 }
 
-fn plain(change: impl FnOnce(Tiff) -> Tiff) -> Result<(Option<f64>, Vec<String>), String> {
-    made("dem", change, |_| {})
+/// [`read_changed`] with a default scenario.
+fn read_tiff(change: impl FnOnce(Tiff) -> Tiff) -> Result<(Option<f64>, Vec<String>), String> {
+    read_changed("dem", change, |_| {})
 }
 
-fn near(found: Result<(Option<f64>, Vec<String>), String>, expected: f64) -> Vec<String> {
-    let (height, notes) = found.unwrap();
+/// Asserts the height and returns the notes.
+fn assert_height(result: Result<(Option<f64>, Vec<String>), String>, expected: f64) -> Vec<String> {
+    let (height, notes) = result.unwrap();
     let height = height.unwrap();
     assert!((height - expected).abs() < 1e-3, "{height} {expected} {notes:?}");
     notes
 }
 
-const FOOT: f64 = 0.3048;
-const SURVEY: f64 = 1200.0 / 3937.0;
+/// International foot, metres.
+const FOOT_M: f64 = 0.3048;
+/// US survey foot, metres.
+const SURVEY_FOOT_M: f64 = 1200.0 / 3937.0;
 
 #[test]
-fn units_by_any_name_or_key() {
-    assert_eq!(near(plain(|tiff| tiff), 140.0), [""; 0]);
+fn height_units_are_applied_by_name_and_by_code() {
+    assert_eq!(assert_height(read_tiff(|tiff| tiff), 140.0), [""; 0]);
     for (items, unit) in [
         (
             r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">metre</Item></GDALMetadata>"#,
@@ -91,36 +102,39 @@ fn units_by_any_name_or_key() {
         ),
         (
             r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">foot</Item></GDALMetadata>"#,
-            FOOT,
+            FOOT_M,
         ),
         (
             r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">Foot_US</Item></GDALMetadata>"#,
-            SURVEY,
+            SURVEY_FOOT_M,
         ),
         (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">cm</Item></GDALMetadata>"#, 0.01),
         (r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype"></Item></GDALMetadata>"#, 1.0),
-        // Of another band.
+        // The unit of another band.
         (r#"<GDALMetadata><Item name="UNITTYPE" sample="1" role="unittype">ft</Item></GDALMetadata>"#, 1.0),
     ] {
-        near(plain(|tiff| tiff.with_metadata(items)), 140.0 * unit);
+        assert_height(read_tiff(|tiff| tiff.with_metadata(items)), 140.0 * unit);
     }
-    let keyed =
-        |keys: &[u16]| plain(|tiff| tiff.with_keys(&[&[1024, 1, 1025, 1, 3072, 32632], keys].concat()));
-    near(keyed(&[4099, 9002]), 140.0 * FOOT);
-    near(keyed(&[4099, 9003]), 140.0 * SURVEY);
-    near(keyed(&[4096, 8228]), 140.0 * FOOT);
-    let error = keyed(&[4099, 9099]).unwrap_err();
+    let with_keys =
+        |keys: &[u16]| read_tiff(|tiff| tiff.with_keys(&[&[1024, 1, 1025, 1, 3072, 32632], keys].concat()));
+    assert_height(with_keys(&[4099, 9002]), 140.0 * FOOT_M);
+    assert_height(with_keys(&[4099, 9003]), 140.0 * SURVEY_FOOT_M);
+    assert_height(with_keys(&[4096, 8228]), 140.0 * FOOT_M);
+    let error = with_keys(&[4099, 9099]).unwrap_err();
     assert!(error.contains("vertical unit has EPSG code 9099"), "{error}");
-    let error = keyed(&[4096, 5703, 4099, 9002]).unwrap_err();
+    let error = with_keys(&[4096, 5703, 4099, 9002]).unwrap_err();
     assert!(
-        error.contains("EPSG:5703 (NAVD88 height) of 1 m and VerticalUnits 9002 of 0.3048 m: set scene.terrain.height_unit"),
+        error.contains(
+            "EPSG:5703 (NAVD88 height) of 1 m and VerticalUnits 9002 of 0.3048 m: set \
+             scene.terrain.height_unit"
+        ),
         "{error}"
     );
-    let error = keyed(&[4096, 5336]).unwrap_err();
-    assert!(error.contains("Black Sea depth") && error.contains("downwards"), "{error}");
-    let notes = near(keyed(&[4096, 5999]), 140.0);
-    assert!(notes[0].contains("vertical system that is not known (EPSG:5999"), "{notes:?}");
-    let error = plain(|tiff| {
+    let error = with_keys(&[4096, 5336]).unwrap_err();
+    assert!(error.contains("Black Sea depth") && error.contains("positive downwards"), "{error}");
+    let notes = assert_height(with_keys(&[4096, 5999]), 140.0);
+    assert!(notes[0].contains("unknown vertical system (EPSG:5999"), "{notes:?}");
+    let error = read_tiff(|tiff| {
         tiff.with_metadata(
             r#"<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">furlong</Item></GDALMetadata>"#,
         )
@@ -130,33 +144,35 @@ fn units_by_any_name_or_key() {
 }
 
 #[test]
-fn scales_are_applied_or_refused() {
-    near(
-        plain(|tiff| {
+fn scales_and_offsets_are_applied_or_refused() {
+    assert_height(
+        read_tiff(|tiff| {
             tiff.with_metadata(
                 r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>"#,
             )
         }),
         280.0,
     );
-    near(
-        plain(|tiff| {
+    assert_height(
+        read_tiff(|tiff| {
             tiff.with_metadata(
                 r#"<GDALMetadata><Item name="OFFSET" sample="0" role="offset">-50</Item></GDALMetadata>"#,
             )
         }),
         90.0,
     );
-    // Scale before unit, and no role is no scale.
-    let all = r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.5</Item><Item name="OFFSET" sample="0" role="offset">30</Item><Item name="UNITTYPE" sample="0" role="unittype">ft</Item></GDALMetadata>"#;
-    near(plain(|tiff| tiff.with_metadata(all)), 100.0 * FOOT);
-    near(
-        plain(|tiff| {
+    // The scale applies before the unit, and needs a role.
+    let all = r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.5</Item>
+        <Item name="OFFSET" sample="0" role="offset">30</Item>
+        <Item name="UNITTYPE" sample="0" role="unittype">ft</Item></GDALMetadata>"#;
+    assert_height(read_tiff(|tiff| tiff.with_metadata(all)), 100.0 * FOOT_M);
+    assert_height(
+        read_tiff(|tiff| {
             tiff.with_metadata(r#"<GDALMetadata><Item name="SCALE" sample="0">2</Item></GDALMetadata>"#)
         }),
         140.0,
     );
-    for (items, says) in [
+    for (items, expected) in [
         (
             r#"<GDALMetadata><Item name="SCALE" sample="0" role="scale">0,1</Item></GDALMetadata>"#,
             "scale is `0,1`",
@@ -175,34 +191,37 @@ fn scales_are_applied_or_refused() {
             "sample `9999999999`",
         ),
     ] {
-        let error =
-            plain(|tiff| tiff.with_metadata(items)).map(|(height, notes)| format!("{height:?} {notes:?}"));
+        let error = read_tiff(|tiff| tiff.with_metadata(items))
+            .map(|(height, notes)| format!("{height:?} {notes:?}"));
         assert!(
-            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)),
-            "{error:?} {says}"
+            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(expected)),
+            "{error:?} {expected}"
         );
     }
-    // In the georeference, as GDAL takes it: with a vertical system only.
-    let third = |tiff: Tiff| {
+    // As in GDAL, the scale of the georeference applies only with a vertical system.
+    let with_vertical_scale = |tiff: Tiff| {
         tiff.with(33550, Value::Double(vec![10.0, 10.0, 0.5]))
             .with(33922, Value::Double(vec![0.0, 0.0, 0.0, 500_000.0, 5_200_000.0, 7.0]))
     };
-    near(plain(|tiff| third(tiff).with_keys(&[1024, 1, 1025, 1, 3072, 32632, 4096, 5703])), 77.0);
-    let notes = near(plain(third), 140.0);
+    assert_height(
+        read_tiff(|tiff| with_vertical_scale(tiff).with_keys(&[1024, 1, 1025, 1, 3072, 32632, 4096, 5703])),
+        77.0,
+    );
+    let notes = assert_height(read_tiff(with_vertical_scale), 140.0);
     assert!(notes[0].contains("ModelPixelScale") && notes[0].contains("not applied"), "{notes:?}");
 }
 
 #[test]
-fn marks_are_of_stored_numbers() {
-    let mark = |text: &'static str| plain(|tiff| tiff.with(42113, Value::Text(text)));
-    assert_eq!(mark("140").unwrap().0, None);
-    assert_eq!(mark("140 ").unwrap().0, None);
-    near(mark("nan"), 140.0);
-    near(mark("-1.#IND"), 140.0);
-    near(mark("-3.4028234663852886e+38"), 140.0);
-    assert!(mark("none").unwrap_err().contains("`none`, which is no number"));
-    // Numbers that are no heights in metres are counted.
-    let (height, notes) = made(
+fn nodata_values_are_compared_with_stored_values() {
+    let with_nodata = |text: &'static str| read_tiff(|tiff| tiff.with(42113, Value::Text(text)));
+    assert_eq!(with_nodata("140").unwrap().0, None);
+    assert_eq!(with_nodata("140 ").unwrap().0, None);
+    assert_height(with_nodata("nan"), 140.0);
+    assert_height(with_nodata("-1.#IND"), 140.0);
+    assert_height(with_nodata("-3.4028234663852886e+38"), 140.0);
+    assert!(with_nodata("none").unwrap_err().contains("`none`, which is not a number"));
+    // Implausible heights are counted.
+    let (height, notes) = read_changed(
         "dem",
         |tiff| {
             tiff.with_metadata(
@@ -212,75 +231,80 @@ fn marks_are_of_stored_numbers() {
         |_| {},
     )
     .unwrap();
-    assert!(height.is_none() && notes[0].contains("1 of its numbers are no heights in metres"), "{notes:?}");
+    assert!(
+        height.is_none() && notes[0].contains("1 of its values are no plausible heights in metres"),
+        "{notes:?}"
+    );
 }
 
 #[test]
-fn systems_of_place_are_known_or_refused() {
-    let keyed =
-        |keys: &[u16], wish: Option<u16>| made("dem", |tiff| tiff.with_keys(keys), |spec| spec.epsg = wish);
-    for (keys, says) in [
-        (&[1024, 1, 1025, 1, 3072, 32767][..], "defines a coordinate system of its own"),
-        // A projection of its own over a known geographic system: metres are no degrees.
-        (&[1024, 1, 1025, 1, 2048, 4326, 3075, 8], "defines a coordinate system of its own"),
-        (&[1024, 1, 1025, 1, 2048, 4326], "defines a coordinate system of its own"),
-        (&[1024, 2, 1025, 1, 2048, 32767], "defines a coordinate system of its own"),
+fn horizontal_systems_are_supported_or_refused() {
+    let with_keys = |keys: &[u16], epsg: Option<u16>| {
+        read_changed("dem", |tiff| tiff.with_keys(keys), |spec| spec.epsg = epsg)
+    };
+    for (keys, expected) in [
+        (&[1024, 1, 1025, 1, 3072, 32767][..], "has a user-defined coordinate system"),
+        // A user-defined projection on a known geographic system.
+        (&[1024, 1, 1025, 1, 2048, 4326, 3075, 8], "has a user-defined coordinate system"),
+        (&[1024, 1, 1025, 1, 2048, 4326], "has a user-defined coordinate system"),
+        (&[1024, 2, 1025, 1, 2048, 32767], "has a user-defined coordinate system"),
         (&[1024, 3, 1025, 1], "geocentric"),
         (&[1024, 1, 1025, 1, 3072, 29190], "EPSG:29190 is not supported (docs/inputs/TERRAIN.md"),
         (&[1024, 1, 1025, 1, 3072, 32632, 3076, 9002], "the horizontal unit has EPSG code 9002"),
         (&[1024, 1, 1025, 1, 3072, 2230, 3076, 9001], "the horizontal unit has EPSG code 9001"),
         (
             &[1024, 1, 1025, 1, 3072, 2230, 3076, 9003],
-            "counts in feet, and nothing says whether the heights do: set scene.terrain.height_unit",
+            "has coordinates in feet, and the unit of the heights is not stated: set \
+             scene.terrain.height_unit",
         ),
         (&[1024, 2, 1025, 1, 2048, 4326, 2054, 9101], "the angular unit has EPSG code 9101"),
     ] {
-        let error = keyed(keys, None).unwrap_err();
-        assert!(error.contains("dem.tif") && error.contains(says), "{error}");
+        let error = with_keys(keys, None).unwrap_err();
+        assert!(error.contains("dem.tif") && error.contains(expected), "{error}");
     }
-    // UTM by its zone; a code for both place and height; the key, where the file has no code.
-    near(keyed(&[1024, 1, 1025, 1, 3072, 32767, 2048, 4326, 3074, 16032], None), 140.0);
-    let notes = near(keyed(&[1024, 1, 1025, 1, 3072, 5555], None), 140.0);
+    // UTM by its zone; a compound code; the key for a file without code.
+    assert_height(with_keys(&[1024, 1, 1025, 1, 3072, 32767, 2048, 4326, 3074, 16032], None), 140.0);
+    let notes = assert_height(with_keys(&[1024, 1, 1025, 1, 3072, 5555], None), 140.0);
     assert!(notes[0].contains("DHHN92 height"), "{notes:?}");
-    near(keyed(&[1024, 1, 1025, 1, 3072, 32767], Some(32632)), 140.0);
-    let error = keyed(&[1024, 1, 1025, 1, 3072, 32632], Some(32633)).unwrap_err();
+    assert_height(with_keys(&[1024, 1, 1025, 1, 3072, 32767], Some(32632)), 140.0);
+    let error = with_keys(&[1024, 1, 1025, 1, 3072, 32632], Some(32633)).unwrap_err();
     assert!(error.contains("states EPSG:32632 but scene.terrain.epsg = 32633"), "{error}");
-    // Feet on the ground, with the key for heights: 10 ft cells about the middle of California zone 6.
+    // Coordinates and heights in feet: 10 ft cells in California zone 6.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dem.tif");
-    let place = Value::Double(vec![0.0, 0.0, 0.0, 6_300_000.0, 1_900_000.0, 0.0]);
+    let tie_point = Value::Double(vec![0.0, 0.0, 0.0, 6_300_000.0, 1_900_000.0, 0.0]);
     Tiff::heights([4, 3], |_, _| 100.0)
-        .with(33922, place)
+        .with(33922, tie_point)
         .with_keys(&[1024, 1, 1025, 1, 3072, 2230, 3076, 9003])
         .write(&path);
     let loaded = read(&TerrainSpec { height_unit: Some(HeightUnit::UsFt), ..spec(&path) }).unwrap();
-    assert!((height_m(&loaded, [1, 1]).unwrap() - 100.0 * SURVEY).abs() < 1e-3);
-    // By PROJ: cs2cs EPSG:2230 EPSG:4269 of the grid's middle.
-    let middle = loaded.summary.centre_rad.map(f64::to_degrees);
+    assert!((height_m(&loaded, [1, 1]).unwrap() - 100.0 * SURVEY_FOOT_M).abs() < 1e-3);
+    // The centre of the grid by PROJ: cs2cs EPSG:2230 EPSG:4269.
+    let centre_deg = loaded.summary.centre_rad.map(f64::to_degrees);
     assert!(
-        (middle[0] - 32.877_115_5).abs() < 2e-6 && (middle[1] - -117.102_211_1).abs() < 2e-6,
-        "{middle:?}"
+        (centre_deg[0] - 32.877_115_5).abs() < 2e-6 && (centre_deg[1] - -117.102_211_1).abs() < 2e-6,
+        "{centre_deg:?}"
     );
 }
 
 #[test]
-fn datums_that_contradict_the_key_are_named() {
-    let keyed = |keys: &[u16], height: HeightReference| {
-        made("dem", |tiff| tiff.with_keys(keys), |spec| spec.height = height).unwrap().1
+fn vertical_datums_that_contradict_the_key_are_reported() {
+    let with_keys = |keys: &[u16], height: HeightReference| {
+        read_changed("dem", |tiff| tiff.with_keys(keys), |spec| spec.height = height).unwrap().1
     };
-    let sea = [1024, 1, 1025, 1, 3072, 32632, 4096, 3855];
-    assert!(keyed(&sea, HeightReference::Ellipsoid)[0].contains("EPSG:3855, EGM2008 height"));
-    assert!(keyed(&sea, HeightReference::Msl).is_empty());
+    let sea_level = [1024, 1, 1025, 1, 3072, 32632, 4096, 3855];
+    assert!(with_keys(&sea_level, HeightReference::Ellipsoid)[0].contains("EPSG:3855, EGM2008 height"));
+    assert!(with_keys(&sea_level, HeightReference::Msl).is_empty());
     let old = [1024, 1, 1025, 1, 3072, 32632, 4096, 5103];
-    assert!(keyed(&old, HeightReference::Ellipsoid)[0].contains("NAVD88"));
+    assert!(with_keys(&old, HeightReference::Ellipsoid)[0].contains("NAVD88"));
     let ellipsoid = [1024, 1, 1025, 1, 3072, 32632, 4096, 5030];
-    assert!(keyed(&ellipsoid, HeightReference::Ellipsoid).is_empty());
-    assert!(keyed(&ellipsoid, HeightReference::Msl)[0].contains("above the ellipsoid"));
+    assert!(with_keys(&ellipsoid, HeightReference::Ellipsoid).is_empty());
+    assert!(with_keys(&ellipsoid, HeightReference::Msl)[0].contains("above the ellipsoid"));
 }
 
 #[test]
-fn broken_layouts_are_refused() {
-    for (tag, value, says) in [
+fn invalid_tags_are_refused() {
+    for (tag, value, expected) in [
         (257, Value::Long(vec![0]), "a side of 0 pixels"),
         (278, Value::Long(vec![0]), "blocks of"),
         (277, Value::Short(vec![0]), "0 samples a pixel"),
@@ -288,19 +312,19 @@ fn broken_layouts_are_refused() {
         (339, Value::Short(vec![6]), "format 6"),
         (317, Value::Short(vec![9]), "predictor 9"),
         (259, Value::Short(vec![12345]), "number 12345 is not read"),
-        (278, Value::Long(vec![1]), "1 blocks are listed, and 3 are needed"),
-        (279, Value::Long(vec![40]), "the file is cut off"),
+        (278, Value::Long(vec![1]), "1 blocks are listed, but 3 are needed"),
+        (279, Value::Long(vec![40]), "the file is truncated"),
         (256, Value::Long(vec![2_000_000_000]), "impossible for a file of this length"),
-        (273, Value::Double(vec![8.0]), "tag 273 is no list of whole numbers"),
+        (273, Value::Double(vec![8.0]), "tag 273 is not a list of integers"),
     ] {
         let error =
-            plain(|tiff| tiff.with(tag, value)).map(|(height, notes)| format!("{height:?} {notes:?}"));
+            read_tiff(|tiff| tiff.with(tag, value)).map(|(height, notes)| format!("{height:?} {notes:?}"));
         assert!(
-            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(says)),
-            "{tag}: {error:?} {says}"
+            error.as_ref().is_err_and(|error| error.contains("dem.tif") && error.contains(expected)),
+            "{tag}: {error:?} {expected}"
         );
     }
-    // Control points alone.
+    // Ground control points without a pixel size.
     let points: Vec<f64> = (0..4)
         .flat_map(|k| {
             [
@@ -313,7 +337,7 @@ fn broken_layouts_are_refused() {
             ]
         })
         .collect();
-    let error = plain(|mut tiff| {
+    let error = read_tiff(|mut tiff| {
         tiff.tags.retain(|(tag, _)| *tag != 33550);
         tiff.with(33922, Value::Double(points))
     });

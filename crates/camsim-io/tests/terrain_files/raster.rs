@@ -1,4 +1,4 @@
-//! A writer of small TIFF files, right and wrong ones.
+//! Writes small TIFF files, valid and invalid.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub enum Value {
     Text(&'static str),
 }
 
-/// One strip of pixels in a classic TIFF, least byte first.
+/// A classic little-endian TIFF with one strip.
 #[derive(Clone)]
 pub struct Tiff {
     pub tags: Vec<(u16, Value)>,
@@ -20,7 +20,7 @@ pub struct Tiff {
 }
 
 impl Tiff {
-    /// Floats of one band in UTM zone 32N, 10 m wide, the corner at 500 000, 5 200 000.
+    /// One band of floats in UTM zone 32N with 10 m pixels; the corner is at 500 000, 5 200 000.
     pub fn heights([width, height]: [u32; 2], value: impl Fn(u32, u32) -> f32) -> Self {
         let data: Vec<u8> = (0..height)
             .flat_map(|row| (0..width).map(move |column| (column, row)))
@@ -31,7 +31,7 @@ impl Tiff {
         tiff
     }
 
-    /// Bytes of red, green and blue at the same place.
+    /// Bands of bytes with the same georeference as [`Self::heights`].
     pub fn colors(
         [width, height]: [u32; 2],
         bands: u16,
@@ -49,6 +49,7 @@ impl Tiff {
         tiff
     }
 
+    /// Pixels without GeoKeys.
     pub fn pixels(
         [width, height]: [u32; 2],
         bands: u16,
@@ -72,23 +73,25 @@ impl Tiff {
         Self { tags, data, keys: Vec::new() }
     }
 
-    /// With a tag in place of what it was.
+    /// Replaces a tag.
     pub fn with(mut self, tag: u16, value: Value) -> Self {
         self.tags.retain(|(known, _)| *known != tag);
         self.tags.push((tag, value));
         self
     }
 
-    /// With GeoKeys instead: pairs of key and value.
+    /// Replaces the GeoKeys: pairs of key and value.
     pub fn with_keys(mut self, keys: &[u16]) -> Self {
         self.keys = keys.to_vec();
         self
     }
 
+    /// Sets GDAL_METADATA.
     pub fn with_metadata(self, items: &'static str) -> Self {
         self.with(42112, Value::Text(items))
     }
 
+    /// Writes the file.
     pub fn write(mut self, path: &Path) {
         if !self.keys.is_empty() {
             let mut list = vec![1, 1, 0, self.keys.len() as u16 / 2];
@@ -124,8 +127,8 @@ impl Tiff {
             }
         }
         file.resize(file.len().next_multiple_of(2), 0);
-        let at = (file.len() as u32).to_le_bytes();
-        file[4..8].copy_from_slice(&at);
+        let directory_offset = (file.len() as u32).to_le_bytes();
+        file[4..8].copy_from_slice(&directory_offset);
         file.extend((self.tags.len() as u16).to_le_bytes());
         file.extend(entries);
         file.extend([0; 4]);

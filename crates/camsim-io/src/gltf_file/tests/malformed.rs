@@ -1,11 +1,11 @@
-//! A good model with one thing wrong: each has one message that names the file, the place, and what to do.
+//! A valid model with one defect each: the message names the file, the JSON path and a remedy.
 
 use serde_json::{Value, json};
 
 use super::*;
 
-/// A square with a picture, vertex colours and indices, in one buffer.
-pub(super) struct Good {
+/// A square with a texture, vertex colours and indices, in one buffer.
+pub(super) struct ModelFile {
     pub json: Value,
     pub bytes: Vec<u8>,
 }
@@ -16,7 +16,7 @@ pub(super) fn png(width: u32, height: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
-pub(super) fn good(picture: &[u8]) -> Good {
+pub(super) fn valid_model(picture: &[u8]) -> ModelFile {
     let parts = [
         floats(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0, 2.0, 0.0]),
         floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
@@ -37,16 +37,17 @@ pub(super) fn good(picture: &[u8]) -> Good {
     colors["normalized"] = json!(true);
     let json = json!({
         "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 3 }, "indices": 2, "material": 0 }] }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 3 },
+            "indices": 2, "material": 0 }] }],
         "materials": [{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
         "textures": [{ "source": 0 }], "images": [{ "bufferView": 4, "mimeType": "image/png" }],
         "accessors": [positions, accessor(1, 5126, 4, "VEC2"), accessor(2, 5123, 6, "SCALAR"), colors],
         "bufferViews": views, "buffers": [{ "byteLength": bytes.len(), "uri": "a.bin" }],
     });
-    Good { json, bytes }
+    ModelFile { json, bytes }
 }
 
-impl Good {
+impl ModelFile {
     pub fn read(&self) -> Result<Model, String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
@@ -58,9 +59,9 @@ impl Good {
     }
 }
 
-/// Reads the good model with `value` at each of these places; null takes out what is there.
-pub(super) fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
-    let mut good = good(&png(4, 4));
+/// Reads the valid model with `value` at each of these JSON pointers; null removes the element.
+pub(super) fn read_with(changes: &[(&str, Value)]) -> Result<Model, String> {
+    let mut good = valid_model(&png(4, 4));
     for (pointer, value) in changes {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         let parent = good.json.pointer_mut(parent).unwrap();
@@ -68,7 +69,7 @@ pub(super) fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
             (Value::Object(map), Value::Null) => drop(map.remove(key)),
             (Value::Object(map), value) => drop(map.insert(key.to_owned(), value.clone())),
             (Value::Array(list), value) => list[key.parse::<usize>().unwrap()] = value.clone(),
-            _ => panic!("{pointer} is nothing"),
+            _ => panic!("{pointer} does not exist"),
         }
     }
     good.read()
@@ -77,27 +78,35 @@ pub(super) fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
 const PRIMITIVE: &str = "/meshes/0/primitives/0";
 
 #[test]
-fn the_good_one_is_read() {
-    let model = with(&[]).unwrap();
+fn valid_model_is_read() {
+    let model = read_with(&[]).unwrap();
     assert_eq!((model.triangles(), &model.notes[..]), (2, &[][..]));
 }
 
 #[test]
-fn numbers_that_mean_nothing_are_refused() {
-    let at = |accessor: u32, key: &str| format!("/accessors/{accessor}/{key}");
+fn invalid_types_and_transforms_are_refused() {
+    let pointer = |accessor: u32, key: &str| format!("/accessors/{accessor}/{key}");
     for (pointer, value, wanted) in [
-        (at(0, "type"), json!("SCALAR"), "accessors.0 is of Scalar, which is nothing for POSITION"),
-        (at(0, "type"), json!("VEC4"), "accessors.0 is of Vec4, which is nothing for POSITION"),
-        (at(1, "type"), json!("VEC3"), "accessors.1 is of Vec3, which is nothing for TEXCOORD_0"),
-        (at(3, "type"), json!("MAT2"), "accessors.3 is of Mat2, which is nothing for COLOR_0"),
-        (at(2, "componentType"), json!(5120), "accessors.2 is of Scalar of I8: indices are whole numbers"),
-        (at(2, "componentType"), json!(5126), "accessors.2 is of Scalar of F32: indices are whole numbers"),
-        (at(2, "type"), json!("VEC2"), "accessors.2 is of Vec2 of U16: indices are whole numbers"),
-        ("/nodes/0/translation".into(), json!([1e30, 0, 0]), "nodes.0: with it meshes.0 reaches 1.0e30 m"),
-        ("/nodes/0/scale".into(), json!([1e12, 1, 1]), "more than 1e9: check its positions, and translation"),
-        ("/nodes/0/matrix".into(), json!([1e39].repeat(16)), "nodes.0: with it meshes.0 reaches NaN m"),
+        (pointer(0, "type"), json!("SCALAR"), "accessors.0 has type Scalar, which POSITION cannot have"),
+        (pointer(0, "type"), json!("VEC4"), "accessors.0 has type Vec4, which POSITION cannot have"),
+        (pointer(1, "type"), json!("VEC3"), "accessors.1 has type Vec3, which TEXCOORD_0 cannot have"),
+        (pointer(3, "type"), json!("MAT2"), "accessors.3 has type Mat2, which COLOR_0 cannot have"),
+        (pointer(2, "componentType"), json!(5120), "accessors.2 has type Scalar of I8: indices must be"),
+        (pointer(2, "componentType"), json!(5126), "accessors.2 has type Scalar of F32: indices must be"),
+        (pointer(2, "type"), json!("VEC2"), "accessors.2 has type Vec2 of U16: indices must be"),
+        (
+            "/nodes/0/translation".into(),
+            json!([1e30, 0, 0]),
+            "nodes.0: places points of meshes.0 1.0e30 m from",
+        ),
+        (
+            "/nodes/0/scale".into(),
+            json!([1e12, 1, 1]),
+            "more than 1e9 m: check the mesh's positions and the translation",
+        ),
+        ("/nodes/0/matrix".into(), json!([1e39].repeat(16)), "nodes.0: places points of meshes.0 NaN m from"),
     ] {
-        let error = with(&[(&pointer, value)]).unwrap_err();
+        let error = read_with(&[(&pointer, value)]).unwrap_err();
         assert!(
             error.contains(wanted) && error.contains("model.gltf"),
             "{pointer}\n  gives {error}\n  not   {wanted}"
@@ -106,30 +115,31 @@ fn numbers_that_mean_nothing_are_refused() {
     let turned = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": 4 } } });
     let zeros =
         json!({ "bufferView": 2, "byteOffset": 0, "componentType": 5121, "count": 1, "type": "VEC4" });
-    let mut good = good(&png(4, 4));
+    let mut good = valid_model(&png(4, 4));
     good.json["nodes"][0]["extensions"] = turned;
     good.json["accessors"].as_array_mut().unwrap().push(zeros);
     good.bytes[80..84].fill(0);
-    assert!(good.read().unwrap_err().contains("reaches NaN m"));
+    assert!(good.read().unwrap_err().contains("meshes.0 NaN m from"));
 }
 
 #[test]
-fn what_is_not_there_is_named_with_its_place() {
+fn missing_elements_and_files_are_reported_with_their_json_path() {
     let pictures = json!([{ "uri": "none.png" }]);
-    let channel = json!([{ "channels": [{ "sampler": 0, "target": { "node": 9, "path": "scale" } }], "samplers": [{ "input": 2, "output": 0 }] }]);
+    let channel = json!([{ "channels": [{ "sampler": 0, "target": { "node": 9, "path": "scale" } }],
+        "samplers": [{ "input": 2, "output": 0 }] }]);
     let compressed = json!([{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }]);
     for (changes, wanted) in [
         (vec![("/buffers/0/uri", json!("none.bin"))], "model.gltf: buffers.0: its file"),
         (vec![("/buffers/0/uri", json!("none.bin"))], "none.bin cannot be read"),
         (vec![("/images", pictures)], "model.gltf: images.0: its file"),
-        (vec![("/buffers/0/uri", json!(""))], "model.gltf: buffers.0: its uri is no name of a file"),
+        (vec![("/buffers/0/uri", json!(""))], "model.gltf: buffers.0: its uri is not a file name"),
         (
             vec![("/animations", channel)],
             "model.gltf: animations.0.channels.0: moves node 9, but there are 1",
         ),
         (
             vec![("/textures", compressed)],
-            "needs the extension KHR_texture_basisu, which is not supported: write its pictures as PNG",
+            "needs the extension KHR_texture_basisu, which is not supported: export its images as PNG",
         ),
         (
             vec![("/asset", json!({ "version": "2.0", "minVersion": "2.9" }))],
@@ -138,62 +148,68 @@ fn what_is_not_there_is_named_with_its_place() {
         (vec![("/asset", Value::Null)], "has no asset.version"),
         (
             vec![("/nodes/0/mesh", json!(5))],
-            "is not valid: nodes[0].mesh names what is not there; write the file again",
+            "is not valid: nodes[0].mesh refers to an element that does not exist; export the file again",
         ),
         (
             vec![("/bufferViews/4/byteLength", json!(0))],
             "images.0: cannot be decoded as PNG, JPEG or WebP: it has no bytes",
         ),
     ] {
-        let error = with(&changes).unwrap_err();
+        let error = read_with(&changes).unwrap_err();
         assert!(error.contains(wanted), "{changes:?}\n  gives {error}\n  not   {wanted}");
     }
-    // What is wrong in many places is told of some.
-    let mut many = good(&png(4, 4));
+    // An error that occurs in many places is listed for some.
+    let mut many = valid_model(&png(4, 4));
     let mut primitive = many.json.pointer(PRIMITIVE).unwrap().clone();
     primitive["material"] = json!(7);
     many.json["meshes"][0]["primitives"] = vec![primitive; 300].into();
     let error = many.read().unwrap_err();
-    assert!(error.contains("primitives[2].material names what is not there, and 297 more; write"), "{error}");
-    assert!(error.len() < 400, "{error}");
+    assert!(
+        error.contains(
+            "primitives[2].material refers to an element that does not exist, and 297 more; export"
+        ),
+        "{error}"
+    );
+    assert!(error.len() < 450, "{error}");
 }
 
 #[test]
-fn a_set_of_coordinates_that_is_not_there_is_noted() {
-    let model = with(&[("/materials/0/pbrMetallicRoughness/baseColorTexture/texCoord", json!(5))]).unwrap();
+fn missing_uv_set_is_noted() {
+    let model =
+        read_with(&[("/materials/0/pbrMetallicRoughness/baseColorTexture/texCoord", json!(5))]).unwrap();
     assert_eq!(
         model.notes,
-        ["meshes.0: has no TEXCOORD_5 for its picture to lie by: one texel of it is all over"]
+        ["meshes.0: has no TEXCOORD_5 for its texture: one texel covers the whole surface"]
     );
 }
 
 #[test]
-fn pictures_of_any_size_are_shown_or_named() {
-    let of = |width: u32, height: u32| good(&png(width, height)).read();
-    assert!(of(16_384, 1).unwrap().notes.is_empty());
-    let notes = of(20_000, 1).unwrap().notes;
+fn large_images_are_noted_and_too_large_ones_refused() {
+    let model = |width: u32, height: u32| valid_model(&png(width, height)).read();
+    assert!(model(16_384, 1).unwrap().notes.is_empty());
+    let notes = model(20_000, 1).unwrap().notes;
     assert!(
         notes.len() == 1
-            && notes[0].contains("images.0: is of 20000x1 px")
+            && notes[0].contains("images.0: has 20000x1 px")
             && notes[0].contains("at most 16384"),
         "{notes:?}"
     );
-    let error = of(40_000, 1).unwrap_err();
+    let error = model(40_000, 1).unwrap_err();
     assert!(
-        error.contains("model.gltf: images.0: is of 40000x1 px, and at most 32768 on a side can be shown"),
+        error.contains("model.gltf: images.0: has 40000x1 px, but a side can have at most 32768"),
         "{error}"
     );
     let mut claims = png(4, 4);
     claims[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
-    assert!(good(&claims).read().unwrap_err().contains("images.0: "));
+    assert!(valid_model(&claims).read().unwrap_err().contains("images.0: "));
     for bytes in [&b"hello"[..], b"\xabKTX 20\xbb\r\n\x1a\n", &png(4, 4)[..40]] {
-        let error = good(bytes).read().unwrap_err();
+        let error = valid_model(bytes).read().unwrap_err();
         assert!(error.contains("images.0: cannot be decoded as PNG, JPEG or WebP: "), "{error}");
     }
 }
 
 #[test]
-fn a_byte_order_mark_is_skipped_and_an_empty_file_is_empty() {
+fn byte_order_mark_is_skipped_and_empty_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.gltf");
     std::fs::write(&path, b"\xef\xbb\xbf{ \"asset\": { \"version\": \"2.0\" } }").unwrap();
@@ -201,5 +217,52 @@ fn a_byte_order_mark_is_skipped_and_an_empty_file_is_empty() {
     std::fs::write(&path, b"").unwrap();
     assert!(
         read_gltf(&path, GltfOptions::default()).unwrap_err().to_string().ends_with("model.gltf: is empty")
+    );
+}
+
+#[test]
+fn errors_name_the_file_and_the_cause() {
+    let wrong = |more: &str, nodes: &str| square(4, more, nodes).unwrap_err();
+    for (message, wanted) in [
+        (wrong(r#", "indices": 7"#, r#"{ "mesh": 0 }"#), "is not valid"),
+        (wrong("", r#"{ "mesh": 0, "children": [0] }"#), "nodes.0: has two parents"),
+        (wrong("", r#"{ "mesh": 0, "children": [1] }, { "children": [0] }"#), "has two parents"),
+        (wrong("", r#"{ "mesh": 9 }"#), "is not valid"),
+        (
+            square(
+                4,
+                r#" }] }], "extensionsRequired": ["KHR_draco_mesh_compression"], "x": [{ "y": [{ "z": 1"#,
+                r#"{ "mesh": 0 }"#,
+            )
+            .unwrap_err(),
+            "KHR_draco_mesh_compression, which is not supported: export the file without compression",
+        ),
+        (
+            model(b"", r#""extensionsRequired": ["EXT_meshopt_compression"]"#, GltfOptions::default())
+                .unwrap_err(),
+            "EXT_meshopt_compression",
+        ),
+        (
+            model(b"", r#""extensionsRequired": ["KHR_texture_basisu"]"#, GltfOptions::default())
+                .unwrap_err(),
+            "PNG or JPEG",
+        ),
+        (
+            model(
+                b"",
+                r#""scenes": [{ "nodes": [] }]"#,
+                GltfOptions { scene: Some(2), ..GltfOptions::default() },
+            )
+            .unwrap_err(),
+            "no scene 2",
+        ),
+    ] {
+        assert!(message.contains(wanted) && message.contains("model.gltf"), "{message}");
+    }
+    assert!(
+        read_gltf(Path::new("/none/such.glb"), GltfOptions::default())
+            .unwrap_err()
+            .to_string()
+            .contains("such.glb: cannot be read")
     );
 }

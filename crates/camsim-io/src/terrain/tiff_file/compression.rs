@@ -1,4 +1,4 @@
-//! What is in a block, as it was before it was compressed.
+//! Decompression of blocks.
 
 use std::io::{Cursor, Read};
 
@@ -7,13 +7,13 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-/// What can be read of tag 259, with how it is called.
+/// Supported values of tag 259 (Compression) with their names.
 pub(crate) const COMPRESSIONS: &[(u64, &str)] = &[
     (NONE, "none"),
     (LZW, "LZW"),
     (JPEG, "JPEG, also of YCbCr colours"),
     (DEFLATE, "deflate"),
-    (OLD_DEFLATE, "deflate by its older number"),
+    (OLD_DEFLATE, "deflate, older code"),
     (PACK_BITS, "PackBits"),
     (ZSTD, "Zstandard"),
     (WEBP, "WebP"),
@@ -28,7 +28,7 @@ const PACK_BITS: u64 = 32773;
 const ZSTD: u64 = 50000;
 pub(crate) const WEBP: u64 = 50001;
 
-/// Names of what is refused, by its number.
+/// Unsupported values of tag 259 with their names.
 pub(crate) const REFUSED: &[(u64, &str)] = &[
     (2, "CCITT run lengths"),
     (3, "CCITT fax 3"),
@@ -41,32 +41,34 @@ pub(crate) const REFUSED: &[(u64, &str)] = &[
     (52546, "JPEG XL"),
 ];
 
-pub(super) fn is_known(compression: u64) -> bool {
+/// Whether a compression is supported.
+pub(super) fn is_supported(compression: u64) -> bool {
     COMPRESSIONS.iter().any(|(code, _)| *code == compression)
 }
 
+/// Name of an unsupported compression.
 pub(super) fn name_of(compression: u64) -> String {
     let name = REFUSED.iter().find(|(code, _)| *code == compression);
     name.map_or_else(|| format!("number {compression}"), |(code, name)| format!("{name} ({code})"))
 }
 
-/// A block that is a picture of its own: 8 bits a sample.
+/// A block that is stored as a picture, with 8 bits per sample.
 pub(super) struct Picture {
     pub size: [u32; 2],
     pub samples: usize,
     pub data: Vec<u8>,
 }
 
-/// As many bytes as a block has. Fewer are an error.
+/// Decompresses `expected` bytes; fewer are an error.
 pub(super) fn expand(compression: u64, raw: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     let mut data = Vec::new();
-    let all = expected as u64;
+    let limit = expected as u64;
     let read = match compression {
-        NONE => Cursor::new(raw).take(all).read_to_end(&mut data),
-        DEFLATE | OLD_DEFLATE => flate2::read::ZlibDecoder::new(raw).take(all).read_to_end(&mut data),
+        NONE => Cursor::new(raw).take(limit).read_to_end(&mut data),
+        DEFLATE | OLD_DEFLATE => flate2::read::ZlibDecoder::new(raw).take(limit).read_to_end(&mut data),
         ZSTD => match ruzstd::decoding::StreamingDecoder::new(raw) {
-            Ok(decoder) => decoder.take(all).read_to_end(&mut data),
-            Err(error) => return Err(format!("a block is no Zstandard stream: {error}")),
+            Ok(decoder) => decoder.take(limit).read_to_end(&mut data),
+            Err(error) => return Err(format!("a block is not a Zstandard stream: {error}")),
         },
         PACK_BITS => {
             data = unpack_bits(raw, expected);
@@ -78,16 +80,16 @@ pub(super) fn expand(compression: u64, raw: &[u8], expected: usize) -> Result<Ve
     read.map_err(|error| format!("a block cannot be decompressed: {error}"))?;
     if data.len() < expected {
         return Err(if compression == NONE {
-            "the file is cut off".into()
+            "the file is truncated".into()
         } else {
-            short(data.len(), expected)
+            size_error(data.len(), expected)
         });
     }
     Ok(data)
 }
 
-fn short(found: usize, expected: usize) -> String {
-    format!("a block holds {found} bytes, and {expected} are needed")
+fn size_error(actual: usize, expected: usize) -> String {
+    format!("a block has {actual} bytes instead of {expected}")
 }
 
 fn expand_lzw(raw: &[u8], expected: usize) -> Result<Vec<u8>, String> {
@@ -106,10 +108,11 @@ fn expand_lzw(raw: &[u8], expected: usize) -> Result<Vec<u8>, String> {
             Err(error) => return Err(format!("a block cannot be decompressed: {error}")),
         }
     }
-    if written < expected { Err(short(written, expected)) } else { Ok(data) }
+    if written < expected { Err(size_error(written, expected)) } else { Ok(data) }
 }
 
-/// Runs: n >= 0: n + 1 bytes as they are; n < 0: 1 - n times the next byte; -128: nothing.
+/// PackBits. Each run begins with a signed byte n: for n >= 0 follow n + 1 literal bytes; for -127 <= n < 0
+/// the next byte repeats 1 - n times; -128 is ignored.
 fn unpack_bits(raw: &[u8], expected: usize) -> Vec<u8> {
     let mut data = Vec::new();
     let mut rest = raw;
@@ -134,40 +137,42 @@ fn unpack_bits(raw: &[u8], expected: usize) -> Vec<u8> {
     data
 }
 
-/// A JPEG, whose tables may be in a tag of their own. `to_rgb`: its colours are YCbCr and become RGB; else
-/// its samples stay as they are.
+/// Decodes a JPEG block with its tables, which may be in tag 347. `to_rgb` converts YCbCr to RGB.
 pub(super) fn jpeg(tables: Option<&[u8]>, raw: &[u8], to_rgb: bool) -> Result<Picture, String> {
     let stream = match tables {
-        // Both are streams from start to end: together they are one.
+        // Both are complete JPEG streams: without the end marker of the first and the start marker of the
+        // second they are one.
         Some([head @ .., 0xff, 0xd9]) if raw.len() >= 2 => [head, &raw[2..]].concat(),
         _ => raw.to_vec(),
     };
-    let wrong = |error: zune_jpeg::errors::DecodeErrors| format!("a JPEG block cannot be decoded: {error}");
+    let message = |error: zune_jpeg::errors::DecodeErrors| format!("a JPEG block cannot be decoded: {error}");
     let mut decoder = JpegDecoder::new(ZCursor::new(&stream));
-    decoder.decode_headers().map_err(wrong)?;
+    decoder.decode_headers().map_err(message)?;
     let stored = decoder.input_colorspace().ok_or("a JPEG block has no colours")?;
-    let wanted = match (stored, to_rgb) {
+    let output = match (stored, to_rgb) {
         (ColorSpace::YCbCr, true) => ColorSpace::RGB,
         (other, _) => other,
     };
-    decoder.set_options(DecoderOptions::default().jpeg_set_out_colorspace(wanted));
-    let data = decoder.decode().map_err(wrong)?;
+    decoder.set_options(DecoderOptions::default().jpeg_set_out_colorspace(output));
+    let data = decoder.decode().map_err(message)?;
     let (width, height) = decoder.dimensions().ok_or("a JPEG block has no size")?;
-    Ok(Picture { size: [width as u32, height as u32], samples: wanted.num_components(), data })
+    Ok(Picture { size: [width as u32, height as u32], samples: output.num_components(), data })
 }
 
-/// A WebP picture as `samples` bytes a pixel; one without alpha is opaque.
+/// Decodes a WebP block to `samples` bytes per pixel; without alpha it is opaque.
 pub(super) fn webp(raw: &[u8], samples: usize) -> Result<Picture, String> {
-    let wrong = |error: image_webp::DecodingError| format!("a WebP block cannot be decoded: {error}");
-    let mut decoder = image_webp::WebPDecoder::new(Cursor::new(raw)).map_err(wrong)?;
+    let message = |error: image_webp::DecodingError| format!("a WebP block cannot be decoded: {error}");
+    let mut decoder = image_webp::WebPDecoder::new(Cursor::new(raw)).map_err(message)?;
     let (width, height) = decoder.dimensions();
-    let own = if decoder.has_alpha() { 4 } else { 3 };
+    let channels = if decoder.has_alpha() { 4 } else { 3 };
     let mut data = vec![0; decoder.output_buffer_size().ok_or("a WebP block is too large")?];
-    decoder.read_image(&mut data).map_err(wrong)?;
-    if own != samples {
+    decoder.read_image(&mut data).map_err(message)?;
+    if channels != samples {
         let channel = |pixel: &[u8], k: usize| pixel.get(k).copied().unwrap_or(255);
-        data =
-            data.chunks_exact(own).flat_map(|pixel| (0..samples).map(move |k| channel(pixel, k))).collect();
+        data = data
+            .chunks_exact(channels)
+            .flat_map(|pixel| (0..samples).map(move |k| channel(pixel, k)))
+            .collect();
     }
     Ok(Picture { size: [width, height], samples, data })
 }

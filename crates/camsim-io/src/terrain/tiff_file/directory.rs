@@ -1,4 +1,4 @@
-//! Directories: tags and their values.
+//! TIFF directories: tags and their values.
 
 use std::{
     fs::File,
@@ -9,21 +9,21 @@ use std::{
 use super::tag;
 use crate::pictures::PictureError;
 
-/// More directories than any file of pictures, masks and overviews has.
-const MOST_DIRECTORIES: usize = 4096;
+/// Largest number of directories.
+const MAX_DIRECTORIES: usize = 4096;
 
-/// A file, open for reading.
+/// A TIFF file that is open for reading.
 #[derive(Debug)]
 pub(crate) struct TiffFile {
     pub path: PathBuf,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
     file: File,
     is_big_endian: bool,
     pub directories: Vec<Directory>,
 }
 
-/// The tags of a picture.
+/// Tags of one picture, mask or overview.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Directory {
     entries: Vec<Entry>,
@@ -34,10 +34,10 @@ struct Entry {
     tag: u16,
     kind: u16,
     count: u64,
-    /// The value, or where it is.
+    /// The value, or its offset in the file.
     inline: [u8; 8],
-    /// Bytes of `inline` that there are.
-    room: u64,
+    /// Number of bytes of `inline` that the file has: 4, or 8 in BigTIFF.
+    inline_bytes: u64,
 }
 
 impl Directory {
@@ -46,9 +46,9 @@ impl Directory {
     }
 }
 
-const CUT_OFF: &str = "the file is cut off";
+const TRUNCATED: &str = "the file is truncated";
 
-/// Whether a file begins as a TIFF does.
+/// Whether a file begins with the TIFF or BigTIFF signature.
 pub(crate) fn is_tiff(path: &Path) -> Result<bool, PictureError> {
     let mut start = Vec::new();
     let file = File::open(path).map_err(|source| PictureError::open(path, source))?;
@@ -72,12 +72,12 @@ impl TiffFile {
         self.is_big_endian
     }
 
-    /// Bytes at a place of the file.
+    /// Bytes at an offset of the file.
     pub fn read_at(&mut self, offset: u64, count: u64) -> Result<Vec<u8>, String> {
         if offset.checked_add(count).is_none_or(|end| end > self.bytes) {
-            return Err(CUT_OFF.into());
+            return Err(TRUNCATED.into());
         }
-        let mut bytes = vec![0; usize::try_from(count).map_err(|_| CUT_OFF)?];
+        let mut bytes = vec![0; usize::try_from(count).map_err(|_| TRUNCATED)?];
         self.file
             .seek(SeekFrom::Start(offset))
             .and_then(|_| self.file.read_exact(&mut bytes))
@@ -98,31 +98,33 @@ impl TiffFile {
             let offset = self.read_at(8, 8)?;
             next = self.unsigned(&offset);
         }
-        let mut seen = Vec::new();
+        let mut visited = Vec::new();
         while next != 0 {
-            if seen.contains(&next) || seen.len() == MOST_DIRECTORIES {
-                return Err("its directories lead in a circle".into());
+            if visited.contains(&next) || visited.len() == MAX_DIRECTORIES {
+                return Err("its directories form a loop".into());
             }
-            seen.push(next);
-            let [count_bytes, entry_bytes, room] = if is_big { [8, 20, 8] } else { [2, 12, 4] };
+            visited.push(next);
+            let [count_bytes, entry_bytes, inline_bytes] = if is_big { [8, 20, 8] } else { [2, 12, 4] };
             let count = self.read_at(next, count_bytes)?;
             let count = self.unsigned(&count);
-            let length =
-                count.checked_mul(entry_bytes).and_then(|bytes| bytes.checked_add(room)).ok_or(CUT_OFF)?;
+            let length = count
+                .checked_mul(entry_bytes)
+                .and_then(|bytes| bytes.checked_add(inline_bytes))
+                .ok_or(TRUNCATED)?;
             let table = self.read_at(next + count_bytes, length)?;
-            let (entries, link) = table.split_at((length - room) as usize);
+            let (entries, link) = table.split_at((length - inline_bytes) as usize);
             let entries = entries.chunks_exact(entry_bytes as usize).map(|entry| {
-                let (head, value) = entry.split_at(entry.len() - room as usize);
+                let (header, value) = entry.split_at(entry.len() - inline_bytes as usize);
                 let mut inline = [0; 8];
                 inline[..value.len()].copy_from_slice(value);
-                let [tag, kind] = [&head[..2], &head[2..4]].map(|bytes| self.unsigned(bytes) as u16);
-                Entry { tag, kind, count: self.unsigned(&head[4..]), inline, room }
+                let [tag, kind] = [&header[..2], &header[2..4]].map(|bytes| self.unsigned(bytes) as u16);
+                Entry { tag, kind, count: self.unsigned(&header[4..]), inline, inline_bytes }
             });
             let directory = Directory { entries: entries.collect() };
             self.directories.push(directory);
             next = self.unsigned(link);
         }
-        if self.directories.is_empty() { Err("it holds no picture".into()) } else { Ok(()) }
+        if self.directories.is_empty() { Err("it has no picture".into()) } else { Ok(()) }
     }
 
     /// The bytes of a value, with the number of its type.
@@ -130,24 +132,24 @@ impl TiffFile {
         let Some(entry) = directory.entries.iter().find(|entry| entry.tag == tag).copied() else {
             return Ok(None);
         };
-        let bytes = (size_of_kind(entry.kind) as u64).checked_mul(entry.count).ok_or(CUT_OFF)?;
-        if bytes <= entry.room {
+        let bytes = (size_of_kind(entry.kind) as u64).checked_mul(entry.count).ok_or(TRUNCATED)?;
+        if bytes <= entry.inline_bytes {
             return Ok(Some((entry.kind, entry.inline[..bytes as usize].to_vec())));
         }
-        let offset = self.unsigned(&entry.inline[..entry.room as usize]);
+        let offset = self.unsigned(&entry.inline[..entry.inline_bytes as usize]);
         Ok(Some((entry.kind, self.read_at(offset, bytes)?)))
     }
 
-    /// A tag's whole numbers.
+    /// A tag's integers.
     pub fn integers(&mut self, directory: &Directory, tag: u16) -> Result<Option<Vec<u64>>, String> {
         let Some((kind, bytes)) = self.value(directory, tag)? else { return Ok(None) };
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
-            return Err(format!("tag {tag} is no list of whole numbers"));
+            return Err(format!("tag {tag} is not a list of integers"));
         }
         Ok(Some(bytes.chunks_exact(size_of_kind(kind)).map(|bytes| self.unsigned(bytes)).collect()))
     }
 
-    /// A tag's only or first whole number.
+    /// A tag's first integer.
     pub fn integer(&mut self, directory: &Directory, tag: u16) -> Result<Option<u64>, String> {
         Ok(self.integers(directory, tag)?.and_then(|list| list.first().copied()))
     }
@@ -161,7 +163,7 @@ impl TiffFile {
             _ => self.unsigned(bytes) as f64,
         };
         if !matches!(kind, 1 | 3 | 4 | 11 | 12 | 16) {
-            return Err(format!("tag {tag} is no list of numbers"));
+            return Err(format!("tag {tag} is not a list of numbers"));
         }
         Ok(Some(bytes.chunks_exact(size_of_kind(kind)).map(real).collect()))
     }
@@ -171,7 +173,7 @@ impl TiffFile {
         Ok(self.value(directory, tag)?.map(|(_, bytes)| bytes))
     }
 
-    /// A tag's text, up to its end mark.
+    /// A tag's text, up to the first zero byte.
     pub fn text(&mut self, directory: &Directory, tag: u16) -> Result<Option<String>, String> {
         let text = |bytes: Vec<u8>| {
             let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
@@ -185,19 +187,19 @@ impl TiffFile {
         let mut side = |tag| match self.integer(directory, tag)? {
             Some(side @ 1..) if side <= u64::from(u32::MAX) => Ok(side as u32),
             Some(side) => Err(format!("a side of {side} pixels is impossible")),
-            None => Err("it does not state its size".to_owned()),
+            None => Err("it has no size".to_owned()),
         };
         Ok([side(tag::IMAGE_WIDTH)?, side(tag::IMAGE_LENGTH)?])
     }
 
-    /// A whole number in the file's byte order.
+    /// An unsigned integer in the file's byte order.
     fn unsigned(&self, bytes: &[u8]) -> u64 {
         let add = |sum: u64, byte: &u8| sum << 8 | u64::from(*byte);
         if self.is_big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
     }
 }
 
-/// Bytes of a value of a type.
+/// Size of a value of a type, bytes.
 fn size_of_kind(kind: u16) -> usize {
     match kind {
         3 | 8 => 2,

@@ -1,9 +1,9 @@
-//! Emitted light whose texture coordinates are a set of its own.
+//! Emissive textures with their own texture coordinates.
 
 use super::*;
 
 #[test]
-fn light_on_a_second_set_of_coordinates_is_shown_where_it_lies() {
+fn emissive_texture_on_a_second_uv_set_is_shown_in_place() {
     let png = |pixels: [[u8; 3]; 2]| {
         let mut bytes = std::io::Cursor::new(Vec::new());
         image::RgbImage::from_raw(2, 1, pixels.concat())
@@ -12,7 +12,8 @@ fn light_on_a_second_set_of_coordinates_is_shown_where_it_lies() {
             .unwrap();
         bytes.into_inner()
     };
-    // The base colour is black, then blue, from left to right; the light red, then none, from bottom to top.
+    // The base colour is black on the left and blue on the right; the emissive texture red at the bottom and
+    // black at the top.
     let pictures = [png([[0, 0, 0], [0, 0, 255]]), png([[255, 0, 0], [0, 0, 0]])];
     let positions = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
     let first = floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
@@ -24,38 +25,44 @@ fn light_on_a_second_set_of_coordinates_is_shown_where_it_lies() {
         bytes.extend(pictures.concat());
         let [a, b] = [pictures[0].len(), pictures[1].len()];
         let rest = format!(
-            r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}, {{ "buffer": 0, "byteOffset": 48, "byteLength": 32 }},
-                {{ "buffer": 0, "byteOffset": 80, "byteLength": 32 }}, {{ "buffer": 0, "byteOffset": {from}, "byteLength": {a} }},
+            r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}, {{ "buffer": 0, "byteOffset": 48,
+                "byteLength": 32 }},
+                {{ "buffer": 0, "byteOffset": 80, "byteLength": 32 }}, {{ "buffer": 0, "byteOffset": {from},
+                    "byteLength": {a} }},
                 {{ "buffer": 0, "byteOffset": {then}, "byteLength": {b} }}],
-            "accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }},
-                {{ "bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2" }}, {{ "bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2" }}],
-            "images": [{{ "bufferView": 3, "mimeType": "image/png" }}, {{ "bufferView": 4, "mimeType": "image/png" }}], {sampler},
+            "accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0] }},
+                {{ "bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2" }}, {{ "bufferView": 2,
+                    "componentType": 5126, "count": 4, "type": "VEC2" }}],
+            "images": [{{ "bufferView": 3, "mimeType": "image/png" }}, {{ "bufferView": 4,
+                "mimeType": "image/png" }}], {sampler},
             "textures": [{{ "source": 0, "sampler": 0 }}, {{ "source": 1, "sampler": 0 }}],
-            "materials": [{{ "name": "lamp", "pbrMetallicRoughness": {{ "baseColorTexture": {{ "index": 0 }} }},
+            "materials": [{{ "name": "lamp",
+                "pbrMetallicRoughness": {{ "baseColorTexture": {{ "index": 0 }} }},
                 "emissiveFactor": [1, 1, 1], "emissiveTexture": {{ "index": 1, "texCoord": 1 }} {more} }}],
-            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2 }}, "mode": 5, "material": 0 }}] }}],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0, "TEXCOORD_0": 1,
+                "TEXCOORD_1": 2 }}, "mode": 5, "material": 0 }}] }}],
             "nodes": [{{ "mesh": 0 }}], "scenes": [{{ "nodes": [0] }}]"#
         );
         model(&bytes, &rest, GltfOptions::default()).unwrap()
     };
-    let found = read(&second, "");
-    assert!(found.notes.is_empty(), "{:?}", found.notes);
-    let mesh = found.place(DVec3::ZERO, 0.0, 1.0).next().unwrap();
-    // What is shown in the middle of each quarter, far from the borders between texels.
-    let at = |x: f32, y: f32| {
+    let model = read(&second, "");
+    assert!(model.notes.is_empty(), "{:?}", model.notes);
+    let mesh = model.place(DVec3::ZERO, 0.0, 1.0).next().unwrap();
+    // The colour in the middle of each quarter, far from the borders between texels.
+    let color = |x: f32, y: f32| {
         let uv = |corner: usize| mesh.shape.vertices[corner].uv;
-        let place = [0, 1].map(|k: usize| uv(0)[k] + x * (uv(1)[k] - uv(0)[k]) + y * (uv(2)[k] - uv(0)[k]));
+        let uv = [0, 1].map(|k: usize| uv(0)[k] + x * (uv(1)[k] - uv(0)[k]) + y * (uv(2)[k] - uv(0)[k]));
         let [w, h] = mesh.material.texture.size_px;
-        let pixel = [(place[0] * w as f32) as usize, (place[1] * h as f32) as usize];
-        let at = 4 * (pixel[1] * w as usize + pixel[0]);
-        mesh.material.texture.rgba8[at..at + 3].to_vec()
+        let pixel = [(uv[0] * w as f32) as usize, (uv[1] * h as f32) as usize];
+        let start = 4 * (pixel[1] * w as usize + pixel[0]);
+        mesh.material.texture.rgba8[start..start + 3].to_vec()
     };
     assert_eq!(
-        [at(0.25, 0.25), at(0.75, 0.25), at(0.25, 0.75), at(0.75, 0.75)],
+        [color(0.25, 0.25), color(0.75, 0.25), color(0.25, 0.75), color(0.75, 0.75)],
         [[255, 0, 0], [255, 0, 255], [0, 0, 0], [0, 0, 255]]
     );
-    // What cannot be told apart is left out, with its name: both triangles lie on each other in both sets, in
-    // different ways.
+    // The emissive strength is baked too.
     let strength = read(
         &second,
         r#", "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 0.5 } }"#,

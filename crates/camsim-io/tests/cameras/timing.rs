@@ -1,20 +1,21 @@
-//! Shutter times and frame rates under all their names, units and contradictions.
+//! Shutter times and frame rates: names, units, contradictions.
 
 use camsim_core::scenario::Readout;
 
-use super::Want::{Fps, Note, Readout as Ms, Without};
+use super::Expected::{Fps, Note, Readout as Ms, Without};
 use super::{check, read, refused};
 
-/// A camchain of one camera of 480 rows with more keys.
+/// A camchain of one camera with 480 rows and further keys.
 fn chain(more: &str) -> String {
     let more: String = more.lines().map(|line| format!("  {line}\n")).collect();
     format!(
-        "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [400, 400, 320, 240]\n  resolution: [640, 480]\n{more}"
+        "cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [400, 400, 320, 240]\n  \
+         resolution: [640, 480]\n{more}"
     )
 }
 
 #[test]
-fn readouts_of_24_ms_under_every_name() {
+fn readout_is_read_under_every_name() {
     for more in [
         "line_delay: 5.0e-5",
         "line_delay_nanoseconds: 50000",
@@ -36,56 +37,59 @@ fn readouts_of_24_ms_under_every_name() {
         check(
             more,
             &read("chain.yaml", &chain(more)),
-            &[Ms(24.0), Without("no shutter times"), Without("left out")],
+            &[Ms(24.0), Without("no shutter times"), Without("not applied")],
         );
     }
 }
 
 #[test]
-fn units_that_are_not_said_are_told_by_what_a_sensor_can_do() {
+fn missing_unit_is_the_only_plausible_one() {
     for (more, unit) in [
-        ("readout_time: 0.024", "was read in s:"),
-        ("readout_time: 24", "was read in ms:"),
-        ("readout_time: 24000", "was read in us:"),
-        ("readout_time: 24000000", "was read in ns:"),
-        ("rolling_shutter_skew: 24000000", "was read in ns:"),
-        ("row_time: 50", "was read in us:"),
-        ("rolling_shutter_time: 0.024", "was read in s:"),
+        ("readout_time: 0.024", "is read in s,"),
+        ("readout_time: 24", "is read in ms,"),
+        ("readout_time: 24000", "is read in us,"),
+        ("readout_time: 24000000", "is read in ns,"),
+        ("rolling_shutter_skew: 24000000", "is read in ns,"),
+        ("row_time: 50", "is read in us,"),
+        ("rolling_shutter_time: 0.024", "is read in s,"),
     ] {
         check(more, &read("chain.yaml", &chain(more)), &[Ms(24.0), Note(unit)]);
     }
 }
 
 #[test]
-fn what_is_no_shutter_is_refused() {
+fn invalid_or_contradicting_timing_is_refused() {
     for (more, words) in [
         ("readout_time: 0.35", ["readout_time", "without a unit"]),
         ("readout_time: 1e12", ["readout_time", "without a unit"]),
         ("readout_time: -24", ["readout_time", "without a unit"]),
-        ("line_delay: 50", ["line_delay", "no sensor takes"]),
-        ("readout_ms: 24000", ["readout_ms", "no sensor takes"]),
-        ("line_delay: 5.0e-5\nreadout_ms: 30", ["readout_ms", "delete the one"]),
+        ("line_delay: 50", ["line_delay", "implausible"]),
+        ("readout_ms: 24000", ["readout_ms", "implausible"]),
+        ("line_delay: 5.0e-5\nreadout_ms: 30", ["readout_ms", "delete the wrong one"]),
         ("readout_ms: fast", ["readout_ms", "not a finite number"]),
         ("readout_ms: .nan", ["chain.yaml:6", "non-finite"]),
         ("rolling_shutter: 0.5", ["rolling_shutter", "neither yes"]),
-        ("shutter_type: mechanical", ["shutter_type", "rolling or global"]),
-        ("shutter_type: global\nrolling_shutter: true", ["rolling_shutter", "another thing"]),
-        ("readout_direction: inwards\nreadout_ms: 24", ["readout_direction", "no direction"]),
-        ("fps: 20\nframe_rate: 30", ["fps", "frames a second"]),
+        ("shutter_type: mechanical", ["shutter_type", "neither rolling nor global"]),
+        ("shutter_type: global\nrolling_shutter: true", ["rolling_shutter", "contradicts"]),
+        ("readout_direction: inwards\nreadout_ms: 24", ["readout_direction", "not a direction"]),
+        ("fps: 20\nframe_rate: 30", ["fps", "frames per second"]),
     ] {
         refused(more, "chain.yaml", &chain(more), &words);
     }
 }
 
 #[test]
-fn what_is_said_of_the_shutter_is_true() {
-    for (more, wants) in [
+fn notes_on_the_shutter_match_the_result() {
+    for (more, expectations) in [
         (
             "shutter_type: rolling",
             &[Ms(0.0), Note("set shutter.readout_ms"), Without("no shutter times")][..],
         ),
-        ("shutter_type: global", &[Ms(0.0), Without("no shutter times"), Without("left out")]),
-        ("shutter_type: global\nline_delay: 5.0e-5", &[Ms(0.0), Note("left out: cam0.line_delay (24 ms)")]),
+        ("shutter_type: global", &[Ms(0.0), Without("no shutter times"), Without("not applied")]),
+        (
+            "shutter_type: global\nline_delay: 5.0e-5",
+            &[Ms(0.0), Note("not applied: cam0.line_delay (24 ms)")],
+        ),
         ("line_delay: 0", &[Ms(0.0), Without("no shutter times"), Without("rows is")]),
         ("exposure_time: 0.01", &[Note("cam0.exposure_time = 0.01"), Without("no shutter times")]),
         ("shutter_speed: 500", &[Note("cam0.shutter_speed = 500"), Without("no shutter times")]),
@@ -100,8 +104,8 @@ fn what_is_said_of_the_shutter_is_true() {
             "fps: 0",
             &[
                 Fps(30.0),
-                Note("no frame rate; fps is 30"),
-                Without("no frame rate is in"),
+                Note("not a frame rate; fps is 30"),
+                Without("the file has no frame rate"),
                 Without("no frame rate and"),
             ],
         ),
@@ -109,12 +113,12 @@ fn what_is_said_of_the_shutter_is_true() {
         ("timeshift_cam_imu: 0.0", &[Without("timeshift")]),
         ("imu_rate_hz: 200", &[Fps(30.0), Note("imu_rate_hz = 200")]),
     ] {
-        check(more, &read("chain.yaml", &chain(more)), wants);
+        check(more, &read("chain.yaml", &chain(more)), expectations);
     }
 }
 
 #[test]
-fn directions() {
+fn readout_direction_is_read() {
     for (more, direction) in [
         ("readout_ms: 24\nreadout_direction: bottom_to_top", Readout::BottomToTop),
         ("readout_ms: -24\nreadout_direction: BottomToTop", Readout::TopToBottom),
@@ -129,17 +133,18 @@ fn directions() {
 }
 
 #[test]
-fn vins() {
+fn vins_rolling_shutter_is_read() {
     let text = |more: &str| {
         format!(
-            "%YAML:1.0\nmodel_type: PINHOLE\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   k1: 0.1\n   k2: 0\n   p1: 0\n   p2: 0\nprojection_parameters:\n   fx: 400\n   \
-             fy: 400\n   cx: 320\n   cy: 240\n{more}"
+            "%YAML:1.0\nmodel_type: PINHOLE\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   \
+             k1: 0.1\n   k2: 0\n   p1: 0\n   p2: 0\nprojection_parameters:\n   fx: 400\n   fy: 400\n   cx: \
+             320\n   cy: 240\n{more}"
         )
     };
     check(
         "global",
         &read("v.yaml", &text("rolling_shutter: 0\nrolling_shutter_tr: 0.033\n")),
-        &[Ms(0.0), Note("left out: rolling_shutter_tr (33 ms)")],
+        &[Ms(0.0), Note("not applied: rolling_shutter_tr (33 ms)")],
     );
     check(
         "no time",

@@ -1,26 +1,30 @@
-//! Several cameras in a file: which one is asked for, by name.
+//! Selection by name in files with several cameras.
 
-use super::Want::{Intrinsics, Note, Without};
+use super::Expected::{Intrinsics, Note, Without};
 use super::{check, import, read, refused};
 
 #[test]
-fn the_one_that_is_named() {
+fn named_camera_is_imported() {
     let colmap = "1 PINHOLE 640 480 500 500 320 240\n7 PINHOLE 640 480 600 600 320 240\n";
     let okvis = |f: &str| {
         format!(
-            "    - {{image_dimension: [640, 480], distortion_coefficients: [], distortion_type: none, focal_length: [{f}, {f}], principal_point: [319.5, 239.5]}}\n"
+            "    - {{image_dimension: [640, 480], distortion_coefficients: [], distortion_type: none, \
+             focal_length: [{f}, {f}], principal_point: [319.5, 239.5]}}\n"
         )
     };
     let okvis = format!("cameras:\n{}{}", okvis("500"), okvis("600"));
     let rig = |label: &str, f: &str| {
         format!(
-            "- camera:\n    label: {label}\n    image_height: 480\n    image_width: 640\n    type: pinhole\n    intrinsics: {{rows: 4, cols: 1, data: [{f}, {f}, 319.5, 239.5]}}\n    distortion: {{type: none, parameters: {{rows: 0, cols: 1, data: []}}}}\n"
+            "- camera:\n    label: {label}\n    image_height: 480\n    image_width: 640\n    type: \
+             pinhole\n    intrinsics: {{rows: 4, cols: 1, data: [{f}, {f}, 319.5, 239.5]}}\n    distortion: \
+             {{type: none, parameters: {{rows: 0, cols: 1, data: []}}}}\n"
         )
     };
     let rig = format!("cameras:\n{}{}", rig("left", "500"), rig("right", "600"));
     let basalt = |f: &str| {
         format!(
-            r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5, "cy": 239.5}}}}"#
+            r#"{{"camera_type": "pinhole", "intrinsics": {{"fx": {f}, "fy": {f}, "cx": 319.5,
+                "cy": 239.5}}}}"#
         )
     };
     let basalt = format!(
@@ -30,7 +34,8 @@ fn the_one_that_is_named() {
     );
     let sensor = |id: &str, f: &str| {
         format!(
-            "<sensor id=\"{id}\" label=\"camera {id}\" type=\"frame\"><calibration><resolution width=\"640\" height=\"480\"/><f>{f}</f></calibration></sensor>"
+            "<sensor id=\"{id}\" label=\"camera {id}\" type=\"frame\"><calibration><resolution width=\"640\" \
+             height=\"480\"/><f>{f}</f></calibration></sensor>"
         )
     };
     let metashape = format!(
@@ -55,7 +60,8 @@ fn the_one_that_is_named() {
         format!("[image]\n\nwidth\n640\n\nheight\n480\n\n{}{}", ini("left", "500"), ini("right", "600"));
     let sfm = |name: &str, f: f64| {
         format!(
-            r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {}, "k1": 0, "k2": 0}}"#,
+            r#""{name}": {{"projection_type": "perspective", "width": 640, "height": 480, "focal": {},
+                "k1": 0, "k2": 0}}"#,
             f / 640.0
         )
     };
@@ -80,21 +86,23 @@ fn the_one_that_is_named() {
             check(
                 &format!("{file} {name}"),
                 &imported,
-                &[Intrinsics([f, f, 319.5, 239.5]), Without("left out")],
+                &[Intrinsics([f, f, 319.5, 239.5]), Without("not applied")],
             );
         }
         let error = import(file, text, None, Some("nobody")).unwrap_err();
-        assert!(error.contains("none is called `nobody`"), "{file}: {error}");
+        assert!(error.contains("there is no `nobody`"), "{file}: {error}");
     }
 }
 
 #[test]
-fn one_alone_need_not_be_named() {
-    let one = "cam3:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [400, 400, 320, 240]\n  resolution: [640, 480]\n";
+fn single_camera_needs_no_name() {
+    let one = "cam3:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [400, 400, 320, \
+               240]\n  resolution: [640, 480]\n";
     check("cam3", &read("chain.yaml", one), &[Intrinsics([400.0, 400.0, 320.0, 240.0])]);
-    let nameless = "image_width: 640\nimage_height: 480\ncam_model: Pinhole\ncam_width: 640\ncam_height: 480\ncam_fx: 400\ncam_fy: 400\ncam_cx: 320\ncam_cy: 240\n";
+    let nameless = "image_width: 640\nimage_height: 480\ncam_model: Pinhole\ncam_width: 640\ncam_height: \
+                    480\ncam_fx: 400\ncam_fy: 400\ncam_cx: 320\ncam_cy: 240\n";
     check("vikit", &read("cam.yaml", nameless), &[Note("image_width = 640")]);
     let error = import("cam.yaml", nameless, None, Some("cam0")).unwrap_err();
-    assert!(error.contains("leave `--camera` out"), "{error}");
-    refused("two of one name", "rig.yaml", "cameras: []\n", &["no camera file"]);
+    assert!(error.contains("omit `--camera`"), "{error}");
+    refused("two of one name", "rig.yaml", "cameras: []\n", &["not a known camera file"]);
 }

@@ -1,19 +1,20 @@
-//! OpenCV's files: which model, which matrix, which size.
+//! OpenCV files: lens model, camera matrix, image size.
 
 use camsim_core::scenario::LensModel::{BrownConrady, KannalaBrandt};
 
-use super::Want::{Intrinsics, Lens, Note, Size};
+use super::Expected::{Intrinsics, Lens, Note, Size};
 use super::{check, import, read, refused};
 
-/// A file of one camera with this list of coefficients.
+/// A file of one camera with a list of coefficients and further keys.
 fn file(list: &str, more: &str) -> String {
     format!(
-        "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: [400, 0, 320, 0, 401, 240, 0, 0, 1]\ndist_coeffs: [{list}]\n{more}\n"
+        "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: [400, 0, 320, 0, 401, 240, 0, \
+         0, 1]\ndist_coeffs: [{list}]\n{more}\n"
     )
 }
 
 #[test]
-fn words_that_name_the_model() {
+fn model_is_detected_by_keys_and_texts() {
     let four = "0.1, 0.2, 0.003, 0.004";
     let list: &[f64] = &[0.1, 0.2, 0.003, 0.004];
     for (more, model) in [
@@ -36,7 +37,7 @@ fn words_that_name_the_model() {
 }
 
 #[test]
-fn two_readings_are_refused() {
+fn ambiguous_or_contradicting_files_are_refused() {
     let (four, five) = ("0.1, 0.2, 0.003, 0.004", "0.1, 0.2, 0.003, 0.004, 0.5");
     for (list, more, words) in [
         (four, "", ["dist_coeffs", "--format opencv-fisheye"]),
@@ -54,12 +55,12 @@ fn two_readings_are_refused() {
         (
             five,
             "fisheye_model: 0\ncamera_model: fisheye",
-            ["camera_model", "another model than fisheye_model"],
+            ["camera_model", "contradicts the model of fisheye_model"],
         ),
         (
             five,
             "distortion_coefficients: [0.5, 0, 0, 0, 0]",
-            ["dist_coeffs", "another thing than distortion_coefficients"],
+            ["dist_coeffs", "differs from distortion_coefficients"],
         ),
         (
             five,
@@ -67,7 +68,7 @@ fn two_readings_are_refused() {
             ["cameras", "there are 2 (`camera_matrix`, `K`)"],
         ),
         (five, "image_size: [752, 480]", ["image_size", "752"]),
-        (five, "img_shape: [480, 640]", ["img_shape", "rows first"]),
+        (five, "img_shape: [480, 640]", ["img_shape", "ambiguous"]),
         (five, "skew: 0.3", ["skew", "recalibrate"]),
         (five, "binning: 2", ["binning", "binned"]),
         (five, "p3: 0.1", ["p3", "coefficient"]),
@@ -79,14 +80,14 @@ fn two_readings_are_refused() {
 }
 
 #[test]
-fn a_matrix_that_is_none() {
+fn invalid_matrices_are_refused() {
     let five = "0.1, 0.2, 0.003, 0.004, 0.5";
     for (matrix, words) in [
         ("400, 0, 0, 0, 401, 0, 320, 240, 1", ["camera_matrix", "transposed"]),
         ("400, 0.7, 320, 0, 401, 240, 0, 0, 1", ["camera_matrix", "skew of 0.7"]),
         ("400, 0, 320, 0, 401, 240, 0, 0, 2", ["camera_matrix", "last row"]),
         ("400, 0, 320, 0, -401, 240, 0, 0, 1", ["focal_px", "-401"]),
-        ("0.625, 0, 0.5, 0, 0.626, 0.5, 0, 0, 1", ["focal length", "fractions"]),
+        ("0.625, 0, 0.5, 0, 0.626, 0.5, 0, 0, 1", ["focal length", "fraction"]),
         ("8.8, 0, 320, 0, 8.8, 240, 0, 0, 1", ["focal length", "millimetres"]),
         ("400, 0, 320, 0, .inf, 240, 0, 0, 1", ["out.yml:5", "non-finite"]),
     ] {
@@ -100,7 +101,7 @@ fn a_matrix_that_is_none() {
 }
 
 #[test]
-fn what_is_odd_is_spoken_of() {
+fn implausible_and_unknown_values_are_reported() {
     let five = "0.1, 0.2, 0.003, 0.004, 0.5";
     for (from, to, note) in [
         (
@@ -109,10 +110,14 @@ fn what_is_odd_is_spoken_of() {
             "outside of the picture",
         ),
         ("image_width: 640\nimage_height: 480", "image_width: 1280\nimage_height: 960", "about 641 x 481"),
-        ("image_width: 640\nimage_height: 480", "image_width: 480\nimage_height: 640", "is it turned?"),
+        (
+            "image_width: 640\nimage_height: 480",
+            "image_width: 480\nimage_height: 640",
+            "whether it is rotated",
+        ),
         ("401, 240", "900, 240", "factor of two"),
         ("[400, 0, 320, 0, 401", "[50, 0, 320, 0, 50", "162 degrees"),
-        ("image_width", "Readout_time_ms: 12\nimage_width", "no frame rate is in the file"),
+        ("image_width", "Readout_time_ms: 12\nimage_width", "the file has no frame rate"),
         (
             "image_width",
             "new_camera_matrix: [380, 0, 320, 0, 381, 240, 0, 0, 1]\nimage_width",
@@ -132,7 +137,7 @@ fn what_is_odd_is_spoken_of() {
 }
 
 #[test]
-fn names_of_other_programs() {
+fn key_names_of_other_programs_are_accepted() {
     let matrix = "[[400, 0, 320], [0, 401, 240], [0, 0, 1]]";
     let list = "[[0.1, 0.2, 0.003, 0.004, 0.5]]";
     for text in [
@@ -141,28 +146,29 @@ fn names_of_other_programs() {
         format!("{{\"cameraMatrix\": {matrix}, \"distCoeffs\": {list}, \"imageSize\": [640, 480]}}"),
         format!("{{\"camera_matrix\": {matrix}, \"dist_coeff\": {list}, \"img_size\": [640, 480]}}"),
         format!(
-            "CameraMat: {{rows: 3, cols: 3, dt: d, data: {matrix}}}\nDistCoeff: {list}\nImageSize: [640, 480]\n"
+            "CameraMat: {{rows: 3, cols: 3, dt: d, data: {matrix}}}\nDistCoeff: {list}\nImageSize: [640, \
+             480]\n"
         ),
     ] {
-        let wants = [
+        let expectations = [
             Size([640, 480]),
             Intrinsics([400.0, 401.0, 320.0, 240.0]),
             Lens(BrownConrady, &[0.1, 0.2, 0.003, 0.004, 0.5]),
             Note("no shutter times"),
         ];
-        check(&text, &read("camera.json", &text), &wants);
+        check(&text, &read("camera.json", &text), &expectations);
     }
     refused(
         "no coefficients",
         "camera.json",
         &format!("{{\"K\": {matrix}, \"width\": 640, \"height\": 480}}"),
-        &["distortion_coefficients", "missing, beside K"],
+        &["distortion_coefficients", "is missing for K"],
     );
     refused("no size", "camera.json", &format!("{{\"K\": {matrix}, \"D\": {list}}}"), &["image_width"]);
     refused(
         "a key twice",
         "camera.json",
         &format!("{{\"K\": {matrix}, \"D\": {list}, \"D\": [0,0,0,0,0], \"width\": 640, \"height\": 480}}"),
-        &["`D` is there twice"],
+        &["duplicate key `D`"],
     );
 }

@@ -1,20 +1,22 @@
-//! ROS: regions of interest, binning, rectification, and what `rostopic echo` prints around a message.
+//! ROS: regions of interest, binning, rectification, and the output of `rostopic echo`.
 
 use camsim_core::scenario::LensModel::{BrownConrady, KannalaBrandt, Pinhole};
 
-use super::Want::{Intrinsics, Lens, Note, Size, Without};
+use super::Expected::{Intrinsics, Lens, Note, Size, Without};
 use super::{check, read, refused};
 
-const FILE: &str = "image_width: 1280\nimage_height: 800\ncamera_name: c\ncamera_matrix: {rows: 3, cols: 3, data: [400, 0, 630, 0, 404, 376, 0, 0, 1]}\ndistortion_model: plumb_bob\n\
-    distortion_coefficients: {rows: 1, cols: 5, data: [0.015, -0.043, -0.0012, -0.0015, 0.009]}\n";
+const FILE: &str = "image_width: 1280\nimage_height: 800\ncamera_name: c\ncamera_matrix: {rows: 3, cols: 3, \
+                    data: [400, 0, 630, 0, 404, 376, 0, 0, 1]}\ndistortion_model: \
+                    plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0.015, -0.043, -0.0012, \
+                    -0.0015, 0.009]}\n";
 
 fn with(more: &str) -> String {
     format!("{FILE}{more}\n")
 }
 
 #[test]
-fn regions_and_binning() {
-    for (more, size, wanted) in [
+fn region_and_binning_change_size_and_matrix() {
+    for (more, size, expected) in [
         (
             "roi: {x_offset: 0, y_offset: 0, width: 0, height: 0, do_rectify: false}",
             [1280, 800],
@@ -34,7 +36,7 @@ fn regions_and_binning() {
         ("binning_x: 2\nbinning_y: 1", [640, 800], [200.0, 404.0, 315.0, 376.0]),
         ("binning_x: 0\nbinning_y: 0", [1280, 800], [400.0, 404.0, 630.0, 376.0]),
     ] {
-        check(more, &read("info.yaml", &with(more)), &[Size(size), Intrinsics(wanted)]);
+        check(more, &read("info.yaml", &with(more)), &[Size(size), Intrinsics(expected)]);
     }
     for (more, words) in [
         ("roi: {x_offset: 700, y_offset: 0, width: 640, height: 400}", ["roi", "not within"]),
@@ -59,7 +61,7 @@ fn regions_and_binning() {
 }
 
 #[test]
-fn rectification_is_spoken_of_where_there_is_one() {
+fn rectification_is_reported_unless_identity() {
     let identity = "rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}";
     let same = "projection_matrix: {rows: 3, cols: 4, data: [400, 0, 630, 0, 0, 404, 376, 0, 0, 0, 1, 0]}";
     check(
@@ -99,7 +101,7 @@ fn rectification_is_spoken_of_where_there_is_one() {
 }
 
 #[test]
-fn models_of_ros() {
+fn ros_models_are_imported_or_refused() {
     let other = |from: &str, to: &str| FILE.replace(from, to);
     let four = "{rows: 1, cols: 4, data: [0.1, 0.2, 0.3, 0.4]}";
     let list = "{rows: 1, cols: 5, data: [0.015, -0.043, -0.0012, -0.0015, 0.009]}";
@@ -122,20 +124,20 @@ fn models_of_ros() {
     );
     for (text, words) in [
         (eight, ["distortion_coefficients", "five"]),
-        (other("plumb_bob", "\"\""), ["distortion_coefficients", "says nothing"]),
+        (other("plumb_bob", "\"\""), ["distortion_coefficients", "is empty"]),
         (other("plumb_bob", "thin_prism"), ["distortion_model", "`thin_prism`"]),
         (other(list, "[0.1, 0.2, 0.3]"), ["distortion_coefficients", "has 3 numbers"]),
         (other("plumb_bob", "equidistant"), ["distortion_coefficients", "fisheye has four"]),
         (
             other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[0, 0, 0, 0, 0, 0, 0, 0, 0]"),
-            ["camera_matrix", "never calibrated"],
+            ["camera_matrix", "not calibrated"],
         ),
         (
             other("[400, 0, 630, 0, 404, 376, 0, 0, 1]", "[400, 0, 0, 0, 404, 0, 630, 376, 1]"),
             ["camera_matrix", "transposed"],
         ),
-        (with("K: [500, 0, 630, 0, 404, 376, 0, 0, 1]"), ["K", "another thing than camera_matrix"]),
-        (with("width: 640"), ["width", "another thing than image_width"]),
+        (with("K: [500, 0, 630, 0, 404, 376, 0, 0, 1]"), ["K", "differs from camera_matrix"]),
+        (with("width: 640"), ["width", "differs from image_width"]),
         (with("image_width: 640"), ["i.yaml", "duplicate"]),
         (
             other("distortion_coefficients", "distortion_coefficents"),
@@ -149,18 +151,25 @@ fn models_of_ros() {
 }
 
 #[test]
-fn messages_as_they_are_printed() {
-    let one = "header: \n  seq: 1\n  stamp: {secs: 1, nsecs: 5}\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: \"plumb_bob\"\nD: [0.1, 0.2, 0.003, 0.004, 0.0]\n\
-               K: [400.0, 0.0, 320.0, 0.0, 401.0, 240.0, 0.0, 0.0, 1.0]\nR: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\nP: [400.0, 0.0, 320.0, 0.0, 0.0, 401.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0]\n\
-               binning_x: 0\nbinning_y: 0\nroi: \n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: False\n---\n";
-    let wants = [
+fn echoed_messages_are_imported() {
+    let one = "header: \n  seq: 1\n  stamp: {secs: 1, nsecs: 5}\n  frame_id: cam\nheight: 480\nwidth: \
+               640\ndistortion_model: \"plumb_bob\"\nD: [0.1, 0.2, 0.003, 0.004, 0.0]\nK: [400.0, 0.0, \
+               320.0, 0.0, 401.0, 240.0, 0.0, 0.0, 1.0]\nR: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, \
+               1.0]\nP: [400.0, 0.0, 320.0, 0.0, 0.0, 401.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0]\nbinning_x: \
+               0\nbinning_y: 0\nroi: \n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: \
+               False\n---\n";
+    let expectations = [
         Size([640, 480]),
         Intrinsics([400.0, 401.0, 320.0, 240.0]),
         Lens(BrownConrady, &[0.1, 0.2, 0.003, 0.004]),
-        Without("left out"),
+        Without("not applied"),
     ];
-    check("one", &read("echo.yaml", one), &wants);
-    check("two alike", &read("echo.yaml", &format!("{one}{}", one.replace("seq: 1", "seq: 2"))), &wants);
+    check("one", &read("echo.yaml", one), &expectations);
+    check(
+        "two alike",
+        &read("echo.yaml", &format!("{one}{}", one.replace("seq: 1", "seq: 2"))),
+        &expectations,
+    );
     refused(
         "two that differ",
         "echo.yaml",

@@ -1,11 +1,11 @@
-//! Colour for terrain without a picture: tinted by height, shaded from the north-west if the scene has no
-//! light of its own.
+//! Texture of terrain without an ortho-image: hypsometric tints, hillshaded from the north-west if the scene
+//! has no light.
 
 use camsim_core::scene::{Encoding, Texture};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Height tints from the lowest to the highest point, sRGB.
+/// Hypsometric tints from the lowest to the highest point, sRGB.
 const TINTS: [[f64; 3]; 5] = [
     [88.0, 125.0, 78.0],
     [140.0, 155.0, 95.0],
@@ -14,27 +14,27 @@ const TINTS: [[f64; 3]; 5] = [
     [235.0, 235.0, 238.0],
 ];
 
-/// Light that reaches faces turned away from the sun.
+/// Relative light on faces turned away from the sun.
 const AMBIENT: f64 = 0.35;
 
-/// Rows of a band, whose points are found together.
+/// Number of rows that are processed together.
 const BAND_ROWS: usize = 32;
 
-/// One pixel a height, `shaded` or not; voids are transparent. `height_m` and `point_ned_m` by column and
-/// row.
-pub(super) fn relief(
+/// A texture with one pixel per height, hillshaded if `is_shaded`; voids are transparent. `height_m` and
+/// `point_ned_m` take column and row.
+pub(super) fn shaded_relief(
     size: [u32; 2],
     [low, high]: [f64; 2],
     height_m: &(dyn Fn([u32; 2]) -> f64 + Sync),
     point_ned_m: &(dyn Fn([u32; 2]) -> DVec3 + Sync),
-    shaded: bool,
+    is_shaded: bool,
 ) -> Texture {
     let [cols, rows] = size.map(|n| n as usize);
-    // Towards a sun in the north-west, 45 degrees up.
+    // The direction of a sun in the north-west, 45 degrees up.
     let to_sun = DVec3::new(0.5, -0.5, -std::f64::consts::FRAC_1_SQRT_2);
     let mut rgba8 = vec![0; 4 * cols * rows];
     rgba8.par_chunks_mut(4 * cols * BAND_ROWS).enumerate().for_each(|(band, pixels)| {
-        // With a row more on each side.
+        // One more row on each side, for the slopes.
         let first = (band * BAND_ROWS).saturating_sub(1);
         let past = (band * BAND_ROWS + BAND_ROWS + 1).min(rows);
         let points: Vec<DVec3> =
@@ -48,14 +48,14 @@ pub(super) fn relief(
             }
             let eastwards = point((i + 1).min(cols - 1), j) - point(i.saturating_sub(1), j);
             let southwards = point(i, (j + 1).min(rows - 1)) - point(i, j.saturating_sub(1));
-            // Beside a void there is no slope: then as level ground.
+            // Beside a void the slope is unknown and taken as level.
             let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
             let upwards = if normal.z > 0.0 { -normal } else { normal };
             let relief =
                 AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
-            let light = if shaded { relief } else { 1.0 };
-            let share = if high > low { (height - low) / (high - low) } else { 0.0 };
-            for (byte, tint) in pixel.iter_mut().zip(tint(share)) {
+            let light = if is_shaded { relief } else { 1.0 };
+            let t = if high > low { (height - low) / (high - low) } else { 0.0 };
+            for (byte, tint) in pixel.iter_mut().zip(tint(t)) {
                 *byte = (tint * light).clamp(0.0, 255.0) as u8;
             }
             pixel[3] = 255;
@@ -66,9 +66,10 @@ pub(super) fn relief(
     texture
 }
 
-fn tint(share: f64) -> [f64; 3] {
-    let position = share.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
+/// The tint at a relative height of 0 to 1, sRGB.
+fn tint(t: f64) -> [f64; 3] {
+    let position = t.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
     let below = (position as usize).min(TINTS.len() - 2);
-    let rest = position - below as f64;
-    [0, 1, 2].map(|k: usize| TINTS[below][k] + rest * (TINTS[below + 1][k] - TINTS[below][k]))
+    let fraction = position - below as f64;
+    [0, 1, 2].map(|k: usize| TINTS[below][k] + fraction * (TINTS[below + 1][k] - TINTS[below][k]))
 }

@@ -1,18 +1,27 @@
-//! Texts that are no calibration, encodings, dialects.
+//! Encodings, malformed files, and files that are not calibrations.
 
-use super::Want::{Intrinsics, Note, Size};
+use super::Expected::{Intrinsics, Note, Size};
 use super::{check, import, read, refused};
 
-const CHAIN: &str = "cam0:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0.1, 0.2, 0.003, 0.004]\n  intrinsics: [400, 401, 320, 240]\n  resolution: [640, 480]\n";
+const CHAIN: &str = "cam0:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0.1, \
+                     0.2, 0.003, 0.004]\n  intrinsics: [400, 401, 320, 240]\n  resolution: [640, 480]\n";
 
 #[test]
-fn encodings() {
-    let wants = [Size([640, 480]), Intrinsics([400.0, 401.0, 320.0, 240.0])];
-    check("CRLF", &read("c.yaml", &CHAIN.replace('\n', "\r\n")), &wants);
-    check("byte-order mark", &read("c.yaml", &format!("\u{feff}{CHAIN}")), &wants);
-    check("byte-order mark, OpenCV", &read("c.yaml", &format!("\u{feff}%YAML:1.0\n---\n{CHAIN}")), &wants);
-    check("comments", &read("c.yaml", &format!("# a\n\n{CHAIN}# z\n")), &wants);
-    check("numbers as text", &read("c.yaml", &CHAIN.replace("[400, 401,", "[\"400\", '401.',")), &wants);
+fn encodings_are_accepted() {
+    let expectations = [Size([640, 480]), Intrinsics([400.0, 401.0, 320.0, 240.0])];
+    check("CRLF", &read("c.yaml", &CHAIN.replace('\n', "\r\n")), &expectations);
+    check("byte-order mark", &read("c.yaml", &format!("\u{feff}{CHAIN}")), &expectations);
+    check(
+        "byte-order mark, OpenCV",
+        &read("c.yaml", &format!("\u{feff}%YAML:1.0\n---\n{CHAIN}")),
+        &expectations,
+    );
+    check("comments", &read("c.yaml", &format!("# a\n\n{CHAIN}# z\n")), &expectations);
+    check(
+        "numbers as text",
+        &read("c.yaml", &CHAIN.replace("[400, 401,", "[\"400\", '401.',")),
+        &expectations,
+    );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("utf16.yaml");
     std::fs::write(&path, CHAIN.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>()).unwrap();
@@ -21,56 +30,57 @@ fn encodings() {
 }
 
 #[test]
-fn kalibrs_files_gone_wrong() {
+fn malformed_kalibr_files_are_refused() {
     for (from, to, words) in [
         ("pinhole", "omni", ["cam0.camera_model", "omnidirectional"]),
         ("pinhole", "ds", ["cam0.camera_model", "double sphere"]),
         ("pinhole", "eucm", ["cam0.camera_model", "extended unified"]),
         ("radtan", "fov", ["cam0.distortion_model", "field-of-view"]),
-        ("radtan", "none", ["cam0.distortion_coeffs", "says that there is none"]),
-        ("distortion_model: radtan", "distortion_mode: radtan", ["cam0.distortion_coeffs", "says nothing"]),
+        ("radtan", "none", ["cam0.distortion_coeffs", "states no distortion"]),
+        ("distortion_model: radtan", "distortion_mode: radtan", ["cam0.distortion_coeffs", "is empty"]),
         ("  distortion_coeffs: [0.1, 0.2, 0.003, 0.004]\n", "", ["cam0.distortion_coeffs", "is missing"]),
         ("distortion_coeffs", "distortion_coefs", ["cam0.distortion_coeffs", "is missing"]),
         ("0.003, 0.004]", "0.003]", ["cam0.distortion_coeffs", "has 3 numbers"]),
         ("[400, 401, 320, 240]", "[0.9, 400, 401, 320, 240]", ["cam0.intrinsics", "has 5 numbers"]),
-        ("[640, 480]", "[640, 480.5]", ["cam0.resolution", "whole numbers"]),
+        ("[640, 480]", "[640, 480.5]", ["cam0.resolution", "positive integers"]),
         ("[400, 401, 320, 240]", "[400 401 320 240]", ["cam0.intrinsics", "not a list"]),
         ("[400, 401,", "[\"400,5\", 401,", ["cam0.intrinsics", "finite"]),
         ("[640, 480]\n", "[640, 480]\n  resolution: [752, 480]\n", ["c.yaml", "duplicate"]),
         (
             "[640, 480]\n",
             "[640, 480]\n  distortion_coefficients: [0, 0, 0, 0]\n",
-            ["cam0.distortion_coefficients", "another thing"],
+            ["cam0.distortion_coefficients", "differs from"],
         ),
         ("[640, 480]\n", "[640, 480]\n  skew: 1.5\n", ["cam0.skew", "1.5"]),
         ("[640, 480]\n", "[640, 480]\n  xi: 0.9\n", ["cam0.xi", "MEI"]),
     ] {
         refused(to, "c.yaml", &CHAIN.replace(from, to), &words);
     }
-    let noted = import(
+    let imported = import(
         "c.yaml",
         &CHAIN.replace("[640, 480]\n", "[640, 480]\n  focal_mm: 8.8\n  pixel_pitch_um: 3.4\n"),
         None,
         None,
     )
     .unwrap();
-    check("unknown", &noted, &[Note("cam0.focal_mm = 8.8, cam0.pixel_pitch_um = 3.4")]);
+    check("unknown", &imported, &[Note("cam0.focal_mm = 8.8, cam0.pixel_pitch_um = 3.4")]);
 }
 
 #[test]
-fn ros_ini_gone_wrong() {
-    let ini = "# oST version 5.0 parameters\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[cam]\n\ncamera matrix\n400 0 320\n0 401 240\n0 0 1\n\ndistortion\n0.1 0.2 0.003 0.004 0.5\n\nrectification\n1 0 0\n0 1 0\n0 0 1\n\n\
-               projection\n400 0 320 0\n0 401 240 0\n0 0 1 0\n";
+fn malformed_ros_ini_files_are_refused() {
+    let ini = "# oST version 5.0 parameters\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[cam]\n\ncamera \
+               matrix\n400 0 320\n0 401 240\n0 0 1\n\ndistortion\n0.1 0.2 0.003 0.004 \
+               0.5\n\nrectification\n1 0 0\n0 1 0\n0 0 1\n\nprojection\n400 0 320 0\n0 401 240 0\n0 0 1 0\n";
     check("good", &read("c.ini", ini), &[Size([640, 480]), Intrinsics([400.0, 401.0, 320.0, 240.0])]);
     for (from, to, words) in [
-        ("0.1 0.2 0.003 0.004 0.5", "0.1 0.2 0.003 0.004", ["distortion", "cannot name a model"]),
+        ("0.1 0.2 0.003 0.004 0.5", "0.1 0.2 0.003 0.004", ["distortion", "cannot state a model"]),
         ("0.1 0.2 0.003 0.004 0.5", "0.1 0.2 0.003 0.004 0.5 0 0 0 0.1", ["distortion", "has 9 numbers"]),
         ("distortion\n0.1 0.2 0.003 0.004 0.5\n", "", ["distortion", "missing"]),
         ("0 0 1\n\ndistortion", "0 0\n\ndistortion", ["camera_matrix", "has 8 numbers"]),
-        ("width\n640", "width\n640\n\nwidth\n752", ["c.ini", "twice"]),
+        ("width\n640", "width\n640\n\nwidth\n752", ["c.ini", "duplicate"]),
         ("height\n480\n", "", ["height", "missing"]),
         ("400 0 320\n0 401", "400 0.5 320\n0 401", ["camera_matrix", "skew"]),
-        ("[image]", "[image]\n12\n", ["c.ini:4", "below a name"]),
+        ("[image]", "[image]\n12\n", ["c.ini:4", "follow a name"]),
     ] {
         refused(to, "c.ini", &ini.replacen(from, to, 1), &words);
     }
@@ -80,12 +90,12 @@ fn ros_ini_gone_wrong() {
 }
 
 #[test]
-fn what_is_no_calibration_is_told_what_it_is() {
+fn other_files_are_refused_with_a_hint() {
     refused(
         "a CAMERA.toml",
         "CAMERA.toml",
         "size_px = [640, 480]\nfocal_px = [500.0, 500.0]\n",
-        &["as it is"],
+        &["needs no import"],
     );
     refused(
         "a bad CAMERA.toml",
@@ -97,13 +107,13 @@ fn what_is_no_calibration_is_told_what_it_is() {
         "lensfun",
         "db.xml",
         "<lensdatabase><lens><model>x</model></lens></lensdatabase>",
-        &["data base of lenses"],
+        &["lens database"],
     );
     refused(
         "a distortion alone",
         "d.yaml",
         "distortion_model: plumb_bob\nD: [0, 0, 0, 0, 0]\n",
-        &["no camera matrix"],
+        &["no 3 x 3 camera matrix"],
     );
     refused(
         "nerfstudio",
@@ -129,8 +139,8 @@ fn what_is_no_calibration_is_told_what_it_is() {
         "ImageSize: [480, 640]\nIntrinsicMatrix: [[400, 0, 0], [0, 401, 0], [320, 240, 1]]\n",
         &["transposed"],
     );
-    refused("a list", "l.json", "[1, 2, 3]", &["no camera file", "COLMAP"]);
-    refused("a number", "n.yaml", "12\n", &["no camera file"]);
+    refused("a list", "l.json", "[1, 2, 3]", &["not a known camera file", "COLMAP"]);
+    refused("a number", "n.yaml", "12\n", &["not a known camera file"]);
     refused("nothing", "e.json", "", &["empty"]);
     refused("comments alone", "e.yaml", "# nothing\n", &["e.yaml"]);
     refused("cut off", "c.json", "{\"K\": [[1, 2", &["c.json:1", "JSON"]);
