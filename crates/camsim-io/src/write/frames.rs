@@ -12,7 +12,7 @@ use std::{
 
 use camsim_core::{
     frame::{COORDS_CHANNELS, RenderedFrame},
-    scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
+    scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec, PlaneKind},
 };
 
 use super::{WriteError, atomic, exr_file, png_file, tables, write_atomic};
@@ -33,6 +33,8 @@ enum OutputFile {
     Valid,
     Coords,
     Rows,
+    /// A channel of [`RenderedFrame::planes`].
+    Plane(Channel, PlaneKind),
 }
 
 impl FrameFiles {
@@ -109,7 +111,7 @@ impl FrameFiles {
             return files;
         }
         for channel in &self.output.channels {
-            let channel_files = match channel {
+            let channel_files = match *channel {
                 Channel::Color => {
                     self.output.format.iter().map(|&format| OutputFile::Color(format)).collect()
                 }
@@ -117,6 +119,7 @@ impl FrameFiles {
                 Channel::Valid => vec![OutputFile::Valid],
                 Channel::Coords => vec![OutputFile::Coords],
                 Channel::Rows => vec![OutputFile::Rows],
+                plane => plane.plane().map(|kind| OutputFile::Plane(plane, kind)).into_iter().collect(),
             };
             // A channel or format that is listed twice gives one file.
             channel_files.into_iter().for_each(|file| {
@@ -151,6 +154,12 @@ impl FrameFiles {
                     exr(&["u", "v", "x", "y", "dt", "n", "e", "d"], samples, ExrPixel::Float)?
                 }
                 OutputFile::Rows => tables::rows_csv(&frame.rows).into_bytes(),
+                OutputFile::Plane(channel, PlaneKind::Float(names)) => {
+                    exr(names, frame.floats(channel).unwrap_or_default(), ExrPixel::Float)?
+                }
+                OutputFile::Plane(channel, PlaneKind::Index) => {
+                    png_file::encode_indices(&path, frame.size_px, frame.indices(channel).unwrap_or_default())?
+                }
             };
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
@@ -168,6 +177,7 @@ fn column_name(file: OutputFile) -> &'static str {
         OutputFile::Valid => "valid",
         OutputFile::Coords => "coords",
         OutputFile::Rows => "rows",
+        OutputFile::Plane(channel, _) => channel.name(),
     }
 }
 
@@ -180,6 +190,8 @@ fn file_name(file: OutputFile, index: u64) -> String {
         OutputFile::Valid => ("valid", "png"),
         OutputFile::Coords => ("coords", "exr"),
         OutputFile::Rows => ("rows", "csv"),
+        OutputFile::Plane(channel, PlaneKind::Float(_)) => (channel.name(), "exr"),
+        OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
     };
     format!("{folder}/frame_{index:06}.{ending}")
 }
@@ -194,6 +206,12 @@ fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteE
             ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS)
         }
         OutputFile::Rows => ("rows", frame.rows.len().min(1), 1),
+        OutputFile::Plane(channel, PlaneKind::Float(names)) => {
+            (channel.name(), frame.floats(channel).map_or(0, <[f32]>::len), pixels * names.len())
+        }
+        OutputFile::Plane(channel, PlaneKind::Index) => {
+            (channel.name(), frame.indices(channel).map_or(0, <[u32]>::len), pixels)
+        }
     };
     for (channel, size, needed) in files.iter().map(|&file| sizes(file)) {
         if size != needed || pixels == 0 {

@@ -48,6 +48,19 @@ pub(super) fn encode_valid(path: &Path, frame: &RenderedFrame) -> Result<Vec<u8>
     encode(path, frame.size_px, &bytes, ExtendedColorType::L8)
 }
 
+/// Encodes numbers of objects or classes as 16 bit grey.
+pub(super) fn encode_indices(path: &Path, size_px: [u32; 2], indices: &[u32]) -> Result<Vec<u8>, WriteError> {
+    let mut bytes = Vec::with_capacity(2 * indices.len());
+    for &index in indices {
+        let index = u16::try_from(index).map_err(|_| WriteError::Encode {
+            path: path.into(),
+            message: format!("number {index} is above 65535, the largest that a 16 bit PNG holds"),
+        })?;
+        bytes.extend(index.to_ne_bytes());
+    }
+    encode(path, size_px, &bytes, ExtendedColorType::L16)
+}
+
 fn encode(
     path: &Path,
     [width, height]: [u32; 2],
