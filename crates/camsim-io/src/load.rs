@@ -94,12 +94,8 @@ pub enum LoadError {
     },
     /// A model is farther away than [`FARTHEST_M`].
     #[error(
-<<<<<<< HEAD
         "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
-            {FARTHEST_M:.0e}: check its place and scale"
-=======
-        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than {MAX_RADIUS_M:.0e}: check its place and scale"
->>>>>>> n-iob
+            {MAX_RADIUS_M:.0e}: check its place and scale"
     )]
     TooFar {
         /// The model.

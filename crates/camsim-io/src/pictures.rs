@@ -126,15 +126,9 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
     if is_tiff(path)? {
         let raster = Raster::read(path)?;
         let pixels = raster.size[0] as usize * raster.size[1] as usize;
-<<<<<<< HEAD
         // Float values up to 255 would all be clipped to white.
-        let max = if raster.depth_is_whole() == Some(false) {
+        let max = if raster.is_integer_depth() == Some(false) {
             (0..pixels).map(|pixel| raster.value(pixel)).fold(0.0, f64::max)
-=======
-        // Floats of 0 to 255 would be white throughout.
-        let most = if raster.is_integer_depth() == Some(false) {
-            (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max)
->>>>>>> n-iob
         } else {
             0.0
         };

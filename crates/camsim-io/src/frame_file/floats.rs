@@ -68,11 +68,7 @@ fn read_tiff(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<StoredD
     })?;
     read_sidecar_mask(path, &mut raster)
         .map_err(|error| failure(path, format!("has a mask beside it that {}", error.reason())))?;
-<<<<<<< HEAD
-    let Some(is_integer) = raster.depth_is_whole() else {
-=======
-    let Some(whole) = raster.is_integer_depth() else {
->>>>>>> n-iob
+    let Some(is_integer) = raster.is_integer_depth() else {
         return Err(failure(
             path,
             "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of \
@@ -133,13 +129,8 @@ fn stated_scale(
     if scale == 0.0 {
         return Err(failure(path, "states a scale of 0 (GDAL_METADATA): correct the file"));
     }
-<<<<<<< HEAD
-    let unit_m = band.unit.as_deref().map(unit_of_name);
-    let statement = format!(
-=======
     let unit_m = band.unit.as_deref().map(metres_per_unit_name);
-    let said = format!(
->>>>>>> n-iob
+    let statement = format!(
         "SCALE {scale}, OFFSET {offset}, UNITTYPE {} (GDAL_METADATA)",
         band.unit.as_ref().map_or("none".to_owned(), |unit| format!("`{unit}`"))
     );

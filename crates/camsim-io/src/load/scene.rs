@@ -143,13 +143,8 @@ fn add_model(
             };
             position_ned_m.z = ground_down_m;
         }
-<<<<<<< HEAD
-        let reach_m = position_ned_m.length() + model.reach_m * spec.scale * scale;
-        if reach_m.is_nan() || reach_m > FARTHEST_M {
-=======
-        let reach_m = at_ned_m.length() + model.radius_m * spec.scale * scale;
+        let reach_m = position_ned_m.length() + model.radius_m * spec.scale * scale;
         if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
->>>>>>> n-iob
             return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
         scene.meshes.extend(model.place(
