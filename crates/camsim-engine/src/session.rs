@@ -136,6 +136,13 @@ impl<'a> Session<'a> {
         self.coords_phase = phase;
     }
 
+    /// Has the cpu use its general code for every pass that it makes ([`CpuRenderer::set_general_only`]): for
+    /// tests, before the first frame.
+    #[doc(hidden)]
+    pub fn set_general_cpu(&mut self, general_only: bool) {
+        self.cpu.set_general_only(general_only);
+    }
+
     /// Measures from now on how long each pass takes on the gpu; `false` without one, and where it has no time
     /// stamps.
     pub fn time_passes(&mut self) -> bool {
