@@ -140,8 +140,8 @@ impl CpuRenderer {
         }
     }
 
-    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth where
-    /// the plan wants it.
+    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth
+    /// where the plan wants it.
     pub fn reverse(
         &mut self,
         inputs: &ReverseInputs<'_>,

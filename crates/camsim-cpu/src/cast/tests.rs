@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
-//! Cast frames against the reference's rays, area means and closed forms. `camsim-engine/tests/stages` compares
-//! them with the reference and with the rasteriser too.
+//! Cast frames against the reference's rays, area means and closed forms. `camsim-engine/tests/stages`
+//! compares them with the reference and with the rasteriser too.
 
 use camsim_core::{
     pose::CameraPose,

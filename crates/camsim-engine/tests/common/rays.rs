@@ -133,8 +133,8 @@ pub fn supersampled_frames(sequence: &Sequence, plan: &FramePlan, scale: u32) ->
     plan.keys.iter().map(of_key).collect()
 }
 
-/// Asserts that pixels near silhouettes are those of the twin of the silhouette rays, of a pinhole camera with
-/// blur.
+/// Asserts that pixels near silhouettes are those of the twin of the silhouette rays, of a pinhole camera
+/// with blur.
 pub fn assert_silhouettes_of_twin(sequence: &Sequence, done: &Finished) {
     let plan = &done.plan;
     let EdgeStage::Supersampled { scale, samples, .. } = plan.edges else { panic!("{:?}", plan.edges) };

@@ -232,8 +232,8 @@ const TAPS: [TapStage; 6] = [
     TapStage::SplineOrGrid { most: 4 },
 ];
 
-/// All taps with ideal pixels of three sizes, with and without blur; the taps are the innermost loop, and the last
-/// ideal pixels are the finest.
+/// All taps with ideal pixels of three sizes, with and without blur; the taps are the innermost loop, and the
+/// last ideal pixels are the finest.
 pub fn taps() -> Vec<Case> {
     let mut cases = Vec::new();
     for finer in [1.0, 1.5, 3.2] {

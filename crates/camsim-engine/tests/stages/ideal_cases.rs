@@ -267,7 +267,8 @@ fn assert_all_surfaces_are_seen(sequence: &Arc<Sequence>, plan: &FramePlan, keys
 
 /// Hills and panes that the rasteriser draws too, with so many samples a pixel.
 pub fn opaque(samples_a_pixel: u32) -> Vec<Case> {
-    // Where ground has a crease within a pixel the rasteriser shades one of its triangles: level ground has none.
+    // Where ground has a crease within a pixel the rasteriser shades one of its triangles: level ground has
+    // none.
     let (relief, reads) = match samples_a_pixel {
         1 => (1.0, &PrefilterTaps::ALL[..]),
         _ => (0.0, &[PrefilterTaps::One, PrefilterTaps::Grid][..]),

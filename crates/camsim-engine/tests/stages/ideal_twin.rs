@@ -53,7 +53,7 @@ pub fn ideal_twin(
         IdealTwin::Pattern { width_m } => {
             let offset = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
             let value = |i: usize| {
-                if inverse_depth[i] <= 0.0 || i % PIXELS_A_MEAN != 0 {
+                if inverse_depth[i] <= 0.0 || !i.is_multiple_of(PIXELS_A_MEAN) {
                     return (None, None);
                 }
                 let color = |k: u32| {

@@ -60,8 +60,8 @@ pub struct Engines {
 }
 
 impl Engines {
-    /// The cpu draws the ideal frames that are compared; output frames are all made from one ideal frame, that of
-    /// the gpu.
+    /// The cpu draws the ideal frames that are compared; output frames are all made from one ideal frame,
+    /// that of the gpu.
     pub fn new(output: Output) -> Self {
         if cfg!(skip_gpu) {
             return Self { cpu: Engine::cpu(), gpu: None };
@@ -130,7 +130,8 @@ impl Engines {
         }
         let color = |sequence| rendered(sequence, &[Channel::Color]).0.frame;
         let frame = FrameOutput {
-            color_alone: (case.output == Output::FrameAndColorAlone)
+            color_alone: (case.output == Output::FrameAndColorAlone
+                && implementation == Implementation::CpuVectorised)
                 .then(|| color(&case.sequence).color_rgba),
             photometric: case.plain.as_ref().map(|plain| with_effects(case, &color(plain))),
             ..frame_output(&done.frame, &done.plan)
@@ -185,8 +186,8 @@ fn color_of(rgba: &[f32; 4]) -> DVec3 {
     DVec3::new(rgba[0].into(), rgba[1].into(), rgba[2].into())
 }
 
-/// A plan that no planner makes, by the cpu's renderer alone. Its ideal frames are cast, but for those that are
-/// compared.
+/// A plan that no planner makes, by the cpu's renderer alone. Its ideal frames are cast, but for those that
+/// are compared.
 fn renderer_output(
     implementation: Implementation,
     case: &Case,

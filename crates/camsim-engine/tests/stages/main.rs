@@ -1,6 +1,6 @@
-//! One table of stages: every stage of a frame that can be inspected, of the vectorised cpu, the general cpu and
-//! the gpu, against the f64 twin. [`compare::run`] is the one body; [`checks::CHECKS`] says which stage of which
-//! implementation is compared with what, and within which tolerance. `--nocapture` shows the table.
+//! One table of stages: every stage of a frame that can be inspected, of the vectorised cpu, the general cpu
+//! and the gpu, against the f64 twin. [`compare::run`] is the one body; [`checks::CHECKS`] says which stage
+//! of which implementation is compared with what, and within which tolerance. `--nocapture` shows the table.
 
 #[path = "../common/mod.rs"]
 mod common;

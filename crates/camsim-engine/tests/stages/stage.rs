@@ -74,7 +74,8 @@ pub struct PixelOutput {
     /// 0 is the sky.
     pub depth_m: Option<f64>,
     pub point_ned_m: Option<DVec3>,
-    /// Whether another depth may be read if the source is rounded: at the skyline and at the border of the scene.
+    /// Whether another depth may be read if the source is rounded: at the skyline and at the border of the
+    /// scene.
     pub is_near_sky: bool,
 }
 

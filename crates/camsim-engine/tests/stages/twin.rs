@@ -3,12 +3,13 @@
 use camsim_core::{
     noise::tail_table,
     photometric::photometric,
-    reference::Oracle,
+    reference::{FrameView, Oracle},
     shutter::RowAxis,
     temporal::{
         ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyDepth, PathStage,
         displacement::{RK2_STEP_DEG, linear, rk2},
         gather, path, reproject, reproject_nodes, reproject_with,
+        unreliable_depth::{DepthGrid, changed},
     },
 };
 use camsim_cpu::RowTable;
@@ -18,7 +19,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    cases::Case,
+    cases::{Case, Input},
     stage::{FrameOutput, PixelOutput},
 };
 
@@ -49,8 +50,9 @@ pub struct Twin<'a> {
     lens_map: Vec<[f32; 2]>,
     weights: Vec<f32>,
     noise_table: Vec<f32>,
-    /// Independent of the plan: times of rows.
-    oracle: Oracle,
+    /// Independent of the plan: times of rows, and truth where look-ups of depth are unreliable.
+    view: FrameView<'a>,
+    stamp_s: f64,
 }
 
 /// A pose from an entry of the table that the renderers read.
@@ -65,6 +67,7 @@ impl<'a> Twin<'a> {
         case: &'a Case,
         plan: &'a FramePlan,
         (ideal, color_rgba, inverse_depth): &'a IdealImages,
+        oracle: &'a Oracle,
     ) -> Self {
         assert_eq!(plan.keys.len(), 1, "{}: one ideal frame", case.name);
         let rest = (DMat3::IDENTITY, DVec3::ZERO);
@@ -90,17 +93,65 @@ impl<'a> Twin<'a> {
             lens_map: if plan.ray == RayStage::LensMap { plan.camera.lens_inverse() } else { Vec::new() },
             weights: case.sequence.vignette_weights().1,
             noise_table: tail_table(),
-            oracle: Oracle::new(case.sequence.clone()).expect("a usable camera"),
+            view: oracle.view(plan.frame),
+            stamp_s: oracle.stamp_s(plan.frame),
         }
     }
 
     /// The frame; rays of a lens are those that `output` reports.
     pub fn frame(&self, output: &FrameOutput) -> FrameOutput {
+        let pixels = output.pixels.par_iter().enumerate();
+        let twin = |(i, reported): (usize, &Option<PixelOutput>)| {
+            self.pixel(self.position(i), reported.and_then(|pixel| pixel.uv))
+        };
+        let mut pixels: Vec<_> = pixels.map(twin).collect();
+        if matches!(self.case.input, Input::Frame(_)) && self.plan.has_exact_truth() {
+            self.complete(&mut pixels);
+        }
+        FrameOutput { pixels, ..FrameOutput::default() }
+    }
+
+    fn position(&self, i: usize) -> [u32; 2] {
         let width = self.plan.camera.size_px[0];
-        let pixels = output.pixels.par_iter().enumerate().map(|(i, reported)| {
-            self.pixel([i as u32 % width, i as u32 / width], reported.and_then(|pixel| pixel.uv))
-        });
-        FrameOutput { pixels: pixels.collect(), ..FrameOutput::default() }
+        [i as u32 % width, i as u32 / width]
+    }
+
+    /// Sessions cast rays for the truth of pixels whose look-up of depth is unreliable, and from each pixel
+    /// that this corrects on for its neighbours.
+    fn complete(&self, pixels: &mut [Option<PixelOutput>]) {
+        let inverse = |depth_m: f64| if depth_m > 0.0 { (1.0 / depth_m) as f32 } else { 0.0 };
+        let inverse_depth: Vec<f32> = pixels
+            .iter()
+            .map(|pixel| inverse(pixel.and_then(|pixel| pixel.depth_m).unwrap_or(0.0)))
+            .collect();
+        let valid: Vec<bool> = pixels.iter().map(Option::is_some).collect();
+        let grid = DepthGrid {
+            width: self.plan.camera.size_px[0] as usize,
+            row_step: if self.plan.shutter.interlace_s() > 0.0 { 2 } else { 1 },
+            inverse_depth: &inverse_depth,
+            valid: &valid,
+        };
+        let mut is_cast = grid.unreliable_pixels();
+        let mut to_cast: Vec<usize> = (0..pixels.len()).filter(|&i| is_cast[i]).collect();
+        while let Some(i) = to_cast.pop() {
+            let Some(pixel) = &mut pixels[i] else { continue };
+            self.cast_truth(self.position(i), pixel);
+            if !changed(inverse_depth[i], inverse(pixel.depth_m.unwrap_or(0.0))) {
+                continue;
+            }
+            let neighbours = grid.neighbours(i).filter(|&neighbour| valid[neighbour]);
+            to_cast.extend(neighbours.filter(|&neighbour| !std::mem::replace(&mut is_cast[neighbour], true)));
+        }
+    }
+
+    /// Truth by the reference's own rays: at mid-exposure, and at the phase of the source coordinates.
+    fn cast_truth(&self, position: [u32; 2], pixel: &mut PixelOutput) {
+        let sample = |phase| self.view.sample(position, DVec2::ZERO, phase);
+        let source = sample(self.case.coords_phase.into());
+        pixel.source_px = source.map(|sample| self.plan.ideal_view().source_px(&sample));
+        let hit = sample(0.0).and_then(|sample| sample.hit);
+        pixel.depth_m = Some(hit.map_or(0.0, |hit| hit.depth_m));
+        pixel.point_ned_m = hit.map(|hit| hit.point_ned_m);
     }
 
     fn map_entry(&self, [x, y]: [u32; 2]) -> Option<DVec2> {
@@ -233,7 +284,7 @@ impl<'a> Twin<'a> {
             color: DVec3::from_array(color.map(f64::from)),
             uv: Some(uv),
             imaged_px: Some(DVec2::new(pixel[0].into(), pixel[1].into())),
-            time_s: Some(self.oracle.view(plan.frame).mid_s(pixel) - self.oracle.stamp_s(plan.frame)),
+            time_s: Some(self.view.mid_s(pixel) - self.stamp_s),
             ..truth
         })
     }
