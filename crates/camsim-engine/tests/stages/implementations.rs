@@ -232,24 +232,28 @@ fn renderer_output(
     let (picture, truth) =
         renderer.reverse(&ReverseInputs { plan, uniforms: &uniforms, rows: &rows }, buffer);
     let truth = truth.expect("a plan with truth");
-    let pixel = |(rgba, truth): (&[f32; 4], &Truth)| {
-        let uv = DVec2::from_array(truth.uv.map(f64::from));
+    let pixels = picture.as_chunks::<4>().0.iter().zip(&truth).map(|(rgba, truth)| {
         assert!(rgba[3] == 1.0 || *rgba == [0.0; 4], "{}: {rgba:?}", case.name);
-        (rgba[3] > 0.0).then(|| PixelOutput {
-            color: color_of(rgba),
-            uv: Some(uv),
-            imaged_px: Some(plan.camera.project(uv)),
-            // The session adds it.
-            time_s: None,
-            source_px: Some(DVec2::from_array(truth.source_px.map(f64::from))),
-            depth_m: Some(truth.depth_m.into()),
-            point_ned_m: Some(DVec3::from_array(truth.point_ned_m.map(f64::from))),
-            is_near_sky: false,
-        })
-    };
-    let pixels = picture.as_chunks::<4>().0.iter().zip(&truth).map(pixel).collect();
-    let frame = FrameOutput { pixels, color_rgba: picture, ..FrameOutput::default() };
+        (rgba[3] > 0.0).then(|| pixel_output(rgba, truth, plan))
+    });
+    let frame =
+        FrameOutput { pixels: pixels.collect(), color_rgba: picture.clone(), ..FrameOutput::default() };
     Ok(CaseOutput { plan: plan.clone(), images: (plan.ideal, color_rgba, inverse_depth), lod, frame })
+}
+
+/// A valid pixel of a renderer. The session adds its time.
+fn pixel_output(rgba: &[f32; 4], truth: &Truth, plan: &FramePlan) -> PixelOutput {
+    let uv = DVec2::from_array(truth.uv.map(f64::from));
+    PixelOutput {
+        color: color_of(rgba),
+        uv: Some(uv),
+        imaged_px: Some(plan.camera.project(uv)),
+        time_s: None,
+        source_px: Some(DVec2::from_array(truth.source_px.map(f64::from))),
+        depth_m: Some(truth.depth_m.into()),
+        point_ned_m: Some(DVec3::from_array(truth.point_ned_m.map(f64::from))),
+        is_near_sky: false,
+    }
 }
 
 /// The terrain at full detail.

@@ -88,6 +88,7 @@ pub fn planned() -> Vec<Case> {
 }
 
 fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
+    // Long because: a line for each case.
     let set = |mut scenario: Scenario, change: &dyn Fn(&mut Scenario)| {
         change(&mut scenario);
         scenario
