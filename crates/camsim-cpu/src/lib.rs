@@ -14,6 +14,9 @@
 #![warn(missing_docs)]
 
 mod cast;
+#[cfg(test)]
+#[path = "../tests/fixtures/mod.rs"]
+mod fixtures;
 mod general;
 mod ideal;
 mod large_pages;

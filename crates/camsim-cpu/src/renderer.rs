@@ -37,6 +37,8 @@ pub struct CpuRenderer {
     meshes: Arc<SceneBatches>,
     /// Whether the rasteriser supports the scene.
     rasterises: bool,
+    /// Whether rays draw every ideal frame and the general pass makes every output frame.
+    general_only: bool,
     /// Created when an ideal frame is first rasterised.
     raster: Option<RasterScene>,
     /// Created when an ideal frame is first cast.
@@ -58,7 +60,7 @@ struct Ideal {
     cast: Vec<IdealImage>,
 }
 
-/// KernelInputs of an output frame.
+/// Inputs of the output pass.
 #[derive(Clone, Copy, Debug)]
 pub struct ReverseInputs<'a> {
     /// The plan.
@@ -77,6 +79,7 @@ impl CpuRenderer {
             kernel: Kernel::new(),
             meshes,
             rasterises: cpu_rasterises(&sequence.scene, u32::MAX),
+            general_only: false,
             raster: None,
             cast: None,
             vignette: sequence.vignette_weights().1,
@@ -85,6 +88,12 @@ impl CpuRenderer {
             last: 0,
             sequence,
         }
+    }
+
+    /// Leaves out rasteriser and vectorised pass, so that tests can compare what replaces them.
+    #[doc(hidden)]
+    pub fn set_general_only(&mut self, general_only: bool) {
+        self.general_only = general_only;
     }
 
     /// Switches to another sequence over the same scene.
@@ -109,7 +118,7 @@ impl CpuRenderer {
         ideal.size_px = plan.ideal.size_px;
         ideal.cast.clear();
         let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
-        if !(self.rasterises && is_plain) {
+        if self.general_only || !(self.rasterises && is_plain) {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
             return IdealBuffer(self.last);
@@ -131,8 +140,13 @@ impl CpuRenderer {
         }
     }
 
+<<<<<<< HEAD
     /// Output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth if the
     /// plan has it.
+=======
+    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth
+    /// where the plan wants it.
+>>>>>>> n-stages
     pub fn reverse(
         &mut self,
         inputs: &ReverseInputs<'_>,
@@ -142,13 +156,23 @@ impl CpuRenderer {
         self.fit_lens_map(plan);
         let ideal = &self.buffers[buffer];
         match inputs.rows {
+<<<<<<< HEAD
             RowTable::Poses(poses) if cpu_vectorises(plan) => match ideal.cast.first() {
                 None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
                 Some(image) => {
                     let drawn = RasterFrame::from_image(image);
                     self.vectorised(inputs, &poses.entries, drawn.texels())
+=======
+            RowTable::Poses(poses) if cpu_vectorises(plan) && !self.general_only => {
+                match ideal.cast.first() {
+                    None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
+                    Some(image) => {
+                        let drawn = DrawnFrame::from_image(image);
+                        self.vectorised(inputs, &poses.entries, drawn.texels())
+                    }
+>>>>>>> n-stages
                 }
-            },
+            }
             _ if ideal.cast.is_empty() => self.general(inputs, &[image_of(&ideal.drawn, &plan.ideal)]),
             _ => self.general(inputs, &ideal.cast),
         }
@@ -163,6 +187,9 @@ impl CpuRenderer {
     ) -> Option<(Vec<f32>, Option<Vec<Truth>>)> {
         self.fit_lens_map(inputs.plan);
         match inputs.rows {
+            RowTable::Poses(_) if self.general_only => {
+                Some(self.general(inputs, &[image_of_texels(&ideal, &inputs.plan.ideal)]))
+            }
             RowTable::Poses(poses) => Some(self.vectorised(inputs, &poses.entries, ideal)),
             RowTable::Times(_) => None,
         }
@@ -205,4 +232,21 @@ impl CpuRenderer {
 fn image_of(drawn: &RasterFrame, geometry: &IdealGeometry) -> IdealImage {
     let (color_rgba, inverse_depth) = drawn.images(geometry.size_px);
     IdealImage { geometry: *geometry, color_rgba, inverse_depth, fine: None }
+}
+
+/// A copied ideal frame in the form that the general pass reads.
+fn image_of_texels(texels: &IdealTexels<'_>, geometry: &IdealGeometry) -> IdealImage {
+    let [width, height] = geometry.size_px.map(|side| side as usize);
+    let color = texels.color.chunks(4 * texels.color_stride as usize).take(height);
+    let depth = texels.depth.chunks(texels.depth_stride as usize).take(height);
+    IdealImage {
+        geometry: *geometry,
+        color_rgba: color
+            .flat_map(|row| row[..4 * width].iter().map(|&bits| half::f16::from_bits(bits).to_f32()))
+            .collect(),
+        inverse_depth: depth
+            .flat_map(|row| row[..width].iter().map(|&depth| depth / camsim_plan::NEAR_M as f32))
+            .collect(),
+        fine: None,
+    }
 }

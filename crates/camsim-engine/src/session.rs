@@ -135,6 +135,13 @@ impl<'a> Session<'a> {
         self.coords_phase = phase;
     }
 
+    /// Has the cpu use its general code for every pass that it makes ([`CpuRenderer::set_general_only`]): for
+    /// tests, before the first frame.
+    #[doc(hidden)]
+    pub fn set_general_cpu(&mut self, general_only: bool) {
+        self.cpu.set_general_only(general_only);
+    }
+
     /// Measures the time of each gpu pass from now on; `false` without a gpu or without time stamps.
     pub fn time_passes(&mut self) -> bool {
         self.gpu.as_mut().is_some_and(GpuSession::time_passes)

@@ -12,11 +12,7 @@ use camsim_core::{
 };
 use camsim_engine::Finished;
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
-use common::{
-    engine,
-    rays::{black_ground_and_roof, roof},
-    render, scenario, sequence, steady,
-};
+use common::{engine, rays::black_ground_and_roof, render, roof, scenario, sequence, steady};
 use glam::DVec3;
 
 /// Pixels: an edge that is nearer to a pixel's centre may be seen from either side.

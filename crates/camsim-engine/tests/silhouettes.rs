@@ -5,21 +5,17 @@ mod common;
 
 use camsim_core::{
     reference::Oracle,
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
+    scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Scene, Terrain},
-    temporal::{
-        edge_mask::edge_mask,
-        silhouette_rays::{SupersampledKey, SupersampledKeys, gather_silhouette},
-        supersampled::PixelCentre,
-    },
+    temporal::{edge_mask::edge_mask, supersampled::PixelCentre},
     trajectory::Trajectory,
 };
 use camsim_engine::Finished;
 use camsim_plan::EdgeStage;
 use common::{
-    engine, pattern,
-    rays::{CastFrame, black_ground_and_roof, expected, linear_psnr, roof},
-    render, scenario, sequence, steady,
+    barrel_lens, engine, pattern,
+    rays::{assert_silhouettes_of_twin, black_ground_and_roof, expected, linear_psnr},
+    render, roof, scenario, sequence, steady,
 };
 use glam::{DVec2, DVec3};
 
@@ -78,10 +74,6 @@ fn rolling(exposure_ms: f64) -> ShutterSpec {
     ShutterSpec { readout_ms: 33.0, exposure_ms, ..ShutterSpec::default() }
 }
 
-fn lens() -> LensSpec {
-    LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] }
-}
-
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn silhouette_rays_agree_with_their_twin() {
@@ -92,45 +84,7 @@ fn silhouette_rays_agree_with_their_twin() {
     scenario.quality.key_frames = Auto::Value(1);
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
-    let plan = &done.plan;
-    let EdgeStage::Supersampled { scale, samples, .. } = plan.edges else { panic!("{:?}", plan.edges) };
-    let cast = CastFrame::new(&sequence, plan, &plan.key_pose, scale);
-    let nodes = plan.blur.expect("15 ms blur").nodes;
-    let d_uv = [DVec2::new(1.0 / plan.camera.focal_px.x, 0.0), DVec2::new(0.0, 1.0 / plan.camera.focal_px.y)];
-    let (mut sum, mut differing, mut compared) = (0.0, 0, 0);
-    for (i, _) in expected(&sequence, plan) {
-        let [x, y] = [i as u32 % 120, i as u32 / 120];
-        let uv =
-            (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px) / plan.camera.focal_px;
-        let poses: Vec<_> = (0..nodes)
-            .map(|node| {
-                let phase = f64::from(node) / f64::from(nodes - 1) - 0.5;
-                let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + phase * plan.shutter.exposure_s();
-                sequence.path.pose(t_s).relative_to(&plan.key_pose)
-            })
-            .collect();
-        let views = [SupersampledKey { nodes: &poses, image: cast.image() }];
-        let keys = SupersampledKeys {
-            views: &views,
-            row_share: 0.5,
-            exposure_share: 1.0,
-            nearest_w: cast.nearest_w(),
-        };
-        let twin = gather_silhouette(uv, d_uv, &keys, samples, &plan.ideal);
-        let error = (twin.x - f64::from(done.frame.color_rgba[4 * i])).abs();
-        sum += error;
-        compared += 1;
-        differing += u32::from(error > 1.5 / f64::from(samples));
-    }
-    let mean = sum / f64::from(compared);
-    eprintln!(
-        "twin: mean difference {mean:.1e}, {differing} of {compared} pixels differ by more than one ray"
-    );
-    // In f32 a ray may round to the next sample; a pixel on the mark's border may be gathered plainly.
-    assert!(
-        compared > 300 && mean < 2e-3 && differing * 50 < compared,
-        "{mean:.1e}, {differing} of {compared}"
-    );
+    assert_silhouettes_of_twin(&sequence, &done);
 }
 
 #[test]
@@ -139,7 +93,7 @@ fn straight_edge_of_full_contrast() {
     let still = steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO);
     check("still", &camera(), &still, &black_ground_and_roof(), [43.5, 33.0]);
     let mut with_lens = camera();
-    with_lens.camera.lens = lens();
+    with_lens.camera.lens = barrel_lens();
     check("still, lens", &with_lens, &still, &black_ground_and_roof(), [43.5, 34.0]);
 }
 
@@ -163,7 +117,7 @@ fn roof_under_a_moving_camera() {
         &black_ground_and_roof(),
         [41.0, 35.3],
     );
-    scenario.camera.lens = lens();
+    scenario.camera.lens = barrel_lens();
     let mut scene = pattern(600.0);
     scene.meshes.push(roof(60.0, 15.0));
     check(
@@ -232,7 +186,7 @@ fn ridges_before_ridges_and_sky() {
     scenario.camera.mount.angles_deg = [4.0, -12.0, 0.0];
     check("ridges, still", &scenario, &steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), &ridges(), [48.0, 35.0]);
     scenario.camera.shutter = rolling(10.0);
-    scenario.camera.lens = lens();
+    scenario.camera.lens = barrel_lens();
     check(
         "ridges, rolling shutter, blur, lens",
         &scenario,

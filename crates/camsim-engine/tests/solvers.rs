@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     reference::{CoordErrors, Oracle, coord_errors},
-    scenario::{
-        Auto, Axis, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec,
-    },
+    scenario::{Auto, Axis, Channel, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
     temporal::{
@@ -17,7 +15,7 @@ use camsim_core::{
     },
 };
 use camsim_plan::{TemporalStage, row_times};
-use common::{engine, pattern, render, render_with_ideal, scenario, sequence, steady};
+use common::{barrel_lens, engine, pattern, render, render_with_ideal, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
 #[test]
@@ -27,8 +25,7 @@ fn linear_and_rk2_agree_with_their_twins() {
     moving.camera.size_px = [160, 120];
     moving.camera.focal_px = [130.0, 130.0];
     moving.camera.mount = MountSpec { angles_deg: [8.0, -70.0, 15.0], ..MountSpec::default() };
-    moving.camera.lens =
-        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
+    moving.camera.lens = barrel_lens();
     moving.camera.shutter = ShutterSpec { readout_ms: 200.0, exposure_ms: 20.0, ..ShutterSpec::default() };
     for solver in [Solver::Linear, Solver::Rk2] {
         moving.quality.solver = Auto::Value(solver);

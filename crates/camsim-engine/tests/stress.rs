@@ -16,7 +16,7 @@ use camsim_core::{
 };
 use camsim_engine::Finished;
 use camsim_plan::{FramePlan, TemporalStage};
-use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
+use common::{engine, pattern, render_at_phase, rolling, scenario, sequence, steady};
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 
 /// A plane through `at`, and how far from `at` its picture reaches.
@@ -101,10 +101,6 @@ fn small(shutter: ShutterSpec, pitch_deg: f64) -> Scenario {
     scenario.camera.mount = MountSpec { angles_deg: [0.0, pitch_deg, 0.0], ..MountSpec::default() };
     scenario.camera.shutter = shutter;
     scenario
-}
-
-fn rolling(readout_ms: f64, exposure_ms: f64) -> ShutterSpec {
-    ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() }
 }
 
 /// At the default tolerance (p99 below 0.05 px), unless the case says more.

@@ -6,12 +6,12 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    scenario::{Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec},
+    scenario::{Channel, FieldOr, MountSpec, Readout, Scenario, ShutterSpec},
     sequence::Sequence,
 };
 use camsim_gpu::reverse::PipelineKey;
 use camsim_plan::Backend;
-use common::{city, engine, scenario, sequence, steady};
+use common::{barrel_lens, city, engine, scenario, sequence, steady};
 use glam::DVec3;
 
 /// Sides that no workgroup divides.
@@ -22,8 +22,7 @@ fn camera(readout: Readout, exposure_ms: f64, interlace_ms: f64) -> Scenario {
     scenario.camera.size_px = SIZE_PX;
     scenario.camera.focal_px = [150.0, 150.0];
     scenario.camera.mount = MountSpec { angles_deg: [3.0, -60.0, 10.0], ..MountSpec::default() };
-    scenario.camera.lens =
-        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] };
+    scenario.camera.lens = barrel_lens();
     scenario.camera.shutter = ShutterSpec {
         readout,
         readout_ms: 33.0,

@@ -92,7 +92,7 @@ pub enum LoadError {
         /// East of the placement, metres.
         east_m: f64,
     },
-    /// A model is farther away than [`FARTHEST_M`].
+    /// A model is farther away than [`MAX_RADIUS_M`].
     #[error(
         "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
             {MAX_RADIUS_M:.0e}: check its place and scale"

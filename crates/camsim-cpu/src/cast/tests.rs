@@ -1,185 +1,26 @@
 #![allow(clippy::unwrap_used)]
 
-//! Cast frames against the reference's rays, area means, the rasteriser and closed forms.
+//! Cast frames against the reference's rays, area means and closed forms. `camsim-engine/tests/stages`
+//! compares them with the reference and with the rasteriser too.
 
 use camsim_core::{
-    mount::CameraPath,
-    pose::{BodyState, CameraPose},
+    pose::CameraPose,
     reference::Oracle,
-    scenario::{Channel, FlightSpec, MountSpec, Scenario},
-    scene::{
-        Light, LodTolerance, Material, Mesh, MeshVertex, PrefilterTaps, SceneBatches, Shape, Terrain,
-        TerrainDetail, Wrap,
-    },
+    scene::{Material, Mesh, PrefilterTaps, Wrap},
     sequence::Sequence,
     temporal::{
         IdealGeometry,
         edge_mask::edge_mask,
         supersampled::{PixelCentre, SupersampledImage},
     },
-    trajectory::Trajectory,
 };
-use camsim_plan::{LinearFog, Planner, uniforms::base_ned_m};
+use camsim_plan::LinearFog;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::*;
-use crate::CpuRenderer;
+use crate::fixtures::gallery::{SIZE_PX, gallery, key, noise, pane, planned, standing};
 
-const SIZE_PX: [u32; 2] = [96, 72];
 const DN: f64 = 255.0;
-
-/// A sequence over a scene and the plan of its first frame, with a plain ideal frame.
-fn planned(scene: Scene) -> (Arc<Sequence>, FramePlan) {
-    let mut scenario = Scenario {
-        seed: 1,
-        flight: FlightSpec {
-            log: "in-memory".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: Default::default(),
-        camera: Default::default(),
-        scene: Default::default(),
-        quality: Default::default(),
-        output: Default::default(),
-    };
-    scenario.camera.size_px = SIZE_PX;
-    scenario.camera.focal_px = [80.0, 78.0];
-    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
-    let still = BodyState {
-        position_ned_m: DVec3::new(0.0, 0.0, -60.0),
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
-    };
-    let trajectory = Trajectory::uniform(-5.0, 10.0, 5.0, vec![still]).unwrap();
-    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
-    let sequence = Arc::new(Sequence {
-        scenario,
-        path,
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 10,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-    });
-    let mut plan = Planner::new(sequence.clone(), &[Channel::Color], 16_384).unwrap().plan(0).unwrap();
-    plan.ideal = IdealGeometry {
-        size_px: SIZE_PX,
-        focal_px: DVec2::new(80.0, 78.0),
-        principal_px: DVec2::new(47.3, 35.8),
-    };
-    plan.samples_a_pixel = 1;
-    plan.edges = EdgeStage::None;
-    plan.surface_reads = PrefilterTaps::One;
-    (sequence, plan)
-}
-
-/// A camera that looks along `pitch_rad` below the horizon, towards `yaw_rad` east of north.
-fn key(position_ned_m: DVec3, yaw_rad: f64, pitch_rad: f64) -> KeyFrame {
-    // Optical axes: right, down, ahead.
-    let level = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
-    let turn = DQuat::from_rotation_z(yaw_rad) * DQuat::from_rotation_y(-pitch_rad);
-    let ned_from_camera = turn * DQuat::from_mat3(&level) * DQuat::from_rotation_z(0.1);
-    KeyFrame { t_s: 0.0, pose: CameraPose { position_ned_m, ned_from_camera } }
-}
-
-/// Pseudo-random bytes.
-fn noise(size_px: [u32; 2], alpha: impl Fn(u32) -> u8, encoding: Encoding) -> Arc<Texture> {
-    let texel = |i: u32| {
-        let bits = camsim_core::noise::pcg4d([i, 7, size_px[0], 3]);
-        [bits[0] as u8, bits[1] as u8, bits[2] as u8, alpha(bits[3])]
-    };
-    let rgba8 = (0..size_px[0] * size_px[1]).flat_map(texel).collect();
-    Arc::new(Texture { size_px, rgba8, encoding })
-}
-
-/// A rectangle of one metre a side in the plane x = 0 of its shape, upright and facing south, with texture
-/// coordinates from `low` to `high`.
-fn pane(low: f32, high: f32, tint: [[f32; 4]; 2]) -> Arc<Shape> {
-    let corner = |y: f32, z: f32, uv: [f32; 2], tint: [f32; 4]| MeshVertex {
-        tint,
-        ..MeshVertex::new([0.0, y, z], uv)
-    };
-    let vertices = vec![
-        corner(-0.5, -0.5, [low, low], tint[0]),
-        corner(0.5, -0.5, [high, low], tint[1]),
-        corner(0.5, 0.5, [high, high], tint[0]),
-        corner(-0.5, 0.5, [low, high], tint[1]),
-    ];
-    let normals = vec![[-0.9, 0.3, -0.3], [-0.9, -0.3, -0.3], [-0.8, 0.0, 0.6], [-1.0, 0.0, 0.0]];
-    Arc::new(Shape { vertices, indices: vec![0, 1, 2, 0, 2, 3], normals })
-}
-
-fn standing(shape: &Arc<Shape>, material: &Material, origin_ned_m: DVec3, turn: DMat3) -> Mesh {
-    Mesh { shape: shape.clone(), material: material.clone(), origin_ned_m, ned_from_shape: turn, object: 0 }
-}
-
-/// Ground of 138 m a side, with hills of so many times their usual height.
-fn hills(relief: f64, texture: Arc<Texture>) -> Terrain {
-    let height = |i: u32| {
-        let (x, y) = (f64::from(i % 70), f64::from(i / 70));
-        relief * (4.0 * (0.3 * x).sin() * (0.23 * y + 1.0).cos() + 1.5 * (0.9 * x + 0.4 * y).sin())
-    };
-    let heights: Vec<f64> = (0..70 * 70).map(height).collect();
-    Terrain::from_heights(70, 70, 2.0, &heights, Some(texture)).unwrap()
-}
-
-/// Hills with coarse texels and upright panes of every kind of material, all magnified from nearby.
-fn gallery() -> Scene {
-    let opaque = |_: u32| 255;
-    let any = |bits: u32| bits as u8;
-    let plain = Material::picture(noise([7, 5], opaque, Encoding::Srgb), Wrap::Clamp);
-    let mask = Material {
-        texture: noise([6, 6], any, Encoding::Srgb),
-        cutoff: Some(0.5),
-        one_sided: true,
-        ..plain.clone()
-    };
-    let mirrored = Material { wrap: [Wrap::Mirror, Wrap::Repeat], ..plain.clone() };
-    let nearest = Material { nearest: true, emissive: [0.05, 0.0, 0.1], ..mirrored.clone() };
-    let glass = Material { texture: noise([4, 3], any, Encoding::Linear), blends: true, ..plain.clone() };
-    let veil = Material { cutoff: Some(0.4), wrap: [Wrap::Mirror; 2], ..glass.clone() };
-    let red = Arc::new(Texture::uniform([200, 40, 30, 90], Encoding::Srgb));
-    let haze = Material { texture: red, ..glass.clone() };
-    let white = [[1.0; 4]; 2];
-    let tinted = [[0.9, 0.5, 0.7, 0.8], [0.4, 1.0, 0.6, 1.0]];
-    let (once, often) = (pane(0.0, 1.0, white), pane(-1.3, 2.4, tinted));
-    let upright = |width: f64, turn_rad: f64| {
-        DMat3::from_rotation_z(turn_rad) * DMat3::from_diagonal(DVec3::splat(width))
-    };
-    let mirrored_shape = DMat3::from_rotation_z(0.2) * DMat3::from_diagonal(DVec3::new(1.0, -8.0, 9.0));
-    let meshes = vec![
-        standing(&once, &plain, DVec3::new(26.0, -9.0, -8.0), upright(16.0, 0.3)),
-        standing(&often, &mask, DVec3::new(18.0, 6.0, -9.0), upright(11.0, -0.4)),
-        standing(&often, &mask, DVec3::new(19.0, 11.0, -9.0), upright(9.0, 3.5)),
-        standing(&often, &mirrored, DVec3::new(22.0, 9.0, -12.0), upright(13.0, 0.1)),
-        standing(&often, &nearest, DVec3::new(24.0, -3.0, -16.0), upright(11.0, -0.2)),
-        standing(&once, &glass, DVec3::new(12.0, -3.0, -9.0), upright(7.0, 0.2)),
-        standing(&often, &veil, DVec3::new(14.0, 0.0, -10.0), upright(9.0, -0.1)),
-        standing(&often, &veil, DVec3::new(12.7, 1.0, -9.0), mirrored_shape),
-        standing(&once, &glass, DVec3::new(15.0, 3.0, -9.0), upright(9.0, 0.5)),
-        // Through the first pane: its box is met before that, half of it after it.
-        standing(&once, &haze, DVec3::new(26.0, -9.0, -8.0), upright(14.0, 1.3)),
-    ];
-    Scene {
-        terrain: Some(hills(1.0, noise([5, 4], opaque, Encoding::Srgb))),
-        meshes,
-        sky_linear: [0.3, 0.5, 0.9],
-        fog_visibility_m: Some(150.0),
-        light: Some(Light::new(3.6, 0.7, 0.7, 0.3)),
-    }
-}
 
 fn pixels() -> impl Iterator<Item = (usize, DVec2)> {
     let [width, height] = SIZE_PX;
@@ -196,41 +37,6 @@ fn color_at(image: &IdealImage, i: usize) -> DVec3 {
         image.color_rgba[4 * i + 1].into(),
         image.color_rgba[4 * i + 2].into(),
     )
-}
-
-#[test]
-fn magnified_surfaces_have_the_colors_and_depths_of_the_reference() {
-    let scene = gallery();
-    let (sequence, plan) = planned(scene);
-    let oracle = Oracle::new(sequence.clone()).unwrap();
-    let cast = CastScene::new(&sequence.scene);
-    let keys = [
-        key(DVec3::new(0.0, 0.0, -12.0), 0.0, 0.05),
-        key(DVec3::new(1.0, 4.0, -9.0), -0.2, 0.1),
-        key(DVec3::new(34.0, 3.0, -11.0), 3.3, 0.1),
-    ];
-    let mut surfaces = vec![0; 1 + sequence.scene.meshes.len()];
-    let mut sky = 0;
-    for key in keys {
-        let image = cast.draw(&plan, &key);
-        let mut differing = 0;
-        for (i, position_px) in pixels() {
-            let uv = ray_uv(&plan, position_px);
-            let hit = oracle.cast(key.pose.position_ned_m, key.pose.ned_from_camera * uv.extend(1.0));
-            match &hit {
-                Some(hit) => surfaces[hit.surface as usize] += 1,
-                None => sky += 1,
-            }
-            let expected_depth = hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
-            let depth_error = (f64::from(image.inverse_depth[i]) - expected_depth).abs();
-            let color_error = (color_at(&image, i) - oracle.radiance(&key.pose, uv)).abs().max_element();
-            differing += u32::from(depth_error > 1e-6 * expected_depth || color_error > 1e-5);
-        }
-        assert_eq!(differing, 0, "of {} pixels", SIZE_PX[0] * SIZE_PX[1]);
-    }
-    eprintln!("{surfaces:?} pixels by surface, {sky} of sky");
-    // The pane of glass without a cutoff has depth all over; every surface is seen.
-    assert!(surfaces.iter().all(|&count| count > 20) && sky > 500, "{surfaces:?} {sky}");
 }
 
 #[test]
@@ -420,83 +226,6 @@ fn samples_have_the_depths_and_colors_of_the_reference() {
         let mean = colors[i].map(|color| DVec3::from_array(color.map(|half| half.to_f64())));
         let mean = mean.iter().sum::<DVec3>() / 4.0;
         assert!((color_at(&image, i) - mean).abs().max_element() < 5e-4, "{mean}");
-    }
-}
-
-/// Ground and panes that the rasteriser draws too.
-fn opaque_scene(relief: f64) -> Scene {
-    let opaque = |_: u32| 255;
-    let plain = Material::picture(noise([90, 70], opaque, Encoding::Srgb), Wrap::Clamp);
-    let repeated = Material { wrap: [Wrap::Repeat; 2], emissive: [0.1, 0.0, 0.0], ..plain.clone() };
-    let often = pane(-1.3, 2.4, [[0.9, 0.5, 0.7, 1.0], [0.4, 1.0, 0.6, 1.0]]);
-    let upright = |width: f64, turn_rad: f64| {
-        DMat3::from_rotation_z(turn_rad) * DMat3::from_diagonal(DVec3::splat(width))
-    };
-    Scene {
-        terrain: Some(hills(relief, noise([300, 300], opaque, Encoding::Srgb))),
-        meshes: vec![
-            standing(&often, &plain, DVec3::new(26.0, -9.0, -8.0), upright(16.0, 0.3)),
-            standing(&often, &repeated, DVec3::new(22.0, 9.0, -12.0), upright(13.0, 0.1)),
-            standing(&often, &repeated, DVec3::new(18.0, 0.0, -12.0), upright(7.0, 0.9)),
-        ],
-        sky_linear: [0.3, 0.5, 0.9],
-        fog_visibility_m: Some(150.0),
-        light: Some(Light::new(3.6, 0.7, 0.7, 0.3)),
-    }
-}
-
-/// Pixels of an opaque scene where a cast frame is apart from the rasteriser's, and RMS difference of the
-/// others, DN.
-fn apart_from_raster(relief: f64, samples_a_pixel: u32, reads: PrefilterTaps) -> (u32, f64) {
-    let (sequence, mut plan) = planned(opaque_scene(relief));
-    let scene = &*sequence.scene;
-    let key = key(DVec3::new(-5.0, 0.0, -16.0), 0.0, 0.45);
-    plan.keys = vec![key];
-    (plan.samples_a_pixel, plan.surface_reads) = (samples_a_pixel, reads);
-    let terrain = scene.terrain.as_ref().unwrap();
-    let detail = TerrainDetail::new(terrain, &key.pose, plan.ideal.tangents(), 80.0, 1e-6);
-    let placed = detail.visible_mesh().placed(terrain, base_ned_m(&key.pose));
-    let tolerance = LodTolerance {
-        focal_px: 80.0,
-        tangents: plan.ideal.tangents(),
-        error_px: 0.0,
-        travel_m: 0.0,
-        parallax_px: 0.0,
-    };
-    let image = CastScene::new(&sequence.scene).draw(&plan, &key);
-    let mut renderer = CpuRenderer::new(sequence.clone(), Arc::new(SceneBatches::new(scene)));
-    let buffer = renderer.draw_ideal(&plan, Some(&placed), &tolerance);
-    let (color, depth) = renderer.ideal_images(buffer);
-    let (mut apart, mut sum, mut count) = (0, 0.0, 0);
-    for (i, _) in pixels() {
-        let drawn = f64::from(depth[i]);
-        let depth_error = (f64::from(image.inverse_depth[i]) - drawn).abs();
-        let other = DVec3::new(color[4 * i].into(), color[4 * i + 1].into(), color[4 * i + 2].into());
-        let error = (color_at(&image, i) - other).abs().max_element();
-        // The rasteriser's corners stand on a grid of 1/256 px.
-        if depth_error > 2e-3 * drawn || error > 0.02 {
-            apart += 1;
-        } else {
-            sum += error * error;
-            count += 1;
-        }
-    }
-    let rms_dn = DN * (sum / f64::from(count)).sqrt();
-    eprintln!("{samples_a_pixel} samples, {reads:?}: {apart} of {} apart, {rms_dn:.3} DN", apart + count);
-    (apart, rms_dn)
-}
-
-#[test]
-fn opaque_scenes_are_those_of_the_rasteriser() {
-    for reads in PrefilterTaps::ALL {
-        let (apart, rms_dn) = apart_from_raster(1.0, 1, reads);
-        assert!(apart < 10 && rms_dn < 0.15, "{reads:?}");
-    }
-    // Where ground has a crease within a pixel the rasteriser shades one of its triangles: level ground has
-    // none.
-    for reads in [PrefilterTaps::One, PrefilterTaps::Grid] {
-        let (apart, rms_dn) = apart_from_raster(0.0, 4, reads);
-        assert!(apart < 12 && rms_dn < 0.5, "{reads:?}");
     }
 }
 

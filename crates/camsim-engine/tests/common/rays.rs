@@ -7,17 +7,19 @@ use std::sync::Arc;
 use camsim_core::{
     frame::RenderedFrame,
     pose::CameraPose,
-    scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
+    scene::{Encoding, Scene, Texture},
     sequence::Sequence,
-    temporal::{
-        edge_lines::EdgeLine,
-        edge_mask::edge_mask,
-        supersampled::{PixelCentre, SupersampledImage},
-    },
+    temporal::supersampled::PixelCentre,
 };
-use camsim_plan::FramePlan;
+use camsim_engine::Finished;
+use camsim_plan::{EdgeStage, FramePlan, KeyFrame};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+
+use super::fixtures::{
+    pattern, roof,
+    supersampled::{SilhouetteErrors, SupersampledFrame, with_keys_of_pixel},
+};
 
 /// Samples along each side of a pixel, and as many instants, that the reference takes.
 const REFERENCE_SIDE: u32 = 16;
@@ -114,81 +116,53 @@ pub fn expected(sequence: &Sequence, plan: &FramePlan) -> Vec<(usize, DVec3)> {
         .collect()
 }
 
-/// A level square above the ground, turned by 17 degrees.
-pub fn roof(height_m: f64, half_m: f64) -> Mesh {
-    let (sin, cos) = 17_f64.to_radians().sin_cos();
-    let corner = |n: f64, e: f64| {
-        let position_m = [((n * cos - e * sin) * half_m) as f32, ((n * sin + e * cos) * half_m) as f32, 0.0];
-        MeshVertex::new(position_m, [0.5, 0.5])
-    };
-    let vertices = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-    let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-    Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(3.0, -2.0, -height_m), Wrap::Clamp)
-}
-
+/// A white roof over black ground.
 pub fn black_ground_and_roof() -> Scene {
-    let mut scene = super::pattern(6000.0);
+    let mut scene = pattern(6000.0);
     scene.meshes[0].material.texture = Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear));
     scene.meshes.push(roof(60.0, 15.0));
     scene
 }
 
-/// An ideal frame with supersampled depth by rays cast in f64; meshes only.
-pub struct CastFrame {
-    pub size_px: [u32; 2],
-    pub scale: u32,
-    pub samples: Vec<f64>,
-    pub sample_colors: Vec<DVec3>,
-    pub centres: Vec<PixelCentre>,
-    pub edge_lines: Vec<Option<EdgeLine>>,
-    pub edge_mask: Vec<bool>,
+/// The ideal frames of a plan with supersampled depth, by rays; meshes only.
+pub fn supersampled_frames(sequence: &Sequence, plan: &FramePlan, scale: u32) -> Vec<SupersampledFrame> {
+    let of_key = |key: &KeyFrame| {
+        let sample = |position_px| sample_ideal(sequence, plan, &key.pose, position_px);
+        SupersampledFrame::new(plan.ideal.size_px, scale, true, sample)
+    };
+    plan.keys.iter().map(of_key).collect()
 }
 
-impl CastFrame {
-    pub fn new(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, scale: u32) -> Self {
-        let size_px = plan.ideal.size_px;
-        let corners = |[width, height]: [u32; 2]| {
-            (0..width * height)
-                .into_par_iter()
-                .map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
-        };
-        let samples: Vec<PixelCentre> = corners(size_px.map(|side| side * scale))
-            .flat_map_iter(|corner| {
-                SupersampledImage::SAMPLE_POSITIONS.map(|place| (corner + place) / f64::from(scale) - 0.5)
-            })
-            .map(|at_px| look(sequence, plan, key, at_px))
-            .collect();
-        // The renderer keeps colours of samples only where they are many.
-        let sample_colors =
-            if scale > 1 { samples.iter().map(|sample| sample.color).collect() } else { Vec::new() };
-        let samples: Vec<f64> = samples.iter().map(|sample| sample.inverse_depth).collect();
-        let centres: Vec<PixelCentre> =
-            corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
-        let edge_mask = edge_mask(size_px, scale, &centres, &samples);
-        let edge_lines = SupersampledImage::edge_lines_of(size_px, scale, &samples);
-        Self { size_px, scale, samples, sample_colors, centres, edge_lines, edge_mask }
+/// Asserts that pixels near silhouettes are those of the twin of the silhouette rays, of a pinhole camera
+/// with blur.
+pub fn assert_silhouettes_of_twin(sequence: &Sequence, done: &Finished) {
+    let plan = &done.plan;
+    let EdgeStage::Supersampled { scale, samples, .. } = plan.edges else { panic!("{:?}", plan.edges) };
+    let frames = supersampled_frames(sequence, plan, scale);
+    let nearest_w = frames.iter().map(SupersampledFrame::nearest_w).fold(0.0, f64::max);
+    let mut errors = SilhouetteErrors::default();
+    let width = plan.camera.size_px[0];
+    for (i, _) in expected(sequence, plan) {
+        let pixel = [i as u32 % width, i as u32 / width];
+        with_keys_of_pixel(sequence, plan, &frames, nearest_w, pixel, |uv, d_uv, keys| {
+            errors.add((uv, d_uv), keys, samples, plan, done.frame.color_rgba[4 * i]);
+        });
     }
-
-    pub fn image(&self) -> SupersampledImage<'_> {
-        let Self { size_px, scale, samples, sample_colors, centres, edge_lines, edge_mask } = self;
-        SupersampledImage {
-            size_px: *size_px,
-            scale: *scale,
-            samples,
-            sample_colors,
-            centres,
-            edge_lines,
-            edge_mask,
-        }
-    }
-
-    pub fn nearest_w(&self) -> f64 {
-        self.samples.iter().copied().fold(0.0, f64::max)
-    }
+    let (mean, SilhouetteErrors { compared, differing, .. }) = (errors.mean(), errors);
+    eprintln!(
+        "twin: mean difference {mean:.1e}, {differing} of {compared} pixels differ by more than one ray"
+    );
+    // In f32 a ray may round to the next sample; a pixel on the mark's border may be gathered plainly.
+    assert!(
+        compared > 300 && mean < 2e-3 && differing * 50 < compared,
+        "{mean:.1e}, {differing} of {compared}"
+    );
 }
 
-fn look(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, at_px: DVec2) -> PixelCentre {
-    let ray = key.ned_from_camera * ((at_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
+/// Inverse depth and colour at a position of an ideal frame.
+fn sample_ideal(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, position_px: DVec2) -> PixelCentre {
+    let ray =
+        key.ned_from_camera * ((position_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
     let origin = key.position_ned_m;
     let hits = sequence
         .scene

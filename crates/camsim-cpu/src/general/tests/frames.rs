@@ -1,11 +1,9 @@
 //! Whole frames against the reference.
 
-use std::sync::Arc;
-
 use camsim_core::{
     reference::coord_errors,
     scenario::{Auto, FieldOr, Readout, Scenario, ShutterSpec, Solver, ZoomSpec},
-    sequence::{GrayImage, Sequence},
+    sequence::Sequence,
 };
 use camsim_plan::{RayStage, TemporalStage};
 use glam::{DVec2, DVec3};
@@ -181,37 +179,6 @@ fn places_outside_of_the_ideal_frame_are_not_shown() {
         shown += usize::from(is_inside);
     }
     assert!(shown > 400 && shown < 48 * 36 - 400, "{shown}");
-}
-
-#[test]
-fn noise_vignette_and_light_are_those_of_the_photometric_twin() {
-    let mut moving = scenario();
-    moving.camera.shutter = rolling(30.0, 80.0);
-    let sequence = over_ground(moving, EAST, TURN);
-    let plain = Case::new(sequence.clone());
-    let mut noisy = sequence;
-    noisy.scenario.camera.photometric.noise_sigma = 0.05;
-    noisy.scenario.camera.photometric.light = 1.3;
-    noisy.vignette =
-        Some(Arc::new(GrayImage { size_px: [3, 2], values: vec![0.0, 0.3, 0.9, 0.02, 0.6, 1.0] }));
-    let spec = noisy.scenario.camera.photometric.clone();
-    let weights = camsim_core::photometric::vignette_weights(
-        noisy.vignette.as_ref().unwrap(),
-        [48, 36],
-        spec.vignette_thresholds,
-    );
-    let noisy = Case::new(noisy);
-    let (plain, noisy) = (plain.render(0.0).0, noisy.render(0.0).0);
-    let table = camsim_core::noise::tail_table();
-    let mut black = 0;
-    for (i, (plain, noisy)) in plain.chunks_exact(4).zip(noisy.chunks_exact(4)).enumerate() {
-        let pixel = [i as u32 % 48, i as u32 / 48];
-        let color = [plain[0], plain[1], plain[2]];
-        let [r, g, b] = camsim_core::photometric::photometric(&spec, color, weights[i], pixel, 0, 12, &table);
-        assert_eq!(noisy, [r, g, b, 1.0], "{pixel:?}");
-        black += u32::from(weights[i] == 0.0);
-    }
-    assert!(black > 50, "the vignette has a black part");
 }
 
 #[test]

@@ -4,24 +4,27 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::RenderedFrame,
-    mount::CameraPath,
     photometric::vignette_weights,
-    pose::BodyState,
     reference::{Oracle, RenderOptions},
-    scenario::{Channel, FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scenario::{Channel, MountSpec, Scenario},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap, srgb_from_linear},
     sequence::Sequence,
     temporal::supersampled::SupersampledImage,
     trajectory::Trajectory,
 };
 use camsim_plan::{EdgeStage, FramePlan, Planner, RayStage};
-use glam::{DQuat, DVec2, DVec3, EulerRot};
+use glam::{DVec2, DVec3};
 use half::f16;
 use rayon::prelude::*;
 
 use camsim_plan::uniforms::Truth;
 
-use crate::general::{FineSamples, FrameInputs, IdealImage, ReversePass, RowTable, render};
+use crate::{
+    fixtures,
+    general::{FineSamples, FrameInputs, IdealImage, ReversePass, RowTable, render},
+};
+
+pub use crate::fixtures::{barrel_lens, ground_and_roof, pattern as ground, rolling};
 
 /// Mean square error of colours, in DN, that is compared as a root.
 pub const DN: f64 = 255.0;
@@ -34,26 +37,7 @@ pub const TURN: DVec3 = DVec3::new(0.2, -0.3, 0.5);
 
 /// A small camera that looks steeply down.
 pub fn scenario() -> Scenario {
-    let mut scenario = Scenario {
-        seed: 12,
-        flight: FlightSpec {
-            log: "in-memory".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: Default::default(),
-        camera: Default::default(),
-        scene: Default::default(),
-        quality: Default::default(),
-        output: Default::default(),
-    };
+    let mut scenario = fixtures::scenario();
     scenario.camera.size_px = [48, 36];
     scenario.camera.focal_px = [42.0, 40.0];
     scenario.camera.mount = MountSpec { angles_deg: [8.0, -70.0, 15.0], ..MountSpec::default() };
@@ -61,61 +45,9 @@ pub fn scenario() -> Scenario {
     scenario
 }
 
-pub fn rolling(readout_ms: f64, exposure_ms: f64) -> ShutterSpec {
-    ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() }
-}
-
-pub fn barrel_lens() -> LensSpec {
-    LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.09, 0.001, -0.002] }
-}
-
 /// Constant velocity and body rate about t = 0, when the camera is `height_m` over the origin.
 pub fn steady(height_m: f64, velocity_ned_m_s: DVec3, rate_body_rad_s: DVec3) -> Trajectory {
-    let start_s = -5.0;
-    let at_zero = DQuat::from_euler(EulerRot::ZYX, HEADING_RAD, 0.0, 0.0);
-    let first = BodyState {
-        position_ned_m: DVec3::new(0.0, 0.0, -height_m) + velocity_ned_m_s * start_s,
-        velocity_ned_m_s,
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: (at_zero * DQuat::from_scaled_axis(rate_body_rad_s * start_s)).normalize(),
-        rate_body_rad_s,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
-    };
-    Trajectory::uniform(start_s, 10.0, 5.0, vec![first]).unwrap()
-}
-
-/// Level ground with a smooth picture.
-pub fn ground(width_m: f64) -> Scene {
-    const SIDE: u32 = 512;
-    let level = |x: u32, y: u32, k: f64, phase: f64| {
-        let angle = |place: u32| std::f64::consts::TAU * k * f64::from(place) / f64::from(SIDE);
-        (127.5 + 110.0 * (angle(x) + phase).sin() * angle(y).cos()).round() as u8
-    };
-    let rgba8 = (0..SIDE * SIDE).flat_map(|i| {
-        let (x, y) = (i % SIDE, i / SIDE);
-        [level(x, y, 8.0, 0.0), level(x, y, 5.0, 1.0), level(x, y, 11.0, 2.0), 255]
-    });
-    let texture = Texture { size_px: [SIDE, SIDE], rgba8: rgba8.collect(), encoding: Encoding::Linear };
-    Scene {
-        meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)],
-        sky_linear: [0.2, 0.4, 0.8],
-        ..Scene::default()
-    }
-}
-
-/// The ground and a white level square above it.
-pub fn ground_and_roof(width_m: f64, height_m: f64, half_m: f64) -> Scene {
-    let mut scene = ground(width_m);
-    let (sin, cos) = 17_f64.to_radians().sin_cos();
-    let corner = |n: f64, e: f64| {
-        let [north, east] = [(n * cos - e * sin) * half_m, (n * sin + e * cos) * half_m];
-        MeshVertex::new([north as f32, east as f32, 0.0], [0.5, 0.5])
-    };
-    let vertices = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-    let white = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-    let origin_ned_m = DVec3::new(3.0, -2.0, -height_m);
-    scene.meshes.push(Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], white, origin_ned_m, Wrap::Clamp));
-    scene
+    fixtures::steady(height_m, HEADING_RAD.to_degrees(), velocity_ned_m_s, rate_body_rad_s)
 }
 
 /// A black wall 60 m to the north before a white sky.
@@ -129,17 +61,7 @@ pub fn wall() -> Scene {
 }
 
 pub fn sequence(scenario: Scenario, trajectory: Trajectory, scene: Scene) -> Sequence {
-    let path = CameraPath::new(trajectory, &scenario.camera.mount).unwrap();
-    Sequence {
-        scenario,
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 100,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-    }
+    Arc::unwrap_or_clone(fixtures::sequence(scenario, trajectory, scene))
 }
 
 /// A frame in the making.

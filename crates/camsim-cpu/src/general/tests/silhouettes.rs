@@ -3,12 +3,7 @@
 use camsim_core::{
     reference::{self, coord_errors, disocclusion},
     scenario::{Auto, Channel, FieldOr, Readout, Scenario, ShutterSpec, Silhouettes, Solver},
-    temporal::{
-        edge_lines::EdgeLine,
-        edge_mask::edge_mask,
-        silhouette_rays::{SupersampledKey, SupersampledKeys, first_surface_of_keys, gather_silhouette},
-        supersampled::{PixelCentre, SupersampledImage},
-    },
+    temporal::{silhouette_rays::first_surface_of_keys, supersampled::PixelCentre},
 };
 use camsim_plan::{EdgeStage, TemporalStage};
 use glam::{DVec2, DVec3};
@@ -16,7 +11,10 @@ use glam::{DVec2, DVec3};
 use super::scenes::{
     Case, EAST, HEADING_RAD, TURN, ground_and_roof, rms_dn, rolling, scenario, sequence, steady, wall,
 };
-use crate::general::{IdealImage, Pixel, ReversePass, rays::Ray};
+use crate::{
+    fixtures::supersampled::{SilhouetteErrors, SupersampledFrame, with_keys_of_pixel},
+    general::{IdealImage, Pixel, ReversePass, rays::Ray},
+};
 
 /// With rays of their own at silhouettes.
 fn by_rays(readout_ms: f64, exposure_ms: f64, keys: u32) -> Scenario {
@@ -71,54 +69,6 @@ impl ReversePass<'_> {
     }
 }
 
-/// An ideal frame as the twins take it.
-struct CastFrame {
-    size_px: [u32; 2],
-    scale: u32,
-    samples: Vec<f64>,
-    sample_colors: Vec<DVec3>,
-    centres: Vec<PixelCentre>,
-    edge_mask: Vec<bool>,
-    edge_lines: Vec<Option<EdgeLine>>,
-}
-
-impl CastFrame {
-    fn new(case: &Case, number: usize, scale: u32, thin: bool) -> Self {
-        let size_px = case.plan.ideal.size_px;
-        let positions = |[width, height]: [u32; 2]| {
-            (0..width * height).map(move |i| DVec2::new((i % width).into(), (i / width).into()))
-        };
-        let samples = positions(size_px.map(|side| side * scale)).flat_map(|corner| {
-            SupersampledImage::SAMPLE_POSITIONS.map(|place| (corner + place) / f64::from(scale) - 0.5)
-        });
-        let (samples, mut sample_colors): (Vec<f64>, Vec<DVec3>) =
-            samples.map(|position_px| case.ideal_pixel(number, position_px)).unzip();
-        if scale == 1 {
-            sample_colors.clear();
-        }
-        let centres: Vec<PixelCentre> = positions(size_px)
-            .map(|position_px| case.ideal_pixel(number, position_px))
-            .map(|(inverse_depth, color)| PixelCentre { inverse_depth, color })
-            .collect();
-        let edge_mask = edge_mask(size_px, scale, &centres, if thin { &samples } else { &[] });
-        let edge_lines = SupersampledImage::edge_lines_of(size_px, scale, &samples);
-        Self { size_px, scale, samples, sample_colors, centres, edge_mask, edge_lines }
-    }
-
-    fn image(&self) -> SupersampledImage<'_> {
-        let Self { size_px, scale, samples, sample_colors, centres, edge_mask, edge_lines } = self;
-        SupersampledImage {
-            size_px: *size_px,
-            scale: *scale,
-            samples,
-            sample_colors,
-            centres,
-            edge_mask,
-            edge_lines,
-        }
-    }
-}
-
 #[test]
 fn rays_through_key_frames_agree_with_their_twin() {
     // With one fine pixel a pixel colours are those of the pixels' middles, with more those of the samples.
@@ -135,50 +85,33 @@ fn rays_through_key_frames_agree_with_their_twin() {
         case.plan.edges = EdgeStage::Supersampled { scale, samples, thin };
         assert_eq!(case.plan.keys.len(), keys as usize);
         let ideal = case.ideal();
-        let cast: Vec<CastFrame> =
-            (0..ideal.len()).map(|number| CastFrame::new(&case, number, scale, thin)).collect();
-        let (picture, plan) = (case.render_from(&ideal, 0.0).0, &case.plan);
-        let nodes = plan.blur.unwrap().nodes;
-        let exposure_s = plan.shutter.exposure_s();
-        let nearest_w = 1.0 / 50.0;
+        let plan = &case.plan;
+        let frames: Vec<SupersampledFrame> = (0..ideal.len())
+            .map(|number| {
+                SupersampledFrame::new(plan.ideal.size_px, scale, thin, |position_px| {
+                    let (inverse_depth, color) = case.ideal_pixel(number, position_px);
+                    PixelCentre { inverse_depth, color }
+                })
+            })
+            .collect();
+        let picture = case.render_from(&ideal, 0.0).0;
         let near = reference::silhouettes(&case.oracle, 0, &[-0.5, 0.0, 0.5]);
-        let d_uv = [DVec2::X / plan.camera.focal_px.x, DVec2::Y / plan.camera.focal_px.y];
-        let (mut sum, mut differing, mut compared) = (0.0, 0, 0);
+        let mut errors = SilhouetteErrors::default();
         let (mut other_key, mut later_keys) = (0, 0);
         case.with_pass(&ideal, |pass| {
-            for (i, [x, y]) in case.pixels().filter(|(i, _)| near[*i]) {
-                let position_px = DVec2::new(x.into(), y.into());
-                let uv = (position_px - plan.camera.principal_point_px) / plan.camera.focal_px;
-                let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-                let poses = |key: &camsim_plan::KeyFrame| -> Vec<_> {
-                    let phase = |node: u32| f64::from(node) / f64::from(nodes - 1) - 0.5;
-                    (0..nodes)
-                        .map(|node| {
-                            case.sequence.path.pose(mid_s + phase(node) * exposure_s).relative_to(&key.pose)
-                        })
-                        .collect()
-                };
-                let poses: Vec<_> = plan.keys.iter().map(poses).collect();
-                let views: Vec<_> = std::iter::zip(&poses, &cast)
-                    .map(|(nodes, cast)| SupersampledKey { nodes, image: cast.image() })
-                    .collect();
-                let exposure_share = exposure_s / (plan.window_s[1] - plan.window_s[0]);
-                let row_share = plan.window_share(mid_s);
-                let all = SupersampledKeys { views: &views, row_share, exposure_share, nearest_w };
-                for share in [0.05, 0.95] {
-                    let (key, _) = first_surface_of_keys(uv, share, &all, &plan.ideal).unwrap();
-                    let found = pass.key_of_ray([x, y], uv, share);
-                    other_key += u32::from(found != Some(key));
-                    later_keys += key;
-                }
-                let twin = gather_silhouette(uv, d_uv, &all, samples, &plan.ideal);
-                let error = (twin.x - f64::from(picture[4 * i])).abs();
-                sum += error;
-                compared += 1;
-                differing += u32::from(error > 1.5 / f64::from(samples));
+            for (i, pixel) in case.pixels().filter(|(i, _)| near[*i]) {
+                with_keys_of_pixel(&case.sequence, plan, &frames, 1.0 / 50.0, pixel, |uv, d_uv, keys| {
+                    for share in [0.05, 0.95] {
+                        let (key, _) = first_surface_of_keys(uv, share, keys, &plan.ideal).unwrap();
+                        let found = pass.key_of_ray(pixel, uv, share);
+                        other_key += u32::from(found != Some(key));
+                        later_keys += key;
+                    }
+                    errors.add((uv, d_uv), keys, samples, plan, picture[4 * i]);
+                });
             }
         });
-        let mean = sum / f64::from(compared);
+        let (mean, SilhouetteErrors { compared, differing, .. }) = (errors.mean(), errors);
         eprintln!(
             "{keys} keys, scale {scale}: mean {mean:.1e}, {differing} of {compared} differ by more than a ray"
         );

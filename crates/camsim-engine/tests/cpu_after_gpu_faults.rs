@@ -1,5 +1,6 @@
-//! Frames that the host makes, where the device's part of a frame fails: frames before and after it are as
-//! they are without a fault. Alone in its process, and in a copy of that: it takes shaders away.
+//! Output frames of the cpu where the gpu's part of another frame fails: frames before and after it are those
+//! of a run without a fault. The test removes shaders, so it has its own test binary and runs in a process of
+//! its own.
 
 mod common;
 
@@ -18,9 +19,9 @@ use camsim_plan::placement::cpu_vectorises;
 use common::{city, engine, pattern, scenario, sequence, steady};
 use glam::DVec3;
 
-const TEST: &str = "a_frame_that_fails_spoils_no_other";
+const TEST: &str = "a_failed_gpu_pass_changes_no_other_frame";
 
-/// Over ground alone, then over houses 200 m further north.
+/// The camera of a flight over ground alone, then over houses 200 m further north.
 fn flight() -> Scenario {
     let mut scenario = scenario();
     scenario.camera.size_px = [96, 72];
@@ -47,18 +48,18 @@ fn session(engine: &Engine) -> Session<'_> {
     engine.session::<Infallible>(sequence, &[Channel::Color]).expect("session")
 }
 
-/// What came, and whether all did.
+/// The frames that were finished, and whether all were.
 fn render(session: &mut Session<'_>, frames: &[u64]) -> (Vec<Finished>, bool) {
-    let mut came = Vec::new();
+    let mut all_finished = Vec::new();
     let mut keep = |finished: Finished| {
-        came.push(finished);
+        all_finished.push(finished);
         Ok(())
     };
     let all = session
         .render::<Infallible>(frames.iter().copied(), &mut keep)
         .inspect_err(|fault| eprintln!("{fault}"))
         .is_ok();
-    (came, all)
+    (all_finished, all)
 }
 
 fn copy_folder(from: &Path, to: &Path) {
@@ -74,7 +75,7 @@ fn copy_folder(from: &Path, to: &Path) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_frame_that_fails_spoils_no_other() {
+fn a_failed_gpu_pass_changes_no_other_frame() {
     let Some(folder) = std::env::var_os("CAMSIM_SHADER_DIR").map(PathBuf::from) else {
         let folder = std::env::temp_dir().join(format!("camsim-faults-{}", std::process::id()));
         copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders"), &folder);
@@ -84,10 +85,10 @@ fn a_frame_that_fails_spoils_no_other() {
             .output()
             .expect("it runs");
         std::fs::remove_dir_all(&folder).expect("the copy goes");
-        let said = String::from_utf8_lossy(&again.stdout);
+        let printed = String::from_utf8_lossy(&again.stdout);
         assert!(
-            again.status.success() && said.contains("1 passed"),
-            "{said}{}",
+            again.status.success() && printed.contains("1 passed"),
+            "{printed}{}",
             String::from_utf8_lossy(&again.stderr)
         );
         return;
@@ -97,26 +98,36 @@ fn a_frame_that_fails_spoils_no_other() {
     let mut whole = session(&engine);
     let (expected, all) = render(&mut whole, &OVER_GROUND);
     assert!(all && expected.iter().all(|done| cpu_vectorises(&done.plan) && done.times.reverse_ms.is_some()));
-    assert!(!cpu_vectorises(&whole.planner().plan(OVER_HOUSES).expect("a plan")), "rays are the device's");
-    let same =
-        |came: &[Finished]| came.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba);
+    assert!(
+        !cpu_vectorises(&whole.planner().plan(OVER_HOUSES).expect("a plan")),
+        "silhouette rays are the gpu's"
+    );
+    let same = |finished: &[Finished]| {
+        finished.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba)
+    };
 
     let rays = folder.join("reverse/edges/silhouette_rays.wgsl");
     let text = std::fs::read(&rays).expect("the shader");
     std::fs::remove_file(&rays).expect("it goes");
     let mut session = session(&engine);
-    // Each time with a frame in flight, the first time with the lens map on its way.
+    // A frame is in flight each time; the first time the lens map is still being made.
     for round in 0..4 {
-        let (came, all) = render(&mut session, &[OVER_GROUND[0], OVER_HOUSES, OVER_GROUND[1]]);
-        assert!(!all && came.len() == 1 && same(&came), "{round}: the frame before it comes, as it is");
+        let (finished, all) = render(&mut session, &[OVER_GROUND[0], OVER_HOUSES, OVER_GROUND[1]]);
+        assert!(
+            !all && finished.len() == 1 && same(&finished),
+            "{round}: the frame before the fault is unchanged"
+        );
     }
-    // Nor without one.
+    // Without a frame in flight.
     for _ in 0..3 {
         assert_eq!(render(&mut session, &[OVER_HOUSES]).0.len(), 0);
     }
     std::fs::write(&rays, text).expect("it comes back");
     for round in 0..3 {
-        let (came, all) = render(&mut session, &[OVER_GROUND[0], OVER_GROUND[1], OVER_HOUSES]);
-        assert!(all && came.len() == 3 && same(&came), "{round}: and those after it");
+        let (finished, all) = render(&mut session, &[OVER_GROUND[0], OVER_GROUND[1], OVER_HOUSES]);
+        assert!(
+            all && finished.len() == 3 && same(&finished),
+            "{round}: the frames after the fault are unchanged"
+        );
     }
 }
