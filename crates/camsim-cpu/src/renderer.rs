@@ -140,13 +140,8 @@ impl CpuRenderer {
         }
     }
 
-<<<<<<< HEAD
     /// Output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth if the
     /// plan has it.
-=======
-    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth
-    /// where the plan wants it.
->>>>>>> n-stages
     pub fn reverse(
         &mut self,
         inputs: &ReverseInputs<'_>,
@@ -156,21 +151,13 @@ impl CpuRenderer {
         self.fit_lens_map(plan);
         let ideal = &self.buffers[buffer];
         match inputs.rows {
-<<<<<<< HEAD
-            RowTable::Poses(poses) if cpu_vectorises(plan) => match ideal.cast.first() {
-                None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
-                Some(image) => {
-                    let drawn = RasterFrame::from_image(image);
-                    self.vectorised(inputs, &poses.entries, drawn.texels())
-=======
             RowTable::Poses(poses) if cpu_vectorises(plan) && !self.general_only => {
                 match ideal.cast.first() {
                     None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
                     Some(image) => {
-                        let drawn = DrawnFrame::from_image(image);
+                        let drawn = RasterFrame::from_image(image);
                         self.vectorised(inputs, &poses.entries, drawn.texels())
                     }
->>>>>>> n-stages
                 }
             }
             _ if ideal.cast.is_empty() => self.general(inputs, &[image_of(&ideal.drawn, &plan.ideal)]),
