@@ -26,12 +26,12 @@
 
 mod engine;
 mod error;
-mod exact_truth;
 mod finished;
 mod memory;
 mod planner_threads;
 mod prepare_ahead;
 mod session;
+mod truth;
 
 pub use camsim_gpu::{AdapterChoice, GpuContext, GpuError, IdealImages};
 pub use camsim_plan::Backend;

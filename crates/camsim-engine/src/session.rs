@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Instant};
 
 use camsim_core::{
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     pose::CameraPose,
     scenario::Channel,
     scene::{LodSelection, LodTolerance, SceneBatches},
@@ -23,7 +23,8 @@ use camsim_plan::{
 use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
-    exact_truth, finished, planner_threads,
+    finished, planner_threads,
+    truth::{FramePixels, hits, planes},
     prepare_ahead::{PrepareAhead, Prepared, Preparer},
 };
 
@@ -36,6 +37,7 @@ pub struct Session<'a> {
     gpu: Option<GpuSession<'a>>,
     ideal: Option<IdealCache>,
     coords_phase: f32,
+    channels: Vec<Channel>,
 }
 
 /// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
@@ -95,7 +97,7 @@ impl<'a> Session<'a> {
             .map(|gpu| GpuSession::new(gpu, &sequence, meshes.clone(), planner.wants_truth()))
             .transpose()?;
         let cpu = CpuRenderer::new(sequence.clone(), meshes);
-        Ok(Self { engine, planner, cpu, gpu, ideal: None, coords_phase: 0.0 })
+        Ok(Self { engine, planner, cpu, gpu, ideal: None, coords_phase: 0.0, channels: channels.into() })
     }
 
     /// Replaces the sequence. The next frames are bit for bit those of a new session. Fast if the scene is
@@ -120,6 +122,7 @@ impl<'a> Session<'a> {
         }
         self.cpu.renew(sequence);
         self.planner = planner;
+        self.channels = channels.into();
         Ok(())
     }
 
@@ -262,7 +265,7 @@ impl<'a> Session<'a> {
 
     /// Waits for a frame, and renders or reads its output frame.
     // Long because: one path through both renderers.
-    fn finish(&mut self, done: InFlight) -> Result<Finished, GpuError> {
+    fn finish(&mut self, done: InFlight) -> Result<Finished, RenderErrorBase> {
         let InFlight { prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
         let inputs = ReverseInputs { plan: &plan, uniforms: &uniforms, rows: &rows };
         let begin = Instant::now();
@@ -295,7 +298,7 @@ impl<'a> Session<'a> {
             IdealSource::Cpu(_) | IdealSource::Copied(..) => times.reverse_ms = Some(elapsed_ms),
         }
         let begin = Instant::now();
-        let frame = self.with_truth(&plan, color_rgba, truth);
+        let frame = self.with_truth(&plan, color_rgba, truth)?;
         times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
         if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
@@ -313,13 +316,14 @@ impl<'a> Session<'a> {
         plan: &FramePlan,
         color_rgba: Vec<f32>,
         mut truth: Option<Vec<Truth>>,
-    ) -> RenderedFrame {
+    ) -> Result<RenderedFrame, PlanError> {
         let sequence = self.planner.sequence();
-        if let Some(truth) = truth.as_mut().filter(|_| plan.has_exact_truth()) {
-            exact_truth::complete(truth, &color_rgba, &self.planner, plan, f64::from(self.coords_phase));
-        }
+        let planes = match &mut truth {
+            Some(truth) => self.complete_truth(plan, &color_rgba, truth)?,
+            None => Vec::new(),
+        };
         let coords = truth.as_ref().map(|truth| finished::coords(truth, &color_rgba, plan, &sequence.path));
-        RenderedFrame {
+        Ok(RenderedFrame {
             index: plan.frame,
             stamp_ns: sequence.epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
             size_px: plan.camera.size_px,
@@ -327,7 +331,29 @@ impl<'a> Session<'a> {
             depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
             coords,
             rows: self.planner.rows(plan),
+            planes,
+        })
+    }
+
+    /// Corrects the truth of a renderer by rays, and computes the other truth channels.
+    fn complete_truth(
+        &self,
+        plan: &FramePlan,
+        color_rgba: &[f32],
+        truth: &mut Vec<Truth>,
+    ) -> Result<Vec<Plane>, PlanError> {
+        let planner = &*self.planner;
+        let rays = planner.frame_rays(plan, f64::from(self.coords_phase));
+        if !self.channels.iter().any(|channel| channel.needs_every_ray()) {
+            if plan.has_exact_truth() {
+                hits::complete(truth, color_rgba, plan, &rays);
+            }
+            return Ok(Vec::new());
         }
+        // With the paper's solvers depth and coordinates say where these look.
+        let mut solved = (!plan.has_exact_truth()).then(|| truth.clone());
+        let hits = hits::of_all_pixels(solved.as_mut().unwrap_or(truth), color_rgba, plan, &rays);
+        planes(&FramePixels { planner, plan, rays: &rays, truth, color_rgba, hits: &hits }, &self.channels)
     }
 
     /// Ideal frame of the last rendered frame, the first of several; `None` before the first frame. Linear

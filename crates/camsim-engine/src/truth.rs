@@ -5,4 +5,4 @@ mod flow;
 pub(crate) mod hits;
 mod planes;
 
-pub(crate) use planes::planes;
+pub(crate) use planes::{FramePixels, planes};

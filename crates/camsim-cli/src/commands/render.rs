@@ -112,18 +112,10 @@ enum FormatArg {
     None,
 }
 
-const CHANNELS: [(&str, Channel); 5] = [
-    ("color", Channel::Color),
-    ("depth", Channel::Depth),
-    ("valid", Channel::Valid),
-    ("rows", Channel::Rows),
-    ("coords", Channel::Coords),
-];
-
 fn channel_parser() -> impl TypedValueParser<Value = Channel> {
-    PossibleValuesParser::new(CHANNELS.map(|(name, _)| name)).try_map(|name| {
-        let known = CHANNELS.into_iter().find(|(known, _)| *known == name);
-        known.map(|(_, channel)| channel).ok_or_else(|| format!("`{name}` is not a channel"))
+    PossibleValuesParser::new(Channel::ALL.map(Channel::name)).try_map(|name| {
+        let known = Channel::ALL.into_iter().find(|known| known.name() == name);
+        known.ok_or_else(|| format!("`{name}` is not a channel"))
     })
 }
 
