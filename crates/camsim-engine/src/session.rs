@@ -16,7 +16,7 @@ use camsim_gpu::{
     session::{FRAMES_IN_FLIGHT, IdealCopy},
 };
 use camsim_plan::{
-    EdgeStage, FramePlan, Planner, PrefilterTaps, Renderer,
+    EdgeStage, FramePlan, PlanError, Planner, PrefilterTaps, Renderer,
     uniforms::{FrameUniforms, Truth, frame_uniforms},
 };
 
@@ -24,8 +24,8 @@ use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
     finished, planner_threads,
-    truth::{FramePixels, hits, planes},
     prepare_ahead::{PrepareAhead, Prepared, Preparer},
+    truth::{FramePixels, hits, planes},
 };
 
 /// One sequence on the renderers of an engine.
@@ -191,7 +191,7 @@ impl<'a> Session<'a> {
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
                     && let Err(fault) = self
                         .finish(done)
-                        .map_err(RenderError::Gpu)
+                        .map_err(RenderError::lift)
                         .and_then(|frame| sink(frame).map_err(RenderError::Sink))
                 {
                     // Buffers of the frame in flight are free only after it. A second error is not reported.
@@ -290,7 +290,7 @@ impl<'a> Session<'a> {
                 })?
                 .ok_or_else(|| GpuError::Device("a copied ideal frame of a plan without poses".into()))?,
             (IdealSource::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
-            (_, None) => return Err(GpuError::NoAdapter(String::new())),
+            (_, None) => return Err(GpuError::NoAdapter(String::new()).into()),
         };
         let elapsed_ms = ms_since(begin);
         match source {

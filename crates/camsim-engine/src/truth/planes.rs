@@ -34,7 +34,11 @@ pub(super) struct Pixel<'a> {
 
 impl FramePixels<'_> {
     /// One value for each pixel in parallel, `empty` without a ray.
-    pub(super) fn map<T: Clone + Send + Sync>(&self, empty: &T, value: impl Fn(Pixel<'_>) -> T + Sync) -> Vec<T> {
+    pub(super) fn map<T: Clone + Send + Sync>(
+        &self,
+        empty: &T,
+        value: impl Fn(Pixel<'_>) -> T + Sync,
+    ) -> Vec<T> {
         let width = self.plan.camera.size_px[0] as usize;
         let of_pixel = |i: usize| {
             if self.color_rgba[4 * i + 3] <= 0.0 {

@@ -157,9 +157,11 @@ impl FrameFiles {
                 OutputFile::Plane(channel, PlaneKind::Float(names)) => {
                     exr(names, frame.floats(channel).unwrap_or_default(), ExrPixel::Float)?
                 }
-                OutputFile::Plane(channel, PlaneKind::Index) => {
-                    png_file::encode_indices(&path, frame.size_px, frame.indices(channel).unwrap_or_default())?
-                }
+                OutputFile::Plane(channel, PlaneKind::Index) => png_file::encode_indices(
+                    &path,
+                    frame.size_px,
+                    frame.indices(channel).unwrap_or_default(),
+                )?,
             };
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
