@@ -1,104 +1,110 @@
-//! Frames a second of the built-in flight: as a whole, and with each effect left out.
+//! Frame rates of the built-in flight: of the whole camera, and with each effect left out.
 //!
-//! A second table is of terrains of different sizes: the same ground seen straight down, so that only what is
-//! out of sight differs. Sides are those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 10 GB and
-//! some minutes to make).
+//! A second table has terrains of different sizes seen straight down: the visible ground is the same, so only
+//! what is out of sight differs. `CAMSIM_TERRAIN_SIDES` sets their sides ("513 1025 4097"; 16385 takes 10 GB
+//! of memory and some minutes to make).
 //!
-//! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+//! Each table has the cpu renderer, the gpu renderer and the paper's preset side by side, measured in the
+//! same rounds. `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
-#![allow(clippy::print_stdout, reason = "the table is what this program is for")]
+#![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 
 use std::time::{Duration, Instant};
 
 use camsim::{
-    core::scenario::Channel,
-    engine::{AdapterChoice, Engine},
+    core::{scenario::Channel, sequence::Sequence},
+    engine::{Backend, Engine},
 };
 
 mod flight;
 
 use flight::{
-    Outcome, Without,
-    rounds::{Effort, Variant, measure, say_rounds, times},
+    Ablation, Outcome,
+    comparison::{Comparison, MS_TO_FIRST, PROCESSOR_MS, Renderers, START_S, TIMES_PRESET},
+    rounds::RoundLimits,
+    with_paper_preset,
 };
 
-/// As many frames as may share an ideal frame.
-const EFFORT: Effort = Effort { burst: 8, rounds: 25, budget: Duration::from_secs(90) };
-/// Pictures of larger sides are in tiles, where that is measured.
-const SMALL_PICTURE_PX: u32 = 256;
+/// A burst has as many frames as may share an ideal frame.
+const LIMITS: RoundLimits = RoundLimits { burst: 8, rounds: 15, budget: Duration::from_secs(90) };
+/// Side above which textures are tiled, in the row that measures tiles.
+const MAX_PICTURE_PX: u32 = 256;
 
 fn main() -> Outcome<()> {
-    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know
-    // whether it works.
-    let measuring = std::env::args().any(|argument| argument == "--bench");
-    let effort = if measuring { EFFORT } else { Effort::TRY };
+    // Cargo passes `--bench`. Without it (`cargo test --benches`) the program only shows that it works.
+    let is_measuring = std::env::args().any(|argument| argument == "--bench");
     let loaded = flight::load()?;
     let demo = &loaded.sequence;
-    let engine = Engine::new(AdapterChoice::Best)?;
+    let renderers = Renderers::open()?;
     let [width, height] = demo.scenario.camera.size_px;
-    println!("adapter   {}", engine);
+    println!("{}", renderers.text());
     println!("frames    {width}x{height} of the built-in flight, read back, nothing encoded");
-    let plain = &demo.scenario.output.channels;
-    let with_truth = [plain.as_slice(), &[Channel::Depth, Channel::Coords]].concat();
-    let mut variants = Vec::new();
-    for (name, without, channels, still) in [
-        ("the full camera", Without::Nothing, plain, false),
-        ("+ depth and coords", Without::Nothing, &with_truth, false),
-        ("- ideal render (frame kept)", Without::Nothing, plain, true),
-        ("- vignette and noise", Without::Photometric, plain, false),
-        ("- motion blur", Without::Blur, plain, false),
-        ("- rolling shutter", Without::RollingShutter, plain, false),
-        ("- blur and rolling shutter", Without::Time, plain, false),
-        ("- lens", Without::Lens, plain, false),
-        ("- samples at silhouettes", Without::SilhouetteSamples, plain, false),
-        ("- all of these: a perfect camera", Without::Anything, plain, false),
-    ] {
-        variants.push(Variant { still, ..Variant::open(name, &engine, without.of(demo)?, channels)? });
-    }
-    let plan = variants[0].session.planner().plan(0)?;
-    let [ideal_width, ideal_height] = plan.ideal.size_px;
-    println!(
-        "ideal     {ideal_width}x{ideal_height} px in frame 0, {} exposure nodes",
-        plan.blur.map_or(1, |blur| blur.nodes)
-    );
+    effects(&renderers, demo, is_measuring)?;
+    terrain_sizes(&renderers, demo, is_measuring)
+}
 
-    measure(&mut variants, demo.frames, effort)?;
-    print_table(&variants, "the full camera", effort);
-    drop(variants);
-
-    let sides = std::env::var("CAMSIM_TERRAIN_SIDES").unwrap_or("513 1025 4097".into());
-    let mut with_tiles = Engine::new(AdapterChoice::Best)?;
-    with_tiles.limit_pictures(SMALL_PICTURE_PX);
-    let mut sizes = Vec::new();
-    for side in sides.split_whitespace().take(if measuring { usize::MAX } else { 1 }) {
-        let begin = Instant::now();
-        let sequence = flight::ground::looking_down(demo, side.parse()?)?;
-        println!("{side} x {side} heights: made in {:.1} s", begin.elapsed().as_secs_f64());
-        // The smallest also with its picture in tiles.
-        for (engine, what) in [(&engine, "heights"), (&with_tiles, "heights, the picture in tiles")]
-            .into_iter()
-            .take(2 - sizes.len().min(1))
-        {
-            sizes.push(Variant::open(format!("{side} x {side} {what}"), engine, sequence.clone(), plain)?);
+/// The whole camera, and with each effect left out.
+fn effects(renderers: &Renderers, demo: &Sequence, is_measuring: bool) -> Outcome<()> {
+    let color = &demo.scenario.output.channels;
+    let with_truth = [color.as_slice(), &[Channel::Depth, Channel::Coords]].concat();
+    let rows = [
+        ("the full camera", Ablation::None, color, false),
+        ("+ depth and coords", Ablation::None, &with_truth, false),
+        ("- ideal frame (drawn once)", Ablation::None, color, true),
+        ("- vignette and noise", Ablation::Photometric, color, false),
+        ("- motion blur", Ablation::Blur, color, false),
+        ("- rolling shutter", Ablation::RollingShutter, color, false),
+        ("- blur and rolling shutter", Ablation::Time, color, false),
+        ("- lens", Ablation::Lens, color, false),
+        ("- silhouette rays", Ablation::SilhouetteRays, color, false),
+        ("- all of these: a perfect camera", Ablation::All, color, false),
+    ];
+    let mut table = Comparison::new(renderers);
+    for (i, (name, ablation, channels, is_still)) in rows.into_iter().enumerate() {
+        table.add(name, &ablation.apply(demo)?, channels, is_still)?;
+        if i == 0 {
+            table.add_preset(None, &with_paper_preset(demo), color)?;
         }
     }
-    measure(&mut sizes, demo.frames, effort)?;
-    print_table(&sizes, "the first", effort);
+    if let Some(variant) = table.variant(0, 0) {
+        let plan = variant.session.planner().plan(0)?;
+        let [width, height] = plan.ideal.size_px;
+        let nodes = plan.blur.map_or(1, |blur| blur.nodes);
+        println!("ideal     {width}x{height} px in frame 0, {nodes} exposure nodes");
+    }
+    let limits = LIMITS.or_smoke_test(is_measuring);
+    table.measure(demo.frames, limits)?;
+    table.print("variant", limits, &[MS_TO_FIRST, TIMES_PRESET, PROCESSOR_MS, START_S]);
     Ok(())
 }
 
-fn print_table(variants: &[Variant<'_>], first: &str, effort: Effort) {
-    println!("{}", say_rounds(variants, effort));
-    println!(
-        "| variant | ms a frame | frames/s | to {first} | processor ms a frame | to {first} | start, s |"
-    );
-    println!("|---|---|---|---|---|---|---|");
-    for variant in variants {
-        println!(
-            "| {} | {} | {:.2} |",
-            variant.name,
-            times(variant, &variants[0]).join(" | "),
-            variant.start.as_secs_f64()
-        );
+/// Terrains of different sizes; on the gpu the smallest also with its texture in tiles.
+fn terrain_sizes(renderers: &Renderers, demo: &Sequence, is_measuring: bool) -> Outcome<()> {
+    let color = &demo.scenario.output.channels;
+    let sides = std::env::var("CAMSIM_TERRAIN_SIDES").unwrap_or("513 1025 4097".into());
+    let tiling_engine = match renderers.gpu {
+        Some(_) => {
+            let mut engine = Engine::open(Backend::Gpu)?;
+            engine.limit_pictures(MAX_PICTURE_PX);
+            Some(engine)
+        }
+        None => None,
+    };
+    let mut table = Comparison::new(renderers);
+    println!();
+    for (i, side) in sides.split_whitespace().take(if is_measuring { usize::MAX } else { 1 }).enumerate() {
+        let begin = Instant::now();
+        let sequence = flight::ground::looking_down(demo, side.parse()?)?;
+        println!("{side} x {side} heights: made in {:.1} s", begin.elapsed().as_secs_f64());
+        table.add(format!("{side} x {side} heights"), &sequence, color, false)?;
+        if i == 0 {
+            table.add_preset(None, &with_paper_preset(&sequence), color)?;
+            let name = format!("{side} x {side} heights, the texture in tiles");
+            table.add_on([None, tiling_engine.as_ref()], name, &sequence, color, false)?;
+        }
     }
+    let limits = LIMITS.or_smoke_test(is_measuring);
+    table.measure(demo.frames, limits)?;
+    table.print("terrain", limits, &[MS_TO_FIRST, TIMES_PRESET, PROCESSOR_MS, START_S]);
+    Ok(())
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use camsim::{
     core::{
         mount::CameraPath,
-        scenario::{LensSpec, ShutterSpec, Silhouettes},
+        scenario::{LensSpec, Preset, ShutterSpec, Silhouettes},
         sequence::Sequence,
     },
     io::{
@@ -17,46 +17,54 @@ use camsim::{
     },
 };
 
+pub mod comparison;
 pub mod ground;
 pub mod rounds;
 
-/// Whatever may go wrong: a benchmark stops and says so.
+/// Result of a benchmark's function; any error ends the benchmark.
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// The scenario of `camsim demo`, loaded from a folder that is gone afterwards.
+/// Loads the scenario of `camsim demo` from a temporary folder.
 pub fn load() -> Outcome<Loaded> {
     let folder = tempfile::tempdir()?;
     let scenario = read_scenario(&builtin::unpack(folder.path())?, &[], None)?;
     Ok(load_sequence(&scenario)?)
 }
 
-/// What a variant leaves out of the demo's camera.
+/// The sequence with the paper's preset.
+pub fn with_paper_preset(sequence: &Sequence) -> Arc<Sequence> {
+    let mut sequence = sequence.clone();
+    sequence.scenario.quality.preset = Preset::Paper;
+    Arc::new(sequence)
+}
+
+/// Effects of a camera that are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Without {
-    /// Nothing: the demo as it is.
-    Nothing,
+pub enum Ablation {
+    /// None: the camera as it is.
+    None,
     /// Vignette map and noise.
     Photometric,
     /// Exposure, and with it motion blur.
     Blur,
-    /// Readout: every row at the same instant, exposure stays.
+    /// Readout: every row has the same instant; the exposure stays.
     RollingShutter,
-    /// Readout and exposure: nothing moves within the frame.
+    /// Readout and exposure: nothing moves within a frame.
     Time,
-    /// Distortion: a pinhole, no lens map.
+    /// Distortion: a pinhole without lens map.
     Lens,
-    /// Samples at silhouettes: one a pixel, as by a tolerance that they cannot break.
-    SilhouetteSamples,
-    /// All of it, and the shaking mount: a perfect camera.
-    Anything,
+    /// Silhouette rays: one source per pixel.
+    SilhouetteRays,
+    /// All effects, and the vibration of the mount: a perfect camera.
+    All,
 }
 
-impl Without {
-    /// The demo's sequence without it.
-    pub fn of(self, demo: &Sequence) -> Outcome<Arc<Sequence>> {
-        let mut sequence = demo.clone();
+impl Ablation {
+    /// The sequence without these effects.
+    pub fn apply(self, sequence: &Sequence) -> Outcome<Arc<Sequence>> {
+        let mut sequence = sequence.clone();
         let camera = &mut sequence.scenario.camera;
-        if matches!(self, Self::Photometric | Self::Anything) {
+        if matches!(self, Self::Photometric | Self::All) {
             camera.photometric.vignette = None;
             camera.photometric.noise_sigma = 0.0;
             sequence.vignette = None;
@@ -64,14 +72,14 @@ impl Without {
         match self {
             Self::Blur => camera.shutter.exposure_ms = 0.0,
             Self::RollingShutter => camera.shutter.readout_ms = 0.0,
-            Self::Time | Self::Anything => camera.shutter = ShutterSpec::default(),
-            Self::SilhouetteSamples => sequence.scenario.quality.silhouettes = Silhouettes::Plain,
-            Self::Nothing | Self::Photometric | Self::Lens => {}
+            Self::Time | Self::All => camera.shutter = ShutterSpec::default(),
+            Self::SilhouetteRays => sequence.scenario.quality.silhouettes = Silhouettes::Plain,
+            Self::None | Self::Photometric | Self::Lens => {}
         }
-        if matches!(self, Self::Lens | Self::Anything) {
+        if matches!(self, Self::Lens | Self::All) {
             camera.lens = LensSpec::default();
         }
-        if self == Self::Anything {
+        if self == Self::All {
             camera.mount.vibration.clear();
             sequence.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &camera.mount)?);
         }

@@ -1,3 +1,3 @@
-// Dispatches whose size a shader finds: workgroups along x, then in rows of MOST_GROUPS. Every adapter has
-// 65535 along each axis.
-const MOST_GROUPS: u32 = 32768u;
+// Size of indirect dispatches: workgroups along x, then rows of MAX_GROUPS_X. Every adapter allows 65535
+// along each axis.
+const MAX_GROUPS_X: u32 = 32768u;

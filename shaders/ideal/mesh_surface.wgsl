@@ -1,16 +1,16 @@
-// Where meshes stand, and what is on them.
+// Placements and material of meshes.
 #import ideal/surface.wgsl
 
 struct MeshMaterial {
-    // Light of its own; alpha below which there is a hole.
+    // Emitted linear light; in w the alpha cut-off.
     emissive_cutoff: vec4<f32>,
-    // Towards the sun, NED, times its strength; the sky's.
+    // Direction towards the sun (NED) times its strength; in w the strength of the sky.
     sun_sky: vec4<f32>,
 }
 
 @group(1) @binding(2) var<uniform> material: MeshMaterial;
 
-// Rows of base_from_shape: turn, then the shape's origin minus the whole-metre base.
+// Rows of base_from_shape: a linear map, and in w the shape's origin relative to the base.
 struct MeshPlacement {
     x: vec4<f32>,
     y: vec4<f32>,
@@ -21,9 +21,11 @@ struct MeshPlacement {
 
 fn base_from_shape(instance: u32, position_m: vec3<f32>) -> vec3<f32> {
     let placement = placements[instance];
-    let at = vec4<f32>(position_m, 1.0);
-    return vec3<f32>(dot(placement.x, at), dot(placement.y, at), dot(placement.z, at));
+    let homogeneous = vec4<f32>(position_m, 1.0);
+    return vec3<f32>(
+        dot(placement.x, homogeneous), dot(placement.y, homogeneous), dot(placement.z, homogeneous)
+    );
 }
 
-// What arrives from it: the `mesh_color` slot.
+// Colour of a fragment: the `mesh_color` slot.
 #import <slot:mesh_color>

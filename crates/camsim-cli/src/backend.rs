@@ -7,12 +7,12 @@ use camsim_engine::{Engine, GpuError};
 pub struct BackendArgs {
     /// Renderer [default: gpu on a graphics card, cpu elsewhere]
     #[arg(long, value_enum)]
-    backend: Option<Backend>,
+    backend: Option<EngineBackend>,
 }
 
 /// A renderer of the engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Backend {
+pub enum EngineBackend {
     /// This machine's processor alone; needs no Vulkan driver
     Cpu,
     /// The graphics adapter alone, a software adapter where there is no card
@@ -27,10 +27,10 @@ impl BackendArgs {
 }
 
 /// Opens what renders, by [`camsim_engine::Backend::Auto`] if nothing is named.
-pub fn open(backend: Option<Backend>) -> Result<Engine, GpuError> {
+pub fn open(backend: Option<EngineBackend>) -> Result<Engine, GpuError> {
     Engine::open(match backend {
         None => camsim_engine::Backend::Auto,
-        Some(Backend::Cpu) => camsim_engine::Backend::Cpu,
-        Some(Backend::Gpu) => camsim_engine::Backend::Gpu,
+        Some(EngineBackend::Cpu) => camsim_engine::Backend::Cpu,
+        Some(EngineBackend::Gpu) => camsim_engine::Backend::Gpu,
     })
 }

@@ -192,7 +192,8 @@ mod tests {
             Path::new("my flights/a.toml"),
             vec!["--set".into(), "camera.size_px=[9, 9]".into()],
         );
-        let whole = "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' --set 'camera.size_px=[9, 9]' --frame 5`";
+        let whole = "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' \
+                     --set 'camera.size_px=[9, 9]' --frame 5`";
         assert_eq!(console.whole(hint), whole);
         console.set_typed(["target/camsim", "render", "it's.toml", "-o", "out"].map(OsString::from).to_vec());
         assert_eq!(console.command_with("--resume"), "target/camsim render 'it'\\''s.toml' -o out --resume");

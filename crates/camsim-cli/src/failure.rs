@@ -48,23 +48,23 @@ impl Failure {
     /// Whether the reader of the output has closed it, which is no failure (`camsim ... | head`).
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
-        let of_pipe = |cause: &(dyn std::error::Error + 'static)| {
+        let is_of_pipe = |cause: &(dyn std::error::Error + 'static)| {
             cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
         };
-        self.error.chain().any(of_pipe)
+        self.error.chain().any(is_of_pipe)
     }
 }
 
 impl fmt::Display for Failure {
     /// `error: ...`, then a line `caused by: ...` for each cause that is not part of the lines before.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut said = self.error.to_string();
+        let mut printed = self.error.to_string();
         let begin = if self.code == INTERRUPTED { "stopped" } else { "error" };
-        write!(f, "{begin}: {said}")?;
+        write!(f, "{begin}: {printed}")?;
         for cause in self.error.chain().skip(1).map(ToString::to_string) {
-            if !said.contains(&cause) {
+            if !printed.contains(&cause) {
                 write!(f, "\n  caused by: {cause}")?;
-                said.push_str(&cause);
+                printed.push_str(&cause);
             }
         }
         Ok(())

@@ -4,10 +4,10 @@ use std::{fmt, str::FromStr};
 
 /// Ranges as typed; omitted ends come from the sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FrameList(Vec<Part>);
+pub struct FrameList(Vec<FrameRange>);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
+struct FrameRange {
     first: u64,
     /// Exclusive.
     end: Option<u64>,
@@ -37,7 +37,8 @@ impl fmt::Display for FrameListError {
             Self::Syntax(part) => {
                 write!(
                     f,
-                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"
+                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several \
+                     of them with commas"
                 )
             }
             Self::Empty(part) => write!(f, "`{part}` is empty: the end must be above the start"),
@@ -45,7 +46,8 @@ impl fmt::Display for FrameListError {
                 let last = frames.saturating_sub(1);
                 write!(
                     f,
-                    "{asked_by}: frame {frame} does not exist, the last one is {last}; widen flight.window_s or raise camera.fps"
+                    "{asked_by}: frame {frame} does not exist, the last one is {last}; widen flight.window_s \
+                     or raise camera.fps"
                 )
             }
         }
@@ -58,11 +60,11 @@ impl FromStr for FrameList {
     type Err = FrameListError;
 
     fn from_str(text: &str) -> Result<Self, FrameListError> {
-        text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>().map(Self)
+        text.split(',').map(|part| FrameRange::parse(part.trim())).collect::<Result<_, _>>().map(Self)
     }
 }
 
-impl Part {
+impl FrameRange {
     fn parse(text: &str) -> Result<Self, FrameListError> {
         let syntax = || FrameListError::Syntax(text.to_owned());
         let number = |digits: &str| match digits.bytes().all(|byte| byte.is_ascii_digit()) {

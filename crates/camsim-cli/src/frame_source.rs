@@ -1,4 +1,4 @@
-//! What renders the frames of a run: the engine on a device, or the oracle's rays on the CPU.
+//! Renderers of a run: the engine, or the reference renderer.
 
 use std::sync::Arc;
 
@@ -14,42 +14,42 @@ use camsim_plan::Planner;
 
 use crate::failure::{Failure, OrFail};
 
-/// Takes finished frames in order.
+/// Receives finished frames in order.
 pub type Sink<'s> = dyn FnMut(Finished) -> Result<(), WriteError> + 's;
 
 /// Something that renders frames of one sequence.
 pub trait FrameSource {
-    /// What renders, for people.
+    /// Name of the renderer, for users.
     fn adapter(&self) -> String;
 
     /// The planner of the sequence.
     fn planner(&self) -> &Planner;
 
-    /// Renders frames in the order asked for and hands each to `sink`.
+    /// Renders frames in the given order and passes each to `sink`.
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure>;
 }
 
-/// The engine.
+/// The engine: cpu or gpu renderer.
 #[derive(Debug)]
-pub struct Device<'a> {
+pub struct EngineSource<'a> {
     engine: &'a Engine,
     session: Session<'a>,
 }
 
-impl<'a> Device<'a> {
-    /// Uploads a sequence.
+impl<'a> EngineSource<'a> {
+    /// Opens a session, which uploads the scene if a gpu renders it.
     pub fn new(engine: &'a Engine, sequence: &Arc<Sequence>) -> Result<Self, Failure> {
         let session = engine.session::<WriteError>(sequence.clone(), &sequence.scenario.output.channels)?;
         Ok(Self { engine, session })
     }
 
-    /// From now on finished frames tell the time of their passes, if the adapter can.
+    /// Measures the time of each gpu pass, if the adapter has time stamps.
     pub fn time_passes(&mut self) {
         self.session.time_passes();
     }
 }
 
-impl FrameSource for Device<'_> {
+impl FrameSource for EngineSource<'_> {
     fn adapter(&self) -> String {
         self.engine.to_string()
     }
@@ -63,23 +63,23 @@ impl FrameSource for Device<'_> {
     }
 }
 
-/// Share of `quality.max_error_dn` that the reference leaves as the standard error of a pixel.
+/// Standard error of a reference pixel, as a share of `quality.max_error_dn`.
 const SHARE_OF_TOLERANCE: f64 = 0.25;
 
-/// No texture is made of the ideal frame, so nearly any size will do, and any number of pixels.
+/// Side limit of ideal frames, which are not drawn here.
 const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 
-/// The oracle. Plans only say which ideal frame source coordinates refer to: the one that the engine would
-/// use.
+/// The reference renderer. Plans only determine the ideal frame of the source coordinates, as the engine
+/// would choose it.
 #[derive(Debug)]
-pub struct Rays {
+pub struct ReferenceSource {
     oracle: Oracle,
     planner: Planner,
     options: RenderOptions,
 }
 
-impl Rays {
-    /// Prepares the scene for rays.
+impl ReferenceSource {
+    /// Builds the ray-casting structures.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, Failure> {
         let scenario = &sequence.scenario;
         let mut planned = Sequence::clone(sequence);
@@ -96,7 +96,7 @@ impl Rays {
     }
 }
 
-impl FrameSource for Rays {
+impl FrameSource for ReferenceSource {
     fn adapter(&self) -> String {
         Oracle::describe()
     }

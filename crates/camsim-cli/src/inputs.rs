@@ -84,7 +84,7 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
     for warning in &loaded.warnings {
         console.warn(warning);
     }
-    say_details(scenario, &loaded.log, console);
+    print_details(scenario, &loaded.log, console);
     Ok(loaded)
 }
 
@@ -97,12 +97,12 @@ pub fn load_flight_only(
     for warning in flight_warnings(scenario, &log, &tracked) {
         console.warn(warning);
     }
-    say_details(scenario, &log, console);
+    print_details(scenario, &log, console);
     Ok((log, tracked))
 }
 
 /// Prints the notes of the log's reader that are no warnings.
-fn say_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>) {
+fn print_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>) {
     let file = scenario.flight.log.display();
     console.detail(format_args!("{file}: {}", log.report));
     for note in log.notes.iter().filter(|note| !note.is_warning) {

@@ -23,7 +23,8 @@ pub fn watch() -> Watch {
             if RUNS.load(Ordering::SeqCst) == 0 || ASKED.swap(true, Ordering::SeqCst) {
                 #[allow(
                     clippy::disallowed_methods,
-                    reason = "asked twice: what is half written has a temporary name, which the next run removes"
+                    reason = "asked twice: what is half written has a temporary name, which the next run \
+                              removes"
                 )]
                 std::process::exit(i32::from(INTERRUPTED));
             }

@@ -44,13 +44,15 @@ Exit codes:
   1  failure during the run (disk, GPU, a check that did not pass)
   2  wrong usage or invalid input; the message names the place and a remedy
   3  no usable graphics adapter where one is demanded
-  130  stopped by Ctrl-C after the current frames; all files are complete, and the message tells how to resume. A second Ctrl-C ends at once
+  130  stopped by Ctrl-C after the current frames: all files are complete, and the message tells how to resume;
+     a second Ctrl-C ends at once
 
---backend cpu renders without a graphics adapter; CAMSIM_ADAPTER=part-of-a-name picks one (names: `camsim info`).";
+--backend cpu renders without a graphics adapter; CAMSIM_ADAPTER=part-of-a-name picks one (`camsim info` lists them).";
 
 /// Simulator of imperfect airborne cameras: frames with ground truth.
 #[derive(Debug, Parser)]
-#[command(name = "camsim", version, after_help = AFTER_HELP, arg_required_else_help = true, max_term_width = 110)]
+#[command(name = "camsim", version, after_help = AFTER_HELP)]
+#[command(arg_required_else_help = true, max_term_width = 110)]
 struct Cli {
     /// Print results only: no progress, notes or warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -64,24 +66,24 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Demo(commands::demo::Args),
-    Render(commands::render::Args),
-    Explain(commands::explain::Args),
-    Verify(commands::verify::Args),
-    Track(commands::track::Args),
-    Lens(commands::lens::Args),
-    Camera(commands::camera::Args),
-    Apply(commands::apply::Args),
-    Board(commands::board::Args),
-    Compare(commands::compare::Args),
+    Demo(commands::demo::DemoArgs),
+    Render(commands::render::RenderArgs),
+    Explain(commands::explain::ExplainArgs),
+    Verify(commands::verify::VerifyArgs),
+    Track(commands::track::TrackArgs),
+    Lens(commands::lens::LensArgs),
+    Camera(commands::camera::CameraArgs),
+    Apply(commands::apply::ApplyArgs),
+    Board(commands::board::BoardArgs),
+    Compare(commands::compare::CompareArgs),
     #[cfg(feature = "lab")]
-    Bench(commands::bench::Args),
+    Bench(commands::bench::BenchArgs),
     #[cfg(feature = "lab")]
-    Reproduce(commands::reproduce::Args),
-    Info(commands::info::Args),
+    Reproduce(commands::reproduce::ReproduceArgs),
+    Info(commands::info::InfoArgs),
     #[cfg(feature = "viewer")]
-    Viewer(commands::viewer::Args),
-    Completions(commands::completions::Args),
+    Viewer(commands::viewer::ViewerArgs),
+    Completions(commands::completions::CompletionsArgs),
 }
 
 /// Runs the program with the process's arguments.

@@ -33,9 +33,9 @@ pub fn write_output(
 /// # Errors
 /// The error that [`write_output`] would return.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
-    let tried = part_of(path)
+    let checked = part_path(path)
         .and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
-    tried.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
+    checked.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
 }
 
 /// Checks, before the run, that a folder can be written. It is created.
@@ -46,8 +46,8 @@ pub fn check_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .with_context(|| format!("{}: cannot be created; choose another folder with -o", folder.display()))
         .or_failed()?;
-    let tried = part_of(&folder.join("camsim")).and_then(|part| touch(&part));
-    tried
+    let checked = part_path(&folder.join("camsim")).and_then(|part| touch(&part));
+    checked
         .with_context(|| format!("{}: cannot be written to; choose another folder with -o", folder.display()))
         .or_failed()
 }
@@ -58,14 +58,14 @@ fn touch(part: &Path) -> io::Result<()> {
 }
 
 /// Temporary name of a file while it is written.
-fn part_of(path: &Path) -> io::Result<PathBuf> {
+fn part_path(path: &Path) -> io::Result<PathBuf> {
     let mut name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_owned();
     name.push(format!(".{}.part", std::process::id()));
     Ok(path.with_file_name(name))
 }
 
 fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let part = part_of(path)?;
+    let part = part_path(path)?;
     let written = File::create(&part).and_then(|file| {
         let mut file = BufWriter::new(file);
         fill(&mut file)?;

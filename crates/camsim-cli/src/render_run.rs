@@ -30,7 +30,7 @@ use crate::{
 mod folder;
 mod tables;
 
-use folder::Standing;
+use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
 pub use tables::{body_at, camera_at, source_frame};
 
@@ -50,7 +50,7 @@ pub struct Job<'a> {
     /// Warnings of loading, stored in `run.json`.
     pub warnings: &'a [String],
     /// Command that resumes the run, for the message after an interruption.
-    pub go_on: &'a str,
+    pub resume_command: &'a str,
 }
 
 /// Result of a run.
@@ -76,26 +76,28 @@ impl Outcome {
     }
 }
 
-/// Renders a job. `look` receives each finished frame before it is written and can stop the run, as Ctrl-C
-/// can. Written frames are kept then, the tables list them, and `run.json` marks the run as unfinished.
+/// Renders a job. `on_frame` receives each finished frame before it is written and can stop the run, as
+/// Ctrl-C can. Written frames are kept then, the tables list them, and `run.json` marks the run as
+/// unfinished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
     console: &mut Console<'_>,
-    look: &mut dyn FnMut(&Finished) -> ControlFlow<()>,
+    on_frame: &mut dyn FnMut(&Finished) -> ControlFlow<()>,
 ) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
     let files = folder::files_of(scenario, job.folder);
-    let inputs = inputs::of_scenario(scenario);
+    let inputs = inputs::scenario_fingerprints(scenario);
     let adapter = source.adapter();
     folder::check(job, &files, &inputs, &adapter, console)?;
-    let mine: Vec<u64> = job
+    let shard_frames: Vec<u64> = job
         .frames
         .iter()
         .copied()
         .filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0)))
         .collect();
-    let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
+    let todo: Vec<u64> =
+        shard_frames.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // Planning errors are reported before anything is written.
     let begin = Instant::now();
     if let Some(&first) = todo.first() {
@@ -115,7 +117,7 @@ pub fn run(
         frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
         shard: job.shard.map(|shard| shard.0),
         written: 0,
-        skipped: (mine.len() - todo.len()) as u64,
+        skipped: (shard_frames.len() - todo.len()) as u64,
         finished: false,
         warnings: job.warnings.to_vec(),
     };
@@ -123,17 +125,17 @@ pub fn run(
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files.clone(), threads()));
-    let (mut blind, mut empty, mut cycles) = (0_u64, 0_u64, OverlapCycles::default());
+    let (mut sky_only, mut empty, mut cycles) = (0_u64, 0_u64, OverlapCycles::default());
     let mut tolerances = Tolerances::new(&scenario.quality);
     let mut made = BTreeMap::new();
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
     let watch = interrupt::watch();
     let rendered = source.render(&todo, &mut |finished| {
-        if look(&finished).is_break() {
+        if on_frame(&finished).is_break() {
             return Err(WriteError::Stopped);
         }
-        blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
+        sky_only += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
         cycles.add(finished.plan.frame, finished.out_of_order);
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
@@ -148,8 +150,8 @@ pub fn run(
     let is_stopped = rendered.is_err() && watch.is_asked();
     drop(watch);
     let time = begin.elapsed();
-    let said: Vec<String> = if rendered.is_ok() {
-        let warnings = validity_warnings(blind, empty, todo.len()).chain(cycles.warning(todo.len()));
+    let run_warnings: Vec<String> = if rendered.is_ok() {
+        let warnings = validity_warnings(sky_only, empty, todo.len()).chain(cycles.warning(todo.len()));
         warnings
             .chain(tolerances.iter().flat_map(Tolerances::warnings))
             .map(|warning| console.whole(&warning))
@@ -157,28 +159,28 @@ pub fn run(
     } else {
         Vec::new()
     };
-    said.iter().for_each(|warning| console.warn(warning));
-    manifest.warnings.extend(said);
+    run_warnings.iter().for_each(|warning| console.warn(warning));
+    manifest.warnings.extend(run_warnings);
     manifest.written = made.keys().filter(|&&frame| !writes_frames || files.exist(frame)).count() as u64;
     manifest.finished = rendered.is_ok() && written.is_ok();
-    let told = finish(job, &files, &made, &manifest, source);
+    let tables_written = finish(job, &files, &made, &manifest, source);
     if is_stopped && written.is_ok() {
-        told?;
+        tables_written?;
         let done = if writes_frames {
-            mine.iter().filter(|&&frame| files.exist(frame)).count() as u64
+            shard_frames.iter().filter(|&&frame| files.exist(frame)).count() as u64
         } else {
             manifest.written
         };
         let folder = job.folder.display();
         return Err(Failure::interrupted(anyhow!(
             "{done} of {} frames are in {folder}; to resume: {}",
-            mine.len(),
-            job.go_on
+            shard_frames.len(),
+            job.resume_command
         )));
     }
     rendered?;
     let bytes = written?.map_or(0, |summary| summary.bytes);
-    told?;
+    tables_written?;
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
 }
 
@@ -193,14 +195,14 @@ fn prepare(
 ) -> Result<(), Failure> {
     let _lock = Lock::take(job.folder)?;
     // Checked again under the lock.
-    let standing = folder::standing(job, files, &manifest.inputs)?;
-    if standing == Standing::Replaced {
+    let folder_state = folder::folder_state(job, files, &manifest.inputs)?;
+    if folder_state == FolderState::Replaced {
         files.remove(job.frames).or_failed()?;
     }
     manifest.write(job.folder).or_failed()?;
-    files.sweep(todo);
+    files.remove_temporaries(todo);
     tables::write_fixed(job, source.planner(), console)?;
-    tables::begin_frames(job, standing == Standing::Ours)
+    tables::begin_frames(job, folder_state == FolderState::Ours)
 }
 
 /// Writes the files after the last frame.
@@ -217,17 +219,21 @@ fn finish(
 }
 
 /// Warns of frames that see only sky, and of frames without a valid pixel.
-fn validity_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
-    let blind = (blind > 0).then(|| {
-        format!("{blind} of {frames} frames see only sky: check camera.mount, flight.height and the position of the scene")
+fn validity_warnings(sky_only: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
+    let sky_only = (sky_only > 0).then(|| {
+        format!(
+            "{sky_only} of {frames} frames see only sky: check camera.mount, flight.height and the position \
+                 of the scene"
+        )
     });
     let empty = (empty > 0).then(|| {
         format!(
-            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, or the lens has none; check \
-             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain SCENARIO.toml`"
+            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, \
+             or the lens has none; check camera.principal_point_px and camera.focal_px against \
+             camera.size_px, and see `camsim explain SCENARIO.toml`"
         )
     });
-    blind.into_iter().chain(empty)
+    sky_only.into_iter().chain(empty)
 }
 
 /// Whether no pixel of a frame's colour is valid; false for a frame without colour.
@@ -237,7 +243,7 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 
 /// Command that renders the missing frames of a folder's scenario.
 #[cfg(feature = "viewer")]
-pub fn go_on(folder: &Path) -> String {
+pub fn resume_command(folder: &Path) -> String {
     use crate::console::quoted;
 
     format!(

@@ -18,7 +18,7 @@ pub struct TimesTable {
 
 impl TimesTable {
     /// Adds a stage before the first frame.
-    pub fn begun(&mut self, name: &'static str, time: Duration) {
+    pub fn add_start(&mut self, name: &'static str, time: Duration) {
         self.start.push((name, time));
     }
 
@@ -28,7 +28,7 @@ impl TimesTable {
         let waiting = waiting(name, quiet);
         let done = work();
         waiting.finish_and_clear();
-        self.begun(name, begin.elapsed());
+        self.add_start(name, begin.elapsed());
         done
     }
 
@@ -70,7 +70,7 @@ impl TimesTable {
             text += &format!("  {name:<22}{median:>10.2}{largest:>10.2}{:>10}\n", all.len());
         }
         if self.parts.iter().all(|(name, _)| name.starts_with("cpu")) {
-            text += "  the adapter has no time stamps\n";
+            text += "  no gpu passes: the cpu rendered all frames, or the adapter has no time stamps\n";
         }
         text += "ms before the first frame\n";
         for (name, time) in &self.start {

@@ -6,13 +6,13 @@ use camsim_plan::FramePlan;
 /// Frames that are predicted to exceed `quality.max_error_px` or `quality.max_error_dn`.
 #[derive(Debug)]
 pub struct Tolerances {
-    px: Broken,
-    dn: Broken,
+    px: Exceeded,
+    dn: Exceeded,
     frames: u64,
 }
 
 #[derive(Debug)]
-struct Broken {
+struct Exceeded {
     key: &'static str,
     unit: &'static str,
     tolerance: f64,
@@ -23,14 +23,14 @@ struct Broken {
 
 impl Tolerances {
     /// `None` for methods that the user chose regardless of their error, those of the paper, and for the
-    /// oracle, which has no plan.
+    /// reference renderer, which has no plan.
     pub fn new(quality: &QualitySpec) -> Option<Self> {
-        let is_asked_for = quality.preset == Preset::Paper
+        let is_explicit = quality.preset == Preset::Paper
             || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle));
-        let broken = |key, unit, tolerance| Broken { key, unit, tolerance, frames: 0, worst: None };
-        (!is_asked_for).then(|| Self {
-            px: broken("quality.max_error_px", " px", quality.max_error_px),
-            dn: broken("quality.max_error_dn", "/255", quality.max_error_dn),
+        let exceeded = |key, unit, tolerance| Exceeded { key, unit, tolerance, frames: 0, worst: None };
+        (!is_explicit).then(|| Self {
+            px: exceeded("quality.max_error_px", " px", quality.max_error_px),
+            dn: exceeded("quality.max_error_dn", "/255", quality.max_error_dn),
             frames: 0,
         })
     }
@@ -45,11 +45,11 @@ impl Tolerances {
 
     /// A warning for each tolerance that is exceeded.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        [&self.px, &self.dn].into_iter().filter_map(|broken| broken.warning(self.frames))
+        [&self.px, &self.dn].into_iter().filter_map(|exceeded| exceeded.warning(self.frames))
     }
 }
 
-impl Broken {
+impl Exceeded {
     fn add(&mut self, frame: u64, kept: bool, error: f64) {
         if kept {
             return;
@@ -60,7 +60,7 @@ impl Broken {
         }
     }
 
-    fn warning(&self, of: u64) -> Option<String> {
+    fn warning(&self, total: u64) -> Option<String> {
         let &Self { key, unit, tolerance, frames, worst } = self;
         let (error, frame) = worst?;
         // Pixels without a source exceed the tolerance too, however accurate the others are.
@@ -70,7 +70,8 @@ impl Broken {
             "too many pixels have no source".to_owned()
         };
         Some(format!(
-            "{frames} of {of} frames exceed {key} = {tolerance}: in the worst, frame {frame}, {expected}; see `camsim explain SCENARIO.toml --frame {frame}`"
+            "{frames} of {total} frames exceed {key} = {tolerance}: in the worst, frame {frame}, {expected}; \
+             see `camsim explain SCENARIO.toml --frame {frame}`"
         ))
     }
 }
@@ -95,12 +96,13 @@ impl OverlapCycles {
     }
 
     /// The warning, if any.
-    pub fn warning(&self, of: usize) -> Option<String> {
+    pub fn warning(&self, total: usize) -> Option<String> {
         let (most, frame) = self.worst?;
         let frames = self.frames;
         Some(format!(
-            "in {frames} of {of} frames blended triangles overlap in cycles, so that up to {most} (frame {frame}) are blended in the wrong \
-             order, which is not predicted; `camsim verify SCENARIO.toml --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
+            "in {frames} of {total} frames blended triangles overlap in cycles, so that up to {most} (frame \
+             {frame}) are blended in the wrong order, which is not predicted; `camsim verify SCENARIO.toml \
+             --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
         ))
     }
 }
@@ -130,10 +132,10 @@ mod tests {
         for (frame, kept, px) in [(3, true, 0.01), (4, false, 0.2), (5, false, 0.31), (6, false, 0.07)] {
             tolerances.px.add(frame, kept, px);
         }
-        let said: Vec<String> = tolerances.warnings().collect();
-        let wanted = "3 of 4 frames exceed quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
-                      see `camsim explain SCENARIO.toml --frame 5`";
-        assert_eq!(said, [wanted]);
+        let text: Vec<String> = tolerances.warnings().collect();
+        let wanted = "3 of 4 frames exceed quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are \
+                      predicted; see `camsim explain SCENARIO.toml --frame 5`";
+        assert_eq!(text, [wanted]);
     }
 
     #[test]
@@ -143,10 +145,13 @@ mod tests {
         [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)]
             .into_iter()
             .for_each(|(frame, count)| cycles.add(frame, count));
-        let said = cycles.warning(5).unwrap();
+        let text = cycles.warning(5).unwrap();
         assert!(
-            said.starts_with("in 4 of 5 frames blended triangles overlap in cycles, so that up to 7 (frame 5) are blended in the wrong order"),
-            "{said}"
+            text.starts_with(
+                "in 4 of 5 frames blended triangles overlap in cycles, so that up to 7 (frame \
+                              5) are blended in the wrong order"
+            ),
+            "{text}"
         );
     }
 
@@ -161,10 +166,13 @@ mod tests {
 
     #[test]
     fn explicit_methods_have_no_tolerance_warnings() {
-        let of = |solver| Tolerances::new(&QualitySpec { solver, ..QualitySpec::default() }).is_some();
-        assert!(of(Auto::Auto) && of(Auto::Value(Solver::Reproject)));
+        let has_warnings =
+            |solver| Tolerances::new(&QualitySpec { solver, ..QualitySpec::default() }).is_some();
+        assert!(has_warnings(Auto::Auto) && has_warnings(Auto::Value(Solver::Reproject)));
         assert!(
-            ![Solver::Linear, Solver::Rk2, Solver::Oracle].into_iter().any(|solver| of(Auto::Value(solver)))
+            ![Solver::Linear, Solver::Rk2, Solver::Oracle]
+                .into_iter()
+                .any(|solver| has_warnings(Auto::Value(solver)))
         );
         assert!(Tolerances::new(&QualitySpec { preset: Preset::Paper, ..QualitySpec::default() }).is_none());
     }

@@ -30,7 +30,8 @@ fn unknown_flow_and_extrapolation_are_reported() {
         .unwrap();
     let apply = |interval_ms: &str, more: &[&str]| {
         let text_of = format!(
-            "color = \"c.ppm\"\nfocal_px = [30.0, 30.0]\n[motion]\nflow = \"f.flo\"\nflow_interval_ms = {interval_ms}\n"
+            "color = \"c.ppm\"\nfocal_px = [30.0, 30.0]\n[motion]\nflow = \"f.flo\"\nflow_interval_ms = \
+             {interval_ms}\n"
         );
         fs::write(&frame, text_of).unwrap();
         let (code, err) = camsim([&["apply", text(&camera), text(&frame), "-o", text(&out)], more].concat());

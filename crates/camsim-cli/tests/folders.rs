@@ -47,15 +47,15 @@ fn program(folder: &Path, args: &[&str]) -> Command {
     program
 }
 
-/// Exit code and standard error.
-fn end(child: Child) -> (i32, String) {
+/// Waits for the program. Returns exit code and standard error.
+fn wait(child: Child) -> (i32, String) {
     let output = child.wait_with_output().unwrap();
     (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 /// `camsim` in a working directory.
 fn camsim(folder: &Path, args: &[&str]) -> (i32, String) {
-    end(spawn(folder, args))
+    wait(spawn(folder, args))
 }
 
 /// A camera so small that the reference renders it quickly.
@@ -129,14 +129,14 @@ fn numbers(folder: &Path) -> Vec<u64> {
 #[test]
 fn copied_folder_reproduces_the_same_bytes() {
     let base = tempfile::tempdir().unwrap();
-    let at = |name: &str| base.path().join(name);
-    camsim_io::builtin::unpack(&at("made/demo/scene")).unwrap();
+    let path = |name: &str| base.path().join(name);
+    camsim_io::builtin::unpack(&path("made/demo/scene")).unwrap();
     let more =
         [&SMALL[..], &["--frames", "0..3", "--outputs", "color,coords,rows", "--format", "exr,png"]].concat();
     let (code, err) =
-        camsim(&at("made"), &[&["render", "demo/scene/demo.toml", "-o", "demo"][..], &more].concat());
+        camsim(&path("made"), &[&["render", "demo/scene/demo.toml", "-o", "demo"][..], &more].concat());
     assert_eq!(code, 0, "{err}");
-    let made = files_below(&at("made/demo"));
+    let made = files_below(&path("made/demo"));
     let run = String::from_utf8(made[Path::new("run.json")].clone()).unwrap();
     assert!(
         run.contains("\"log\": \"scene/demo_flight.csv\"")
@@ -150,15 +150,17 @@ fn copied_folder_reproduces_the_same_bytes() {
 
     // In another place, without the first folder, from another working directory, by the folder's own
     // scenario.
-    fs::create_dir_all(at("far/away")).unwrap();
-    fs::create_dir_all(at("work")).unwrap();
-    fs::rename(at("made/demo"), at("far/away/copy")).unwrap();
-    fs::remove_dir_all(at("made")).unwrap();
+    fs::create_dir_all(path("far/away")).unwrap();
+    fs::create_dir_all(path("work")).unwrap();
+    fs::rename(path("made/demo"), path("far/away/copy")).unwrap();
+    fs::remove_dir_all(path("made")).unwrap();
     let frames = ["--frames", "0..3"];
-    let (code, err) =
-        camsim(&at("work"), &[&["render", "../far/away/copy/run.json", "-o", "again"][..], &frames].concat());
+    let (code, err) = camsim(
+        &path("work"),
+        &[&["render", "../far/away/copy/run.json", "-o", "again"][..], &frames].concat(),
+    );
     assert_eq!(code, 0, "{err}");
-    let again = files_below(&at("work/again"));
+    let again = files_below(&path("work/again"));
     for (name, bytes) in made.iter().filter(|(name, _)| !name.starts_with("scene")) {
         // These two contain relative paths, and the vignette was copied.
         if !["run.json", "camera.toml"].contains(&name.to_str().unwrap()) {
@@ -168,27 +170,27 @@ fn copied_folder_reproduces_the_same_bytes() {
     assert_eq!(again[Path::new("inputs/vignette.png")], made[Path::new("scene/vignette.png")]);
     // Rendering into the same folder changes no byte, and existing frames are skipped.
     let (code, err) =
-        camsim(&at("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
+        camsim(&path("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
     assert_eq!(code, 0, "{err}");
-    assert!(files_below(&at("far/away/copy")) == made);
+    assert!(files_below(&path("far/away/copy")) == made);
     let (code, err) =
-        camsim(&at("far/away/copy"), &["render", "run.json", "-o", ".", "--frames", "0..4", "--resume"]);
+        camsim(&path("far/away/copy"), &["render", "run.json", "-o", ".", "--frames", "0..4", "--resume"]);
     assert_eq!(code, 0, "{err}");
     let run: serde_json::Value =
-        serde_json::from_slice(&fs::read(at("far/away/copy/run.json")).unwrap()).unwrap();
+        serde_json::from_slice(&fs::read(path("far/away/copy/run.json")).unwrap()).unwrap();
     assert_eq!((run["written"].as_u64(), run["skipped"].as_u64()), (Some(1), Some(3)));
 
     // The camera file of either folder.
     for (folder, camera) in [("work", "again/camera.toml"), ("far", "away/copy/camera.toml")] {
-        let (code, err) = camsim(&at(folder), &["lens", camera, "check"]);
+        let (code, err) = camsim(&path(folder), &["lens", camera, "check"]);
         assert_eq!(code, 0, "{err}");
         fs::write(
-            at(folder).join("F.toml"),
+            path(folder).join("F.toml"),
             "color = \"p.png\"\nfocal_px = [30.0, 30.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 0.1]\n",
         )
         .unwrap();
-        fs::copy(at("far/away/copy/scene/acircles.png"), at(folder).join("p.png")).unwrap();
-        let (code, err) = camsim(&at(folder), &["apply", camera, "F.toml", "-o", "applied.png"]);
+        fs::copy(path("far/away/copy/scene/acircles.png"), path(folder).join("p.png")).unwrap();
+        let (code, err) = camsim(&path(folder), &["apply", camera, "F.toml", "-o", "applied.png"]);
         assert_eq!(code, 0, "{err}");
     }
 }
@@ -196,7 +198,7 @@ fn copied_folder_reproduces_the_same_bytes() {
 #[test]
 fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
     let base = tempfile::tempdir().unwrap();
-    let at = |name: &str| base.path().join(name);
+    let path = |name: &str| base.path().join(name);
     let done = |out: &str, more: &[&str]| {
         let (code, err) = render(base.path(), out, more);
         assert_eq!(code, 0, "{err}");
@@ -204,9 +206,9 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
     };
     done("whole", &["--frames", "2..8"]);
     done("parts", &["--frames", "2..5"]);
-    assert_eq!(numbers(&at("parts")), [2, 3, 4]);
+    assert_eq!(numbers(&path("parts")), [2, 3, 4]);
     done("parts", &["--frames", "4..8"]);
-    assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    assert_eq!(fs::read(path("parts/frames.csv")).unwrap(), fs::read(path("whole/frames.csv")).unwrap());
     // Two concurrent runs.
     let pattern = pattern();
     let shard = |shard: &str| {
@@ -225,23 +227,23 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
         spawn(base.path(), &[&args[..], &SMALL].concat())
     };
     for child in ["1/3", "2/3", "3/3"].map(shard) {
-        let (code, err) = end(child);
+        let (code, err) = wait(child);
         assert_eq!(code, 0, "{err}");
     }
-    assert_eq!(fs::read(at("shards/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    assert_eq!(fs::read(path("shards/frames.csv")).unwrap(), fs::read(path("whole/frames.csv")).unwrap());
     // Deleted frames are not listed, and a deleted table is restored from the existing frames.
-    fs::remove_file(at("parts/color/frame_000003.exr")).unwrap();
+    fs::remove_file(path("parts/color/frame_000003.exr")).unwrap();
     done("parts", &["--frames", "7", "--resume"]);
-    let rows = frames(&at("parts"));
+    let rows = frames(&path("parts"));
     assert!(
         rows[1]["frame"] == "3"
             && rows[1]["color_exr"].is_empty()
             && rows[1]["depth"] == "depth/frame_000003.exr",
         "{rows:?}"
     );
-    fs::remove_file(at("parts/frames.csv")).unwrap();
+    fs::remove_file(path("parts/frames.csv")).unwrap();
     done("parts", &["--frames", "2..8", "--resume"]);
-    assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    assert_eq!(fs::read(path("parts/frames.csv")).unwrap(), fs::read(path("whole/frames.csv")).unwrap());
     // Another channel of the same frames is added.
     let channel = camsim(
         base.path(),
@@ -249,7 +251,7 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
             .concat(),
     );
     assert_eq!(channel.0, 0, "{}", channel.1);
-    let rows = frames(&at("parts"));
+    let rows = frames(&path("parts"));
     assert!(
         rows.len() == 6
             && rows[0]["valid"] == "valid/frame_000002.png"
@@ -259,7 +261,7 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
     assert!(rows[5]["valid"].is_empty(), "{rows:?}");
 
     // Another scenario among these frames is refused before anything is changed ...
-    let before = files_below(&at("whole"));
+    let before = files_below(&path("whole"));
     let (code, err) = render(base.path(), "whole", &["--frames", "2..4", "--set", "seed=99"]);
     assert!(
         code == 2
@@ -267,17 +269,18 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
             && err.contains("20 files of other frames would remain (color/frame_000004.exr is the first)"),
         "{err}"
     );
-    assert!(files_below(&at("whole")) == before);
+    assert!(files_below(&path("whole")) == before);
     // ... and if it replaces all of them, no old frame remains.
     let err = done("whole", &["--frames", "2..8", "--set", "seed=99"]);
     assert!(err.contains("its frames are replaced"), "{err}");
-    assert_eq!(numbers(&at("whole")), [2, 3, 4, 5, 6, 7]);
+    assert_eq!(numbers(&path("whole")), [2, 3, 4, 5, 6, 7]);
     assert!(
-        fs::read(at("whole/color/frame_000002.exr")).unwrap() == before[Path::new("color/frame_000002.exr")],
+        fs::read(path("whole/color/frame_000002.exr")).unwrap()
+            == before[Path::new("color/frame_000002.exr")],
         "the pattern has no noise"
     );
     // Frames of unknown origin.
-    fs::remove_file(at("whole/run.json")).unwrap();
+    fs::remove_file(path("whole/run.json")).unwrap();
     let (code, err) = render(base.path(), "whole", &["--frames", "2..8", "--resume"]);
     assert!(code == 2 && err.contains("no run.json that describes their origin"), "{err}");
     let (code, err) = render(base.path(), "whole", &["--frames", "2..4"]);
@@ -311,23 +314,23 @@ fn interrupted_run_reports_progress_and_resume_command() {
     }
     let process = rustix::process::Pid::from_raw(child.id() as i32).unwrap();
     rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
-    let (code, err) = end(child);
+    let (code, err) = wait(child);
     assert_eq!(code, 130, "{err}");
     assert!(err.contains("stopping after the frames that are under way"), "{err}");
-    let told = err.lines().find(|line| line.starts_with("stopped: ")).unwrap_or_else(|| panic!("{err}"));
+    let message = err.lines().find(|line| line.starts_with("stopped: ")).unwrap_or_else(|| panic!("{err}"));
     let done = count();
     assert!(
         done < 60
-            && told.starts_with(&format!(
+            && message.starts_with(&format!(
                 "stopped: {done} of 60 frames are in my out; to resume: camsim render "
             )),
-        "{told}"
+        "{message}"
     );
     assert!(
-        told.contains(" -o 'my out' ")
-            && told.contains("--set 'camera.size_px=[64, 48]'")
-            && told.ends_with(" --resume"),
-        "{told}"
+        message.contains(" -o 'my out' ")
+            && message.contains("--set 'camera.size_px=[64, 48]'")
+            && message.ends_with(" --resume"),
+        "{message}"
     );
     // Exactly the written frames are listed.
     assert_eq!(numbers(&out), (0..done as u64).collect::<Vec<_>>());
@@ -348,13 +351,16 @@ fn interrupted_run_reports_progress_and_resume_command() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn unknown_adapter_lists_available_ones() {
     let base = tempfile::tempdir().unwrap();
-    let there = camsim_gpu::context::adapters(camsim_engine::AdapterChoice::Best);
+    let adapters = camsim_gpu::context::adapters(camsim_engine::AdapterChoice::Best);
     let (code, err) =
-        end(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
+        wait(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
     assert!(
         code == 3 && err.contains("no adapter has `no such thing` in its name (CAMSIM_ADAPTER): there is "),
         "{err}"
     );
     // The list of this process, which may be shorter.
-    assert!(there.iter().all(|adapter| err.contains(&adapter.to_string())) && !there.is_empty(), "{err}");
+    assert!(
+        adapters.iter().all(|adapter| err.contains(&adapter.to_string())) && !adapters.is_empty(),
+        "{err}"
+    );
 }

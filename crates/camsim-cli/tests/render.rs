@@ -4,7 +4,7 @@
 
 use std::{ffi::OsString, fs, path::Path};
 
-/// Exit code, standard output, standard error.
+/// Runs camsim. Returns exit code, standard output and standard error.
 fn camsim(args: &[&str]) -> (u8, String, String) {
     let (mut out, mut err) = (Vec::new(), Vec::new());
     let args = std::iter::once("camsim").chain(args.iter().copied()).map(OsString::from);
@@ -194,7 +194,7 @@ const WITHOUT_ADAPTER: &str = "CAMSIM_TEST_WITHOUT_ADAPTER";
 
 /// The reference needs no adapter, and shards give the bytes of one run.
 #[test]
-fn the_reference_renders_without_an_adapter() {
+fn reference_renders_without_an_adapter() {
     if std::env::var_os(WITHOUT_ADAPTER).is_none() {
         let again = std::process::Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "the_reference_renders_without_an_adapter"])
@@ -204,10 +204,10 @@ fn the_reference_renders_without_an_adapter() {
             .env("CAMSIM_ADAPTER", "no such adapter")
             .output()
             .unwrap();
-        let said = String::from_utf8_lossy(&again.stdout);
+        let output = String::from_utf8_lossy(&again.stdout);
         assert!(
-            again.status.success() && said.contains("1 passed"),
-            "{said}{}",
+            again.status.success() && output.contains("1 passed"),
+            "{output}{}",
             String::from_utf8_lossy(&again.stderr)
         );
         return;
@@ -261,7 +261,7 @@ fn the_reference_renders_without_an_adapter() {
     );
     assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
 
-    // Scenarios that name methods are refused, because the oracle would ignore them.
+    // Scenarios that name methods are refused, because the reference renderer would ignore them.
     for (more, wanted) in [
         (vec!["--preset", "paper"], "quality.preset = \"paper\" cannot be combined with --backend reference"),
         (vec!["--set", "quality.solver=rk2"], "quality.solver = \"rk2\" cannot be combined"),
@@ -441,18 +441,18 @@ fn predicted_tolerance_violations_are_reported_once_and_stored() {
         (err, run_json(folder.path())["warnings"].to_string())
     };
     let strict = ["--set", "quality.max_error_px=1e-7", "--set", "quality.max_error_dn=1e-3"];
-    for said in <[String; 2]>::from(render(&strict)) {
+    for output in <[String; 2]>::from(render(&strict)) {
         for key in ["quality.max_error_px = 0.0000001", "quality.max_error_dn = 0.001"] {
             assert_eq!(
-                said.matches(&format!("2 of 2 frames exceed {key}: in the worst, frame ")).count(),
+                output.matches(&format!("2 of 2 frames exceed {key}: in the worst, frame ")).count(),
                 1,
-                "{said}"
+                "{output}"
             );
         }
         assert!(
-            said.contains(&format!("`camsim explain {} --set ", scenario.display()))
-                && said.contains(" --frame "),
-            "{said}"
+            output.contains(&format!("`camsim explain {} --set ", scenario.display()))
+                && output.contains(" --frame "),
+            "{output}"
         );
     }
     let lax = ["--set", "quality.max_error_dn=20"];
@@ -461,8 +461,8 @@ fn predicted_tolerance_violations_are_reported_once_and_stored() {
         &[&strict[..], &["--preset", "paper"]].concat(),
         &[&strict[..], &["--set", "quality.solver=linear"]].concat(),
     ] {
-        for said in <[String; 2]>::from(render(more)) {
-            assert!(!said.contains("exceed"), "{more:?}: {said}");
+        for output in <[String; 2]>::from(render(more)) {
+            assert!(!output.contains("exceed"), "{more:?}: {output}");
         }
     }
 }

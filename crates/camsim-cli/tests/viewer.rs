@@ -27,7 +27,7 @@ fn viewer_shows_the_bytes_that_render_writes() {
     assert_eq!(code, 0, "{}", String::from_utf8_lossy(&err));
     let written = image::open(folder.path().join("color/frame_000007.png")).unwrap().to_rgba8();
 
-    let shown = camsim_viewer::still(&scenario, 7).unwrap();
+    let shown = camsim_viewer::render_headless(&scenario, 7).unwrap();
     assert_eq!(shown.size_px, [written.width() as usize, written.height() as usize]);
     let differing =
         shown.rgba.iter().zip(written.as_raw()).filter(|(shown, written)| shown != written).count();
@@ -37,6 +37,7 @@ fn viewer_shows_the_bytes_that_render_writes() {
 
 #[test]
 fn invalid_scenario_gives_the_error_of_the_viewer() {
-    let error = camsim_viewer::still(Path::new("no/such/scenario.toml"), 0).unwrap_err().to_string();
+    let error =
+        camsim_viewer::render_headless(Path::new("no/such/scenario.toml"), 0).unwrap_err().to_string();
     assert!(error.contains("no/such/scenario.toml"), "{error}");
 }

@@ -63,6 +63,7 @@ pub mod noise;
 pub mod photometric;
 pub mod pose;
 pub mod reference;
+pub mod row_time;
 pub mod scenario;
 pub mod scene;
 pub mod sequence;

@@ -1,13 +1,13 @@
-//! The ideal frame on the host's own processors, for software adapters.
+//! Ideal frames by a CPU rasteriser with deferred shading.
 //!
-//! Such an adapter's driver draws triangles as a GPU would: it shades blocks of 4x4 pixels for each triangle
-//! that touches them, small triangles over and over, and one is a matter of a microsecond. Here triangles
-//! only tell which of them a pixel shows, and how far it is; then each pixel's colour is worked out once,
-//! from the planes of its own triangle, whose derivatives are exact. Corners stand on the devices' grid of
-//! 1/256 px and borders belong to triangles by the same rule, so that nothing is covered twice or not at all.
+//! A software adapter's driver draws triangles as a GPU would: it shades 4x4 pixels for each triangle that
+//! touches them, and a small triangle takes about a microsecond. Here rasterisation only determines the
+//! visible triangle and the depth of each pixel (a visibility buffer). Then each pixel is shaded once, from
+//! the attribute planes of its own triangle, whose derivatives are exact. Vertices are snapped to the GPUs'
+//! grid of 1/256 px and borders follow the top-left rule, so that no pixel is covered twice or missed.
 //!
-//! Where triangles go: corners ([`corners`]) -> triangles and the bands of rows that they may be in
-//! ([`triangles`]) -> what pixels show ([`cover`]) -> colours ([`shade`], [`reads`]).
+//! Pipeline: vertices ([`vertices`]) -> triangles, binned into bands of rows ([`triangles`]) -> visible
+//! triangles ([`rasterise`]) -> colours ([`shade`], [`prefilter`]).
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
@@ -15,200 +15,141 @@ use camsim_core::{
     pose::CameraPose,
     scene::{Batch, Light, LodTolerance, PlacedMesh, Scene, SceneBatches, Texture, Wrap},
 };
-use camsim_plan::{FramePlan, NEAR_M};
+use camsim_plan::FramePlan;
 use rayon::prelude::*;
 
-use crate::general::IdealImage;
-use crate::large_pages::Large;
-use crate::reverse::IdealTexels;
+use crate::large_pages::LargeArray;
 use crate::simd::{
     lanes::LANES,
     vectors::{Vectors, widest},
 };
 use camsim_plan::uniforms::{base_ned_m, ideal_camera};
 
-mod corners;
-mod cover;
-mod marks;
-mod models;
-mod picture;
-mod reads;
-mod samples;
+mod meshes;
+mod multisample;
+mod prefilter;
+mod raster_frame;
+mod rasterise;
+mod sampled_tiles;
 mod shade;
 #[cfg(test)]
 mod tests;
+mod texture;
 mod triangles;
+mod vertices;
 
-use corners::{Camera, Corner};
-use cover::{BEYOND, Band, Pixels, Places, SKY};
-use models::{Bench, Piece, TRIANGLES_A_CHUNK};
-use picture::Picture;
-use samples::{ALONG, Sampled};
-use shade::{Paint, Planes, Shader};
-use triangles::{BAND_ROWS, Chunk, Kind, MORE};
+use meshes::{Piece, Scratch, TRIANGLES_PER_CHUNK};
+use multisample::{Multisample, SAMPLES_PER_SIDE};
+pub use raster_frame::RasterFrame;
+use rasterise::{Band, PixelCentres, SKY, SamplePattern};
+use shade::{Material, PixelPlanes, Shader};
+use texture::SurfaceTexture;
+use triangles::{BAND_ROWS, Chunk, EXTRA_ATTRIBUTES, TriangleKind};
+use vertices::{Camera, Vertex};
 
-/// Corners of the terrain that a task projects.
-const CORNERS_A_TASK: usize = 4096;
-/// Chunks that are drawn at once: a million triangles at most, which bounds the memory that they take, and
-/// their numbers. What has more is drawn in turns, each over the one before.
-const CHUNKS_A_ROUND: usize = 256;
-/// What is on the ground.
-const GROUND: u32 = 0;
-/// Half floats of a texel.
+/// Terrain vertices per projection task.
+const VERTICES_PER_TASK: usize = 4096;
+/// Chunks per pass: a million triangles at most, which bounds their memory and their ids. Scenes with more
+/// are drawn in several passes, each over the one before.
+const CHUNKS_PER_PASS: usize = 256;
+/// Index of the terrain's material.
+const TERRAIN_MATERIAL: u32 = 0;
+/// Half floats of a texel: R G B A.
 const CHANNELS: usize = 4;
 
-/// An ideal frame in memory.
-#[derive(Debug, Default)]
-pub struct DrawnFrame {
-    /// Linear R G B A, half floats.
-    pub(crate) color: Large<u16>,
-    /// near / z; 0 is infinitely far.
-    pub(crate) depth: Large<f32>,
-    /// Texels from one row to the next, of both.
-    pub(crate) stride: usize,
-}
-
-impl DrawnFrame {
-    /// Has so many pixels from now on.
-    fn fit(&mut self, size_px: [u32; 2]) {
-        let [width, height] = size_px.map(|side| side as usize);
-        self.stride = (width + BEYOND).next_multiple_of(LANES);
-        self.depth.fit(self.stride * height);
-        self.color.fit(CHANNELS * self.stride * height);
-    }
-
-    /// From linear R G B A and inverse depths in single precision.
-    pub(crate) fn from_image(image: &IdealImage) -> Self {
-        let mut frame = Self::default();
-        frame.fit(image.geometry.size_px);
-        let width = image.geometry.size_px[0] as usize;
-        let (stride, near_m) = (frame.stride, NEAR_M as f32);
-        let rows = frame.color.par_chunks_mut(CHANNELS * stride).zip(frame.depth.par_chunks_mut(stride));
-        let values = image.color_rgba.par_chunks(CHANNELS * width).zip(image.inverse_depth.par_chunks(width));
-        rows.zip(values).for_each(|((color, depth), (rgba, inverse_depth))| {
-            color
-                .iter_mut()
-                .zip(rgba)
-                .for_each(|(half, &value)| *half = half::f16::from_f32(value).to_bits());
-            depth.iter_mut().zip(inverse_depth).for_each(|(depth, &inverse)| *depth = inverse * near_m);
-        });
-        frame
-    }
-
-    /// The frame as the vectorised pass reads it.
-    pub(crate) fn texels(&self) -> IdealTexels<'_> {
-        let stride = self.stride as u32;
-        IdealTexels { color: &self.color, color_stride: stride, depth: &self.depth, depth_stride: stride }
-    }
-
-    /// Linear R G B A and inverse depth, 1/m, of a frame of this size, row-major.
-    pub fn images(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
-        let (width, height) = (width as usize, height as usize);
-        let color = self
-            .color
-            .chunks_exact(CHANNELS * self.stride)
-            .take(height)
-            .flat_map(|row| &row[..CHANNELS * width]);
-        let depth = self.depth.chunks_exact(self.stride).take(height).flat_map(|row| &row[..width]);
-        (
-            color.map(|&bits| half::f16::from_bits(bits).to_f32()).collect(),
-            depth.map(|depth| depth / NEAR_M as f32).collect(),
-        )
-    }
-}
-
-/// A scene as the rasteriser holds it.
+/// A scene in the form of the rasteriser.
 #[derive(Debug)]
 pub(crate) struct RasterScene {
-    /// Of the ground, then those of batches.
-    paints: Vec<Paint>,
-    /// By batch.
-    models: Vec<Model>,
+    /// Materials: of the terrain, then of the mesh batches.
+    materials: Vec<Material>,
+    /// Meshes by batch.
+    meshes: Vec<MeshModel>,
     chunks: Vec<Chunk>,
-    terrain: Vec<Corner<2>>,
-    /// Which triangle each pixel shows.
-    shown: Large<u32>,
-    /// What frames of several samples a pixel need.
-    sampled: Sampled,
+    terrain: Vec<Vertex<2>>,
+    /// Visible triangle of each pixel.
+    visible: LargeArray<u32>,
+    /// State for frames with several samples per pixel.
+    multisample: Multisample,
 }
 
 /// Meshes of one shape and material.
 #[derive(Debug)]
-struct Model {
-    /// By level of detail.
+struct MeshModel {
+    /// Pieces by level of detail.
     levels: Vec<Vec<Piece>>,
     one_sided: bool,
     light: Option<Light>,
 }
 
-/// Triangles that follow each other in a chunk.
+/// Consecutive triangles of a chunk.
 #[derive(Debug)]
-enum Part {
-    /// These indices of the terrain.
+enum DrawPart {
+    /// A range of terrain indices.
     Terrain(Range<usize>),
-    /// A piece of a batch's level, at these of the places in view.
-    Piece { batch: usize, level: usize, piece: usize, places: Range<usize> },
+    /// A piece of one level of detail of a batch, for a range of placements in view.
+    Piece { batch: usize, level: usize, piece: usize, placements: Range<usize> },
 }
 
-/// What models are drawn with, without tints of their corners and with them.
-type Benches = (Bench<2>, Bench<{ 2 + MORE }>);
+/// Scratch buffers for meshes without and with per-vertex tint or lighting.
+type ScratchBuffers = (Scratch<2>, Scratch<{ 2 + EXTRA_ATTRIBUTES }>);
 
-/// What an ideal frame is drawn from.
+/// Inputs of an ideal frame.
 #[derive(Clone, Copy)]
-pub(crate) struct View<'a> {
+pub(crate) struct DrawInputs<'a> {
     pub plan: &'a FramePlan,
     pub scene: &'a Scene,
     pub batches: &'a SceneBatches,
-    /// Triangles of the terrain, if there is any.
+    /// Triangles of the terrain, if there is one.
     pub terrain: Option<&'a PlacedMesh>,
     pub tolerance: &'a LodTolerance,
 }
 
-/// A view, as what is drawn of it is seen.
+/// A view with its camera and visible meshes.
 #[derive(Clone, Copy)]
-struct Drawing<'a> {
+struct DrawContext<'a> {
     camera: Camera,
     pose: &'a CameraPose,
-    view: View<'a>,
-    /// Places of meshes that may be in view.
-    seen: &'a [u32],
+    view: DrawInputs<'a>,
+    /// Placements of meshes that may be in view.
+    in_view: &'a [u32],
 }
 
 impl RasterScene {
-    /// For a scene that it [draws](camsim_plan::placement::cpu_rasterises).
+    /// Prepares a scene that the rasteriser [supports](camsim_plan::placement::cpu_rasterises).
     #[must_use]
     pub fn new(scene: &Scene, batches: &SceneBatches) -> Self {
-        let mut pictures = Pictures::default();
+        let mut textures = TextureCache::default();
         let ground = match &scene.terrain {
-            Some(terrain) => Picture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
-            None => Picture::Uniform([0.0; 4]),
+            Some(terrain) => SurfaceTexture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
+            None => SurfaceTexture::Uniform([0.0; 4]),
         };
-        let mut paints = vec![Paint {
-            picture: Arc::new(ground),
+        let mut materials = vec![Material {
+            texture: Arc::new(ground),
             tint: [1.0; 3],
             emissive: [0.0; 3],
-            has_more: false,
+            has_extra_attributes: false,
             sky: None,
         }];
-        paints.extend(batches.batches.iter().map(|batch| paint(batch, pictures.of(batch))));
-        let model = |batch: &Batch| Model {
+        materials
+            .extend(batches.batches.iter().map(|batch| material(batch, textures.triangles_of_piece(batch))));
+        let mesh_model = |batch: &Batch| MeshModel {
             levels: Piece::of_levels(&batch.shape, &batch.levels),
             one_sided: batch.material.one_sided,
             light: batch.light,
         };
-        let models = batches.batches.iter().map(model).collect();
+        let meshes = batches.batches.iter().map(mesh_model).collect();
         Self {
-            paints,
-            models,
+            materials,
+            meshes,
             chunks: Vec::new(),
             terrain: Vec::new(),
-            shown: Large::default(),
-            sampled: Sampled::default(),
+            visible: LargeArray::default(),
+            multisample: Multisample::default(),
         }
     }
 
     /// Draws the one ideal frame of a plan.
-    pub fn draw(&mut self, view: View<'_>, into: &mut DrawnFrame) {
+    pub fn draw(&mut self, view: DrawInputs<'_>, into: &mut RasterFrame) {
         let Some(key) = view.plan.keys.first() else { return };
         let ideal = &view.plan.ideal;
         let camera = Camera {
@@ -216,77 +157,87 @@ impl RasterScene {
             focal_px: ideal.focal_px.as_vec2().to_array(),
             principal_px: ideal.principal_px.as_vec2().to_array(),
             size_px: ideal.size_px,
-            beside: 0,
+            sample_offset: 0,
         };
-        let (seen, drawn) = view.batches.in_view(&key.pose, view.tolerance);
+        let (in_view, level_instances) = view.batches.in_view(&key.pose, view.tolerance);
         let mut parts = terrain_parts(view.terrain);
-        self.add_parts(&drawn, &mut parts);
-        let jobs = jobs(parts);
-        let drawing = Drawing { camera, pose: &key.pose, view, seen: &seen };
+        self.add_parts(&level_instances, &mut parts);
+        let chunk_parts = chunk_parts(parts);
+        let context = DrawContext { camera, pose: &key.pose, view, in_view: &in_view };
         match view.plan.samples_a_pixel {
-            1 => self.draw_all(Pixels, &drawing, &jobs, into),
-            _ => self.draw_samples(&Drawing { camera: camera.of_samples(), ..drawing }, &jobs, into),
+            1 => self.draw_all(PixelCentres, &context, &chunk_parts, into),
+            _ => self.draw_samples(
+                &DrawContext { camera: camera.sample_grid(), ..context },
+                &chunk_parts,
+                into,
+            ),
         }
     }
 
-    /// Draws so many chunks at once, each number of them over what is there.
-    fn draw_all<P: Places>(
+    /// Draws all chunks, in several passes if there are many.
+    fn draw_all<P: SamplePattern>(
         &mut self,
-        places: P,
-        drawing: &Drawing<'_>,
-        jobs: &[Vec<Part>],
-        into: &mut DrawnFrame,
+        placements: P,
+        context: &DrawContext<'_>,
+        chunk_parts: &[Vec<DrawPart>],
+        into: &mut RasterFrame,
     ) {
-        let Drawing { camera, view, .. } = drawing;
+        let DrawContext { camera, view, .. } = context;
         into.fit(camera.size_px);
-        self.shown.fit(into.depth.len());
+        self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
-            let first = round * CHUNKS_A_ROUND;
-            let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
-            self.collect(drawing, jobs, |_| {});
-            self.fill(places, camera, view.plan, jobs.len(), round > 0, into);
+        for pass in 0..chunk_parts.len().div_ceil(CHUNKS_PER_PASS).max(1) {
+            let first = pass * CHUNKS_PER_PASS;
+            let chunk_parts = &chunk_parts[first..chunk_parts.len().min(first + CHUNKS_PER_PASS)];
+            self.collect(context, chunk_parts, |_| {});
+            self.fill(placements, camera, view.plan, chunk_parts.len(), pass > 0, into);
         }
     }
 
-    /// The same of several samples a pixel, as their camera sees them.
-    fn draw_samples(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>], into: &mut DrawnFrame) {
-        let Drawing { camera, view, .. } = drawing;
+    /// Draws a frame with several samples per pixel, as seen by the camera of the sample grid.
+    fn draw_samples(
+        &mut self,
+        context: &DrawContext<'_>,
+        chunk_parts: &[Vec<DrawPart>],
+        into: &mut RasterFrame,
+    ) {
+        let DrawContext { camera, view, .. } = context;
         into.fit(view.plan.ideal.size_px);
-        if jobs.len() > CHUNKS_A_ROUND {
-            // What samples show would have to be kept from one round to the next: each is drawn as a pixel.
-            let mut samples = DrawnFrame::default();
-            self.draw_all(cover::Samples, drawing, jobs, &mut samples);
-            return samples::mix(&samples, view.plan.ideal.size_px, into);
+        if chunk_parts.len() > CHUNKS_PER_PASS {
+            // The visible triangle of each sample would have to be kept between passes: instead each sample
+            // is drawn and shaded as a pixel.
+            let mut samples = RasterFrame::default();
+            self.draw_all(rasterise::SamplePositions, context, chunk_parts, &mut samples);
+            return multisample::resolve_samples(&samples, view.plan.ideal.size_px, into);
         }
-        self.shown.fit(into.depth.len());
+        self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        let mut sampled = std::mem::take(&mut self.sampled);
-        sampled.clear(camera.size_px);
-        self.collect(drawing, jobs, |chunk| sampled.mark(chunk));
-        let chunks = &self.chunks[..jobs.len()];
+        let mut multisample = std::mem::take(&mut self.multisample);
+        multisample.clear(camera.size_px);
+        self.collect(context, chunk_parts, |chunk| multisample.add_meshes(chunk));
+        let chunks = &self.chunks[..chunk_parts.len()];
         let shader = Shader {
             camera,
             chunks,
-            paints: &self.paints,
-            reads: view.plan.surface_reads,
-            a_pixel: ALONG as f32,
-            is_over: false,
+            materials: &self.materials,
+            taps: view.plan.surface_reads,
+            pixel_step: SAMPLES_PER_SIDE as f32,
+            is_overlay: false,
         };
-        sampled.fill(&shader, &mut self.shown, into);
-        self.sampled = sampled;
+        multisample.fill(&shader, &mut self.visible, into);
+        self.multisample = multisample;
     }
 
-    fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(Part, usize)>) {
-        for (batch, (model, drawn)) in self.models.iter().zip(drawn).enumerate() {
-            for (level, (pieces, places)) in model.levels.iter().zip(drawn).enumerate() {
-                for (piece, of) in pieces.iter().enumerate() {
-                    let together = (TRIANGLES_A_CHUNK / of.len().max(1)).max(1);
-                    let (begin, end) = (places.start as usize, places.end as usize);
-                    parts.extend((begin..end).step_by(together).map(|first| {
-                        let places = first..(first + together).min(end);
-                        let triangles = of.len() * places.len();
-                        (Part::Piece { batch, level, piece, places }, triangles)
+    fn add_parts(&self, level_instances: &[Vec<Range<u32>>], parts: &mut Vec<(DrawPart, usize)>) {
+        for (batch, (mesh_model, level_instances)) in self.meshes.iter().zip(level_instances).enumerate() {
+            for (level, (pieces, placements)) in mesh_model.levels.iter().zip(level_instances).enumerate() {
+                for (piece, triangles_of_piece) in pieces.iter().enumerate() {
+                    let placements_per_part = (TRIANGLES_PER_CHUNK / triangles_of_piece.len().max(1)).max(1);
+                    let (begin, end) = (placements.start as usize, placements.end as usize);
+                    parts.extend((begin..end).step_by(placements_per_part).map(|first| {
+                        let placements = first..(first + placements_per_part).min(end);
+                        let triangles = triangles_of_piece.len() * placements.len();
+                        (DrawPart::Piece { batch, level, piece, placements }, triangles)
                     }));
                 }
             }
@@ -295,37 +246,45 @@ impl RasterScene {
 
     fn project_terrain(&mut self, camera: &Camera, terrain: Option<&PlacedMesh>) {
         let vertices = terrain.map_or(&[][..], |mesh| &mesh.vertices);
-        let project = |&[x, y, z, u, v]: &[f32; 5]| camera.corner(camera.in_camera_m([x, y, z]), [u, v]);
-        self.terrain.resize(vertices.len(), Corner::NOWHERE);
-        let tasks = self.terrain.par_chunks_mut(CORNERS_A_TASK).zip(vertices.par_chunks(CORNERS_A_TASK));
+        let project = |&[x, y, z, u, v]: &[f32; 5]| camera.project(camera.in_camera_m([x, y, z]), [u, v]);
+        self.terrain.resize(vertices.len(), Vertex::UNPROJECTED);
+        let tasks =
+            self.terrain.par_chunks_mut(VERTICES_PER_TASK).zip(vertices.par_chunks(VERTICES_PER_TASK));
         tasks.for_each(|(corners, vertices)| {
-            widest!(_vectors => corners.iter_mut().zip(vertices).for_each(|(corner, vertex)| *corner = project(vertex)));
+            widest!(_vectors => {
+                corners.iter_mut().zip(vertices).for_each(|(projected, vertex)| *projected = project(vertex));
+            });
         });
     }
 
-    /// Triangles of all jobs, and which bands they are in; each chunk of them is shown as soon as they are
-    /// there.
-    fn collect(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>], show: impl Fn(&Chunk) + Sync) {
-        let bands = (drawing.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
+    /// Sets up the triangles of all jobs and bins them into bands. `on_set_up` is called for each chunk as
+    /// soon as its triangles are set up.
+    fn collect(
+        &mut self,
+        context: &DrawContext<'_>,
+        chunk_parts: &[Vec<DrawPart>],
+        on_set_up: impl Fn(&Chunk) + Sync,
+    ) {
+        let bands = (context.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
-        if chunks.len() < jobs.len() {
-            chunks.resize_with(jobs.len(), Chunk::default);
+        if chunks.len() < chunk_parts.len() {
+            chunks.resize_with(chunk_parts.len(), Chunk::default);
         }
-        jobs.par_iter().zip(&mut *chunks).for_each(|(job, chunk)| {
+        chunk_parts.par_iter().zip(&mut *chunks).for_each(|(parts, chunk)| {
             chunk.clear();
-            chunk.is_of_ground = matches!(job.first(), Some(Part::Terrain(_)));
-            self.triangles_of(drawing, job, chunk);
-            show(chunk);
-            chunk.sort(bands);
+            chunk.is_terrain = matches!(parts.first(), Some(DrawPart::Terrain(_)));
+            self.triangles_of(context, parts, chunk);
+            on_set_up(chunk);
+            chunk.bin(bands);
         });
         self.chunks = chunks;
     }
 
-    fn triangles_of(&self, drawing: &Drawing<'_>, job: &[Part], chunk: &mut Chunk) {
-        let mut benches = (Bench::new(), Bench::new());
+    fn triangles_of(&self, context: &DrawContext<'_>, parts: &[DrawPart], chunk: &mut Chunk) {
+        let mut scratch = (Scratch::new(), Scratch::new());
         widest!(vectors => {
-            for part in job {
-                self.triangles(vectors, drawing, part, &mut benches, chunk);
+            for part in parts {
+                self.triangles(vectors, context, part, &mut scratch, chunk);
             }
         })
     }
@@ -334,75 +293,84 @@ impl RasterScene {
     fn triangles(
         &self,
         vectors: impl Vectors,
-        drawing: &Drawing<'_>,
-        part: &Part,
-        benches: &mut Benches,
+        context: &DrawContext<'_>,
+        part: &DrawPart,
+        scratch: &mut ScratchBuffers,
         chunk: &mut Chunk,
     ) {
-        let Drawing { camera, pose, view, seen } = drawing;
+        let DrawContext { camera, pose, view, in_view } = context;
         match part {
-            Part::Terrain(of) => {
-                let kind = Kind { paint: GROUND, one_sided: false, sky: None };
-                let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
+            DrawPart::Terrain(triangles_of_piece) => {
+                let kind = TriangleKind { material: TERRAIN_MATERIAL, one_sided: false, sky: None };
+                let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[triangles_of_piece.clone()]);
                 for triangle in indices.chunks_exact(3) {
-                    let corner = |k: usize| &self.terrain[triangle[k] as usize];
-                    chunk.add(vectors, camera, [corner(0), corner(1), corner(2)], kind);
+                    let vertex = |k: usize| &self.terrain[triangle[k] as usize];
+                    chunk.add(vectors, camera, [vertex(0), vertex(1), vertex(2)], kind);
                 }
             }
-            Part::Piece { batch, level, piece, places } => {
-                let model = &self.models[*batch];
-                let paint = *batch + 1;
-                let kind =
-                    Kind { paint: paint as u32, one_sided: model.one_sided, sky: self.paints[paint].sky };
-                let piece = &model.levels[*level][*piece];
-                for &place in &seen[places.clone()] {
-                    let stands = &view.batches.placed[place as usize];
-                    match self.paints[paint].has_more {
-                        true => piece.draw_more(
+            DrawPart::Piece { batch, level, piece, placements } => {
+                let mesh_model = &self.meshes[*batch];
+                let material = *batch + 1;
+                let kind = TriangleKind {
+                    material: material as u32,
+                    one_sided: mesh_model.one_sided,
+                    sky: self.materials[material].sky,
+                };
+                let piece = &mesh_model.levels[*level][*piece];
+                for &placement in &in_view[placements.clone()] {
+                    let placed = &view.batches.placed[placement as usize];
+                    match self.materials[material].has_extra_attributes {
+                        true => piece.draw_with_extra(
                             vectors,
                             camera,
                             pose,
-                            stands,
-                            model.light,
+                            placed,
+                            mesh_model.light,
                             kind,
-                            &mut benches.1,
+                            &mut scratch.1,
                             chunk,
                         ),
-                        false => piece.draw(vectors, camera, pose, stands, kind, &mut benches.0, chunk),
+                        false => piece.draw(vectors, camera, pose, placed, kind, &mut scratch.0, chunk),
                     }
                 }
             }
         }
     }
 
-    /// Depth and colour of every pixel; with `is_over` of those that show something nearer than what is
-    /// there.
-    fn fill<P: Places>(
+    /// Computes depth and colour of every pixel; with `is_overlay` only of pixels where something is nearer
+    /// than before.
+    fn fill<P: SamplePattern>(
         &mut self,
-        places: P,
+        placements: P,
         camera: &Camera,
         plan: &FramePlan,
         chunks: usize,
-        is_over: bool,
-        into: &mut DrawnFrame,
+        is_overlay: bool,
+        into: &mut RasterFrame,
     ) {
-        let (stride, reads) = (into.stride, plan.surface_reads);
-        let a_pixel = camera.size_px[0] as f32 / plan.ideal.size_px[0] as f32;
-        let shader =
-            Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, a_pixel, is_over };
-        let of_band = stride * BAND_ROWS;
+        let (stride, taps) = (into.stride, plan.surface_reads);
+        let pixel_step = camera.size_px[0] as f32 / plan.ideal.size_px[0] as f32;
+        let shader = Shader {
+            camera,
+            chunks: &self.chunks[..chunks],
+            materials: &self.materials,
+            taps,
+            pixel_step,
+            is_overlay,
+        };
+        let band_len = stride * BAND_ROWS;
         let bands = into
             .depth
-            .par_chunks_mut(of_band)
-            .zip(into.color.par_chunks_mut(CHANNELS * of_band))
-            .zip(self.shown.par_chunks_mut(of_band));
-        bands.enumerate().for_each(|(band, ((depth, color), shown))| {
-            if !is_over {
+            .par_chunks_mut(band_len)
+            .zip(into.color.par_chunks_mut(CHANNELS * band_len))
+            .zip(self.visible.par_chunks_mut(band_len));
+        bands.enumerate().for_each(|(band, ((depth, color), visible))| {
+            if !is_overlay {
                 depth.fill(0.0);
             }
-            shown.fill(SKY);
-            let band = Band { number: band, stride, depth, shown };
-            widest!(vectors => fill_band(vectors, places, &shader, band, color))
+            visible.fill(SKY);
+            let band = Band { number: band, stride, depth, visible };
+            widest!(vectors => fill_band(vectors, placements, &shader, band, color))
         });
     }
 }
@@ -410,79 +378,91 @@ impl RasterScene {
 #[inline(always)]
 fn fill_band(
     vectors: impl Vectors,
-    places: impl Places,
+    placements: impl SamplePattern,
     shader: &Shader<'_>,
     mut band: Band<'_>,
     color: &mut [u16],
 ) {
     for (number, chunk) in (0..).zip(shader.chunks) {
-        band.draw(vectors, places, chunk, number, |_| true);
+        band.draw(vectors, placements, chunk, number, |_| true);
     }
     let width = shader.camera.size_px[0] as usize;
-    let rows = band.shown.chunks_exact(band.stride).zip(color.chunks_exact_mut(CHANNELS * band.stride));
-    let mut planes = Planes::new();
-    for (row, (shown, color)) in rows.enumerate() {
-        let blocks = shown.as_chunks().0.iter().zip(color.chunks_exact_mut(CHANNELS * LANES));
-        for (number, (shown, color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
-            shader.block(vectors, [number * LANES, band.number * BAND_ROWS + row], shown, &mut planes, color);
+    let rows = band.visible.chunks_exact(band.stride).zip(color.chunks_exact_mut(CHANNELS * band.stride));
+    let mut planes = PixelPlanes::new();
+    for (row, (visible, color)) in rows.enumerate() {
+        let blocks = visible.as_chunks().0.iter().zip(color.chunks_exact_mut(CHANNELS * LANES));
+        for (number, (visible, color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
+            shader.block(
+                vectors,
+                [number * LANES, band.number * BAND_ROWS + row],
+                visible,
+                &mut planes,
+                color,
+            );
         }
     }
 }
 
-/// With their numbers of triangles.
-fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(Part, usize)> {
+/// Parts of the terrain, with their numbers of triangles.
+fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(DrawPart, usize)> {
     let count = terrain.map_or(0, |mesh| mesh.indices.len());
-    let step = 3 * TRIANGLES_A_CHUNK;
+    let step = 3 * TRIANGLES_PER_CHUNK;
     (0..count)
         .step_by(step)
         .map(|first| first..(first + step).min(count))
-        .map(|of| (Part::Terrain(of.clone()), of.len() / 3))
+        .map(|triangles_of_piece| {
+            (DrawPart::Terrain(triangles_of_piece.clone()), triangles_of_piece.len() / 3)
+        })
         .collect()
 }
 
-/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many
-/// different models there are; of the terrain or of models.
-fn jobs(parts: Vec<(Part, usize)>) -> Vec<Vec<Part>> {
-    let mut jobs: Vec<Vec<Part>> = Vec::new();
-    let mut room = 0;
+/// Distributes parts to chunks in order: at most [`TRIANGLES_PER_CHUNK`] triangles each, few chunks even for
+/// many different meshes, and terrain apart from meshes.
+fn chunk_parts(parts: Vec<(DrawPart, usize)>) -> Vec<Vec<DrawPart>> {
+    let mut chunk_parts: Vec<Vec<DrawPart>> = Vec::new();
+    let mut free_triangles = 0;
     for (part, triangles) in parts {
-        let is_terrain = |part: &Part| matches!(part, Part::Terrain(_));
-        let is_alike = |job: &[Part]| job.first().is_some_and(|first| is_terrain(first) == is_terrain(&part));
-        match jobs.last_mut().filter(|job| triangles <= room && is_alike(job)) {
-            Some(job) => job.push(part),
+        let is_terrain = |part: &DrawPart| matches!(part, DrawPart::Terrain(_));
+        let is_same_kind =
+            |parts: &[DrawPart]| parts.first().is_some_and(|first| is_terrain(first) == is_terrain(&part));
+        match chunk_parts.last_mut().filter(|parts| triangles <= free_triangles && is_same_kind(parts)) {
+            Some(parts) => parts.push(part),
             None => {
-                jobs.push(vec![part]);
-                room = TRIANGLES_A_CHUNK;
+                chunk_parts.push(vec![part]);
+                free_triangles = TRIANGLES_PER_CHUNK;
             }
         }
-        room -= triangles.min(room);
+        free_triangles -= triangles.min(free_triangles);
     }
-    jobs
+    chunk_parts
 }
 
-fn paint(batch: &Batch, picture: Arc<Picture>) -> Paint {
-    let tint = |corner: usize| {
+fn material(batch: &Batch, texture: Arc<SurfaceTexture>) -> Material {
+    let tint = |vertex: usize| {
         batch
             .shape
             .vertices
-            .get(corner)
+            .get(vertex)
             .map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]])
     };
     let first = tint(0);
-    let has_more =
-        batch.light.is_some() || (0..batch.shape.vertices.len()).any(|corner| tint(corner) != first);
+    let has_extra_attributes =
+        batch.light.is_some() || (0..batch.shape.vertices.len()).any(|vertex| tint(vertex) != first);
     let sky = batch.light.map(|light| light.sky as f32);
-    Paint { picture, tint: first, emissive: batch.material.emissive, has_more, sky }
+    Material { texture, tint: first, emissive: batch.material.emissive, has_extra_attributes, sky }
 }
 
-/// Pictures that several batches share, each once.
+/// Textures of the batches; those with the same image and wrap modes are shared.
 #[derive(Default)]
-struct Pictures(HashMap<(*const Texture, [u8; 2]), Arc<Picture>>);
+struct TextureCache(HashMap<(*const Texture, [u8; 2]), Arc<SurfaceTexture>>);
 
-impl Pictures {
-    fn of(&mut self, batch: &Batch) -> Arc<Picture> {
-        let look = &batch.material;
-        let name = (Arc::as_ptr(&look.texture), look.wrap.map(|wrap| wrap as u8));
-        self.0.entry(name).or_insert_with(|| Arc::new(Picture::new(&look.texture, look.wrap, None))).clone()
+impl TextureCache {
+    fn triangles_of_piece(&mut self, batch: &Batch) -> Arc<SurfaceTexture> {
+        let material = &batch.material;
+        let cache_key = (Arc::as_ptr(&material.texture), material.wrap.map(|wrap| wrap as u8));
+        self.0
+            .entry(cache_key)
+            .or_insert_with(|| Arc::new(SurfaceTexture::new(&material.texture, material.wrap, None)))
+            .clone()
     }
 }

@@ -1,47 +1,48 @@
-//! Numbers that frame after frame reads all over, in large pages where the system has them: a processor
-//! remembers where a few pages are, and looks the others up over and over.
+//! Large arrays in huge pages, if the system provides them: with small pages, the frequent reads of whole
+//! frames miss the TLB.
 
 use std::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 
-/// Numbers in a row. What holds at least a large page asks for such; everything else, and where there are
-/// none, is a vector.
+/// An array. If it fills at least one huge page, it requests huge pages; otherwise, or if there are none, it
+/// is a vector.
 #[derive(Debug)]
-pub(crate) enum Large<T> {
+pub(crate) enum LargeArray<T> {
     Heap(Vec<T>),
     #[cfg(target_os = "linux")]
     Pages(pages::Pages, usize),
 }
 
-impl<T> Default for Large<T> {
+impl<T> Default for LargeArray<T> {
     fn default() -> Self {
         Self::Heap(Vec::new())
     }
 }
 
-impl<T: Pod> Large<T> {
-    /// So many zeros.
+impl<T: Pod> LargeArray<T> {
+    /// Creates an array of zeros.
     pub fn zeros(len: usize) -> Self {
         #[cfg(target_os = "linux")]
-        if let Some(pages) = pages::Pages::of(len.saturating_mul(size_of::<T>())) {
+        if let Some(pages) = pages::Pages::new(len.saturating_mul(size_of::<T>())) {
             return Self::Pages(pages, len);
         }
         Self::Heap(vec![T::zeroed(); len])
     }
 
-    /// Has so many from now on: what it had, or zeros. It grows and does not shrink.
+    /// Sets the length. Existing values stay; new ones are zeros or stale values. It grows, but does not
+    /// shrink.
     pub fn fit(&mut self, len: usize) {
         match self {
             Self::Heap(values) if len <= values.capacity() => values.resize(len, T::zeroed()),
             #[cfg(target_os = "linux")]
-            Self::Pages(pages, of) if len <= pages.bytes().len() / size_of::<T>() => *of = len,
+            Self::Pages(pages, length) if len <= pages.bytes().len() / size_of::<T>() => *length = len,
             _ => *self = Self::zeros(len),
         }
     }
 }
 
-impl<T: Pod> Deref for Large<T> {
+impl<T: Pod> Deref for LargeArray<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
@@ -53,7 +54,7 @@ impl<T: Pod> Deref for Large<T> {
     }
 }
 
-impl<T: Pod> DerefMut for Large<T> {
+impl<T: Pod> DerefMut for LargeArray<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         match self {
             Self::Heap(values) => values,
@@ -69,10 +70,10 @@ impl<T: Pod> DerefMut for Large<T> {
 mod pages {
     use memmap2::{Advice, MmapMut};
 
-    /// Of x86-64, and of aarch64 with pages of 4 KiB.
+    /// Size of a huge page on x86-64, and on aarch64 with pages of 4 KiB.
     const LARGE_PAGE_BYTES: usize = 2 << 20;
 
-    /// Memory of the system's own, whole large pages from the first byte on.
+    /// An anonymous mapping, aligned to huge pages.
     #[derive(Debug)]
     pub struct Pages {
         memory: MmapMut,
@@ -80,13 +81,13 @@ mod pages {
     }
 
     impl Pages {
-        /// Of zeros; `None` for what is smaller than a page, and where the system gives none.
-        pub fn of(bytes: usize) -> Option<Self> {
+        /// Maps zeros. `None` below the size of one huge page, or if the system provides none.
+        pub fn new(bytes: usize) -> Option<Self> {
             let bytes = Some(bytes)
                 .filter(|&bytes| bytes >= LARGE_PAGE_BYTES)?
                 .checked_next_multiple_of(LARGE_PAGE_BYTES)?;
-            // Most systems begin what is so large at a large page; one more is room for those that do not,
-            // and is never touched.
+            // Most systems align mappings of this size; one extra page covers those that do not, and is never
+            // touched.
             let memory = MmapMut::map_anon(bytes.checked_add(LARGE_PAGE_BYTES)?).ok()?;
             memory.advise(Advice::HugePage).ok()?;
             let first = memory.as_ptr().align_offset(LARGE_PAGE_BYTES);
@@ -113,9 +114,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stay_what_they_are_however_many_there_are() {
-        // Below a large page, one, and several; and back.
-        let mut all: Large<u32> = Large::default();
+    fn values_survive_resizing() {
+        // Below one huge page, one, and several; and back.
+        let mut all: LargeArray<u32> = LargeArray::default();
         assert!(all.is_empty());
         for len in [3, 1 << 19, 1 << 19, 5_000_001, 7, 1 << 19, 5_000_001] {
             all.fit(len);
@@ -125,19 +126,19 @@ mod tests {
             }
             assert!(all.iter().zip(0..).all(|(&value, i): (&u32, u32)| value == i), "{len}");
         }
-        let zeros: Large<[f32; 2]> = Large::zeros(700_001);
-        assert!(zeros.len() == 700_001 && zeros.iter().all(|&of| of == [0.0; 2]));
+        let zeros: LargeArray<[f32; 2]> = LargeArray::zeros(700_001);
+        assert!(zeros.len() == 700_001 && zeros.iter().all(|&new| new == [0.0; 2]));
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn pages_begin_at_a_large_one() {
+    fn mappings_are_aligned_to_huge_pages() {
         for (len, may_have_pages) in
             [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)]
         {
-            let numbers: Large<f64> = Large::zeros(len);
-            // A system need not have large pages.
-            let has_pages = matches!(numbers, Large::Pages(..));
+            let numbers: LargeArray<f64> = LargeArray::zeros(len);
+            // A system may have no huge pages.
+            let has_pages = matches!(numbers, LargeArray::Pages(..));
             assert!(may_have_pages || !has_pages, "{len}");
             assert!(!has_pages || numbers.as_ptr().align_offset(2 << 20) == 0, "{len}");
         }

@@ -1,16 +1,15 @@
-//! Ideal frames and output frames on this machine's processor: no Vulkan, no driver.
+//! Ideal frames and output frames on the processor, without Vulkan or a driver.
 //!
 //! [`CpuRenderer`] draws the ideal frames of a scene and makes output frames from them, as a
-//! [`FramePlan`](camsim_plan::FramePlan) says. The crate `camsim-engine` feeds it.
+//! [`FramePlan`](camsim_plan::FramePlan) says. The crate `camsim-engine` drives it.
 //!
-//! * `ideal`: a rasteriser of triangles. It finds which triangle each pixel shows, then shades each pixel
-//!   once.
-//! * `reverse`: lens map, temporal inverse, gather, photometric stage and truth, for blocks of pixels side by
-//!   side.
-//! * `general`: the same in double precision for every plan that `reverse` does not vectorise.
-//! * `cast`: ideal frames of every scene and plan, by rays.
-//! * `simd`, `large_pages`: vector instructions and memory in large pages, where the processor and the system
-//!   have them.
+//! * `ideal`: a triangle rasteriser with deferred shading: it finds the visible triangle of each pixel, then
+//!   shades each pixel once.
+//! * `reverse`: lens map, temporal inverse, gather, photometric stage and truth, vectorised over blocks of
+//!   pixels.
+//! * `general`: the same in double precision, for every plan that `reverse` does not vectorise.
+//! * `cast`: ideal frames of every scene and plan, by ray casting.
+//! * `simd`, `large_pages`: vector instructions and huge memory pages, where processor and system have them.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! One sequence on the processor: its scene, its lens map, and the ideal frames drawn last.
+//! Renderer of one sequence: scene, lens map, and the ideal frames drawn last.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ use camsim_plan::{
 use crate::{
     cast::CastScene,
     general::{self, FrameInputs, IdealImage, RowTable},
-    ideal::{DrawnFrame, RasterScene, View},
-    reverse::{IdealTexels, Inputs, Kernel, LensMap},
+    ideal::{DrawInputs, RasterFrame, RasterScene},
+    reverse::{IdealTexels, Kernel, KernelInputs, LensMap},
 };
 
-/// Ideal frames that are kept: one for the frame at work, one for the frame after it.
+/// Number of buffers for ideal frames: one for the current frame, one for the next.
 const BUFFERS: usize = 2;
 
-/// Names ideal frames that the renderer holds.
+/// Handle of ideal frames that the renderer holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IdealBuffer(usize);
 
@@ -35,14 +35,14 @@ pub struct CpuRenderer {
     kernel: Kernel,
     sequence: Arc<Sequence>,
     meshes: Arc<SceneBatches>,
-    /// Whether the rasteriser draws the scene.
+    /// Whether the rasteriser supports the scene.
     rasterises: bool,
-    /// Made when an ideal frame is first rasterised.
+    /// Created when an ideal frame is first rasterised.
     raster: Option<RasterScene>,
-    /// Made when an ideal frame is first cast.
+    /// Created when an ideal frame is first cast.
     cast: Option<CastScene>,
     vignette: Vec<f32>,
-    /// By the bits of its zoom value.
+    /// Lens map, and the bits of its zoom value.
     lens_map: Option<(u64, LensMap)>,
     buffers: [Ideal; BUFFERS],
     last: usize,
@@ -52,18 +52,18 @@ pub struct CpuRenderer {
 #[derive(Debug, Default)]
 struct Ideal {
     size_px: [u32; 2],
-    /// The one that was rasterised.
-    drawn: DrawnFrame,
-    /// All key frames, where they were cast.
+    /// The rasterised key frame.
+    drawn: RasterFrame,
+    /// All key frames, if they were cast; else empty.
     cast: Vec<IdealImage>,
 }
 
-/// What an output frame is made from.
+/// KernelInputs of an output frame.
 #[derive(Clone, Copy, Debug)]
 pub struct ReverseInputs<'a> {
     /// The plan.
     pub plan: &'a FramePlan,
-    /// Numbers of the frame.
+    /// Uniforms of the frame.
     pub uniforms: &'a FrameUniforms,
     /// Poses or times of the rows.
     pub rows: &'a RowTable,
@@ -87,22 +87,22 @@ impl CpuRenderer {
         }
     }
 
-    /// Goes on with another sequence over the same scene.
+    /// Switches to another sequence over the same scene.
     pub fn renew(&mut self, sequence: Arc<Sequence>) {
         self.lens_map = None;
         self.vignette = sequence.vignette_weights().1;
         self.sequence = sequence;
     }
 
-    /// Draws the ideal frames of a plan: by the rasteriser where it can, else by rays. Those drawn before the
-    /// last are overwritten.
+    /// Draws the ideal frames of a plan: by the rasteriser if it supports them, else by ray casting. It
+    /// overwrites those drawn before the last ones.
     pub fn draw_ideal(
         &mut self,
         plan: &FramePlan,
         terrain: Option<&PlacedMesh>,
         tolerance: &LodTolerance,
     ) -> IdealBuffer {
-        // The frame in flight may still read the other one.
+        // The frame in flight may still read the other buffer.
         self.last = (self.last + 1) % BUFFERS;
         let scene = &self.sequence.scene;
         let ideal = &mut self.buffers[self.last];
@@ -115,12 +115,12 @@ impl CpuRenderer {
             return IdealBuffer(self.last);
         }
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
-        let view = View { plan, scene, batches: &self.meshes, terrain, tolerance };
+        let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
         raster.draw(view, &mut ideal.drawn);
         IdealBuffer(self.last)
     }
 
-    /// The first ideal frame that was drawn here: linear R G B A (with the paper preset values as stored) and
+    /// The first ideal frame of a buffer: linear R G B A (with the paper preset sRGB-encoded values) and
     /// inverse depth, 1/m, row-major.
     #[must_use]
     pub fn ideal_images(&self, IdealBuffer(buffer): IdealBuffer) -> (Vec<f32>, Vec<f32>) {
@@ -131,8 +131,8 @@ impl CpuRenderer {
         }
     }
 
-    /// The output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth where
-    /// the plan wants it.
+    /// Output frame from ideal frames that were drawn here: linear R G B A, row-major, and the truth if the
+    /// plan has it.
     pub fn reverse(
         &mut self,
         inputs: &ReverseInputs<'_>,
@@ -145,7 +145,7 @@ impl CpuRenderer {
             RowTable::Poses(poses) if cpu_vectorises(plan) => match ideal.cast.first() {
                 None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
                 Some(image) => {
-                    let drawn = DrawnFrame::from_image(image);
+                    let drawn = RasterFrame::from_image(image);
                     self.vectorised(inputs, &poses.entries, drawn.texels())
                 }
             },
@@ -154,8 +154,8 @@ impl CpuRenderer {
         }
     }
 
-    /// The same for a [vectorised](cpu_vectorises) plan, from an ideal frame that another renderer has drawn.
-    /// `None` for other plans.
+    /// Output frame of a [vectorised](cpu_vectorises) plan from an ideal frame that another renderer has
+    /// drawn: linear R G B A, row-major, and the truth if the plan has it. `None` for other plans.
     pub fn reverse_from(
         &mut self,
         inputs: &ReverseInputs<'_>,
@@ -176,7 +176,8 @@ impl CpuRenderer {
     ) -> (Vec<f32>, Option<Vec<Truth>>) {
         let &ReverseInputs { plan, uniforms, .. } = inputs;
         let map = self.lens_map.as_ref().map(|(_, map)| map);
-        self.kernel.render(plan, &Inputs { frame: uniforms, poses, map, vignette: &self.vignette, ideal })
+        self.kernel
+            .render(plan, &KernelInputs { frame: uniforms, poses, map, vignette: &self.vignette, ideal })
     }
 
     fn general(&self, inputs: &ReverseInputs<'_>, ideal: &[IdealImage]) -> (Vec<f32>, Option<Vec<Truth>>) {
@@ -189,7 +190,7 @@ impl CpuRenderer {
         general::render(inputs.plan, &self.sequence, ideal, &frame)
     }
 
-    /// Makes the lens map of a plan, unless it is there.
+    /// Makes the lens map of a plan, unless it is cached.
     fn fit_lens_map(&mut self, plan: &FramePlan) {
         let bits = plan.zoom.unwrap_or_default().to_bits();
         let is_there = self.lens_map.as_ref().is_some_and(|(zoom, _)| *zoom == bits);
@@ -200,8 +201,8 @@ impl CpuRenderer {
     }
 }
 
-/// A rasterised ideal frame in the form that the general pass reads.
-fn image_of(drawn: &DrawnFrame, geometry: &IdealGeometry) -> IdealImage {
+/// Converts a rasterised ideal frame for the general pass.
+fn image_of(drawn: &RasterFrame, geometry: &IdealGeometry) -> IdealImage {
     let (color_rgba, inverse_depth) = drawn.images(geometry.size_px);
     IdealImage { geometry: *geometry, color_rgba, inverse_depth, fine: None }
 }

@@ -11,7 +11,7 @@ use crate::{RenderError, Session};
 /// Largest side of an ideal frame where no adapter limits it.
 const CPU_MAX_SIDE_PX: u32 = 16_384;
 
-/// The opened adapter, if there is one, and which renderers may be used.
+/// The opened adapter, if any, and the renderers that may be used.
 #[derive(Debug)]
 pub struct Engine {
     gpu: Option<GpuContext>,
@@ -19,26 +19,25 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Opens an adapter and uses it as [`Backend::Auto`] says.
+    /// Opens an adapter, with [`Backend::Auto`].
     ///
     /// # Errors
-    /// No usable adapter.
+    /// There is no usable adapter.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         Ok(Self { gpu: Some(GpuContext::new(choice)?), backend: automatic() })
     }
 
-    /// The cpu alone: no adapter is opened, no driver is loaded.
+    /// The cpu renderer alone, without opening an adapter or loading a driver.
     #[must_use]
     pub fn cpu() -> Self {
         Self { gpu: None, backend: Backend::Cpu }
     }
 
-    /// Opens what a backend needs: with [`Backend::Auto`] the best adapter, or the cpu alone where there is
-    /// none.
+    /// Opens the renderers of a backend: with [`Backend::Auto`] the best adapter, or the cpu alone without
+    /// one.
     ///
     /// # Errors
-    /// A backend that needs an adapter where none can be used; an adapter that `CAMSIM_ADAPTER` names and that
-    /// is not there.
+    /// There is no adapter and the backend needs one, or none with the name in `CAMSIM_ADAPTER`.
     pub fn open(backend: Backend) -> Result<Self, GpuError> {
         match backend {
             Backend::Cpu => Ok(Self::cpu()),
@@ -52,30 +51,30 @@ impl Engine {
         }
     }
 
-    /// The adapter, if one is open.
+    /// The opened adapter.
     #[must_use]
     pub fn gpu(&self) -> Option<&GpuContext> {
         self.gpu.as_ref()
     }
 
-    /// Holds pictures with longer sides in tiles, as if textures ended there, for sessions to come: for tests,
-    /// and where the memory of a card is short.
+    /// Tiles textures with longer sides in new sessions, as if the adapter had this limit: for tests, and for
+    /// cards with little memory.
     pub fn limit_pictures(&mut self, max_side_px: u32) {
         self.gpu.iter_mut().for_each(|gpu| gpu.limit_pictures(max_side_px));
     }
 
-    /// Pixels of a row that each thread of the gpu's reverse kernel takes ([`GpuContext::set_pixels_a_thread`]),
-    /// for sessions to come.
+    /// Sets the number of pixels of a row per thread of the gpu's reverse kernel
+    /// ([`GpuContext::set_pixels_per_thread`]) in new sessions.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
-        self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_a_thread(pixels));
+        self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_per_thread(pixels));
     }
 
-    /// Which renderers sessions to come may use. Without an adapter it is always the cpu.
+    /// Sets the renderers that new sessions may use. Without an adapter it is always the cpu.
     pub fn set_backend(&mut self, backend: Backend) {
         self.backend = backend;
     }
 
-    /// What plans depend on.
+    /// Capabilities of this machine, which plans depend on.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
         let adapter = self.gpu.as_ref().map(|gpu| match gpu.is_software() {
@@ -90,16 +89,16 @@ impl Engine {
         }
     }
 
-    /// Largest side of an ideal frame.
+    /// Largest side of an ideal frame, px.
     #[must_use]
     pub fn max_side_px(&self) -> u32 {
         self.gpu.as_ref().map_or(CPU_MAX_SIDE_PX, GpuContext::max_side_px)
     }
 
-    /// Most pixels of an output frame with depth and coordinates.
+    /// Largest number of pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
-        self.gpu.as_ref().map_or(u64::MAX, GpuContext::most_pixels_with_truth)
+        self.gpu.as_ref().map_or(u64::MAX, GpuContext::max_pixels_with_truth)
     }
 
     /// Whether frames are rendered on the processor that also plans them.
@@ -107,10 +106,10 @@ impl Engine {
         self.gpu.as_ref().is_none_or(GpuContext::is_software)
     }
 
-    /// Prepares for the frames of a sequence; uploads its scene where an adapter has a part.
+    /// Opens a session for a sequence, and uploads its scene if an adapter is open.
     ///
     /// # Errors
-    /// What the adapter cannot hold, a camera that cannot be used.
+    /// The scene is too large for the adapter, or the camera is invalid.
     pub fn session<E: std::error::Error + 'static>(
         &self,
         sequence: Arc<Sequence>,
@@ -120,7 +119,7 @@ impl Engine {
     }
 }
 
-/// Shader files that are to be tried run on the gpu.
+/// The gpu if `CAMSIM_SHADER_DIR` names shader files to try, otherwise automatic.
 fn automatic() -> Backend {
     match std::env::var_os("CAMSIM_SHADER_DIR") {
         Some(_) => Backend::Gpu,
@@ -129,7 +128,7 @@ fn automatic() -> Backend {
 }
 
 impl fmt::Display for Engine {
-    /// What renders, for people: the adapter, and the part of the cpu.
+    /// Name of the renderer, for users.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let threads = rayon::current_num_threads();
         match (&self.gpu, self.backend) {

@@ -1,26 +1,26 @@
-//! What can go wrong while frames are rendered.
+//! Errors of rendering.
 
 use camsim_gpu::{GpuError, PassError};
 use camsim_plan::PlanError;
 
-/// Errors of rendering; `E` is the sink's own.
+/// Errors of rendering; `E` is the error of the sink.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError<E: std::error::Error + 'static> {
-    /// The adapter or its device.
+    /// The adapter failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// Planning.
+    /// Planning failed.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The shader files.
+    /// The shader files are invalid.
     #[error(transparent)]
     Shader(#[from] camsim_gpu::shaders::ComposeError),
-    /// The sink that takes the frames.
+    /// The sink failed.
     #[error(transparent)]
     Sink(E),
 }
 
-/// Errors before a sink is involved.
+/// Errors of functions without a sink.
 pub(crate) type RenderErrorBase = RenderError<std::convert::Infallible>;
 
 impl<E: std::error::Error + 'static> From<PassError> for RenderError<E> {
@@ -33,7 +33,7 @@ impl<E: std::error::Error + 'static> From<PassError> for RenderError<E> {
 }
 
 impl<E: std::error::Error + 'static> RenderError<E> {
-    /// As the error of a sink of another kind.
+    /// Converts the error to that of a function with a sink.
     pub(crate) fn lift(base: RenderErrorBase) -> Self {
         match base {
             RenderError::Gpu(error) => Self::Gpu(error),

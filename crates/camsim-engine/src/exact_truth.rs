@@ -1,16 +1,56 @@
-//! Depth and coordinates where a look-up in the ideal frame does not tell them: by rays in f64, cast by the
-//! host.
+//! Depth and coordinates where a look-up in the ideal frame is unreliable
+//! ([`camsim_core::temporal::unreliable_depth`]): by rays in f64.
+//!
+//! Most of these pixels are at creases of the terrain, where neighbours see the same patch. Their rays are
+//! walked from the triangle of the pixel beside them, which costs a tenth of a cast ray; a ray is cast where
+//! the walk does not arrive, where it contradicts the look-up, and where a silhouette passes between two
+//! neighbours.
 
-use camsim_core::temporal::unreliable_depth::{DepthGrid, changed};
-use camsim_plan::{FramePlan, PixelTruth, Planner};
+use camsim_core::{
+    scene::TerrainTriangle,
+    temporal::unreliable_depth::{DepthGrid, changed},
+};
+use camsim_plan::{FramePlan, FrameRays, PixelTruth, Planner, uniforms::Truth};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use camsim_plan::uniforms::Truth;
+/// Relative difference of inverse depth between a look-up and a walk from which on they are of two surfaces.
+/// Look-ups on the same surface differ by the terrain's level of detail and by bilinear reads at creases.
+const SAME_SURFACE: f32 = 0.01;
 
-/// Casts rays for the pixels that the device has left to the host (their depth is below 0), for those whose
-/// depth may belong to no surface or to the wrong one, and from each pixel that a ray has corrected on for
-/// its neighbours. `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
+/// How the truth of a pixel is known.
+#[derive(Clone, Copy, PartialEq)]
+enum Source {
+    LookUp,
+    /// By a walk that ended at this triangle.
+    Walk(TerrainTriangle),
+    /// By a walk that began at the pixel on the left.
+    WalkFromLeft(TerrainTriangle),
+    /// By a ray, which hit this triangle of the terrain or something else.
+    Ray(Option<TerrainTriangle>),
+}
+
+impl Source {
+    fn triangle(self) -> Option<TerrainTriangle> {
+        match self {
+            Self::LookUp => None,
+            Self::Walk(triangle) | Self::WalkFromLeft(triangle) => Some(triangle),
+            Self::Ray(triangle) => triangle,
+        }
+    }
+
+    fn is_walk(self) -> bool {
+        matches!(self, Self::Walk(_) | Self::WalkFromLeft(_))
+    }
+
+    fn is_ray(self) -> bool {
+        matches!(self, Self::Ray(_))
+    }
+}
+
+/// Casts rays for the pixels whose depth the gpu has left open (below 0), for those whose depth may belong to
+/// no surface or to the wrong one, and from each pixel that a ray has corrected on for its neighbours.
+/// `phase` is that of the coordinates; pixels are valid where `color_rgba` says so.
 pub(crate) fn complete(
     truth: &mut [Truth],
     color_rgba: &[f32],
@@ -19,45 +59,140 @@ pub(crate) fn complete(
     phase: f64,
 ) {
     let width = plan.camera.size_px[0] as usize;
-    let sight = |i: usize, truth: &Truth| {
-        let uv = DVec2::new(f64::from(truth.uv[0]), f64::from(truth.uv[1]));
-        planner.pixel_truth(plan, [(i % width) as u32, (i / width) as u32], uv, phase)
-    };
-    let cast = |truth: &[Truth], pixels: &[usize]| -> Vec<(usize, PixelTruth)> {
-        pixels.par_iter().map(|&i| (i, sight(i, &truth[i]))).collect()
-    };
-    let mut by_ray: Vec<bool> = truth.iter().map(|of| of.depth_m < 0.0).collect();
-    let unknown: Vec<usize> = (0..truth.len()).filter(|&i| by_ray[i]).collect();
-    for (i, sight) in cast(truth, &unknown) {
-        tell(&mut truth[i], &sight);
-    }
+    let rays = planner.frame_rays(plan, phase);
+    let mut source = vec![Source::LookUp; truth.len()];
+    let open: Vec<usize> = (0..truth.len()).filter(|&i| truth[i].depth_m < 0.0).collect();
+    Frame { width, truth, source: &mut source, rays: &rays }.cast(&open);
+
     let valid: Vec<bool> = color_rgba.chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
-    let inverse_depth: Vec<f32> = truth.iter().map(inverse_depth).collect();
+    let looked_up: Vec<f32> = truth.iter().map(inverse_depth).collect();
     let row_step = if plan.shutter.interlace_s() > 0.0 { 2 } else { 1 };
-    let grid = DepthGrid { width, row_step, inverse_depth: &inverse_depth, valid: &valid };
-    let mut pixels: Vec<usize> = grid
-        .unreliable_pixels()
-        .into_iter()
-        .enumerate()
-        .filter(|&(i, suspect)| suspect && !by_ray[i])
-        .map(|(i, _)| i)
+    let grid = DepthGrid { width, row_step, inverse_depth: &looked_up, valid: &valid };
+    let unreliable = grid.unreliable_pixels();
+    let mut frame = Frame { width, truth, source: &mut source, rays: &rays };
+    frame.walk_rows(&unreliable, &looked_up);
+    let at_silhouettes = frame.at_silhouettes(&unreliable, row_step * width);
+    frame.cast(&at_silhouettes);
+
+    let mut changed_pixels: Vec<usize> = (0..looked_up.len())
+        .filter(|&i| unreliable[i] && source[i].is_ray() && changed(looked_up[i], inverse_depth(&truth[i])))
         .collect();
-    pixels.iter().for_each(|&i| by_ray[i] = true);
-    while !pixels.is_empty() {
-        let found = cast(truth, &pixels);
-        pixels.clear();
-        for (i, sight) in found {
-            tell(&mut truth[i], &sight);
-            if !changed(inverse_depth[i], self::inverse_depth(&truth[i])) {
-                continue;
-            }
-            for beside in grid.neighbours(i).filter(|&beside| valid[beside]) {
-                if !std::mem::replace(&mut by_ray[beside], true) {
-                    pixels.push(beside);
-                }
-            }
+    while !changed_pixels.is_empty() {
+        let mut beside: Vec<usize> = changed_pixels
+            .iter()
+            .flat_map(|&i| grid.neighbours(i))
+            .filter(|&i| valid[i] && !source[i].is_ray())
+            .collect();
+        beside.sort_unstable();
+        beside.dedup();
+        Frame { width, truth, source: &mut source, rays: &rays }.cast(&beside);
+        beside.retain(|&i| changed(looked_up[i], inverse_depth(&truth[i])));
+        changed_pixels = beside;
+    }
+}
+
+/// The pixels of a frame, row-major.
+struct Frame<'a> {
+    width: usize,
+    truth: &'a mut [Truth],
+    source: &'a mut [Source],
+    rays: &'a FrameRays<'a>,
+}
+
+impl Frame<'_> {
+    fn pixel(&self, i: usize) -> [u32; 2] {
+        [(i % self.width) as u32, (i / self.width) as u32]
+    }
+
+    fn cast(&mut self, pixels: &[usize]) {
+        let cast = |&i: &usize| self.rays.cast(self.pixel(i), uv(&self.truth[i]));
+        let hits: Vec<PixelTruth> = pixels.par_iter().map(cast).collect();
+        for (&i, hit) in pixels.iter().zip(&hits) {
+            set(&mut self.truth[i], hit);
+            self.source[i] = Source::Ray(triangle(hit));
         }
     }
+
+    /// Walks along each row from one unreliable pixel to the next, and casts where that fails.
+    fn walk_rows(&mut self, unreliable: &[bool], looked_up: &[f32]) {
+        let (width, rays) = (self.width, self.rays);
+        let rows = self.truth.par_chunks_mut(width).zip(self.source.par_chunks_mut(width)).enumerate();
+        rows.for_each(|(y, (truth, source))| {
+            let mut last: Option<(usize, TerrainTriangle)> = None;
+            for x in 0..width {
+                let i = y * width + x;
+                if !unreliable[i] || source[x].is_ray() {
+                    continue;
+                }
+                let (pixel, uv) = ([x as u32, y as u32], uv(&truth[x]));
+                let walk =
+                    last.and_then(|(_, from)| rays.walk(from, pixel, uv, 2.0 * f64::from(SAME_SURFACE)));
+                let walk = walk.filter(|walk| is_near(looked_up[i], walk));
+                let hit = walk.unwrap_or_else(|| rays.cast(pixel, uv));
+                set(&mut truth[x], &hit);
+                source[x] = match (triangle(&hit), last) {
+                    (Some(triangle), Some((from_x, _))) if walk.is_some() => {
+                        if from_x + 1 == x {
+                            Source::WalkFromLeft(triangle)
+                        } else {
+                            Source::Walk(triangle)
+                        }
+                    }
+                    (triangle, _) => Source::Ray(triangle),
+                };
+                last = triangle(&hit).map(|triangle| (x, triangle)).or(last);
+            }
+        });
+    }
+
+    /// Walked pixels whose walk does not lead on to an unreliable neighbour in the row or the column.
+    fn at_silhouettes(&self, unreliable: &[bool], stride: usize) -> Vec<usize> {
+        let (width, length) = (self.width, self.source.len());
+        let rows = (0..length / width).into_par_iter().flat_map_iter(|y| {
+            (y * width..(y + 1) * width).flat_map(move |i| {
+                let right = (i % width + 1 < width).then_some(i + 1);
+                let below = (i + stride < length).then_some(i + stride);
+                let pairs = [right, below].into_iter().flatten();
+                pairs
+                    .filter(move |&beside| self.is_parted(unreliable, i, beside))
+                    .flat_map(move |beside| [i, beside])
+            })
+        });
+        let mut pixels: Vec<usize> = rows.filter(|&i| self.source[i].is_walk()).collect();
+        pixels.sort_unstable();
+        pixels.dedup();
+        pixels
+    }
+
+    /// Whether a silhouette may lie between two neighbours, at least one of which was walked.
+    fn is_parted(&self, unreliable: &[bool], here: usize, beside: usize) -> bool {
+        let sources = [self.source[here], self.source[beside]];
+        let is_walked = beside == here + 1 && matches!(sources[1], Source::WalkFromLeft(_));
+        if !(unreliable[here] && unreliable[beside])
+            || is_walked
+            || sources.iter().all(|source| source.is_ray())
+        {
+            return false;
+        }
+        match sources.map(Source::triangle) {
+            [Some(from), Some(to)] => {
+                !self.rays.connects(from, self.pixel(beside), uv(&self.truth[beside]), to)
+            }
+            _ => true,
+        }
+    }
+}
+
+fn triangle(truth: &PixelTruth) -> Option<TerrainTriangle> {
+    truth.hit.and_then(|hit| hit.triangle)
+}
+
+fn uv(truth: &Truth) -> DVec2 {
+    DVec2::new(f64::from(truth.uv[0]), f64::from(truth.uv[1]))
+}
+
+fn is_near(looked_up: f32, walk: &PixelTruth) -> bool {
+    walk.hit.is_some_and(|hit| (looked_up * hit.depth_m as f32 - 1.0).abs() <= SAME_SURFACE)
 }
 
 /// 1/m; 0 where nothing is.
@@ -65,8 +200,8 @@ fn inverse_depth(truth: &Truth) -> f32 {
     if truth.depth_m > 0.0 { 1.0 / truth.depth_m } else { 0.0 }
 }
 
-fn tell(truth: &mut Truth, sight: &PixelTruth) {
-    truth.source_px = sight.source_px.as_vec2().to_array();
-    truth.point_ned_m = sight.hit.map_or([0.0; 3], |(point_ned_m, _)| point_ned_m.as_vec3().to_array());
-    truth.depth_m = sight.hit.map_or(0.0, |(_, depth_m)| depth_m as f32);
+fn set(truth: &mut Truth, hit: &PixelTruth) {
+    truth.source_px = hit.source_px.as_vec2().to_array();
+    truth.point_ned_m = hit.hit.map_or([0.0; 3], |hit| hit.point_ned_m.as_vec3().to_array());
+    truth.depth_m = hit.hit.map_or(0.0, |hit| hit.depth_m as f32);
 }

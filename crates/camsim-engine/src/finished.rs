@@ -1,5 +1,4 @@
-//! What a session hands over: the frame, how it was made, and where its time went; and how that is taken from
-//! device and host.
+//! A finished frame with its plan and times, and its coordinates.
 
 use camsim_core::{
     frame::{COORDS_CHANNELS, RenderedFrame, sky_direction_ned},
@@ -13,49 +12,46 @@ use rayon::prelude::*;
 
 use camsim_gpu::recorder::PassTime;
 
-/// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one
-/// before.
+/// Times of the stages of a frame, ms. Frames overlap: while the program waits for one, the gpu may still
+/// work on the one before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTimes {
-    /// The host planned it and computed its tables, on another thread than what follows.
+    /// Planning and row tables, on another thread than the other stages.
     pub plan_ms: f64,
-    /// The host wrote its tables and recorded its passes.
+    /// Upload of tables and recording of gpu passes.
     pub record_ms: f64,
-    /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame
-    /// before.
+    /// Submission to the driver. Some drivers (Mesa's software adapters) return only after the frame before.
     pub submit_ms: f64,
-    /// The host drew the ideal frame, where it does that itself; none where an
-    /// earlier frame's is kept.
+    /// Ideal frame by the cpu renderer; `None` if the gpu draws it or an earlier one is shared.
     pub ideal_ms: Option<f64>,
-    /// The host waited for the device.
+    /// Waiting for the gpu.
     pub wait_ms: f64,
-    /// The host made the picture from the ideal frame, where it does that itself.
+    /// Output frame by the cpu renderer; `None` if the gpu renders it.
     pub reverse_ms: Option<f64>,
-    /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what
-    /// pixels at silhouettes see.
+    /// Read-back from the gpu, and with depth or coordinates the exact rays at unreliable pixels.
     pub read_ms: f64,
-    /// What ran on the device, if asked for ([`crate::Session::time_passes`]) and if the adapter has time stamps.
+    /// Gpu passes, if [`crate::Session::time_passes`] was called and the adapter has time stamps.
     pub passes: Vec<PassTime>,
 }
 
-/// A finished frame with the plan it was made by.
+/// A finished frame with its plan.
 #[derive(Debug)]
 pub struct Finished {
-    /// The pictures.
+    /// Colour and truth channels.
     pub frame: RenderedFrame,
     /// The plan.
     pub plan: FramePlan,
-    /// The terrain's level of detail.
+    /// Level of detail of the terrain.
     pub lod: LodSelection,
-    /// Blended triangles that are mixed before something behind them, since they cover each other in rings;
-    /// of all ideal frames.
+    /// Number of blended triangles drawn in the wrong order because they overlap in cycles, over all ideal
+    /// frames.
     pub out_of_order: u32,
-    /// Where its time went.
+    /// Times of the stages.
     pub times: FrameTimes,
 }
 
-/// What was found beside the picture, with each pixel's time shift, and the direction of the sky where there
-/// is a ray (alpha) and nothing that it meets.
+/// The channel `coords`: ray, source, time shift and point of each pixel, with the direction in place of the
+/// point where a valid pixel shows the sky.
 pub(crate) fn coords(
     truth: &[Truth],
     color_rgba: &[f32],
@@ -63,15 +59,15 @@ pub(crate) fn coords(
     path: &CameraPath,
 ) -> Vec<[f32; COORDS_CHANNELS]> {
     let width = plan.camera.size_px[0] as usize;
-    let of_row = |(y, (row, alphas)): (usize, (&[Truth], &[f32]))| {
-        // Where lines are rows, all pixels of one look at one instant.
+    let row_coords = |(y, (row, alphas)): (usize, (&[Truth], &[f32]))| {
+        // If sensor rows are image rows, all pixels of a row have one instant.
         let mut last: Option<(f64, CameraPose)> = None;
-        let of_pixel = |(x, (t, rgba)): (usize, (&Truth, &[f32]))| {
+        let pixel_coords = |(x, (t, rgba)): (usize, (&Truth, &[f32]))| {
             let dt_s = plan.shutter.dt_pixel_s(x as u32, y as u32);
             let [mut n, mut e, mut d] = t.point_ned_m;
             if t.depth_m == 0.0 && rgba[3] > 0.0 {
                 let pose = last
-                    .filter(|(of_s, _)| *of_s == dt_s)
+                    .filter(|(last_s, _)| *last_s == dt_s)
                     .map_or_else(|| path.pose(plan.stamp_s + dt_s), |(_, pose)| pose);
                 last = Some((dt_s, pose));
                 let uv = DVec2::new(f64::from(t.uv[0]), f64::from(t.uv[1]));
@@ -79,7 +75,12 @@ pub(crate) fn coords(
             }
             [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s as f32, n, e, d]
         };
-        row.iter().zip(alphas.chunks_exact(4)).enumerate().map(of_pixel).collect::<Vec<_>>()
+        row.iter().zip(alphas.chunks_exact(4)).enumerate().map(pixel_coords).collect::<Vec<_>>()
     };
-    truth.par_chunks(width).zip(color_rgba.par_chunks(4 * width)).enumerate().flat_map_iter(of_row).collect()
+    truth
+        .par_chunks(width)
+        .zip(color_rgba.par_chunks(4 * width))
+        .enumerate()
+        .flat_map_iter(row_coords)
+        .collect()
 }

@@ -1,4 +1,4 @@
-//! Renders sequences: plans ahead on other threads, keeps two frames in flight, and gives each pass to the
+//! Renders sequences: plans ahead on other threads, keeps two frames in flight, and runs each pass on the
 //! renderer that its plan names.
 //!
 //! ```no_run
@@ -20,17 +20,17 @@
 //!
 //! * [`Engine`]: the renderers of this machine ([`camsim_plan::Backend`]).
 //! * [`Session`]: one sequence.
-//! * [`Finished`]: a frame with its plan and its times.
+//! * [`Finished`]: a frame with its plan and times.
 
 #![warn(missing_docs)]
 
-mod ahead;
 mod engine;
 mod error;
 mod exact_truth;
 mod finished;
 mod memory;
-mod planners;
+mod planner_threads;
+mod prepare_ahead;
 mod session;
 
 pub use camsim_gpu::{AdapterChoice, GpuContext, GpuError, IdealImages};

@@ -1,7 +1,6 @@
-//! Memory of the program.
+//! Memory of the process.
 
-/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there
-/// is no such file.
+/// Peak memory of this process, MB (`VmHWM` in `/proc/self/status`). `None` on systems without this file.
 #[must_use]
 pub fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

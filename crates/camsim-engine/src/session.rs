@@ -12,7 +12,7 @@ use camsim_core::{
 };
 use camsim_cpu::{CpuRenderer, IdealBuffer, IdealTexels, ReverseInputs};
 use camsim_gpu::{
-    GpuError, GpuJob, GpuSession, IdealImages, Submitted, Wanted,
+    GpuError, GpuJob, GpuSession, IdealImages, Readback, Submitted,
     session::{FRAMES_IN_FLIGHT, IdealCopy},
 };
 use camsim_plan::{
@@ -22,9 +22,9 @@ use camsim_plan::{
 
 use crate::{
     Engine, Finished, FrameTimes, RenderError,
-    ahead::{Ahead, Prepared, Preparer},
     error::RenderErrorBase,
-    exact_truth, finished, planners,
+    exact_truth, finished, planner_threads,
+    prepare_ahead::{PrepareAhead, Prepared, Preparer},
 };
 
 /// One sequence on the renderers of an engine.
@@ -34,11 +34,11 @@ pub struct Session<'a> {
     planner: Arc<Planner>,
     cpu: CpuRenderer,
     gpu: Option<GpuSession<'a>>,
-    drawn: Option<Drawn>,
+    ideal: Option<IdealCache>,
     coords_phase: f32,
 }
 
-/// What an ideal frame depends on. Ideal frames that were drawn for the same need not be drawn again.
+/// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
 #[derive(Clone, Debug, PartialEq)]
 struct IdealKey {
     poses: Vec<CameraPose>,
@@ -48,35 +48,35 @@ struct IdealKey {
     models: LodTolerance,
     surface_reads: PrefilterTaps,
     samples_a_pixel: u32,
-    by: Renderer,
+    renderer: Renderer,
 }
 
-/// The ideal frames that were drawn last.
+/// The last ideal frames, reused by frames with the same key.
 #[derive(Debug)]
-struct Drawn {
+struct IdealCache {
     key: IdealKey,
     lod: LodSelection,
-    /// Where the cpu renderer has it, if it drew it.
+    /// Buffer of the cpu renderer, if it drew them.
     buffer: Option<IdealBuffer>,
 }
 
-/// Where the ideal frame of a frame in flight is.
+/// Location of the ideal frame of a frame in flight.
 #[derive(Debug)]
-enum Source {
-    /// The gpu makes the output frame too.
+enum IdealSource {
+    /// On the gpu, which renders the output frame too.
     Gpu(Submitted),
-    /// The gpu copies it to memory.
+    /// On the gpu, which copies it to memory for the cpu renderer.
     Copied(Submitted, IdealCopy),
-    /// The cpu has drawn it.
+    /// In a buffer of the cpu renderer.
     Cpu(IdealBuffer),
 }
 
-/// A frame that is being worked on.
+/// A submitted frame.
 #[derive(Debug)]
 struct InFlight {
     prepared: Prepared,
     uniforms: FrameUniforms,
-    source: Source,
+    source: IdealSource,
     lod: LodSelection,
     times: FrameTimes,
 }
@@ -95,15 +95,14 @@ impl<'a> Session<'a> {
             .map(|gpu| GpuSession::new(gpu, &sequence, meshes.clone(), planner.wants_truth()))
             .transpose()?;
         let cpu = CpuRenderer::new(sequence.clone(), meshes);
-        Ok(Self { engine, planner, cpu, gpu, drawn: None, coords_phase: 0.0 })
+        Ok(Self { engine, planner, cpu, gpu, ideal: None, coords_phase: 0.0 })
     }
 
-    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the last
-    /// bit. Fast where its scene is the one of this session (the same [`Arc`]) and its preset too: kernels and
-    /// the scene's pictures stay. Otherwise everything is made anew.
+    /// Replaces the sequence. The next frames are bit for bit those of a new session. Fast if the scene is
+    /// the same [`Arc`] and the preset is the same: pipelines and textures are kept.
     ///
     /// # Errors
-    /// As [`Engine::session`]; the session then stays as it was.
+    /// Those of [`Engine::session`]; the session is unchanged then.
     pub fn renew<E: std::error::Error + 'static>(
         &mut self,
         sequence: Arc<Sequence>,
@@ -130,31 +129,30 @@ impl<'a> Session<'a> {
         &self.planner
     }
 
-    /// Picks the instant of the exposure, in [-0.5, 0.5], at which `coords` reports source coordinates (0 =
-    /// mid-exposure): what the blur stage samples can so be checked from outside.
+    /// Sets the instant of the exposure, in [-0.5, 0.5], of the source coordinates in `coords` (0 =
+    /// mid-exposure), to check the exposure path.
     pub fn set_coords_phase(&mut self, phase: f32) {
         self.coords_phase = phase;
     }
 
-    /// Measures from now on how long each pass takes on the gpu; `false` without one, and where it has no time
-    /// stamps.
+    /// Measures the time of each gpu pass from now on; `false` without a gpu or without time stamps.
     pub fn time_passes(&mut self) -> bool {
         self.gpu.as_mut().is_some_and(GpuSession::time_passes)
     }
 
-    /// Forgets what was planned and drawn last, so that the next frame takes as long as if no other had been
-    /// like it. No picture changes: for benchmarks, which render the same frames over and over.
+    /// Clears the caches of plans and ideal frames. Pictures stay the same. For benchmarks, which render the
+    /// same frames over and over.
     pub fn forget(&mut self) {
-        self.drawn = None;
+        self.ideal = None;
         self.gpu.iter_mut().for_each(GpuSession::forget);
         self.planner.forget();
     }
 
-    /// Renders frames in the order asked for and hands each to `sink`. While one frame is read, the gpu works
-    /// on the next, and other threads plan those that follow; `frames` is read ahead of them.
+    /// Renders frames in the given order and passes each to `sink`. While one frame is read, the gpu works on
+    /// the next, and other threads plan the following ones; `frames` is read ahead.
     ///
     /// # Errors
-    /// The first fault of planning, device or sink; frames before it have been handed over.
+    /// The first error of planning, gpu or sink. The frames before it have been passed to `sink`.
     pub fn render<E: std::error::Error + 'static>(
         &mut self,
         frames: impl IntoIterator<Item = u64>,
@@ -164,8 +162,8 @@ impl<'a> Session<'a> {
         let mut frames = frames.into_iter();
         let first: Vec<u64> = frames.by_ref().take(2).collect();
         let is_single = first.len() < 2;
-        planners::scope(self.engine.shares_processor(), is_single, |scope| {
-            let mut ahead = Ahead::start(scope, &preparer, first.into_iter().chain(frames));
+        planner_threads::scope(self.engine.shares_processor(), is_single, |scope| {
+            let mut ahead = PrepareAhead::start(scope, &preparer, first.into_iter().chain(frames));
             let mut in_flight: Option<InFlight> = None;
             let mut slot = 0;
             loop {
@@ -186,8 +184,7 @@ impl<'a> Session<'a> {
                         .map_err(RenderError::Gpu)
                         .and_then(|frame| sink(frame).map_err(RenderError::Sink))
                 {
-                    // The frame in flight is not wanted, but its buffers can only be used again after it; a
-                    // second fault is not reported.
+                    // Buffers of the frame in flight are free only after it. A second error is not reported.
                     let _ = in_flight.map(|unwanted| self.finish(unwanted));
                     return Err(fault);
                 }
@@ -198,7 +195,8 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Draws the ideal frames of a frame, and has the gpu begin with its passes.
+    /// Draws ideal frames on the cpu, or submits the gpu passes of a frame.
+    // Long because: one path through both renderers.
     fn submit(&mut self, prepared: Prepared, slot: usize) -> Result<InFlight, RenderErrorBase> {
         let plan = &prepared.plan;
         let sequence = self.planner.sequence().clone();
@@ -211,24 +209,24 @@ impl<'a> Session<'a> {
             models: plan.model_tolerance(&sequence.scenario.quality),
             surface_reads: plan.surface_reads,
             samples_a_pixel: plan.samples_a_pixel,
-            by: plan.placement.ideal,
+            renderer: plan.placement.ideal,
         };
-        let redraws = self.drawn.as_ref().is_none_or(|drawn| drawn.key != key);
+        let redraws = self.ideal.as_ref().is_none_or(|ideal| ideal.key != key);
         let mut times = FrameTimes { plan_ms: prepared.plan_ms, ..FrameTimes::default() };
         if redraws {
             let lod = prepared.meshes.get(plan.keys.len() / 2).map(|mesh| mesh.lod).unwrap_or_default();
-            self.drawn = Some(Drawn { key: key.clone(), lod, buffer: None });
-            if key.by == Renderer::Cpu {
-                let begun = Instant::now();
+            self.ideal = Some(IdealCache { key: key.clone(), lod, buffer: None });
+            if key.renderer == Renderer::Cpu {
+                let begin = Instant::now();
                 let terrain = prepared.meshes.first();
                 let buffer = self.cpu.draw_ideal(plan, terrain, &key.models);
-                self.drawn.iter_mut().for_each(|drawn| drawn.buffer = Some(buffer));
-                times.ideal_ms = Some(ms_since(begun));
+                self.ideal.iter_mut().for_each(|ideal| ideal.buffer = Some(buffer));
+                times.ideal_ms = Some(ms_since(begin));
             }
         }
-        let (lod, buffer) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.buffer)).unwrap_or_default();
+        let (lod, buffer) = self.ideal.as_ref().map(|ideal| (ideal.lod, ideal.buffer)).unwrap_or_default();
         let source = match (buffer, &mut self.gpu) {
-            (Some(buffer), _) => Source::Cpu(buffer),
+            (Some(buffer), _) => IdealSource::Cpu(buffer),
             (None, Some(gpu)) => {
                 let makes_output = plan.placement.reverse == Renderer::Gpu;
                 let job = GpuJob {
@@ -240,14 +238,14 @@ impl<'a> Session<'a> {
                     models: &key.models,
                     zoom: self.planner.zoom_table(),
                     redraws,
-                    wanted: if makes_output { Wanted::Output } else { Wanted::Ideal },
+                    readback: if makes_output { Readback::Output } else { Readback::Ideal },
                 };
-                let submitted = gpu.submit(&job, slot).inspect_err(|_| self.drawn = None)?;
+                let submitted = gpu.submit(&job, slot).inspect_err(|_| self.ideal = None)?;
                 times.record_ms = submitted.record_ms;
                 times.submit_ms = submitted.submit_ms;
                 match submitted.copy.filter(|_| !makes_output) {
-                    Some(copy) => Source::Copied(submitted, copy),
-                    None => Source::Gpu(submitted),
+                    Some(copy) => IdealSource::Copied(submitted, copy),
+                    None => IdealSource::Gpu(submitted),
                 }
             }
             (None, None) => return Err(GpuError::NoAdapter(String::new()).into()),
@@ -255,19 +253,22 @@ impl<'a> Session<'a> {
         Ok(InFlight { prepared, uniforms, source, lod, times })
     }
 
-    /// Waits for a frame and takes its pictures.
+    /// Waits for a frame, and renders or reads its output frame.
+    // Long because: one path through both renderers.
     fn finish(&mut self, done: InFlight) -> Result<Finished, GpuError> {
         let InFlight { prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
         let inputs = ReverseInputs { plan: &plan, uniforms: &uniforms, rows: &rows };
-        let begun = Instant::now();
-        if let (Some(gpu), Source::Gpu(submitted) | Source::Copied(submitted, _)) = (&self.gpu, &source) {
+        let begin = Instant::now();
+        if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
+            (&self.gpu, &source)
+        {
             gpu.wait(submitted)?;
-            times.wait_ms = ms_since(begun);
+            times.wait_ms = ms_since(begin);
         }
-        let begun = Instant::now();
+        let begin = Instant::now();
         let (color_rgba, truth) = match (&source, &self.gpu) {
-            (Source::Cpu(buffer), _) => self.cpu.reverse(&inputs, *buffer),
-            (Source::Copied(_, copy), Some(gpu)) => gpu
+            (IdealSource::Cpu(buffer), _) => self.cpu.reverse(&inputs, *buffer),
+            (IdealSource::Copied(_, copy), Some(gpu)) => gpu
                 .with_copy(*copy, |ideal| {
                     let texels = IdealTexels {
                         color: ideal.color,
@@ -278,27 +279,29 @@ impl<'a> Session<'a> {
                     self.cpu.reverse_from(&inputs, texels)
                 })?
                 .ok_or_else(|| GpuError::Device("a copied ideal frame of a plan without poses".into()))?,
-            (Source::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
+            (IdealSource::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
             (_, None) => return Err(GpuError::NoAdapter(String::new())),
         };
-        let elapsed_ms = ms_since(begun);
+        let elapsed_ms = ms_since(begin);
         match source {
-            Source::Gpu(_) => times.read_ms = elapsed_ms,
-            Source::Cpu(_) | Source::Copied(..) => times.reverse_ms = Some(elapsed_ms),
+            IdealSource::Gpu(_) => times.read_ms = elapsed_ms,
+            IdealSource::Cpu(_) | IdealSource::Copied(..) => times.reverse_ms = Some(elapsed_ms),
         }
-        let begun = Instant::now();
-        let frame = self.completed(&plan, color_rgba, truth);
-        times.read_ms += ms_since(begun);
+        let begin = Instant::now();
+        let frame = self.with_truth(&plan, color_rgba, truth);
+        times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
-        if let (Some(gpu), Source::Gpu(submitted) | Source::Copied(submitted, _)) = (&self.gpu, &source) {
+        if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
+            (&self.gpu, &source)
+        {
             times.passes = gpu.pass_times(submitted)?;
             out_of_order = submitted.out_of_order;
         }
         Ok(Finished { frame, plan, lod, out_of_order, times })
     }
 
-    /// The frame with its truth, rays cast where look-ups do not tell it.
-    fn completed(
+    /// The frame with its truth, from exact rays where depth look-ups are unreliable.
+    fn with_truth(
         &self,
         plan: &FramePlan,
         color_rgba: Vec<f32>,
@@ -320,14 +323,13 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A
-    /// (with the paper preset sRGB values as stored) and inverse depth (1/m), row-major. For tests and for
-    /// looking at stages one by one.
+    /// Ideal frame of the last rendered frame, the first of several; `None` before the first frame. Linear
+    /// RGBA (with the paper preset stored sRGB values) and inverse depth (1/m), row-major. For tests.
     ///
     /// # Errors
-    /// Device faults; `None` before the first frame.
+    /// Faults of the adapter.
     pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
-        let Some(Drawn { key, buffer, .. }) = &self.drawn else { return Ok(None) };
+        let Some(IdealCache { key, buffer, .. }) = &self.ideal else { return Ok(None) };
         match (buffer, &self.gpu) {
             (Some(buffer), _) => {
                 let (color, inverse_depth) = self.cpu.ideal_images(*buffer);
@@ -338,23 +340,22 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Triangles of the terrain near marks, which were drawn with several samples a pixel
-    /// ([`GpuSession::triangles_near_marks`]).
+    /// Number of terrain triangles near edge marks, which are drawn with several samples per pixel
+    /// ([`GpuSession::triangles_near_edges`]); `None` before the first frame and without a gpu.
     ///
     /// # Errors
-    /// Device faults; `None` before the first frame and without a gpu.
+    /// Faults of the adapter.
     pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
-        self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_marks)
+        self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_edges)
     }
 
-    /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture that
-    /// is held whole.
+    /// Number of terrain texture tiles on the gpu, and of all tiles; `None` if the texture is not tiled.
     #[must_use]
     pub fn tiles_held(&self) -> Option<[usize; 2]> {
-        self.gpu.as_ref().and_then(GpuSession::tiles_held)
+        self.gpu.as_ref().and_then(GpuSession::resident_tiles)
     }
 }
 
-pub(crate) fn ms_since(begun: Instant) -> f64 {
-    begun.elapsed().as_secs_f64() * 1e3
+pub(crate) fn ms_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1e3
 }

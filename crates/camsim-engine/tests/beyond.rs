@@ -1,5 +1,4 @@
-//! Ground beyond its picture is of the one colour that it is to have, wherever it is seen from and whoever
-//! draws it.
+//! Ground beyond its texture has the configured colour, from every view and with every renderer.
 
 mod common;
 
@@ -46,7 +45,7 @@ fn ground() -> Scene {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn it_is_grey_to_the_horizon() {
+fn ground_beyond_the_texture_has_one_colour() {
     let scene = ground();
     let light = linear_from_srgb(f32::from(GREY) / 255.0);
     for (pitch_deg, height_m) in [(-90.0, 700.0), (-90.0, 3500.0), (-35.0, 400.0), (-8.0, 60.0)] {
@@ -89,7 +88,8 @@ fn it_is_grey_to_the_horizon() {
                 }
             }
             eprintln!(
-                "{name}, {pitch_deg} deg, {height_m} m: {beyond} pixels beyond, {inside} inside, off by {:.4}/255",
+                "{name}, {pitch_deg} deg, {height_m} m: {beyond} pixels beyond, {inside} inside, off by \
+                 {:.4}/255",
                 255.0 * worst
             );
             assert!(beyond > 1000 && inside > 10, "{beyond} {inside}");

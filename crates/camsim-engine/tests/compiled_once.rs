@@ -25,7 +25,7 @@ fn pieces_of_code() -> Option<usize> {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn no_kernel_is_compiled_anew_for_other_numbers() {
+fn kernels_are_compiled_once() {
     let mut engine = engine();
     engine.set_backend(Backend::Gpu);
     for (preset, ideal_scale, channels) in [

@@ -1,4 +1,4 @@
-//! Pictures on the device are the light that their bytes stand for: IEC 61966-2-1 and nothing near it.
+//! Textures are decoded from sRGB by IEC 61966-2-1.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn chart() -> Mesh {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn every_byte_is_the_light_that_it_stands_for() {
+fn srgb_bytes_are_decoded_by_the_standard() {
     let mut scenario = scenario();
     scenario.camera.size_px = [160, 160];
     scenario.camera.focal_px = [250.0, 250.0];

@@ -51,7 +51,7 @@ fn errors(sequence: &Arc<Sequence>, done: &Finished) -> TruthErrors {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
+fn every_depth_belongs_to_a_visible_surface() {
     let engine = engine();
     let cases: [Case; 6] = [
         ("roof", -90.0, black_ground_and_roof(), |_| {}),
@@ -82,7 +82,7 @@ fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn depths_between_two_surfaces_are_found() {
+fn depths_between_two_surfaces_are_detected() {
     let sequence =
         sequence(camera(-90.0), steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
     let mut done = render(&engine(), &sequence, &[Channel::Depth], 0);
@@ -111,7 +111,7 @@ fn depths_between_two_surfaces_are_found() {
 /// `tests/data/field/low-town`, whose models are not part of the repository.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_town_from_between_its_houses() {
+fn depths_between_houses_are_exact() {
     let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
         eprintln!("CAMSIM_DATA is not set: skipped");
         return;

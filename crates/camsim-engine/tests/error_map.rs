@@ -1,5 +1,5 @@
-//! The predicted error from place to place: its largest is the plan's, and pixels are off by no more than the
-//! places around them say.
+//! The map of predicted errors: its largest value is that of the plan, and pixel errors are within the
+//! predictions around them.
 
 mod common;
 
@@ -61,7 +61,7 @@ fn mapped(sequence: &Arc<Sequence>, frame: u64) -> (FramePlan, ErrorMap) {
 }
 
 #[test]
-fn the_largest_of_all_places_is_what_the_plan_says() {
+fn largest_error_of_the_map_is_that_of_the_plan() {
     let mut kinds = [0; 3];
     let mut cases: Vec<(&str, Scenario, Scene)> = Vec::new();
     for tolerance_px in [0.05, 1e-3] {
@@ -110,7 +110,7 @@ fn the_largest_of_all_places_is_what_the_plan_says() {
 }
 
 #[test]
-fn frames_of_one_ideal_frame_have_their_own_maps() {
+fn frames_of_one_ideal_frame_have_separate_maps() {
     let mut scenario = camera();
     (scenario.camera.size_px, scenario.camera.focal_px) = ([160, 120], [130.0, 130.0]);
     scenario.camera.lens.coefficients = vec![-0.2, 0.05, 0.001, -0.002];
@@ -157,7 +157,7 @@ fn frames_of_one_ideal_frame_have_their_own_maps() {
 /// What is worked out once for all places is worked out in parallel: places that wait for it may not keep its
 /// parts from being done.
 #[test]
-fn as_many_threads_as_there_are_leave_each_other_free() {
+fn error_maps_on_all_threads_do_not_deadlock() {
     let (done, is_done) = std::sync::mpsc::channel();
     let work = move || {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build().expect("threads");
@@ -175,7 +175,7 @@ fn as_many_threads_as_there_are_leave_each_other_free() {
 /// By exact rays at random pixels, away from silhouettes as the map itself knows them.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn pixels_are_off_by_no_more_than_the_places_around_them_say() {
+fn pixel_errors_are_within_the_neighbouring_predictions() {
     let engine = engine();
     for (name, scene) in [("plane", pattern(60_000.0)), ("hills", hills()), ("city", city(5))] {
         let mut scenario = camera();

@@ -152,7 +152,7 @@ fn translation_and_motion_along_the_optical_axis() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn both_with_delay_and_interlacing_in_every_readout_direction() {
+fn delay_and_interlacing_in_every_readout_direction() {
     for readout in [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft] {
         let shutter = ShutterSpec { delay_ms: 50.0, interlace_ms: FieldOr::Ms(16.0), readout, ..rolling() };
         check(&format!("{readout:?}"), with(shutter, |_| ()), steady(400.0, -120.0, EAST, TURN));
@@ -197,7 +197,7 @@ fn through_a_fisheye_with_oblique_view() {
 /// A picture that repeats is the same one period on; held at its border it is not.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_picture_repeats_where_its_mesh_says_so() {
+fn texture_repeats_with_wrap_mode_repeat() {
     let engine = engine();
     let mut scenario = scenario();
     scenario.camera.size_px = [120, 90];
@@ -225,7 +225,7 @@ fn a_picture_repeats_where_its_mesh_says_so() {
 /// a line's displacement away.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn depth_is_that_of_the_lines_own_camera() {
+fn depth_is_in_the_camera_of_the_row() {
     let scene = |solver: Auto<Solver>| {
         let mut scenario = with(ShutterSpec { readout_ms: 90.0, ..ShutterSpec::default() }, |camera| {
             camera.mount.angles_deg[1] = -50.0

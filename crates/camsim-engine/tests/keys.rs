@@ -1,4 +1,4 @@
-//! Several ideal frames for one output frame: what one key camera does not see, another one does.
+//! Several key frames for one output frame: one shows what another one hides.
 
 mod common;
 
@@ -59,7 +59,7 @@ impl Flight {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn rays_through_several_keys_agree_with_their_twin() {
+fn gathering_from_several_key_frames_agrees_with_its_twin() {
     let mut scenario = camera(-90.0);
     scenario.camera.size_px = [120, 90];
     scenario.camera.focal_px = [96.0, 96.0];
@@ -130,7 +130,7 @@ fn rays_through_several_keys_agree_with_their_twin() {
 /// share of the pixel's area and exposure that it covers.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_edges_of_a_board_stay_where_they_are() {
+fn board_edges_are_exact_with_several_key_frames() {
     let engine = engine();
     for (name, delay_ms, readout_ms, exposure_ms) in
         [("delay", 1000.0, 0.0, 0.0), ("rolling shutter", 0.0, 1000.0, 0.0), ("all", 1000.0, 1000.0, 200.0)]
@@ -155,7 +155,8 @@ fn the_edges_of_a_board_stay_where_they_are() {
         let found: f64 = near.iter().map(|&(i, _)| f64::from(done.frame.color_rgba[4 * i])).sum();
         let psnr = linear_psnr(&done.frame, &near);
         eprintln!(
-            "{name}: {} keys, {psnr:.1} dB, worst coverage error {worst:.3}, area {found:.1} of {covered:.1} px over {} px",
+            "{name}: {} keys, {psnr:.1} dB, worst coverage error {worst:.3}, area {found:.1} of {covered:.1} \
+             px over {} px",
             done.plan.keys.len(),
             near.len()
         );
@@ -197,7 +198,7 @@ const FLIGHTS: [(&str, Flight); 6] = [
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn every_pixel_over_buildings_has_the_source_and_depth_of_what_it_sees() {
+fn sources_and_depths_over_buildings_are_exact() {
     let engine = engine();
     let mut unseen = 0;
     for (name, flight) in &FLIGHTS[1..5] {
@@ -213,7 +214,8 @@ fn every_pixel_over_buildings_has_the_source_and_depth_of_what_it_sees() {
             unseen += disocclusion(&oracle, done.plan.frame, &done.plan.key_poses(), &[phase]).hidden;
             let depth_off = worst_depth(&oracle, &done.frame);
             eprintln!(
-                "{name}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth {depth_off:.1e}",
+                "{name}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth \
+                 {depth_off:.1e}",
                 done.plan.keys.len(),
                 errors.all.rms_px,
                 errors.silhouettes.rms_px,
@@ -246,7 +248,7 @@ fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_second_key_fills_what_a_second_of_flight_uncovers() {
+fn second_key_frame_fills_disocclusions() {
     let engine = engine();
     let (name, flight) = &FLIGHTS[5];
     let oracle = Oracle::new(flight.sequence(Auto::Auto, 1.0)).expect("a usable camera");

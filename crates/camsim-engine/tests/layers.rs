@@ -1,5 +1,4 @@
-//! Surfaces that are mixed with what is behind them: the device and the oracle against closed forms, and
-//! against each other.
+//! Blended surfaces: the gpu and the reference renderer against closed forms and against each other.
 
 mod common;
 
@@ -109,7 +108,7 @@ impl Pictures {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn two_panes_over_a_wall_have_their_closed_form_from_both_sides() {
+fn two_panes_over_a_wall_match_closed_form() {
     for (heights, alphas, depth_m) in [
         ([20.0, 40.0], [0.3, 0.6], 60.0),
         ([40.0, 20.0], [0.3, 0.6], 80.0),
@@ -134,7 +133,7 @@ fn two_panes_over_a_wall_have_their_closed_form_from_both_sides() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn light_fog_and_light_of_its_own_are_mixed_too() {
+fn blending_with_light_fog_and_emission() {
     let light = Light::new(2.3, 0.6, 0.7, 0.3);
     let up = 0.7 * 0.6_f64.sin() + 0.3;
     let mut shining = pane(RED, 0.4, 40.0);
@@ -152,7 +151,7 @@ fn light_fog_and_light_of_its_own_are_mixed_too() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_papers_frames_mix_too() {
+fn paper_preset_blends() {
     let mut sequence = standing(vec![pane(RED, 0.3, 40.0), level(WALL, 1.0, 0.0)]);
     Arc::make_mut(&mut sequence).scenario.quality.preset = Preset::Paper;
     let found = render(&engine(), &sequence, &[Channel::Color], 0).frame.color_rgba;
@@ -182,7 +181,7 @@ fn disc() -> Texture {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn pictures_tints_and_holes_are_mixed_as_the_oracle_does() {
+fn textures_tints_and_cutouts_blend_as_in_the_reference() {
     let textured = |height_m: f64| {
         let mut mesh = level(DVec3::ONE, 1.0, height_m);
         mesh.material.texture = Arc::new(disc());
@@ -223,7 +222,7 @@ fn pictures_tints_and_holes_are_mixed_as_the_oracle_does() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn many_copies_of_all_sizes_are_drawn_from_behind() {
+fn many_copies_are_drawn_back_to_front() {
     // Tilted alike, each in a slab of its own: none cross, and their middles tell nothing of their order.
     let tilt = DMat3::from_rotation_x(0.6) * DMat3::from_rotation_y(-0.4);
     let part = |k: u32, step: f64| (f64::from(k) * step).fract() - 0.5;
@@ -252,7 +251,7 @@ fn many_copies_of_all_sizes_are_drawn_from_behind() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn what_one_depth_costs_is_foretold() {
+fn error_of_one_depth_per_pixel_is_predicted() {
     let mut checkered = pane(RED, 0.45, 30.0);
     checkered.ned_from_shape = DMat3::from_diagonal(DVec3::new(4.0, 4.0, 1.0));
     let rgba8 =
@@ -289,7 +288,7 @@ fn what_one_depth_costs_is_foretold() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_test_model_of_blending_is_as_the_oracle_sees_it() {
+fn blending_test_model_matches_the_reference() {
     let Some(data) = std::env::var_os("CAMSIM_DATA") else {
         eprintln!("CAMSIM_DATA is not set: models of other people are not read");
         return;

@@ -197,7 +197,7 @@ fn lens_maps_agree_with_the_f64_inverse() {
 }
 
 #[test]
-fn a_warm_start_finds_the_same_map() {
+fn warm_start_gives_the_same_map() {
     let gpu = Gpu::new();
     for (name, camera) in sets(320.0) {
         let zoomed = CameraModel { focal_px: camera.focal_px * 1.1, ..camera.clone() };
@@ -227,7 +227,7 @@ fn large_images_keep_the_tolerance() {
 }
 
 #[test]
-fn a_pinhole_and_odd_sizes() {
+fn pinhole_and_odd_sizes_match() {
     let gpu = Gpu::new();
     for size in [[1, 1], [9, 7], [641, 3]] {
         let camera = CameraModel::new(size, [500.0, 510.0], None, LensModel::Pinhole, &[]).unwrap();
@@ -238,7 +238,7 @@ fn a_pinhole_and_odd_sizes() {
 
 /// Lenses that nobody calibrated: every third one rational, a quarter of their pixels beyond the fold.
 #[test]
-fn random_lenses_agree_too() {
+fn random_lenses_agree() {
     let gpu = Gpu::new();
     // Park-Miller: the same lenses on every machine.
     let mut state = 20_u64;

@@ -216,8 +216,8 @@ fn check(name: &str, light: Option<Light>) {
     let [db_full, db_some] =
         [&full, &some].map(|drawn| -20.0 * rms(&drawn.color_rgba, &truth.color_rgba).log10());
     eprintln!(
-        "{name}: {} of {} triangles, within {:.4} m or {:.4} px; depth off by {apart_m:.4} m; picture by {:.2}/255 RMS of {:.2}/255; \
-         {db_some:.1} dB against the oracle, {db_full:.1} dB with all triangles",
+        "{name}: {} of {} triangles, within {:.4} m or {:.4} px; depth off by {apart_m:.4} m; picture by \
+         {:.2}/255 RMS of {:.2}/255; {db_some:.1} dB against the oracle, {db_full:.1} dB with all triangles",
         some.detail.triangles,
         some.detail.finest_triangles,
         some.error_m,
@@ -231,18 +231,18 @@ fn check(name: &str, light: Option<Light>) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_level_of_detail_is_as_far_from_the_oracle_as_its_bound_says() {
+fn level_of_detail_is_within_its_bound() {
     check("colours", None);
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_level_of_detail_in_light_is_as_far_from_the_oracle_as_its_bound_says() {
+fn level_of_detail_in_light_is_within_its_bound() {
     check("light", Some(Light::new(2.3, 0.6, 0.7, 0.3)));
 }
 
 #[test]
-fn models_may_be_as_far_beside_in_the_picture_however_fine_the_ideal_frame_is() {
+fn model_tolerance_is_in_output_pixels() {
     // Pixels twice as high as wide: they bound what is across and what is down alike.
     for (ideal_scale, times) in [(0.5, 1.0), (1.0, 1.0), (2.0, 2.0)] {
         let mut scenario = scenario();

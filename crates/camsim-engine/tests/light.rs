@@ -1,4 +1,4 @@
-//! Sun and sky: the device and the oracle against closed forms, and against each other.
+//! Sun and sky: the gpu and the reference renderer against closed forms and against each other.
 
 mod common;
 
@@ -81,7 +81,7 @@ fn expect_in_the_middle(name: &str, mesh: Mesh, light: Option<Light>, expected: 
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn planes_have_the_colour_of_their_closed_form() {
+fn lit_planes_match_closed_form() {
     let albedo = DVec3::from_array(ALBEDO);
     let up = DVec3::NEG_Z;
     let turn = |a: f64, b: f64| DMat3::from_quat(DQuat::from_rotation_z(a) * DQuat::from_rotation_x(b));
@@ -128,7 +128,7 @@ fn planes_have_the_colour_of_their_closed_form() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn tints_holes_and_light_of_its_own_go_with_light() {
+fn tints_cutouts_and_emission_with_light() {
     let albedo = DVec3::from_array(ALBEDO);
     let mut mesh = square();
     mesh.material.emissive = [0.1, 0.05, 0.0];
@@ -179,7 +179,7 @@ fn ball(n: u32) -> Shape {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn many_turned_copies_are_as_near_to_the_oracle_as_without_light() {
+fn rotated_copies_with_light_match_the_reference() {
     let shape = Arc::new(ball(16));
     let place = |k: u32| {
         let part = |step: f64| (f64::from(k) * step).fract() - 0.5;
@@ -200,7 +200,7 @@ fn many_turned_copies_are_as_near_to_the_oracle_as_without_light() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_slope_has_the_colour_of_its_closed_form() {
+fn lit_slope_matches_closed_form() {
     // 40 % up to the north, 30 % up to the east, seen with few triangles and many.
     let heights: Vec<f64> =
         (0..81 * 81).map(|k| 2.0 * (-0.4 * f64::from(k / 81) + 0.3 * f64::from(k % 81)) + 8.0).collect();

@@ -1,4 +1,4 @@
-//! What meshes are covered with and how they stand: the device against the oracle, feature by feature.
+//! Materials and placement of meshes: the gpu against the reference renderer, feature by feature.
 
 mod common;
 
@@ -79,7 +79,7 @@ fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn tints_samplers_and_light_of_their_own() {
+fn tints_samplers_and_emission() {
     let mut tinted = square(picture(64));
     for (vertex, tint) in Arc::make_mut(&mut tinted.shape).vertices.iter_mut().zip([
         [1.0, 0.2, 0.1, 1.0],
@@ -106,7 +106,7 @@ fn tints_samplers_and_light_of_their_own() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn one_side_and_holes() {
+fn single_sided_and_cutout_materials() {
     let mut front = square(picture(64));
     front.material.one_sided = true;
     let mut back = front.clone();
@@ -127,7 +127,7 @@ fn one_side_and_holes() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn many_of_one_shape_turned_and_scaled() {
+fn rotated_and_scaled_instances() {
     let one = square(picture(64));
     let place = |k: u32| {
         let part = |step: f64| (f64::from(k) * step).fract() - 0.5;

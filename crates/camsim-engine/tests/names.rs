@@ -1,4 +1,4 @@
-//! The noise of cameras by their names: the same numbers from every renderer.
+//! Noise depends on the name of the camera, equally on every renderer.
 
 mod common;
 
@@ -27,7 +27,7 @@ fn grey(name: &str) -> Arc<Sequence> {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn cameras_of_one_seed_and_several_names_have_noise_of_their_own() {
+fn cameras_of_one_seed_have_independent_noise() {
     let of = |name: &str, place: Option<Backend>| {
         let sequence = grey(name);
         let Some(place) = place else {

@@ -101,7 +101,7 @@ fn a_frame_that_fails_spoils_no_other() {
     let same =
         |came: &[Finished]| came.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba);
 
-    let rays = folder.join("reverse/edges/supersampled.wgsl");
+    let rays = folder.join("reverse/edges/silhouette_rays.wgsl");
     let text = std::fs::read(&rays).expect("the shader");
     std::fs::remove_file(&rays).expect("it goes");
     let mut session = session(&engine);

@@ -1,5 +1,5 @@
-//! Two independent routes to a rolling-shutter frame over terrain: the oracle's rays in f64, and the device
-//! rendering one global-shutter frame at each row's own instant, of which that row is kept.
+//! Two independent ways to a rolling-shutter frame over terrain: rays of the reference renderer, and one gpu
+//! frame per row with a global shutter at the instant of that row.
 
 mod common;
 
@@ -64,7 +64,7 @@ fn at_instant(t_s: f64) -> Arc<Sequence> {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn rays_agree_with_a_frame_rendered_at_each_row() {
+fn reference_agrees_with_global_shutter_frames_per_row() {
     let mut rolling = camera();
     rolling.camera.shutter = ShutterSpec { delay_ms: 20.0, readout_ms: 60.0, ..ShutterSpec::default() };
     let oracle = Oracle::new(sequence(rolling, flight(), hills())).expect("an oracle");

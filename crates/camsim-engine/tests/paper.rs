@@ -110,8 +110,8 @@ fn the_paper_preset_agrees_with_its_twins() {
     }
     let rms_dn = (square_dn / f64::from(3 * compared)).sqrt();
     eprintln!(
-        "paper preset: {compared} pixels compared, {invalid} invalid, {other_root} with another root; ray {worst_ray_px:.1e} px, \
-         ends {worst_px:.1e} px, colour RMS {rms_dn:.3} max {worst_dn:.2} of 255"
+        "paper preset: {compared} pixels compared, {invalid} invalid, {other_root} with another root; ray \
+         {worst_ray_px:.1e} px, ends {worst_px:.1e} px, colour RMS {rms_dn:.3} max {worst_dn:.2} of 255"
     );
     assert!(compared > 60_000 && invalid > 500, "{compared} {invalid}");
     assert!(other_root < 400, "{other_root}");
@@ -122,7 +122,7 @@ fn the_paper_preset_agrees_with_its_twins() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn without_motion_lens_and_fog_the_paper_preset_keeps_the_colours() {
+fn paper_preset_without_effects_keeps_colours() {
     let mut scenario = paper_scenario();
     scenario.camera.lens = LensSpec::default();
     scenario.camera.shutter = ShutterSpec::default();
@@ -147,7 +147,8 @@ fn without_motion_lens_and_fog_the_paper_preset_keeps_the_colours() {
     let worst = levels.iter().fold(0.0_f32, |worst, level| worst.max(level.abs()));
     let beyond = levels.iter().filter(|level| level.abs() > 1.1).count();
     eprintln!(
-        "paper preset at rest: mean {mean:.3}, worst {worst:.3} levels of 255 from the default's colours, {beyond} beyond 1.1"
+        "paper preset at rest: mean {mean:.3}, worst {worst:.3} levels of 255 from the default's colours, \
+         {beyond} beyond 1.1"
     );
     // Rounding to 8 bit is half a level; lavapipe's own sRGB encoder adds as much in places (other devices:
     // 0.1). Where a sample falls on the border of two texels the two frames, of different size, may round to

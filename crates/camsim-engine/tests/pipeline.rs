@@ -1,5 +1,5 @@
-//! The frame pipeline: nothing is made on the device once it runs, frames come in the order asked for, and
-//! faults stop it at once.
+//! The frame pipeline: frames create no gpu objects, come in the requested order, and stop at the first
+//! error.
 
 mod common;
 
@@ -104,7 +104,7 @@ fn held(engine: &Engine) -> Vec<(&'static str, isize)> {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_frame_makes_nothing_on_the_device() {
+fn frames_create_no_gpu_objects() {
     let mut engine = engine();
     engine.set_backend(Backend::Gpu);
     for (name, sequence) in
@@ -131,7 +131,7 @@ fn a_frame_makes_nothing_on_the_device() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn frames_come_in_the_order_asked_for_whoever_asks() {
+fn frames_come_in_the_requested_order() {
     let engine = engine();
     let mut session = engine.session::<Infallible>(plain(false), &[Channel::Color]).expect("session");
     let order = [7, 3, 3, 11, 0, 5];
@@ -159,7 +159,7 @@ struct Full(u64);
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn any_number_of_threads_makes_the_same_frames() {
+fn frames_do_not_depend_on_the_number_of_threads() {
     let frames_of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
@@ -188,7 +188,7 @@ fn any_number_of_threads_makes_the_same_frames() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_first_fault_stops_everything_and_the_session_goes_on() {
+fn first_error_stops_the_run_and_the_session_stays_usable() {
     let engine = engine();
     let sequence = plain(false);
     let planned = Arc::new(AtomicU64::new(0));
@@ -232,7 +232,7 @@ fn the_first_fault_stops_everything_and_the_session_goes_on() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_lost_device_is_a_fault_and_no_panic() {
+fn lost_device_is_an_error() {
     let mut engine = engine();
     engine.set_backend(Backend::Gpu);
     let sequence = houses();

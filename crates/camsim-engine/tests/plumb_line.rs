@@ -1,5 +1,4 @@
-//! A plumb line seen from a turning aircraft leans by rate times readout: measured in rendered pixels over a
-//! real log.
+//! In a turn a plumb line leans by rate times readout, measured in rendered pixels with a real log.
 
 mod common;
 
@@ -133,7 +132,7 @@ fn check(log: &Path, t_s: f64) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_plumb_line_leans_by_rate_times_readout_in_a_turn() {
+fn plumb_line_leans_by_rate_times_readout() {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo_flight.csv");
     check(&demo, 13.0);
     check(&demo, 26.0);

@@ -208,7 +208,7 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn random_frames_stay_within_their_prediction() {
+fn errors_of_random_frames_are_within_the_prediction() {
     let long = std::env::var_os("CAMSIM_LONG").is_some_and(|value| value == "1");
     let engine = engine();
     let scenes = [
@@ -236,7 +236,8 @@ fn random_frames_stay_within_their_prediction() {
             other => format!("{other:?}"),
         };
         eprintln!(
-            "{seed:>5} {name:9} {tolerance_px:>5} {temporal:13} {:>6} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e} {:>9.1e} {ratio:>5.2} {}{}",
+            "{seed:>5} {name:9} {tolerance_px:>5} {temporal:13} {:>6} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e} \
+             {:>9.1e} {ratio:>5.2} {}{}",
             smooth.count,
             worst.all.rms_px,
             smooth.rms_px,
@@ -261,7 +262,8 @@ fn random_frames_stay_within_their_prediction() {
     ratios.sort_by(f64::total_cmp);
     let [low, median, high] = [0, ratios.len() / 2, ratios.len() - 1].map(|i| ratios[i]);
     eprintln!(
-        "predicted / measured over {} frames: median {median:.2}, from {low:.2} to {high:.2}; {empty} frames hardly show anything but silhouettes; a plan takes {:.2} ms",
+        "predicted / measured over {} frames: median {median:.2}, from {low:.2} to {high:.2}; {empty} frames \
+         hardly show anything but silhouettes; a plan takes {:.2} ms",
         ratios.len(),
         plan_ms / (ratios.len() + empty) as f64
     );
@@ -284,7 +286,7 @@ fn assert_predicted(case: &str, Found { plan, worst, .. }: &Found) {
 /// and depth looked up there says nothing of what is between. Long readouts make every line another phase.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn what_happens_between_the_ends_of_an_exposure_is_predicted() {
+fn errors_within_an_exposure_are_predicted() {
     let engine = engine();
     for readout_ms in [100.0, 300.0, 1000.0] {
         let mut scenario = scenario();
@@ -337,7 +339,7 @@ fn long_exposures_are_predicted() {
 /// probes find so, it gets more nodes.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_path_that_is_missed_gets_more_nodes() {
+fn curved_exposure_path_gets_more_nodes() {
     let engine = engine();
     for max_error_px in [5.0, 0.5, 0.05] {
         let mut scenario = scenario();
@@ -369,7 +371,7 @@ fn a_path_that_is_missed_gets_more_nodes() {
 /// A tighter tolerance is kept, and costs look-ups.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_tolerance_buys_what_it_says() {
+fn tolerance_is_kept() {
     let engine = engine();
     let mut look_ups = [0, 0];
     for (name, scene) in [("plane", pattern(60_000.0)), ("hills", hills()), ("buildings", buildings())] {
@@ -387,7 +389,8 @@ fn a_tolerance_buys_what_it_says() {
             let Found { plan, worst, .. } = find(&engine, &sequence);
             let CoordErrors { all, smooth, .. } = worst;
             eprintln!(
-                "{name:9} tolerance {tolerance_px:>5}: {:?}, smooth rms {:.1e} p99 {:.1e}, all rms {:.1e} max {:.1e}, predicted {:.1e}",
+                "{name:9} tolerance {tolerance_px:>5}: {:?}, smooth rms {:.1e} p99 {:.1e}, all rms {:.1e} \
+                 max {:.1e}, predicted {:.1e}",
                 plan.temporal, smooth.rms_px, smooth.p99_px, all.rms_px, all.max_px, plan.predicted.total_px
             );
             assert!(

@@ -1,5 +1,4 @@
-//! A session that goes on with other sequences gives the frames that a session of each one's own gives, to
-//! the last bit.
+//! A session that is renewed for other sequences gives bit for bit the frames of new sessions.
 
 mod common;
 
@@ -73,7 +72,7 @@ fn next(session: &mut Session<'_>, frame: u64) -> RenderedFrame {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn every_step_gives_the_frames_of_a_fresh_session() {
+fn renewed_session_gives_the_frames_of_a_new_session() {
     let engine = engine();
     let mut session = engine.session::<Infallible>(Arc::new(base()), &COLOR).expect("session");
     let mut last: Vec<f32> = Vec::new();
@@ -96,7 +95,7 @@ fn every_step_gives_the_frames_of_a_fresh_session() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_sequence_that_is_refused_leaves_the_session_as_it_was() {
+fn refused_sequence_leaves_the_session_unchanged() {
     let engine = engine();
     let good = Arc::new(base());
     let mut session = engine.session::<Infallible>(good.clone(), &COLOR).expect("session");

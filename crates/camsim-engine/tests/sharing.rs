@@ -1,5 +1,5 @@
-//! Several output frames from one ideal frame: drawn once, right in every pixel's source, and the same frames
-//! in any order.
+//! Several output frames from one ideal frame: it is drawn once, sources are exact, and the order of frames
+//! does not matter.
 
 mod common;
 
@@ -73,7 +73,7 @@ fn is_drawn(done: &Finished) -> bool {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_group_is_drawn_once_and_every_frame_of_it_is_right() {
+fn shared_ideal_frame_is_drawn_once_with_exact_sources() {
     let engine = engine();
     for (name, sequence) in flights() {
         let plain = rendered(&engine, &sequence, &[Channel::Color], 0..FRAMES);
@@ -143,7 +143,7 @@ fn rms_dn(a: &Finished, b: &Finished) -> f64 {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn who_shares_depends_on_the_scenario_alone() {
+fn sharing_depends_on_the_scenario_only() {
     let engine = engine();
     let (_, sequence) = &flights()[0];
     let in_order = rendered(&engine, sequence, &[Channel::Color], 0..FRAMES);
@@ -162,7 +162,7 @@ fn who_shares_depends_on_the_scenario_alone() {
 }
 
 #[test]
-fn what_moves_too_far_is_not_shared() {
+fn frames_far_apart_share_no_ideal_frame() {
     let group = |sequence: &Arc<Sequence>| {
         let planner = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner");
         let plan = planner.plan(5).expect("a plan");
@@ -197,7 +197,7 @@ fn what_moves_too_far_is_not_shared() {
 
 /// The frame that a group is planned from by itself cannot be made; the others can.
 #[test]
-fn a_fault_of_one_frame_is_its_own() {
+fn error_of_one_frame_does_not_affect_others() {
     let mut spun = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 8));
     let knot = |k: i32| BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -80.0),
@@ -224,7 +224,7 @@ fn a_fault_of_one_frame_is_its_own() {
 }
 
 #[test]
-fn an_ideal_frame_that_no_memory_holds_is_refused_whatever_its_sides() {
+fn too_large_ideal_frame_is_refused() {
     let with_size = |size_px: [u32; 2]| {
         let mut large = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 1));
         large.scenario.camera.lens = LensSpec::default();

@@ -54,7 +54,8 @@ fn check(
     );
     let edges = done.plan.edges;
     eprintln!(
-        "{name}: {found:.1} dB over {} pixels at silhouettes ({edges:?}); 4 samples a pixel {four:.1} dB, 1 sample {one:.1} dB",
+        "{name}: {found:.1} dB over {} pixels at silhouettes ({edges:?}); 4 samples a pixel {four:.1} dB, 1 \
+         sample {one:.1} dB",
         expected.len()
     );
     assert!(
@@ -83,7 +84,7 @@ fn lens() -> LensSpec {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn rays_at_silhouettes_agree_with_their_twin() {
+fn silhouette_rays_agree_with_their_twin() {
     let mut scenario = camera();
     scenario.camera.size_px = [120, 90];
     scenario.camera.focal_px = [96.0, 96.0];
@@ -134,7 +135,7 @@ fn rays_at_silhouettes_agree_with_their_twin() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_straight_edge_of_full_contrast() {
+fn straight_edge_of_full_contrast() {
     let still = steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO);
     check("still", &camera(), &still, &black_ground_and_roof(), [43.5, 33.0]);
     let mut with_lens = camera();
@@ -144,7 +145,7 @@ fn a_straight_edge_of_full_contrast() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_roof_under_a_moving_camera() {
+fn roof_under_a_moving_camera() {
     let mut scenario = camera();
     scenario.camera.shutter = rolling(0.0);
     check(
@@ -192,7 +193,7 @@ fn ridges() -> Scene {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn depths_of_ridges_before_ridges_and_sky_are_those_of_one_of_them() {
+fn ridge_depths_belong_to_one_ridge() {
     let mut scenario = camera();
     scenario.quality.max_terrain_error_px = 0.02;
     scenario.camera.size_px = [120, 90];
@@ -243,7 +244,7 @@ fn ridges_before_ridges_and_sky() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
+fn only_triangles_near_silhouettes_are_multisampled() {
     let mut scenario = camera();
     scenario.camera.size_px = [640, 480];
     scenario.camera.focal_px = [512.0, 512.0];
@@ -274,7 +275,7 @@ fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
 /// workgroups and the frame's borders.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn marks_are_their_twins() {
+fn edge_marks_agree_with_their_twin() {
     let mut scenario = camera();
     scenario.camera.size_px = [313, 241];
     scenario.camera.mount.angles_deg = [4.0, -35.0, 0.0];
@@ -305,18 +306,18 @@ fn marks_are_their_twins() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_surface_that_fills_the_view_is_not_supersampled() {
+fn surface_that_fills_the_view_has_no_silhouette_rays() {
     let sequence = sequence(camera(), steady(120.0, 0.0, EAST, TURN), pattern(6000.0));
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
     assert_eq!(done.plan.edges, EdgeStage::None);
-    assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette supersampling"));
+    assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette rays"));
 }
 
 /// Where colours at silhouettes are left as they are depth and coordinates are not, and asking for these
 /// changes no colour.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn colours_do_not_depend_on_whether_truth_is_wanted() {
+fn colours_do_not_depend_on_truth_channels() {
     let mut scenario = camera();
     scenario.camera.shutter = rolling(8.0);
     scenario.quality.silhouettes = Silhouettes::Plain;
@@ -346,7 +347,7 @@ fn colours_do_not_depend_on_whether_truth_is_wanted() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn resolved_depth_is_that_of_one_surface() {
+fn resolved_depth_belongs_to_one_surface() {
     let mut scenario = camera();
     scenario.quality.silhouettes = Silhouettes::Rays;
     scenario.quality.max_error_dn = COARSE_DN;
@@ -401,7 +402,7 @@ fn tiny(size_px: [u32; 2], exposure_ms: f64, solver: Auto<Solver>) -> Scenario {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_picture_may_have_a_single_pixel() {
+fn single_pixel_frame_is_rendered() {
     let engine = engine();
     let moving = (EAST, TURN);
     let forced = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| (Auto::Value(solver), moving));

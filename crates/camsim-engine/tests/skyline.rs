@@ -1,4 +1,4 @@
-//! Pixels of the sky beside a surface go with it: a skyline is where it is, wherever the ideal frame has it.
+//! Skylines are exact, wherever the ideal frame has them.
 
 mod common;
 
@@ -48,7 +48,7 @@ fn rms_dn(found: &[f32], truth: &[f32]) -> f64 {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_skyline_is_where_it_is_from_an_ideal_frame_that_has_it_elsewhere() {
+fn skyline_is_exact_from_a_distant_ideal_frame() {
     // At the first and the last line the wall is up to 1.3 px elsewhere in the ideal frame, and as much more
     // with twice the speed.
     for exposure_ms in [0.0, 6.0] {
@@ -72,7 +72,7 @@ fn a_skyline_is_where_it_is_from_an_ideal_frame_that_has_it_elsewhere() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
+fn skyline_search_agrees_with_its_twin() {
     let sequence = flying_past(0.0, 60.0);
     let truth = Oracle::new(sequence.clone()).expect("oracle").render(0, &RenderOptions::default());
     for place in [Backend::GpuThenCpu, Backend::Gpu] {
@@ -127,7 +127,7 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
+fn sky_coordinates_are_exact_beside_surfaces() {
     for (place, exposure_ms) in
         [(Backend::GpuThenCpu, 0.0), (Backend::Gpu, 0.0), (Backend::GpuThenCpu, 6.0), (Backend::Gpu, 6.0)]
     {
@@ -174,7 +174,7 @@ fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn nothing_goes_with_a_surface_where_panes_may_stand_before_the_sky() {
+fn sky_behind_panes_does_not_follow_surfaces() {
     let plain = flying_past(0.0, 30.0);
     let mut blended = Sequence::clone(&plain);
     let mut pane = wall();

@@ -1,5 +1,4 @@
-//! The constant-twist solvers of the paper on the device: against their twins, and their errors against rays
-//! cast into the scene.
+//! The paper's constant-twist solvers on the gpu: against their twins, and their errors against rays.
 
 mod common;
 
@@ -64,7 +63,8 @@ fn linear_and_rk2_agree_with_their_twins() {
                 compared += 1;
             }
             eprintln!(
-                "{solver:?} at phase {phase}: {worst_px:.2e} px over {compared} pixels, up to {most_steps} steps"
+                "{solver:?} at phase {phase}: {worst_px:.2e} px over {compared} pixels, up to {most_steps} \
+                 steps"
             );
             assert!(compared > 19_000 && most_steps >= 3, "{compared} {most_steps}");
             // f32 of coordinates up to 400 px: 3e-5 px a rounding.

@@ -1,4 +1,4 @@
-//! However many pixels of a line a thread takes, the frame is the same.
+//! Frames do not depend on the number of pixels per thread.
 
 mod common;
 
@@ -70,7 +70,7 @@ fn any_number_of_pixels_a_thread_gives_the_same_bytes() {
         let sequence =
             sequence(scenario, steady(120.0, 10.0, DVec3::new(5.0, 30.0, 0.0), DVec3::ZERO), city(6));
         let (one, key) = frame(&sequence, channels, 1);
-        assert!(key.holds_line(), "{name}: nothing to be shared in {key:?}");
+        assert!(key.caches_line_poses(), "{name}: nothing to be shared in {key:?}");
         assert!(one.color_rgba.iter().any(|&value| value > 0.1), "{name}: a picture");
         for pixels in [3, 16, 1000] {
             let (several, _) = frame(&sequence, channels, pixels);

@@ -1,4 +1,4 @@
-//! A picture of the ground in tiles shows what it shows in one texture.
+//! A tiled ground texture gives the picture of a single texture.
 
 mod common;
 
@@ -99,7 +99,8 @@ fn tiles_show_what_one_texture_does() {
             let largest = differences.iter().copied().fold(0.0, f32::max);
             let mean = differences.iter().sum::<f32>() / differences.len() as f32;
             eprintln!(
-                "{reads:?}, frame {frame}: {held} of {all} tiles; largest difference {:.3}/255, mean {:.4}/255",
+                "{reads:?}, frame {frame}: {held} of {all} tiles; largest difference {:.3}/255, mean \
+                 {:.4}/255",
                 255.0 * largest,
                 255.0 * mean
             );

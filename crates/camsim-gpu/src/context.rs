@@ -10,62 +10,66 @@ use crate::layout::Truth;
 /// Errors of the GPU side. Texts name the fix.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// There is nothing to run on.
+    /// No adapter found; holds the setting of `CAMSIM_ADAPTER`, in words.
     #[error(
-        "no usable graphics adapter found{0}: install a Vulkan driver (on Debian or Ubuntu without a GPU: `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's name from `camsim info`"
+        "no usable graphics adapter found{0}: install a Vulkan driver (on Debian or Ubuntu without a GPU: \
+         `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's \
+         name from `camsim info`"
     )]
     NoAdapter(String),
-    /// There are adapters, but none of this name.
+    /// There are adapters, but none with this name.
     #[error(
-        "no adapter has `{wanted}` in its name (CAMSIM_ADAPTER): there is {there}; set CAMSIM_ADAPTER to part of one of these names, or not at all"
+        "no adapter has `{wanted_name}` in its name (CAMSIM_ADAPTER): there is {available}; set \
+         CAMSIM_ADAPTER to part of one of these names, or not at all"
     )]
     UnknownAdapter {
-        /// As in the environment.
-        wanted: String,
-        /// What there is, in words.
-        there: String,
+        /// Value of `CAMSIM_ADAPTER`.
+        wanted_name: String,
+        /// Available adapters, in words.
+        available: String,
     },
-    /// The adapter would not give a device.
+    /// The adapter refused to open a device.
     #[error("adapter `{adapter}` gave no device: {reason}")]
     NoDevice {
         /// Adapter name.
         adapter: String,
-        /// What wgpu says.
+        /// Error text of wgpu.
         reason: String,
     },
     /// The device stopped working.
     #[error(
-        "the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out"
+        "the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran \
+         out"
     )]
     Device(String),
-    /// A picture or table does not fit the adapter.
+    /// An image or table exceeds a limit of the adapter.
     #[error("{what} needs {needed}, but the adapter's {limit_name} is {limit}: {fix}")]
     TooLarge {
-        /// What does not fit.
+        /// What does not fit, in words.
         what: String,
-        /// How much it needs.
+        /// Required size, in the unit of the limit.
         needed: u64,
         /// Name of the limit.
         limit_name: &'static str,
-        /// Its value.
+        /// Value of the limit.
         limit: u64,
-        /// What to do.
+        /// What the user can do.
         fix: &'static str,
     },
 }
 
-/// Which adapter to use.
+/// How an adapter is selected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
     /// `CAMSIM_ADAPTER` (part of a name) if set, else discrete before integrated before software.
     #[default]
     Best,
-    /// `CAMSIM_ADAPTER` if set, else a software adapter: tests use it, so that figures compare between
+    /// `CAMSIM_ADAPTER` if set, else a software adapter. Tests use it, so that results are comparable between
     /// machines unless a GPU is asked for.
     Software,
 }
 
-/// What an adapter is, for people.
+/// Description of an adapter, for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSummary {
     /// Device name.
@@ -98,39 +102,38 @@ impl fmt::Display for AdapterSummary {
     }
 }
 
-/// Pixels that a thread takes on a software adapter: reading a line's poses costs llvmpipe up to two fifths
-/// of the kernel, and there are few processors to be kept busy (docs/DECISIONS.md, "Gpu
-/// renderer").
-const SOFTWARE_PIXELS: u32 = 16;
+/// Pixels per thread of the reverse kernel on a software adapter: reading a line's poses costs llvmpipe up to
+/// two fifths of the kernel, and there are few processors to keep busy (docs/DECISIONS.md, "Gpu renderer").
+const SOFTWARE_PIXELS_PER_THREAD: u32 = 16;
 
-/// Device, queue, and what they run on.
+/// An open adapter: device and queue.
 #[derive(Debug)]
 pub struct GpuContext {
     /// Logical device.
     pub device: wgpu::Device,
-    /// Its queue.
+    /// Queue of the device.
     pub queue: wgpu::Queue,
     /// Description of the adapter.
     pub adapter: AdapterSummary,
-    /// Whether the device is this machine's processor.
+    /// Whether the driver runs on this machine's processor.
     pub(crate) is_software: bool,
-    /// Largest side of a picture that is held whole.
+    /// Largest side of a texture that is not split into tiles, pixels.
     pub(crate) max_picture_px: u32,
-    /// Pixels of a line that a thread of the reverse kernel takes.
-    pub(crate) pixels_a_thread: u32,
-    /// The first error that the device reported outside of a call.
+    /// Pixels of a line per thread of the reverse kernel.
+    pub(crate) pixels_per_thread: u32,
+    /// First error that the device reported outside of a call.
     fault: Arc<Mutex<Option<String>>>,
 }
 
-/// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr
-/// on headless machines.
+/// The wgpu instance. Vulkan, Metal and DirectX 12 have compute shaders everywhere; GL is not even probed, as
+/// it prints to stderr on headless machines.
 ///
-/// One for all engines, and never dropped: with the last instance the loader unloads the driver, and NVIDIA's
-/// has left something to be done at the end of every thread that called it. A thread that ends after that
-/// crashes.
+/// There is one instance for all engines, and it is never dropped: with the last instance the loader unloads
+/// the driver, but NVIDIA's has registered a destructor for every thread that called it. A thread that ends
+/// after the unloading crashes.
 ///
-/// Arguments of indirect calls come from camsim's own shaders, which bound them; wgpu's check of each would
-/// be a pass of its own, and a buffer made for it.
+/// Validation of indirect calls is off: their arguments come from camsim's own shaders, which bound them, and
+/// wgpu's check would be an extra pass and buffer for each.
 static INSTANCE: LazyLock<wgpu::Instance> = LazyLock::new(|| {
     let from_env = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     let flags = from_env.flags.difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
@@ -141,31 +144,31 @@ static INSTANCE: LazyLock<wgpu::Instance> = LazyLock::new(|| {
     })
 });
 
-/// All adapters of this machine, the one that would be used first.
+/// All adapters of this machine, the preferred one first.
 #[must_use]
 pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
-    ranked(choice).iter().map(|adapter| AdapterSummary::of(&adapter.get_info())).collect()
+    ranked_adapters(choice).iter().map(|adapter| AdapterSummary::of(&adapter.get_info())).collect()
 }
 
-/// Nothing to run on, or nothing of the name that is wanted.
-fn none_found(choice: AdapterChoice) -> GpuError {
-    let Ok(wanted) = std::env::var("CAMSIM_ADAPTER") else { return GpuError::NoAdapter(String::new()) };
-    let there: Vec<String> = named(choice, None)
+/// Error for an empty list of adapters.
+fn no_adapter_error(choice: AdapterChoice) -> GpuError {
+    let Ok(wanted_name) = std::env::var("CAMSIM_ADAPTER") else { return GpuError::NoAdapter(String::new()) };
+    let available: Vec<String> = adapters_named(choice, None)
         .iter()
         .map(|adapter| AdapterSummary::of(&adapter.get_info()).to_string())
         .collect();
-    if there.is_empty() {
-        return GpuError::NoAdapter(format!(" with CAMSIM_ADAPTER={wanted}"));
+    if available.is_empty() {
+        return GpuError::NoAdapter(format!(" with CAMSIM_ADAPTER={wanted_name}"));
     }
-    GpuError::UnknownAdapter { wanted, there: there.join("; ") }
+    GpuError::UnknownAdapter { wanted_name, available: available.join("; ") }
 }
 
-fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
-    named(choice, std::env::var("CAMSIM_ADAPTER").ok().map(|name| name.to_lowercase()))
+fn ranked_adapters(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
+    adapters_named(choice, std::env::var("CAMSIM_ADAPTER").ok().map(|name| name.to_lowercase()))
 }
 
-fn named(choice: AdapterChoice, wanted: Option<String>) -> Vec<wgpu::Adapter> {
-    let rank = |info: &wgpu::AdapterInfo| match (info.device_type, choice) {
+fn adapters_named(choice: AdapterChoice, wanted_name: Option<String>) -> Vec<wgpu::Adapter> {
+    let preference = |info: &wgpu::AdapterInfo| match (info.device_type, choice) {
         (wgpu::DeviceType::Cpu, AdapterChoice::Software) => 0,
         (wgpu::DeviceType::DiscreteGpu, _) => 1,
         (wgpu::DeviceType::IntegratedGpu, _) => 2,
@@ -173,34 +176,35 @@ fn named(choice: AdapterChoice, wanted: Option<String>) -> Vec<wgpu::Adapter> {
         (wgpu::DeviceType::Cpu, _) => 4,
         (wgpu::DeviceType::Other, _) => 5,
     };
-    let mut found = pollster::block_on(INSTANCE.enumerate_adapters(wgpu::Backends::PRIMARY));
-    found.retain(|adapter| {
+    let mut adapters = pollster::block_on(INSTANCE.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters.retain(|adapter| {
         let info = adapter.get_info();
-        let of_kind =
-            choice == AdapterChoice::Best || wanted.is_some() || info.device_type == wgpu::DeviceType::Cpu;
-        let named = wanted.as_ref().is_none_or(|name| info.name.to_lowercase().contains(name));
-        of_kind
-            && named
+        let is_allowed_kind = choice == AdapterChoice::Best
+            || wanted_name.is_some()
+            || info.device_type == wgpu::DeviceType::Cpu;
+        let adapters_named = wanted_name.as_ref().is_none_or(|name| info.name.to_lowercase().contains(name));
+        is_allowed_kind
+            && adapters_named
             && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
     });
-    found.sort_by_key(|adapter| rank(&adapter.get_info()));
-    found
+    adapters.sort_by_key(|adapter| preference(&adapter.get_info()));
+    adapters
 }
 
-/// Keeps the first error that a device reports outside of a call.
-fn watch(device: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
+/// Installs callbacks that keep the first error that the device reports outside of a call.
+fn record_faults(device: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
     let fault = Arc::new(Mutex::new(None));
-    let note = |fault: &Arc<Mutex<Option<String>>>, text: String| {
+    let record = |fault: &Arc<Mutex<Option<String>>>, text: String| {
         if let Ok(mut first) = fault.lock() {
             first.get_or_insert(text);
         }
     };
     let for_errors = fault.clone();
-    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&for_errors, error.to_string())));
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| record(&for_errors, error.to_string())));
     let for_loss = fault.clone();
     device.set_device_lost_callback(move |reason, text| {
         if reason != wgpu::DeviceLostReason::Destroyed {
-            note(&for_loss, text);
+            record(&for_loss, text);
         }
     });
     fault
@@ -212,16 +216,16 @@ impl GpuContext {
     /// # Errors
     /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
-        let mut candidates = ranked(choice);
+        let mut candidates = ranked_adapters(choice);
         if candidates.is_empty() {
-            return Err(none_found(choice));
+            return Err(no_adapter_error(choice));
         }
         let adapter = candidates.remove(0);
         let info = adapter.get_info();
         let summary = AdapterSummary::of(&info);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("camsim"),
-            // Only for measuring; nothing else depends on it.
+            // Time stamps serve measurements only.
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             experimental_features: wgpu::ExperimentalFeatures::disabled(),
@@ -234,9 +238,9 @@ impl GpuContext {
         })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
-        let pixels_a_thread = if is_software { SOFTWARE_PIXELS } else { 1 };
-        let fault = watch(&device);
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, fault })
+        let pixels_per_thread = if is_software { SOFTWARE_PIXELS_PER_THREAD } else { 1 };
+        let fault = record_faults(&device);
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_per_thread, fault })
     }
 
     /// Whether the adapter is a driver that runs on this machine's processor.
@@ -245,31 +249,31 @@ impl GpuContext {
         self.is_software
     }
 
-    /// Largest side of a picture that is held whole.
+    /// Largest side of a texture that is not split into tiles, pixels.
     #[must_use]
     pub fn max_picture_px(&self) -> u32 {
         self.max_picture_px
     }
 
-    /// Holds pictures with longer sides in tiles, as if textures ended there: for tests, and where the
-    /// device's memory is short.
+    /// Splits textures with longer sides into tiles, as if this were the adapter's limit: for tests, and
+    /// where device memory is short.
     pub fn limit_pictures(&mut self, max_side_px: u32) {
         self.max_picture_px = max_side_px.min(self.max_side_px());
     }
 
-    /// Pixels of a row that each thread of the reverse kernel takes, 1 to 4096: by default 16 on a software
-    /// adapter and 1 on a card. Pictures are the same, byte for byte.
-    pub fn set_pixels_a_thread(&mut self, pixels: u32) {
-        self.pixels_a_thread = pixels.clamp(1, 4096);
+    /// Sets the pixels of a row per thread of the reverse kernel, 1 to 4096. The default is 16 on a software
+    /// adapter and 1 on a card. The output does not depend on it.
+    pub fn set_pixels_per_thread(&mut self, pixels: u32) {
+        self.pixels_per_thread = pixels.clamp(1, 4096);
     }
 
-    /// Most pixels of an output frame with depth and coordinates.
+    /// Maximum number of pixels of an output frame with depth and coordinates.
     #[must_use]
-    pub fn most_pixels_with_truth(&self) -> u64 {
+    pub fn max_pixels_with_truth(&self) -> u64 {
         self.max_storage_bytes() / size_of::<Truth>() as u64
     }
 
-    /// Fails once the device has reported an error.
+    /// Fails if the device has reported an error.
     ///
     /// # Errors
     /// [`GpuError::Device`].
@@ -293,7 +297,7 @@ impl GpuContext {
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
 
-    /// Refuses what does not fit one storage buffer.
+    /// Checks that a storage buffer of this size fits.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].

@@ -1,14 +1,14 @@
-//! Faults of the passes.
+//! Errors of the passes.
 
 use crate::{context::GpuError, shaders::ComposeError};
 
-/// Why a pass cannot be recorded or read.
+/// Why a pass cannot be recorded or read back.
 #[derive(Debug, thiserror::Error)]
 pub enum PassError {
-    /// The device.
+    /// The device failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The shader files.
+    /// The shader files are inconsistent.
     #[error(transparent)]
     Shader(#[from] ComposeError),
 }

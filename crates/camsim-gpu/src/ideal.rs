@@ -8,7 +8,7 @@ use camsim_core::{
     scene::{LodTolerance, PlacedMesh, Scene},
 };
 use camsim_plan::{
-    EdgeStage, FramePlan, SIZE_QUANTUM_PX,
+    EdgeStage, FramePlan,
     uniforms::{IdealCamera, base_ned_m, ideal_camera},
 };
 
@@ -17,135 +17,62 @@ use crate::{
     upload::SceneBuffers,
 };
 
-mod drawing;
-mod fine;
-mod layers;
-mod marks;
-mod near_marks;
-mod pipelines;
-mod sampled;
-mod surfaces;
+mod blended_triangles;
+mod draw_state;
+mod draw_surfaces;
+mod edge_mask;
+mod multisampled_target;
+mod supersampled_target;
+mod surface_pipelines;
+mod target;
+mod triangles_near_edges;
 
-pub(crate) use fine::whole;
-pub use fine::{FINE_SAMPLES, FineTarget};
-use fine::{TILE_PX, scale_of, texture};
-use layers::Ordered;
-use marks::MarksPass;
+use blended_triangles::BlendedTriangles;
+use draw_surfaces::{
+    TerrainSlot, TriangleSelection, draw_meshes, draw_terrain, upload_placements, upload_terrain,
+};
+use edge_mask::EdgeMaskPass;
 #[cfg(test)]
-pub(crate) use marks::spread_slot;
-use near_marks::NearMarksPass;
-use pipelines::{SurfaceKey, SurfacePipelines};
+pub(crate) use edge_mask::thin_surfaces_slot;
+use multisampled_target::ResolveDepthPass;
+use supersampled_target::TILE_PX;
+pub(crate) use supersampled_target::full_view;
+pub use supersampled_target::{FINE_SAMPLES, SupersampledTarget};
+use surface_pipelines::{SurfaceKey, SurfacePipelines};
 #[cfg(test)]
-#[cfg(test)]
-pub(crate) use pipelines::{ground_slots, mesh_slots};
-use sampled::{MiddleDepthPass, SampledTarget};
-use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
+pub(crate) use surface_pipelines::{mesh_slots, terrain_slots};
+pub use target::IdealTarget;
+use triangles_near_edges::EdgeTrianglesPass;
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Colour format of the paper preset's ideal frame: the device encodes on writing; the gather reads what is
-/// stored ([`STORED_VIEW`]).
-pub const STORED_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-/// How the paper preset's gather sees it.
-pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Colour format of the paper preset's ideal frame: the GPU encodes to sRGB on writing, and the gather reads
+/// the encoded values ([`SRGB_ENCODED_VIEW`]).
+pub const SRGB_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+/// View format through which the paper preset's gather reads encoded values.
+pub const SRGB_ENCODED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth format of the ideal frame: near / z.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Uniform buffers have at least this many bytes.
+/// Least size of uniform buffers, bytes.
 const MIN_BYTES: u64 = 256;
 
-/// Textures that an ideal frame is drawn to.
-#[derive(Debug)]
-pub struct IdealTarget {
-    /// Allocated width, height.
-    pub allocated_px: [u32; 2],
-    /// Linear colour.
-    pub color: wgpu::Texture,
-    /// near / z.
-    pub depth: wgpu::Texture,
-    /// What frames with silhouettes have besides.
-    pub fine: Option<FineTarget>,
-    /// What frames of several samples a pixel are drawn to first.
-    sampled: Option<SampledTarget>,
-    /// What surfaces are drawn to with one sample a pixel.
-    drawn_color: wgpu::TextureView,
-    drawn_depth: wgpu::TextureView,
-    /// The colour as the gather reads it.
-    pub gathered_color: wgpu::TextureView,
-    /// The depth as the gather reads it.
-    pub gathered_depth: wgpu::TextureView,
-}
-
-impl IdealTarget {
-    /// Allocated size for the ideal frames of a plan: one below the other. Rounded up, so that a few
-    /// allocations serve all frames; depends on the frame alone.
-    #[must_use]
-    pub fn size_for(plan: &FramePlan, max_side_px: u32) -> [u32; 2] {
-        let width = plan.ideal.size_px[0].next_multiple_of(SIZE_QUANTUM_PX);
-        [width, key_rows(&plan.ideal) * plan.keys.len() as u32].map(|side| side.min(max_side_px))
-    }
-
-    /// Whether the ideal frames of a plan, which take this size, are drawn to it.
-    #[must_use]
-    pub fn serves(&self, allocated_px: [u32; 2], plan: &FramePlan) -> bool {
-        self.allocated_px == allocated_px
-            && self.fine.as_ref().map(|fine| fine.scale) == scale_of(plan.edges)
-            && self.sampled.is_some() == (plan.samples_a_pixel > 1)
-    }
-
-    /// Whether it has textures of several samples a pixel, for whatever.
-    #[must_use]
-    pub fn has_samples(&self) -> bool {
-        self.fine.is_some() || self.sampled.is_some()
-    }
-
-    /// Allocates.
-    #[must_use]
-    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], plan: &FramePlan) -> Self {
-        let fine = scale_of(plan.edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
-        let sampled = (plan.samples_a_pixel > 1).then(|| SampledTarget::new(gpu, allocated_px));
-        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
-            | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC;
-        let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(plan.preset), 1, usage);
-        let depth = texture(gpu, "camsim.ideal.depth", allocated_px, DEPTH_FORMAT, 1, usage);
-        let format = (color.format() == STORED_FORMAT).then_some(STORED_VIEW);
-        // Not every usage of the texture is legal for a view of another format, and the gather needs one
-        // only.
-        let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
-        let gathered_color =
-            color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
-        let (drawn_color, drawn_depth, gathered_depth) = (whole(&color), whole(&depth), whole(&depth));
-        Self {
-            allocated_px,
-            color,
-            depth,
-            fine,
-            sampled,
-            drawn_color,
-            drawn_depth,
-            gathered_color,
-            gathered_depth,
-        }
-    }
-}
-
-/// Format that surfaces are drawn to with one sample a pixel.
+/// Colour format with one sample per pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
         Preset::Default => COLOR_FORMAT,
-        Preset::Paper => STORED_FORMAT,
+        Preset::Paper => SRGB_FORMAT,
     }
 }
 
 pub use camsim_plan::uniforms::key_rows;
 
-/// Pipelines of the ideal render.
+/// Pipelines that draw ideal frames.
 #[derive(Debug)]
 pub struct IdealPass {
     /// Compiled when a silhouette is first in view.
     silhouettes: Option<SilhouettePasses>,
     /// Compiled when pixels first have several samples.
-    resolve_depth: Option<MiddleDepthPass>,
+    resolve_depth: Option<ResolveDepthPass>,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
@@ -153,45 +80,45 @@ pub struct IdealPass {
     /// Compiled when first needed.
     pipelines: HashMap<SurfaceKey, SurfacePipelines>,
     color_format: wgpu::TextureFormat,
-    /// Whether the ground's picture is in tiles.
+    /// Whether the terrain's texture is split into tiles.
     has_tiles: bool,
-    /// Whether the ideal frame has the scene's fog.
+    /// Whether the ideal frame includes the scene's fog.
     has_fog: bool,
 }
 
-/// What frames with silhouettes take besides drawing.
+/// Passes of frames with silhouettes.
 #[derive(Debug)]
 struct SilhouettePasses {
-    marks: MarksPass,
-    near_marks: NearMarksPass,
+    mask: EdgeMaskPass,
+    edge_triangles: EdgeTrianglesPass,
 }
 
-/// Buffers of one ideal frame of a frame in flight, and their bind groups.
+/// Buffers and bind groups of one ideal frame of a frame in flight.
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
-    /// None without a terrain.
+    /// `None` without a terrain.
     terrain: Option<TerrainSlot>,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     placement_group: wgpu::BindGroup,
-    /// By batch: what is on it, and which placements are drawn with each of its levels of detail.
-    mesh_groups: Vec<wgpu::BindGroup>,
-    drawn: Vec<Vec<Range<u32>>>,
-    /// What is mixed, from behind to the front; none where nothing in the scene is.
-    layers: Option<Ordered>,
+    /// Texture and material by batch.
+    material_groups: Vec<wgpu::BindGroup>,
+    level_instances: Vec<Vec<Range<u32>>>,
+    /// Blended triangles, back to front; `None` if nothing in the scene blends.
+    blended: Option<BlendedTriangles>,
 }
 
 impl IdealSlot {
-    /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their
-    /// number.
-    pub(crate) fn near_marks(&self) -> Option<&wgpu::Buffer> {
-        self.terrain.as_ref().map(|terrain| &terrain.kept.arguments)
+    /// Arguments of the indirect draw of the terrain triangles near edges; the first is the number of
+    /// indices.
+    pub(crate) fn edge_triangles_arguments(&self) -> Option<&wgpu::Buffer> {
+        self.terrain.as_ref().map(|terrain| &terrain.selection.arguments)
     }
 }
 
 impl IdealPass {
-    /// Compiles the pipelines.
+    /// Creates the layouts; pipelines are compiled when needed.
     ///
     /// # Errors
     /// Faults of the shader files.
@@ -234,12 +161,12 @@ impl IdealPass {
             pipelines: HashMap::new(),
             color_format: color_format(preset),
             has_tiles,
-            // The paper's fog comes after the gather.
+            // The paper preset applies its fog after the gather.
             has_fog: fog_visibility_m.is_some() && preset != Preset::Paper,
         })
     }
 
-    /// Buffers for one ideal frame of this scene, whose pictures are there.
+    /// Creates the buffers for one ideal frame of this scene, whose textures have been uploaded.
     #[must_use]
     pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
         let create = |label, size: u64, usage| {
@@ -264,18 +191,19 @@ impl IdealPass {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
         let terrain = buffers.terrain.as_ref().map(|_| TerrainSlot::new(gpu));
-        let mesh_groups = buffers.batches.iter().zip(&buffers.pictures).map(|(batch, picture)| {
+        let material_groups = buffers.batches.iter().zip(&buffers.textures).map(|(batch, texture)| {
             group(
                 &self.mesh_layout,
                 &[
-                    entry(0, wgpu::BindingResource::TextureView(picture)),
+                    entry(0, wgpu::BindingResource::TextureView(texture)),
                     entry(1, wgpu::BindingResource::Sampler(&batch.sampler)),
                     entry(2, batch.material.as_entire_binding()),
                 ],
             )
         });
-        let mesh_groups = mesh_groups.collect();
-        let layers = buffers.batches.iter().any(|batch| batch.kind.blends).then(|| Ordered::new(gpu));
+        let material_groups = material_groups.collect();
+        let blended =
+            buffers.batches.iter().any(|batch| batch.kind.blends).then(|| BlendedTriangles::new(gpu));
         let placement_group = group(&self.placement_layout, &[entry(0, placements.as_entire_binding())]);
         IdealSlot {
             camera,
@@ -283,14 +211,14 @@ impl IdealPass {
             placements,
             camera_group,
             placement_group,
-            mesh_groups,
-            drawn: Vec::new(),
-            layers,
+            material_groups,
+            level_instances: Vec::new(),
+            blended,
         }
     }
 
-    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own
-    /// triangles of it; returns how many blended triangles are out of order.
+    /// Records the ideal frames of a plan, each with its own slot and, if there is a terrain, its own
+    /// triangles of it. Returns how many blended triangles are out of order.
     ///
     /// # Errors
     /// Faults of the shader files; `GpuError::TooLarge` for triangles that no buffer holds.
@@ -306,102 +234,145 @@ impl IdealPass {
         tolerance: &LodTolerance,
         target: &IdealTarget,
     ) -> Result<u32, PassError> {
-        let plain = if target.sampled.is_some() {
-            SurfaceKey::Fine(plan.surface_reads)
-        } else {
-            SurfaceKey::Plain(plan.surface_reads)
-        };
-        if target.sampled.is_some() && self.resolve_depth.is_none() {
-            self.resolve_depth = Some(MiddleDepthPass::new(gpu)?);
-        }
-        let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
-        let fine =
-            colored.map(
-                |colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth },
-            );
-        for key in [Some(plain), fine].into_iter().flatten() {
-            if !self.pipelines.contains_key(&key) {
-                self.pipelines.insert(key, self.surface_pipelines(gpu, key, &buffers.batches)?);
-            }
-        }
-        if fine.is_some() && self.silhouettes.is_none() {
-            let near_marks = NearMarksPass::new(gpu, &self.camera_layout, &self.terrain_layout)?;
-            self.silhouettes = Some(SilhouettePasses { marks: MarksPass::new(gpu)?, near_marks });
-        }
-        let mut out_of_order = 0;
-        let mut index_counts = Vec::new();
-        for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
-            let base_ned_m = base_ned_m(&key.pose);
-            recorder.write(
-                &slot.camera,
-                0,
-                bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)),
-            );
-            let mut indices = 0;
-            if let (Some(terrain), Some(on_device), Some(mesh)) =
-                (&mut slot.terrain, &buffers.terrain, meshes.get(k))
-            {
-                indices = place_terrain(gpu, recorder, terrain, mesh)?;
-                terrain.bind(gpu, recorder, &self.terrain_layout, on_device, &buffers.sampler);
-            }
-            index_counts.push(indices);
-            let seen = place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
-            if let Some(layers) = &mut slot.layers {
-                layers.order(gpu, recorder, buffers, &slot.drawn, &seen, &key.pose, tolerance.tangents)?;
-                out_of_order += layers.out_of_order;
-            }
-        }
-        let (color, depth) = match &target.sampled {
-            None => (color_attachment(&target.drawn_color, scene), &target.drawn_depth),
-            Some(sampled) => {
-                let mut color = color_attachment(&sampled.color, scene);
-                color.resolve_target = Some(&target.drawn_color);
+        let (base_key, supersampled_key) = self.compile(gpu, buffers, plan, target)?;
+        let (index_counts, out_of_order) =
+            self.upload_keys(gpu, recorder, slots, scene, buffers, plan, meshes, tolerance)?;
+        let (color, depth) = match &target.multisampled {
+            None => (color_attachment(&target.color_attachment_view, scene), &target.depth_attachment_view),
+            Some(multisampled) => {
+                let mut color = color_attachment(&multisampled.color, scene);
+                color.resolve_target = Some(&target.color_attachment_view);
                 color.ops.store = wgpu::StoreOp::Discard;
-                (color, &sampled.depth)
+                (color, &multisampled.depth)
             }
         };
         let mut pass = recorder.render_pass("ideal", Some(color), Some(depth_attachment(depth)));
-        self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
+        self.draw_keys(&mut pass, base_key, plan, 1, buffers, slots, |k| {
+            TriangleSelection::All(index_counts[k])
+        });
         drop(pass);
-        if let (Some(sampled), Some(resolve_depth)) = (&target.sampled, &self.resolve_depth) {
-            resolve_depth.encode(gpu, recorder, sampled, depth_attachment(&target.drawn_depth));
+        if let (Some(multisampled), Some(resolve_depth)) = (&target.multisampled, &self.resolve_depth) {
+            let depth = depth_attachment(&target.depth_attachment_view);
+            resolve_depth.encode(gpu, recorder, multisampled, depth);
         }
-        if let (Some(fine), Some(key), Some(passes), EdgeStage::Supersampled { thin, .. }) =
-            (&target.fine, fine, &self.silhouettes, plan.edges)
-        {
-            let SilhouettePasses { marks, near_marks } = passes;
-            if !thin {
-                marks.mark(gpu, recorder, plan, target, fine, false);
-                near_marks.encode(
-                    gpu,
-                    recorder,
-                    plan,
-                    target.allocated_px[0].div_ceil(TILE_PX),
-                    slots,
-                    &index_counts,
-                    fine,
-                );
-            }
-            let color = fine.color_view.as_ref().map(|view| color_attachment(view, scene));
-            let mut pass =
-                recorder.render_pass("ideal_fine", color, Some(depth_attachment(&fine.depth_view)));
-            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, |k| {
-                match (thin, index_counts[k]) {
-                    (false, 1..) => Triangles::Kept,
-                    (_, count) => Triangles::All(count),
-                }
-            });
-            drop(pass);
-            if thin {
-                marks.mark(gpu, recorder, plan, target, fine, true);
-            }
-            marks.stamp(gpu, recorder, target, fine);
-            marks.borders(gpu, recorder, plan, target, fine);
+        if let Some(key) = supersampled_key {
+            self.encode_supersampled(gpu, recorder, key, slots, scene, buffers, plan, &index_counts, target);
         }
         Ok(out_of_order)
     }
 
-    /// Draws each key's surfaces, one key below the other.
+    /// Compiles what a plan needs. Returns the pipelines of the frame itself and of its supersampled version.
+    fn compile(
+        &mut self,
+        gpu: &GpuContext,
+        buffers: &SceneBuffers,
+        plan: &FramePlan,
+        target: &IdealTarget,
+    ) -> Result<(SurfaceKey, Option<SurfaceKey>), ComposeError> {
+        let base_key = if target.multisampled.is_some() {
+            SurfaceKey::Multisampled(plan.surface_reads)
+        } else {
+            SurfaceKey::SingleSample(plan.surface_reads)
+        };
+        if target.multisampled.is_some() && self.resolve_depth.is_none() {
+            self.resolve_depth = Some(ResolveDepthPass::new(gpu)?);
+        }
+        let supersampled_key = target.supersampled.as_ref().map(|supersampled| match supersampled.color {
+            Some(_) => SurfaceKey::Multisampled(plan.surface_reads),
+            None => SurfaceKey::MultisampledDepth,
+        });
+        for key in [Some(base_key), supersampled_key].into_iter().flatten() {
+            if !self.pipelines.contains_key(&key) {
+                self.pipelines.insert(key, self.surface_pipelines(gpu, key, &buffers.batches)?);
+            }
+        }
+        if supersampled_key.is_some() && self.silhouettes.is_none() {
+            let edge_triangles = EdgeTrianglesPass::new(gpu, &self.camera_layout, &self.terrain_layout)?;
+            self.silhouettes = Some(SilhouettePasses { mask: EdgeMaskPass::new(gpu)?, edge_triangles });
+        }
+        Ok((base_key, supersampled_key))
+    }
+
+    /// Uploads camera, terrain and placements of all key frames. Returns the number of terrain indices of
+    /// each key frame, and how many blended triangles are out of order.
+    fn upload_keys(
+        &self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        slots: &mut [IdealSlot],
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        plan: &FramePlan,
+        meshes: &[PlacedMesh],
+        tolerance: &LodTolerance,
+    ) -> Result<(Vec<u32>, u32), PassError> {
+        let mut out_of_order = 0;
+        let mut index_counts = Vec::new();
+        for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
+            let base_ned_m = base_ned_m(&key.pose);
+            let camera = ideal_camera(plan, &key.pose, base_ned_m, scene);
+            recorder.write(&slot.camera, 0, bytemuck::bytes_of(&camera));
+            let mut indices = 0;
+            if let (Some(terrain), Some(terrain_buffers), Some(mesh)) =
+                (&mut slot.terrain, &buffers.terrain, meshes.get(k))
+            {
+                indices = upload_terrain(gpu, recorder, terrain, mesh)?;
+                terrain.bind(gpu, recorder, &self.terrain_layout, terrain_buffers, &buffers.sampler);
+            }
+            index_counts.push(indices);
+            let meshes_in_view = upload_placements(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
+            if let Some(blended) = &mut slot.blended {
+                let instances = &slot.level_instances;
+                let tangents = tolerance.tangents;
+                blended.sort(gpu, recorder, buffers, instances, &meshes_in_view, &key.pose, tangents)?;
+                out_of_order += blended.out_of_order;
+            }
+        }
+        Ok((index_counts, out_of_order))
+    }
+
+    /// Records edge mask, samples and borders of frames with silhouettes.
+    fn encode_supersampled(
+        &self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        key: SurfaceKey,
+        slots: &[IdealSlot],
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        plan: &FramePlan,
+        index_counts: &[u32],
+        target: &IdealTarget,
+    ) {
+        let (Some(supersampled), Some(passes), EdgeStage::Supersampled { thin, .. }) =
+            (&target.supersampled, &self.silhouettes, plan.edges)
+        else {
+            return;
+        };
+        let SilhouettePasses { mask, edge_triangles } = passes;
+        if !thin {
+            mask.compute_mask(gpu, recorder, plan, target, supersampled, false);
+            let tiles_across = target.allocated_px[0].div_ceil(TILE_PX);
+            edge_triangles.encode(gpu, recorder, plan, tiles_across, slots, index_counts, supersampled);
+        }
+        let color = supersampled.color_view.as_ref().map(|view| color_attachment(view, scene));
+        let depth = depth_attachment(&supersampled.depth_view);
+        let mut pass = recorder.render_pass("ideal_fine", color, Some(depth));
+        self.draw_keys(&mut pass, key, plan, supersampled.scale, buffers, slots, |k| {
+            match (thin, index_counts[k]) {
+                (false, 1..) => TriangleSelection::NearEdges,
+                (_, count) => TriangleSelection::All(count),
+            }
+        });
+        drop(pass);
+        if thin {
+            mask.compute_mask(gpu, recorder, plan, target, supersampled, true);
+        }
+        mask.write_alpha(gpu, recorder, target, supersampled);
+        mask.edge_lines(gpu, recorder, plan, target, supersampled);
+    }
+
+    /// Draws the surfaces of all key frames, one key frame below the other.
     fn draw_keys(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
@@ -410,7 +381,7 @@ impl IdealPass {
         scale: u32,
         buffers: &SceneBuffers,
         slots: &[IdealSlot],
-        triangles: impl Fn(usize) -> Triangles,
+        triangles: impl Fn(usize) -> TriangleSelection,
     ) {
         let Some(pipelines) = self.pipelines.get(&key) else { return };
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
@@ -421,16 +392,16 @@ impl IdealPass {
             pass.set_bind_group(0, &slot.camera_group, &[]);
             draw_terrain(pass, pipelines, slot, triangles(k));
             draw_meshes(pass, pipelines, slot, buffers, false);
-            if let Some(layers) = &slot.layers {
-                layers.draw(pass, pipelines, slot, buffers);
-                // Their depth last: what is mixed hides nothing that is mixed.
+            if let Some(blended) = &slot.blended {
+                blended.draw(pass, pipelines, slot, buffers);
+                // Their depth comes last: blended surfaces do not occlude blended surfaces.
                 draw_meshes(pass, pipelines, slot, buffers, true);
             }
         }
     }
 }
 
-/// Linear colour, cleared to the sky's.
+/// Colour attachment, cleared to the sky.
 fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::RenderPassColorAttachment<'a> {
     let [r, g, b] = scene.sky_linear.map(f64::from);
     wgpu::RenderPassColorAttachment {
@@ -444,7 +415,7 @@ fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::Ren
     }
 }
 
-/// Reversed depth, cleared: 0 is infinitely far.
+/// Depth attachment, cleared to 0: infinitely far in reversed depth.
 fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     wgpu::RenderPassDepthStencilAttachment {
         view,

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use camsim_core::scene::MeshVertex;
 pub use camsim_plan::uniforms::{FrameUniforms, IdealCamera, Truth};
 
-/// Mirror of `KeyLayout` in shaders/ideal/near_marks.wgsl.
+/// Mirror of `KeyLayout` in shaders/ideal/triangles_near_edges.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]
@@ -18,11 +18,11 @@ pub struct KeyLayout {
     pub pad2: u32,
 }
 
-/// A corner of a mesh: `shaders/ideal/mesh.wgsl`. Tints have 16 bits.
+/// A vertex of a mesh: `shaders/ideal/mesh.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshVertexData {
-    /// Metres in the shape's axes.
+    /// Position in the axes of the shape, metres.
     pub position_m: [f32; 3],
     /// Texture coordinates.
     pub uv: [f32; 2],
@@ -37,26 +37,26 @@ impl From<&MeshVertex> for MeshVertexData {
     }
 }
 
-/// What is on a mesh besides its picture. Mirror of `MeshMaterial` in `shaders/ideal/mesh_surface.wgsl`.
+/// Material of a mesh besides its texture. Mirror of `MeshMaterial` in `shaders/ideal/mesh_surface.wgsl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshMaterial {
-    /// Light of its own, and the alpha below which there is a hole.
+    /// Emitted linear R G B, and the alpha cut-off.
     pub emissive_cutoff: [f32; 4],
-    /// Towards the sun (NED) times its strength, and the sky's.
+    /// Direction towards the sun (NED) times its strength, and the strength of the sky.
     pub sun_sky: [f32; 4],
 }
 
-/// Where a mesh stands from a key: rows of a turn, each followed by the origin's place. Mirror of
-/// `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
+/// Rows of the affine map from the axes of a shape to NED relative to the base of a key frame, metres. Mirror
+/// of `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshPlacement {
-    /// North.
+    /// Row of the north component.
     pub x: [f32; 4],
-    /// East.
+    /// Row of the east component.
     pub y: [f32; 4],
-    /// Down.
+    /// Row of the down component.
     pub z: [f32; 4],
 }
 
@@ -85,7 +85,8 @@ mod tests {
     }
 
     #[test]
-    fn structs_are_laid_out_as_in_the_shaders() {
+    fn struct_layouts_equal_those_of_the_shaders() {
+        // Long because: one line per field.
         let parse = |text: String| {
             naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)))
         };
@@ -143,7 +144,7 @@ mod tests {
         let module = parse(
             shaders::compose(
                 "ideal/terrain.wgsl",
-                &crate::ideal::ground_slots(camsim_plan::PrefilterTaps::Grid, true, true),
+                &crate::ideal::terrain_slots(camsim_plan::PrefilterTaps::Grid, true, true),
             )
             .unwrap(),
         );
@@ -169,7 +170,7 @@ mod tests {
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);
-        let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
+        let module = parse(shaders::compose("ideal/triangles_near_edges.wgsl", &[]).unwrap());
         assert_mirror!(
             &module,
             "KeyLayout",

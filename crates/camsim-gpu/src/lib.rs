@@ -1,13 +1,19 @@
 //! Ideal frames and output frames on a GPU, by wgpu: passes, buffers and read-back. Software adapters (Mesa's
 //! lavapipe) count as GPUs.
 //!
-//! [`GpuContext`] opens an adapter; [`GpuSession`] holds one sequence on it and records the passes that a
-//! [`FramePlan`](camsim_plan::FramePlan) names. It decides nothing itself. The crate `camsim-engine` feeds it.
+//! [`GpuContext`] opens an adapter; [`GpuSession`] holds one sequence on it and records the passes of a
+//! [`FramePlan`](camsim_plan::FramePlan). It decides nothing itself; the crate `camsim-engine` drives it.
 //!
-//! Modules in the order of the data flow: [`context`] (adapter and device), [`shaders`] (WGSL composition),
-//! [`layout`] (mirrors of shader structs), [`upload`] (the scene), [`staging`] and [`recorder`] (a frame's
-//! writes and commands), [`ideal`] (ideal frames), [`reverse`] (output frames), [`session`] (all passes of a
-//! frame, read-back).
+//! | module | holds |
+//! |---|---|
+//! | [`context`] | adapter and device |
+//! | [`shaders`] | composition of the WGSL |
+//! | [`layout`] | Rust mirrors of shader structs |
+//! | [`upload`], [`tiles`] | the scene on the GPU; tiles of large textures |
+//! | [`staging`], [`recorder`] | uploads and commands of a frame, time stamps of its passes |
+//! | [`ideal`] | ideal frames |
+//! | [`reverse`] | lens map and output frames |
+//! | [`session`] | all passes of a frame, read-back |
 
 #![warn(missing_docs)]
 
@@ -20,10 +26,9 @@ pub mod reverse;
 pub mod session;
 pub mod shaders;
 pub mod staging;
-/// Tiles of large pictures.
 pub mod tiles;
 pub mod upload;
 
 pub use context::{AdapterChoice, AdapterSummary, GpuContext, GpuError};
 pub use error::PassError;
-pub use session::{GpuJob, GpuSession, IdealImages, Submitted, Wanted};
+pub use session::{GpuJob, GpuSession, IdealImages, Readback, Submitted};

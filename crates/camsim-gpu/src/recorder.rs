@@ -1,36 +1,35 @@
-//! Commands of a frame as they are recorded, what the host writes for them, and how long each pass takes on
-//! the device by its own clock.
+//! Commands of a frame while they are recorded, its uploads, and GPU time stamps of its passes.
 
 use crate::{
     context::{GpuContext, GpuError},
     staging::Staging,
 };
 
-/// Passes of a frame: lens map and the map it starts from, ideal frame, marks, triangles near them, samples,
-/// stamp, borders, reverse, rays; and some to spare.
+/// Maximum number of timed passes of a frame: two of the lens map, ideal frame, its multisampled depth, edge
+/// mask, triangles near edges, supersampled frame, edge mask to alpha, edge lines, reverse, candidates, rays.
 const MAX_PASSES: u32 = 12;
 const STAMPS_BYTES: u64 = 16 * MAX_PASSES as u64;
 
-/// A pass and the milliseconds between its begin and its end.
+/// Duration of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassTime {
-    /// As `camsim explain` names it.
+    /// Name of the pass.
     pub name: &'static str,
-    /// By the device's clock.
+    /// Milliseconds by the GPU's clock.
     pub ms: f64,
 }
 
-/// Time stamps of one frame in flight.
+/// Time stamps of the passes of one frame in flight.
 #[derive(Debug)]
 pub struct PassClock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    on_host: wgpu::Buffer,
+    cpu_buffer: wgpu::Buffer,
     names: Vec<&'static str>,
 }
 
 impl PassClock {
-    /// `None` where the adapter has no time stamps.
+    /// `None` if the adapter has no time stamps.
     #[must_use]
     pub fn new(gpu: &GpuContext) -> Option<Self> {
         let buffer = |usage| {
@@ -49,13 +48,13 @@ impl PassClock {
                 count: 2 * MAX_PASSES,
             }),
             resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            on_host: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            cpu_buffer: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
             names: Vec::new(),
         })
     }
 
-    /// The stamps' numbers for the begin and the end of the next pass.
-    fn next(&mut self, name: &'static str) -> Option<(&wgpu::QuerySet, u32)> {
+    /// Registers the next pass. Returns the query set and the index of its first time stamp.
+    fn next_pass(&mut self, name: &'static str) -> Option<(&wgpu::QuerySet, u32)> {
         let first = 2 * self.names.len() as u32;
         (first < 2 * MAX_PASSES).then(|| {
             self.names.push(name);
@@ -63,12 +62,12 @@ impl PassClock {
         })
     }
 
-    /// Where the host reads the stamps.
-    pub(crate) fn on_host(&self) -> &wgpu::Buffer {
-        &self.on_host
+    /// Buffer from which the CPU reads the time stamps.
+    pub(crate) fn cpu_buffer(&self) -> &wgpu::Buffer {
+        &self.cpu_buffer
     }
 
-    /// The passes of the recorded frame, in order, from the stamps that the host has read.
+    /// Passes of the recorded frame in order, from the time stamps that were read back.
     pub(crate) fn passes(&self, gpu: &GpuContext, stamps: &[u64]) -> Vec<PassTime> {
         let ms_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
         let ms = |stamp: &[u64]| stamp[1].saturating_sub(stamp[0]) as f64 * ms_per_tick;
@@ -80,7 +79,7 @@ impl PassClock {
     }
 }
 
-/// One frame's commands.
+/// Commands of one frame.
 #[derive(Debug)]
 pub struct Recorder<'a> {
     device: &'a wgpu::Device,
@@ -91,8 +90,8 @@ pub struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins a frame; its passes are timed where there is a clock. What is written for it goes through
-    /// `staging`, which no other frame may use before this one has been waited for.
+    /// Begins a frame. Passes are timed if there is a clock. Uploads go through `staging`, which no other
+    /// frame may use until this one has been waited for.
     #[must_use]
     pub fn new(
         device: &'a wgpu::Device,
@@ -108,7 +107,7 @@ impl<'a> Recorder<'a> {
         Self { device, encoder, clock, staging, fault: None }
     }
 
-    /// Writes to a buffer, after all that has been recorded so far and before what follows. A fault shows in
+    /// Records an upload to a buffer, ordered after all that has been recorded so far. Errors are returned by
     /// [`Recorder::finish`].
     pub fn write(&mut self, to: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
         if self.fault.is_none() {
@@ -116,14 +115,14 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// For commands outside of passes.
+    /// Encoder for commands outside of passes.
     pub fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
         &mut self.encoder
     }
 
     /// Begins a compute pass.
     pub fn compute_pass(&mut self, name: &'static str) -> wgpu::ComputePass<'_> {
-        let stamps = self.clock.as_mut().and_then(|clock| clock.next(name));
+        let stamps = self.clock.as_mut().and_then(|clock| clock.next_pass(name));
         let timestamp_writes = stamps.map(|(query_set, first)| wgpu::ComputePassTimestampWrites {
             query_set,
             beginning_of_pass_write_index: Some(first),
@@ -139,7 +138,7 @@ impl<'a> Recorder<'a> {
         color: Option<wgpu::RenderPassColorAttachment<'_>>,
         depth: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
     ) -> wgpu::RenderPass<'_> {
-        let stamps = self.clock.as_mut().and_then(|clock| clock.next(name));
+        let stamps = self.clock.as_mut().and_then(|clock| clock.next_pass(name));
         let timestamp_writes = stamps.map(|(query_set, first)| wgpu::RenderPassTimestampWrites {
             query_set,
             beginning_of_pass_write_index: Some(first),
@@ -156,7 +155,7 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// The commands, to be submitted.
+    /// Finishes the command buffer for submission.
     ///
     /// # Errors
     /// [`GpuError::Device`] if the device would not take what was written.
@@ -164,13 +163,13 @@ impl<'a> Recorder<'a> {
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        self.staging.end();
+        self.staging.unmap();
         if let Some(clock) = self.clock {
             let stamps = 2 * clock.names.len() as u32;
             if stamps > 0 {
                 self.encoder.resolve_query_set(&clock.queries, 0..stamps, &clock.resolved, 0);
             }
-            self.encoder.copy_buffer_to_buffer(&clock.resolved, 0, &clock.on_host, 0, STAMPS_BYTES);
+            self.encoder.copy_buffer_to_buffer(&clock.resolved, 0, &clock.cpu_buffer, 0, STAMPS_BYTES);
         }
         Ok(self.encoder.finish())
     }

@@ -1,7 +1,7 @@
-//! The reverse pipeline: output pixel -> lens inverse (map) -> temporal inverse -> gather -> photometric ->
-//! output buffer.
+//! The reverse pipeline: output pixel -> lens inverse (map) -> temporal inverse -> gather -> photometric
+//! stage -> output buffer.
 //!
-//! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text.
+//! One fused compute kernel, composed of one file per stage; what a frame does not need is not in its text.
 //! [`PipelineKey::all`] lists every legal composition.
 
 use std::collections::{HashMap, hash_map::Entry};
@@ -11,113 +11,113 @@ use camsim_plan::{FramePlan, RayStage};
 
 use crate::{
     context::GpuContext,
-    ideal::{FineTarget, whole},
+    ideal::{SupersampledTarget, full_view},
     recorder::Recorder,
     shaders::{self, ComposeError},
 };
 
-mod key;
 pub mod lens_inverse;
+mod pipeline_key;
 
-pub use key::{EdgeKind, KeyKind, PipelineKey, TapKind, TemporalKind};
+pub use pipeline_key::{EdgeKind, KeyKind, PipelineKey, TapKind, TemporalKind};
 
-/// The kernel's main file.
+/// Main file of the image kernel.
 pub const SHADER: &str = "reverse/reverse.wgsl";
-/// The kernel that goes through the pixels that it lists, where silhouettes can be in view.
+/// Main file of the kernel that filters the listed pixels, where silhouettes can be in view.
 pub const CANDIDATES_SHADER: &str = "reverse/edges/candidates.wgsl";
-/// The kernel of those that stay.
-pub const RAYS_SHADER: &str = "reverse/rays.wgsl";
-/// Edge of the square workgroups.
+/// Main file of the kernel that casts silhouette rays for the remaining pixels.
+pub const RAYS_SHADER: &str = "reverse/edges/rays.wgsl";
+/// Side of the square workgroups, pixels.
 const WORKGROUP_PX: u32 = 8;
 
-/// What a dispatch reads and writes.
+/// Resources that the kernels read and write.
 #[derive(Debug)]
 pub struct ReverseBindings<'a> {
     /// `FrameUniforms`.
     pub frame: &'a wgpu::Buffer,
-    /// Normal quantiles, a row an octave.
+    /// Normal quantiles, one row per octave.
     pub noise_table: &'a wgpu::TextureView,
-    /// Ideal colour.
+    /// Colour of the ideal frames.
     pub color: &'a wgpu::TextureView,
-    /// Ideal depth.
+    /// Depth of the ideal frames.
     pub depth: &'a wgpu::TextureView,
-    /// The ideal frame's samples, when the key reads them.
-    pub fine: Option<&'a FineTarget>,
+    /// Samples of the ideal frames, if the key reads them.
+    pub fine: Option<&'a SupersampledTarget>,
     /// Relative poses of the lines, or their times for the constant-twist solvers.
     pub poses: &'a wgpu::Buffer,
     /// Vignette weights.
     pub vignette: &'a wgpu::TextureView,
-    /// Lens map, when the key reads one.
+    /// Lens map, if the key reads one.
     pub lens_map: Option<&'a wgpu::TextureView>,
-    /// Linear R G B A.
+    /// Output colour: linear R G B A.
     pub out_color: &'a wgpu::Buffer,
-    /// Depth and coordinates, when the key writes them.
+    /// Output truth, if the key writes it.
     pub out_truth: Option<&'a wgpu::Buffer>,
-    /// Lists of pixels, when the key lists any: of the picture's kernel, and what stays of it. Each has
-    /// [`list_size`] bytes, the first four words of them [`EMPTY_LIST`].
+    /// Pixel lists, if the key has silhouettes: of the image kernel, and filtered. Each has [`list_size`]
+    /// bytes and begins with [`EMPTY_LIST`].
     pub lists: Option<&'a [wgpu::Buffer; 2]>,
 }
 
-/// Head of the list of pixels before a frame: arguments of an empty dispatch, and no pixel.
+/// Head of an empty pixel list: arguments of an empty dispatch, and the number of pixels.
 pub const EMPTY_LIST: [u32; 4] = [0, 1, 1, 0];
 
-/// Bytes for a list of all pixels of a picture. A shader's structure is a multiple of its alignment long: the
-/// head and one pixel take 32.
+/// Size of a list for all pixels of a frame, bytes. The size of a shader struct is a multiple of its
+/// alignment: the head and one pixel take 32.
 #[must_use]
 pub fn list_size(size_px: [u32; 2]) -> u64 {
     let words = EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]);
     (4 * words).next_multiple_of(LIST_ALIGNMENT)
 }
 
-/// That of the `vec3<u32>` in a list's head.
+/// Alignment of the `vec3<u32>` in the head of a list.
 const LIST_ALIGNMENT: u64 = 16;
 
-/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and those of its
-/// silhouettes, made when a key is first used. They go with the target, and when a buffer of the frame's is
-/// replaced.
+/// Bind groups of one frame in flight with one ideal target, by key: of the image kernel and of the two
+/// silhouette kernels. Created when a key is first used, and invalid once the target or a buffer of the frame
+/// is replaced.
 #[derive(Debug, Default)]
-pub struct ReverseGroups(HashMap<PipelineKey, [Groups; 3]>);
+pub struct ReverseBindGroups(HashMap<PipelineKey, [Groups; 3]>);
 
 type Groups = [Option<wgpu::BindGroup>; 4];
 
-impl ReverseGroups {
-    /// A buffer was replaced.
+impl ReverseBindGroups {
+    /// Drops the bind groups, after a buffer has been replaced.
     pub fn clear(&mut self) {
         self.0.clear();
     }
 }
 
 #[derive(Debug)]
-struct Variant {
+struct KernelVariant {
     pipeline: wgpu::ComputePipeline,
-    lists: Lists,
+    lists: ListAccess,
     groups: [Option<wgpu::BindGroupLayout>; 4],
 }
 
-/// The kernels of a frame: the picture's, and where there may be silhouettes that of its list and that of
-/// their rays.
+/// Kernels of a key: the image kernel, and where there may be silhouettes the filter of its list and the
+/// kernel of the rays.
 #[derive(Debug)]
 struct Kernels {
-    picture: Variant,
-    silhouettes: Option<[Variant; 2]>,
+    image: KernelVariant,
+    silhouettes: Option<[KernelVariant; 2]>,
 }
 
-/// What a kernel does with the lists.
+/// Access of a kernel to the pixel lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lists {
-    /// Fills the first.
-    Fills,
-    /// Takes what stays from the first into the second.
-    Thins,
-    /// Reads the second.
-    Reads,
+enum ListAccess {
+    /// Writes the first list.
+    Write,
+    /// Reads the first list and writes the second.
+    Filter,
+    /// Reads the second list.
+    Read,
 }
 
 /// Kernels, compiled when first needed.
 #[derive(Debug)]
 pub struct ReversePass {
     variants: HashMap<PipelineKey, Kernels>,
-    /// Between texels, and of none of them.
+    /// Bilinear and nearest-texel sampler.
     samplers: [wgpu::Sampler; 2],
 }
 
@@ -136,7 +136,7 @@ impl ReversePass {
         Self { variants: HashMap::new(), samplers }
     }
 
-    /// Records the kernel of a plan; `groups` are those of these `bindings`.
+    /// Records the kernels of a plan. `groups` belong to these `bindings`.
     ///
     /// # Errors
     /// Faults of the shader files.
@@ -146,36 +146,42 @@ impl ReversePass {
         recorder: &mut Recorder<'_>,
         plan: &FramePlan,
         bindings: &ReverseBindings<'_>,
-        groups: &mut ReverseGroups,
+        groups: &mut ReverseBindGroups,
     ) -> Result<(), ComposeError> {
         let key = PipelineKey::of(plan);
         let kernels = match self.variants.entry(key) {
-            Entry::Occupied(compiled) => compiled.into_mut(),
-            Entry::Vacant(first_use) => first_use.insert(Kernels {
-                picture: Variant::new(gpu, key, SHADER, "reverse", Lists::Fills)?,
+            Entry::Occupied(occupied) => occupied.into_mut(),
+            Entry::Vacant(vacant) => vacant.insert(Kernels {
+                image: KernelVariant::new(gpu, key, SHADER, "reverse", ListAccess::Write)?,
                 silhouettes: match key.edges {
                     EdgeKind::None => None,
                     _ => Some([
-                        Variant::new(gpu, key, CANDIDATES_SHADER, "ask", Lists::Thins)?,
-                        Variant::new(gpu, key, RAYS_SHADER, "rays", Lists::Reads)?,
+                        KernelVariant::new(
+                            gpu,
+                            key,
+                            CANDIDATES_SHADER,
+                            "filter_candidates",
+                            ListAccess::Filter,
+                        )?,
+                        KernelVariant::new(gpu, key, RAYS_SHADER, "trace_silhouette_rays", ListAccess::Read)?,
                     ]),
                 },
             }),
         };
-        let [of_picture, of_silhouettes @ ..] = groups.0.entry(key).or_insert_with(|| {
-            let bind = |variant: &Variant| variant.bind(gpu, &self.samplers, bindings);
+        let [image_groups, silhouette_groups @ ..] = groups.0.entry(key).or_insert_with(|| {
+            let bind = |variant: &KernelVariant| variant.bind(gpu, &self.samplers, bindings);
             let [candidates, rays] =
                 kernels.silhouettes.as_ref().map(|of| of.each_ref().map(bind)).unwrap_or_default();
-            [bind(&kernels.picture), candidates, rays]
+            [bind(&kernels.image), candidates, rays]
         });
         let mut pass = recorder.compute_pass("reverse");
-        kernels.picture.set(&mut pass, of_picture);
-        let [across, down] = workgroups(plan, pixels_a_thread(gpu, key));
+        kernels.image.set(&mut pass, image_groups);
+        let [across, down] = workgroups(plan, pixels_per_thread(gpu, key));
         pass.dispatch_workgroups(across, down, 1);
         drop(pass);
         if let (Some(variants), Some(lists)) = (&kernels.silhouettes, bindings.lists) {
             for (((variant, groups), list), name) in
-                variants.iter().zip(of_silhouettes).zip(lists).zip(["candidates", "rays"])
+                variants.iter().zip(silhouette_groups).zip(lists).zip(["candidates", "rays"])
             {
                 let mut pass = recorder.compute_pass(name);
                 variant.set(&mut pass, groups);
@@ -186,14 +192,14 @@ impl ReversePass {
     }
 }
 
-/// Where poses are not held the pixels of a thread would share nothing.
-fn pixels_a_thread(gpu: &GpuContext, key: PipelineKey) -> u32 {
-    if key.holds_line() { gpu.pixels_a_thread } else { 1 }
+/// Without cached poses the pixels of a thread would share nothing.
+fn pixels_per_thread(gpu: &GpuContext, key: PipelineKey) -> u32 {
+    if key.caches_line_poses() { gpu.pixels_per_thread } else { 1 }
 }
 
-/// Along x and y, each as long as a thread's pixels along the lines and as wide as a workgroup across them.
-fn workgroups(plan: &FramePlan, pixels_a_thread: u32) -> [u32; 2] {
-    let long = WORKGROUP_PX * pixels_a_thread;
+/// Number of workgroups along x and y. A workgroup is as long along the lines as the pixels of its threads.
+fn workgroups(plan: &FramePlan, pixels_per_thread: u32) -> [u32; 2] {
+    let long = WORKGROUP_PX * pixels_per_thread;
     let sides_px = match plan.shutter.row_axis() {
         RowAxis::Rows => [long, WORKGROUP_PX],
         RowAxis::Columns => [WORKGROUP_PX, long],
@@ -201,13 +207,13 @@ fn workgroups(plan: &FramePlan, pixels_a_thread: u32) -> [u32; 2] {
     std::array::from_fn(|axis| plan.camera.size_px[axis].div_ceil(sides_px[axis]))
 }
 
-impl Variant {
+impl KernelVariant {
     fn new(
         gpu: &GpuContext,
         key: PipelineKey,
         file: &str,
         entry_point: &str,
-        lists: Lists,
+        lists: ListAccess,
     ) -> Result<Self, ComposeError> {
         let module = shaders::module(&gpu.device, "camsim.reverse", file, &key.slots())?;
         let groups = layouts(key, lists).map(|entries| {
@@ -223,8 +229,8 @@ impl Variant {
             bind_group_layouts: &groups.each_ref().map(Option::as_ref),
             immediate_size: 0,
         });
-        let pixels = [("PIXELS", f64::from(pixels_a_thread(gpu, key)))];
-        let constants = if lists == Lists::Fills && key.holds_line() { &pixels[..] } else { &[] };
+        let pixels = [("PIXELS", f64::from(pixels_per_thread(gpu, key)))];
+        let constants = if lists == ListAccess::Write && key.caches_line_poses() { &pixels[..] } else { &[] };
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("camsim.reverse"),
             layout: Some(&layout),
@@ -249,38 +255,38 @@ impl Variant {
         &self,
         gpu: &GpuContext,
         [sampler, nearest]: &[wgpu::Sampler; 2],
-        b: &ReverseBindings<'_>,
+        bindings: &ReverseBindings<'_>,
     ) -> Groups {
         let view = |view| wgpu::BindingResource::TextureView(view);
         let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
-            vec![(0, b.frame.as_entire_binding()), (1, view(b.noise_table))],
+            vec![(0, bindings.frame.as_entire_binding()), (1, view(bindings.noise_table))],
             vec![
-                (0, view(b.color)),
+                (0, view(bindings.color)),
                 (1, wgpu::BindingResource::Sampler(sampler)),
-                (2, view(b.depth)),
-                (3, b.poses.as_entire_binding()),
-                (4, view(b.vignette)),
+                (2, view(bindings.depth)),
+                (3, bindings.poses.as_entire_binding()),
+                (4, view(bindings.vignette)),
                 (9, wgpu::BindingResource::Sampler(nearest)),
             ],
             Vec::new(),
-            vec![(0, b.out_color.as_entire_binding())],
+            vec![(0, bindings.out_color.as_entire_binding())],
         ];
-        let fine = b
-            .fine
-            .map(|fine| (fine.color_view.as_ref(), &fine.depth_view, whole(&fine.lines), &fine.within_reach));
-        if let Some((color, depth, lines, within_reach)) = &fine {
+        let fine = bindings.fine.map(|fine| {
+            (fine.color_view.as_ref(), &fine.depth_view, full_view(&fine.lines), &fine.dilated_tiles)
+        });
+        if let Some((color, depth, lines, dilated_tiles)) = &fine {
             resources[1].extend(color.map(|color| (5, view(color))));
-            resources[1].extend([(6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
+            resources[1].extend([(6, view(depth)), (7, view(lines)), (8, dilated_tiles.as_entire_binding())]);
         }
-        resources[2].extend(b.lens_map.map(|map| (0, view(map))));
-        resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
-        if let Some([candidates, listed]) =
-            b.lists.map(|lists| lists.each_ref().map(wgpu::Buffer::as_entire_binding))
+        resources[2].extend(bindings.lens_map.map(|map| (0, view(map))));
+        resources[3].extend(bindings.out_truth.map(|truth| (1, truth.as_entire_binding())));
+        if let Some([candidates, filtered]) =
+            bindings.lists.map(|lists| lists.each_ref().map(wgpu::Buffer::as_entire_binding))
         {
             match self.lists {
-                Lists::Fills => resources[3].push((2, candidates)),
-                Lists::Thins => resources[3].extend([(2, listed), (3, candidates)]),
-                Lists::Reads => resources[3].push((2, listed)),
+                ListAccess::Write => resources[3].push((2, candidates)),
+                ListAccess::Filter => resources[3].extend([(2, filtered), (3, candidates)]),
+                ListAccess::Read => resources[3].push((2, filtered)),
             }
         }
         let mut groups = [const { None }; 4];
@@ -301,7 +307,7 @@ impl Variant {
     }
 }
 
-fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
+fn layouts(key: PipelineKey, lists: ListAccess) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
@@ -315,14 +321,14 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let numbers = || texture(wgpu::TextureSampleType::Float { filterable: false });
-    let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, numbers())];
+    let unfiltered = || texture(wgpu::TextureSampleType::Float { filterable: false });
+    let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, unfiltered())];
     let mut ideal = vec![
         entry(0, texture(wgpu::TextureSampleType::Float { filterable: true })),
         entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-        entry(2, numbers()),
+        entry(2, unfiltered()),
         entry(3, storage(true)),
-        entry(4, numbers()),
+        entry(4, unfiltered()),
         entry(9, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)),
     ];
     if key.edges != EdgeKind::None {
@@ -343,15 +349,15 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
     }
     let lens = match key.ray {
         RayStage::Pinhole | RayStage::GaussNewton => Vec::new(),
-        RayStage::LensMap => vec![entry(0, numbers())],
+        RayStage::LensMap => vec![entry(0, unfiltered())],
     };
     let mut out = vec![entry(0, storage(false))];
     if key.truth {
         out.push(entry(1, storage(false)));
     }
     if key.edges != EdgeKind::None {
-        out.push(entry(2, storage(lists == Lists::Reads)));
-        out.extend((lists == Lists::Thins).then(|| entry(3, storage(true))));
+        out.push(entry(2, storage(lists == ListAccess::Read)));
+        out.extend((lists == ListAccess::Filter).then(|| entry(3, storage(true))));
     }
     [frame, ideal, lens, out]
 }

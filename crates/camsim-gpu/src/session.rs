@@ -1,4 +1,4 @@
-//! One sequence on a gpu: buffers, passes and read-back of its frames.
+//! One sequence on a GPU: buffers, passes and read-back of its frames.
 
 use std::{collections::HashMap, sync::Arc, time::Instant};
 
@@ -24,83 +24,83 @@ use crate::{
     upload::SceneBuffers,
 };
 
-mod copies;
+mod frame_slot;
+mod ideal_copies;
 mod inspect;
 mod readback;
-mod slot;
 mod tables;
 
-use copies::IdealCopies;
-pub use copies::IdealCopy;
+use frame_slot::{FrameSlot, SessionTarget, list_buffer, pose_buffer};
+use ideal_copies::IdealCopies;
+pub use ideal_copies::IdealCopy;
 pub use inspect::IdealImages;
-use slot::{Slot, Target, list_buffer, pose_buffer};
 
-/// Frames that are worked on at once: one on the device while the one before is read.
+/// Frames in flight: one runs on the GPU while the one before is read back.
 pub const FRAMES_IN_FLIGHT: usize = 2;
-/// Ideal targets of different size that are kept.
+/// Maximum number of cached ideal targets.
 const MAX_TARGETS: usize = 4;
-/// The same for supersampled ones, which take 16 times the memory.
+/// Maximum number of cached supersampled or multisampled ideal targets, which take up to 16 times the memory.
 const MAX_FINE_TARGETS: usize = 2;
 
-/// What a frame is made from.
+/// Inputs of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct GpuJob<'a> {
     /// The plan.
     pub plan: &'a FramePlan,
     /// The scene.
     pub scene: &'a Scene,
-    /// Triangles of the terrain for each key frame; none without a terrain.
+    /// Terrain triangles of each key frame; empty without a terrain.
     pub terrain: &'a [PlacedMesh],
-    /// Poses or times of the rows, as the shaders read them.
+    /// Poses or times of the rows, in the layout of the shaders.
     pub rows: &'a [u8],
-    /// Numbers of the frame.
+    /// Uniforms of the frame.
     pub uniforms: &'a FrameUniforms,
     /// Level of detail of the models.
     pub models: &'a LodTolerance,
     /// Calibrations of a zoom lens.
     pub zoom: Option<&'a ZoomTable>,
-    /// Whether the ideal frames differ from those of the frame before.
+    /// Whether the ideal frames differ from those of the previous frame.
     pub redraws: bool,
-    /// What is read back.
-    pub wanted: Wanted,
+    /// What to read back.
+    pub readback: Readback,
 }
 
-/// What is read back of a frame.
+/// Result of a frame that is read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum Readback {
     /// The output frame.
     Output,
-    /// The ideal frame, for the cpu renderer.
+    /// The ideal frame, for the CPU renderer.
     Ideal,
 }
 
-/// A frame on the device.
+/// A submitted frame.
 #[derive(Debug)]
 pub struct Submitted {
     slot: usize,
     submission: wgpu::SubmissionIndex,
-    /// Where a copy of the ideal frame will be, if that is wanted.
+    /// The copy of the ideal frame, if it is read back.
     pub copy: Option<IdealCopy>,
-    /// Blended triangles that are drawn before something behind them, of all ideal frames.
+    /// Blended triangles that are drawn before something behind them, over all ideal frames.
     pub out_of_order: u32,
-    /// Milliseconds that recording took.
+    /// Duration of the recording, ms.
     pub record_ms: f64,
-    /// Milliseconds that the driver took to accept the commands.
+    /// Duration of the driver's submit call, ms.
     pub submit_ms: f64,
 }
 
-/// Ideal frames that were drawn last.
+/// The ideal frames that were drawn last.
 #[derive(Clone, Copy, Debug)]
-struct Drawn {
-    /// Place in the targets.
+struct LastIdeal {
+    /// Index in the targets.
     target: usize,
-    /// The slot of the frame that they were drawn for.
+    /// Slot of the frame for which they were drawn.
     slot: usize,
     out_of_order: u32,
     copy: Option<IdealCopy>,
 }
 
-/// One sequence on the device.
+/// One sequence on the GPU.
 #[derive(Debug)]
 pub struct GpuSession<'a> {
     gpu: &'a GpuContext,
@@ -108,22 +108,22 @@ pub struct GpuSession<'a> {
     ideal_pass: IdealPass,
     reverse_pass: ReversePass,
     lens_pass: Option<LensInversePass>,
-    /// Current lens map, by the bits of its zoom value.
+    /// Current lens map, and the bits of its zoom value.
     lens_map: Option<(u64, LensMap)>,
-    /// Maps of the zoom table's entries: starts for those in between.
+    /// Lens maps of the zoom table's entries: initial values for the zoom values in between.
     zoom_maps: HashMap<usize, LensMap>,
-    targets: Vec<Target>,
-    drawn: Option<Drawn>,
+    targets: Vec<SessionTarget>,
+    last_ideal: Option<LastIdeal>,
     copies: IdealCopies,
-    slots: Vec<Slot>,
-    /// Pixels of the frame at work that may see silhouettes, for frames that have any.
+    frame_slots: Vec<FrameSlot>,
+    /// Pixel lists of the frame that is being recorded, for frames with silhouettes.
     lists: Option<[wgpu::Buffer; 2]>,
     vignette: wgpu::TextureView,
     noise_table: wgpu::TextureView,
 }
 
 impl<'a> GpuSession<'a> {
-    /// Uploads a scene and prepares for frames of its sequence; `truth`: with depth and coordinates.
+    /// Uploads a scene and prepares for frames of its sequence. `truth`: frames have depth and coordinates.
     ///
     /// # Errors
     /// What the adapter cannot hold, faults of the shader files.
@@ -147,9 +147,9 @@ impl<'a> GpuSession<'a> {
             lens_map: None,
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
-            drawn: None,
+            last_ideal: None,
             copies: IdealCopies::new(gpu),
-            slots: slots(gpu, sequence, truth),
+            frame_slots: frame_slots(gpu, sequence, truth),
             lists: None,
             buffers,
             gpu,
@@ -158,8 +158,8 @@ impl<'a> GpuSession<'a> {
         Ok(session)
     }
 
-    /// Goes on with another sequence over the same scene and with the same preset: kernels and pictures stay
-    /// on the device. `before` is the sequence of now, with its wish for truth.
+    /// Switches to another sequence over the same scene with the same preset: kernels and textures stay on
+    /// the GPU. `before` is the current sequence and whether it has truth.
     ///
     /// # Errors
     /// Output frames that no storage buffer holds; the session then stays as it was.
@@ -172,8 +172,8 @@ impl<'a> GpuSession<'a> {
         check_output(self.gpu, sequence, truth)?;
         let same_size = before.0.scenario.camera.size_px == sequence.scenario.camera.size_px;
         if !same_size || truth != before.1 {
-            self.slots = slots(self.gpu, sequence, truth);
-            self.drawn = None;
+            self.frame_slots = frame_slots(self.gpu, sequence, truth);
+            self.last_ideal = None;
         }
         if !same_size {
             self.lists = None;
@@ -181,35 +181,34 @@ impl<'a> GpuSession<'a> {
         self.lens_map = None;
         self.zoom_maps.clear();
         self.vignette = tables::vignette(self.gpu, sequence);
-        // Bind groups hold what has just been replaced.
+        // Bind groups refer to what has just been replaced.
         self.targets.iter_mut().flat_map(|target| &mut target.groups).for_each(|groups| groups.clear());
         self.gpu.check()
     }
 
-    /// Whether ideal frames that were drawn here are still there.
+    /// Whether the ideal frames that were drawn last are still valid.
     #[must_use]
     pub fn has_ideal(&self) -> bool {
-        self.drawn.is_some()
+        self.last_ideal.is_some()
     }
 
-    /// Forgets what was drawn.
+    /// Invalidates the ideal frames that were drawn last.
     pub fn forget(&mut self) {
-        self.drawn = None;
+        self.last_ideal = None;
     }
 
-    /// Tiles of the ground's picture, if it is too large for a texture.
+    /// Tile grid of the terrain's texture, if that is larger than a GPU texture.
     #[must_use]
     pub fn tiles(&self) -> Option<Arc<TerrainTiles>> {
         self.buffers.tiles().map(|tiles| tiles.ground.clone())
     }
 
-    /// Measures from now on how long each pass takes on the device; `false` where the adapter has no time
-    /// stamps.
+    /// Enables time stamps of each pass. `false` if the adapter has none.
     pub fn time_passes(&mut self) -> bool {
-        for slot in &mut self.slots {
+        for slot in &mut self.frame_slots {
             slot.clock = PassClock::new(self.gpu);
         }
-        self.slots.iter().all(|slot| slot.clock.is_some())
+        self.frame_slots.iter().all(|slot| slot.clock.is_some())
     }
 
     /// Records and submits a frame in one of [`FRAMES_IN_FLIGHT`] slots.
@@ -217,32 +216,33 @@ impl<'a> GpuSession<'a> {
     /// # Errors
     /// What the adapter cannot hold, faults of the shader files and of the device.
     pub fn submit(&mut self, job: &GpuJob<'_>, slot: usize) -> Result<Submitted, PassError> {
-        let begun = Instant::now();
-        let mut clock = self.slots[slot].clock.take();
-        let mut staging = self.slots[slot].staging.take().unwrap_or_else(|| Staging::new(&self.gpu.device));
-        let recorded = self.record(job, slot, Recorder::new(&self.gpu.device, clock.as_mut(), &mut staging));
-        self.slots[slot].clock = clock;
-        self.slots[slot].staging = Some(staging);
-        let commands = recorded.inspect_err(|_| {
-            // What was recorded to be kept will never be there.
-            (self.drawn, self.lens_map) = (None, None);
+        let start = Instant::now();
+        let mut clock = self.frame_slots[slot].clock.take();
+        let mut staging =
+            self.frame_slots[slot].staging.take().unwrap_or_else(|| Staging::new(&self.gpu.device));
+        let result = self.record(job, slot, Recorder::new(&self.gpu.device, clock.as_mut(), &mut staging));
+        self.frame_slots[slot].clock = clock;
+        self.frame_slots[slot].staging = Some(staging);
+        let commands = result.inspect_err(|_| {
+            // Caches whose contents were recorded but never submitted are invalid.
+            (self.last_ideal, self.lens_map) = (None, None);
             self.zoom_maps.clear();
             self.targets.clear();
             self.copies.forget();
         })?;
-        let record_ms = ms_since(begun);
-        let begun = Instant::now();
+        let record_ms = ms_since(start);
+        let start = Instant::now();
         let submission = self.gpu.queue.submit([commands]);
-        let submit_ms = ms_since(begun);
-        self.slots[slot].recall(job.wanted == Wanted::Output);
-        self.copies.recall();
+        let submit_ms = ms_since(start);
+        self.frame_slots[slot].request_mapping(job.readback == Readback::Output);
+        self.copies.request_mapping();
         self.gpu.check()?;
         let (out_of_order, copy) =
-            self.drawn.map(|drawn| (drawn.out_of_order, drawn.copy)).unwrap_or_default();
+            self.last_ideal.map(|last_ideal| (last_ideal.out_of_order, last_ideal.copy)).unwrap_or_default();
         Ok(Submitted { slot, submission, copy, out_of_order, record_ms, submit_ms })
     }
 
-    /// Waits for a frame.
+    /// Waits for a submitted frame.
     ///
     /// # Errors
     /// Faults of the device.
@@ -253,62 +253,64 @@ impl<'a> GpuSession<'a> {
         self.gpu.check()
     }
 
-    /// The output frame of a submission that is done: linear R G B A, and the truth where it is wanted.
+    /// Output frame of a completed submission: linear R G B A, and the truth if the plan has it.
     ///
     /// # Errors
     /// Faults of the device.
     pub fn output(&self, submitted: &Submitted) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
-        let slot = &self.slots[submitted.slot];
+        let slot = &self.frame_slots[submitted.slot];
         let truth = slot.truth.as_ref().map(|truth| truth.read::<Truth>()).transpose()?;
         Ok((slot.color.read()?, truth))
     }
 
-    /// The copy of an ideal frame, once its submission is done.
+    /// Calls `read` with the copy of an ideal frame, once its submission is complete.
     ///
     /// # Errors
     /// Faults of the device.
     pub fn with_copy<R>(
         &self,
         copy: IdealCopy,
-        read: impl FnOnce(copies::CopiedIdeal<'_>) -> R,
+        read: impl FnOnce(ideal_copies::CopiedIdeal<'_>) -> R,
     ) -> Result<R, GpuError> {
         self.copies.read(copy, read)
     }
 
-    /// How long the passes of a frame took, if they are timed.
+    /// Duration of each pass of a frame, if time stamps are enabled.
     ///
     /// # Errors
     /// Faults of the device.
     pub fn pass_times(&self, submitted: &Submitted) -> Result<Vec<PassTime>, GpuError> {
-        match &self.slots[submitted.slot].clock {
-            Some(clock) => Ok(clock.passes(self.gpu, &readback::read_mapped(clock.on_host())?)),
+        match &self.frame_slots[submitted.slot].clock {
+            Some(clock) => Ok(clock.passes(self.gpu, &readback::read_mapped(clock.cpu_buffer())?)),
             None => Ok(Vec::new()),
         }
     }
 
-    /// Every pass of a frame, in order.
+    /// Records all passes of a frame in order.
     fn record(
         &mut self,
         job: &GpuJob<'_>,
         slot: usize,
         mut recorder: Recorder<'_>,
     ) -> Result<wgpu::CommandBuffer, PassError> {
-        let makes_output = job.wanted == Wanted::Output;
-        if makes_output && job.plan.ray == RayStage::LensMap {
+        let has_output = job.readback == Readback::Output;
+        if has_output && job.plan.ray == RayStage::LensMap {
             self.lens_inverse(&mut recorder, job);
         }
-        if job.redraws || self.drawn.is_none() {
-            self.drawn = Some(self.ideal(&mut recorder, job, slot)?);
+        if job.redraws || self.last_ideal.is_none() {
+            self.last_ideal = Some(self.ideal(&mut recorder, job, slot)?);
         }
-        if makes_output {
+        if has_output {
             self.reverse(&mut recorder, job, slot)?;
-            let slot = &self.slots[slot];
+            let slot = &self.frame_slots[slot];
             for output in std::iter::once(&slot.color).chain(&slot.truth) {
                 output.copy(recorder.encoder());
             }
-        } else if let Some(drawn) = self.drawn.as_mut().filter(|drawn| drawn.copy.is_none()) {
-            let target = &self.targets[drawn.target].ideal;
-            drawn.copy = Some(self.copies.record(self.gpu, &mut recorder, target, &job.plan.ideal));
+        } else if let Some(last_ideal) =
+            self.last_ideal.as_mut().filter(|last_ideal| last_ideal.copy.is_none())
+        {
+            let target = &self.targets[last_ideal.target].ideal;
+            last_ideal.copy = Some(self.copies.record(self.gpu, &mut recorder, target, &job.plan.ideal));
         }
         Ok(recorder.finish()?)
     }
@@ -316,8 +318,8 @@ impl<'a> GpuSession<'a> {
     /// Pass 1, only when the lens has changed: the lens map.
     fn lens_inverse(&mut self, recorder: &mut Recorder<'_>, job: &GpuJob<'_>) {
         let (device, plan) = (&self.gpu.device, job.plan);
-        let bits = plan.zoom.unwrap_or_default().to_bits();
-        if self.lens_map.as_ref().is_some_and(|(of, _)| *of == bits) {
+        let zoom_bits = plan.zoom.unwrap_or_default().to_bits();
+        if self.lens_map.as_ref().is_some_and(|(of, _)| *of == zoom_bits) {
             return;
         }
         let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(device));
@@ -338,7 +340,7 @@ impl<'a> GpuSession<'a> {
             None => LensMap::new(device, plan.camera.size_px),
         };
         pass.encode(device, recorder, &plan.camera, &mut map, warm);
-        self.lens_map = Some((bits, map));
+        self.lens_map = Some((zoom_bits, map));
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
@@ -347,11 +349,11 @@ impl<'a> GpuSession<'a> {
         recorder: &mut Recorder<'_>,
         job: &GpuJob<'_>,
         slot: usize,
-    ) -> Result<Drawn, PassError> {
+    ) -> Result<LastIdeal, PassError> {
         let (gpu, plan) = (self.gpu, job.plan);
         let target = self.target(plan);
-        self.buffers.bring_pictures(gpu, job.scene);
-        let ideal_slots = &mut self.slots[slot].ideal;
+        self.buffers.upload_textures(gpu, job.scene);
+        let ideal_slots = &mut self.frame_slots[slot].ideal;
         while ideal_slots.len() < plan.keys.len() {
             ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));
         }
@@ -360,7 +362,7 @@ impl<'a> GpuSession<'a> {
                 job.terrain.iter().flat_map(|mesh| mesh.tiles.iter().copied()).collect();
             tiles.sort_unstable();
             tiles.dedup();
-            pool.bring(gpu, &tiles)?;
+            pool.make_resident(gpu, &tiles)?;
         }
         let out_of_order = self.ideal_pass.encode(
             gpu,
@@ -373,22 +375,23 @@ impl<'a> GpuSession<'a> {
             job.models,
             &self.targets[target].ideal,
         )?;
-        Ok(Drawn { target, slot, out_of_order, copy: None })
+        Ok(LastIdeal { target, slot, out_of_order, copy: None })
     }
 
-    /// A target for the ideal frames of a plan, the last of all: the one used longest ago makes room.
+    /// Target for the ideal frames of a plan. It becomes the last of all; the least recently used one of its
+    /// kind is dropped if there are too many.
     fn target(&mut self, plan: &FramePlan) -> usize {
         let size_px = IdealTarget::size_for(plan, self.gpu.max_side_px());
-        let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
-        let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
+        let cached = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
+        let target = cached.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let has_samples = plan.edges != EdgeStage::None || plan.samples_a_pixel > 1;
             let limit = if has_samples { MAX_FINE_TARGETS } else { MAX_TARGETS };
-            let alike = |target: &Target| target.ideal.has_samples() == has_samples;
-            if self.targets.iter().filter(|target| alike(target)).count() >= limit {
-                let longest_unused = self.targets.iter().position(alike).unwrap_or_default();
+            let is_same_kind = |target: &SessionTarget| target.ideal.has_samples() == has_samples;
+            if self.targets.iter().filter(|target| is_same_kind(target)).count() >= limit {
+                let longest_unused = self.targets.iter().position(is_same_kind).unwrap_or_default();
                 self.targets.remove(longest_unused);
             }
-            Target { ideal: IdealTarget::new(self.gpu, size_px, plan), groups: Default::default() }
+            SessionTarget { ideal: IdealTarget::new(self.gpu, size_px, plan), groups: Default::default() }
         });
         self.targets.push(target);
         self.targets.len() - 1
@@ -402,21 +405,23 @@ impl<'a> GpuSession<'a> {
         slot: usize,
     ) -> Result<(), ComposeError> {
         let (gpu, plan) = (self.gpu, job.plan);
-        let buffers = &mut self.slots[slot];
+        let buffers = &mut self.frame_slots[slot];
         if buffers.poses.size() < job.rows.len() as u64 {
             buffers.poses = pose_buffer(gpu, job.rows.len() as u64);
             self.targets.iter_mut().for_each(|target| target.groups[slot].clear());
         }
         recorder.write(&buffers.frame, 0, bytemuck::bytes_of(job.uniforms));
         recorder.write(&buffers.poses, 0, job.rows);
-        let Some(target) = self.drawn.map(|drawn| &mut self.targets[drawn.target]) else { return Ok(()) };
+        let Some(target) = self.last_ideal.map(|last_ideal| &mut self.targets[last_ideal.target]) else {
+            return Ok(());
+        };
         let lens_map = match plan.ray {
             RayStage::LensMap => self.lens_map.as_ref().map(|(_, map)| &map.view),
             _ => None,
         };
         let lists = (plan.edges != EdgeStage::None).then(|| {
             let lists = self.lists.get_or_insert_with(|| {
-                ["camsim.candidates", "camsim.listed"]
+                ["camsim.candidates", "camsim.filtered_candidates"]
                     .map(|label| list_buffer(gpu, label, plan.camera.size_px))
             });
             lists.iter().for_each(|list| recorder.write(list, 0, bytemuck::cast_slice(&EMPTY_LIST)));
@@ -426,24 +431,24 @@ impl<'a> GpuSession<'a> {
             lists,
             frame: &buffers.frame,
             noise_table: &self.noise_table,
-            color: &target.ideal.gathered_color,
-            depth: &target.ideal.gathered_depth,
-            fine: target.ideal.fine.as_ref(),
+            color: &target.ideal.gather_color,
+            depth: &target.ideal.gather_depth,
+            fine: target.ideal.supersampled.as_ref(),
             poses: &buffers.poses,
             vignette: &self.vignette,
             lens_map,
-            out_color: &buffers.color.on_device,
-            out_truth: buffers.truth.as_ref().map(|truth| &truth.on_device),
+            out_color: &buffers.color.gpu_buffer,
+            out_truth: buffers.truth.as_ref().map(|truth| &truth.gpu_buffer),
         };
         let groups = &mut target.groups[slot];
         self.reverse_pass.encode(gpu, recorder, plan, &bindings, groups)
     }
 }
 
-/// Refuses output frames that no storage buffer or texture holds.
+/// Checks that storage buffers and textures hold the output frame.
 fn check_output(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Result<(), GpuError> {
     let [width, height] = sequence.scenario.camera.size_px.map(u64::from);
-    // Lens map and vignette are textures of its size.
+    // Lens map and vignette are textures of the same size.
     let (needed, limit) = (width.max(height), u64::from(gpu.max_side_px()));
     if needed > limit {
         let (what, limit_name) = ("a side of the output frame".into(), "max_texture_dimension_2d (px)");
@@ -458,10 +463,10 @@ fn check_output(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Result<()
     Ok(())
 }
 
-fn slots(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Vec<Slot> {
-    (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, sequence, truth)).collect()
+fn frame_slots(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Vec<FrameSlot> {
+    (0..FRAMES_IN_FLIGHT).map(|_| FrameSlot::new(gpu, sequence, truth)).collect()
 }
 
-fn ms_since(begun: Instant) -> f64 {
-    begun.elapsed().as_secs_f64() * 1e3
+fn ms_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }

@@ -1,15 +1,16 @@
 //! WGSL composition: `#import path` includes a file once; `#import <slot:name>` is filled by the pipeline
 //! key.
 //!
-//! About a hundred lines of plain text joining keep every file readable by WGSL tools, need no build step,
-//! and leave naga's version alone; naga_oil's module system would rename every symbol for no gain at this
-//! size. `CAMSIM_SHADER_DIR` reads the files from a folder instead of the embedded copies, for development.
+//! A hundred lines of plain text substitution keep every file readable by WGSL tools, need no build step, and
+//! are independent of naga's version. naga_oil's module system would rename every symbol for no gain at this
+//! size. If `CAMSIM_SHADER_DIR` is set, the files are read from that folder instead of the embedded copies,
+//! for development.
 
 use std::borrow::Cow;
 
 macro_rules! embedded {
     ($($path:literal),* $(,)?) => {
-        /// Every shader file: path below `shaders/`, text.
+        /// All shader files: path below `shaders/`, text.
         pub const FILES: &[(&str, &str)] = &[$(($path, include_str!(concat!("../../../shaders/", $path)))),*];
     };
 }
@@ -18,72 +19,73 @@ embedded![
     "common/dispatch.wgsl",
     "common/frame.wgsl",
     "common/noise.wgsl",
-    "ideal/borders.wgsl",
+    "ideal/alpha_mask.wgsl",
     "ideal/camera.wgsl",
-    "ideal/covered/samples.wgsl",
-    "ideal/covered/whole.wgsl",
-    "ideal/fine.wgsl",
+    "ideal/centroid/covered_samples.wgsl",
+    "ideal/centroid/pixel_centre.wgsl",
+    "ideal/dilate_tiles.wgsl",
+    "ideal/edge_lines.wgsl",
+    "ideal/edge_mask.wgsl",
+    "ideal/edge_mask_to_alpha.wgsl",
+    "ideal/edge_tiles.wgsl",
+    "ideal/find_edge_lines.wgsl",
+    "ideal/fog/exponential.wgsl",
     "ideal/fog/none.wgsl",
-    "ideal/fog/some.wgsl",
-    "ideal/holes.wgsl",
     "ideal/light.wgsl",
-    "ideal/lines.wgsl",
-    "ideal/marked_tiles.wgsl",
-    "ideal/marks.wgsl",
     "ideal/mesh.wgsl",
-    "ideal/mesh_color/mixed.wgsl",
-    "ideal/mesh_color/whole.wgsl",
-    "ideal/mesh_holes.wgsl",
-    "ideal/mesh_holes_lit.wgsl",
+    "ideal/mesh_color/blended.wgsl",
+    "ideal/mesh_color/opaque.wgsl",
     "ideal/mesh_lit.wgsl",
+    "ideal/mesh_masked.wgsl",
+    "ideal/mesh_masked_lit.wgsl",
     "ideal/mesh_surface.wgsl",
-    "ideal/near_marks.wgsl",
-    "ideal/picture/mixed.wgsl",
-    "ideal/picture/tiles.wgsl",
-    "ideal/picture/whole.wgsl",
-    "ideal/reach.wgsl",
-    "ideal/reads/four.wgsl",
-    "ideal/reads/grid.wgsl",
-    "ideal/reads/one.wgsl",
-    "ideal/reads/two.wgsl",
-    "ideal/samples.wgsl",
-    "ideal/spread/none.wgsl",
-    "ideal/spread/samples.wgsl",
-    "ideal/stamp.wgsl",
+    "ideal/prefilter/four.wgsl",
+    "ideal/prefilter/grid.wgsl",
+    "ideal/prefilter/one.wgsl",
+    "ideal/prefilter/two.wgsl",
+    "ideal/resolve_depth.wgsl",
+    "ideal/sample_count.wgsl",
     "ideal/surface.wgsl",
     "ideal/terrain.wgsl",
     "ideal/terrain_vertex.wgsl",
+    "ideal/texture/opaque.wgsl",
+    "ideal/texture/tiled.wgsl",
+    "ideal/texture/with_alpha.wgsl",
+    "ideal/thin_surfaces/none.wgsl",
+    "ideal/thin_surfaces/samples.wgsl",
+    "ideal/triangles_near_edges.wgsl",
     "reverse/color/linear.wgsl",
-    "reverse/color/stored.wgsl",
+    "reverse/color/srgb.wgsl",
     "reverse/depth/bilinear.wgsl",
     "reverse/depth/nearest.wgsl",
     "reverse/edges/candidates.wgsl",
     "reverse/edges/color/centres.wgsl",
     "reverse/edges/color/samples.wgsl",
-    "reverse/edges/list.wgsl",
-    "reverse/edges/listed.wgsl",
-    "reverse/edges/near.wgsl",
+    "reverse/edges/list_candidates.wgsl",
+    "reverse/edges/near_silhouette.wgsl",
     "reverse/edges/none.wgsl",
-    "reverse/edges/seen.wgsl",
-    "reverse/edges/supersampled.wgsl",
+    "reverse/edges/pixel_list.wgsl",
+    "reverse/edges/rays.wgsl",
+    "reverse/edges/silhouette_rays.wgsl",
+    "reverse/edges/truth.wgsl",
     "reverse/emit/color.wgsl",
     "reverse/emit/truth.wgsl",
     "reverse/gather/blur.wgsl",
     "reverse/gather/footprint.wgsl",
     "reverse/gather/interface.wgsl",
+    "reverse/gather/no_blur.wgsl",
     "reverse/gather/nodes/each.wgsl",
     "reverse/gather/nodes/ends.wgsl",
+    "reverse/gather/nodes/independent.wgsl",
     "reverse/gather/nodes/mid.wgsl",
-    "reverse/gather/nodes/solved.wgsl",
     "reverse/gather/nodes/three.wgsl",
     "reverse/gather/path/parabola.wgsl",
     "reverse/gather/path/quartic.wgsl",
     "reverse/gather/path/straight.wgsl",
-    "reverse/gather/sharp.wgsl",
+    "reverse/gather/segments/one.wgsl",
+    "reverse/gather/segments/several.wgsl",
+    "reverse/gather/segments/two.wgsl",
     "reverse/gather/straight.wgsl",
-    "reverse/gather/stretches/one.wgsl",
-    "reverse/gather/stretches/several.wgsl",
-    "reverse/gather/stretches/two.wgsl",
     "reverse/gather/tap/area.wgsl",
     "reverse/gather/tap/bilinear.wgsl",
     "reverse/gather/tap/cells.wgsl",
@@ -92,10 +94,10 @@ embedded![
     "reverse/gather/tap/spline.wgsl",
     "reverse/gather/tap/spline_or_grid.wgsl",
     "reverse/ideal_frame.wgsl",
-    "reverse/keys/elsewhere.wgsl",
+    "reverse/keys/mid_window.wgsl",
     "reverse/keys/one.wgsl",
+    "reverse/keys/other_instant.wgsl",
     "reverse/keys/several.wgsl",
-    "reverse/keys/single.wgsl",
     "reverse/lens_inverse/brown_conrady.wgsl",
     "reverse/lens_inverse/kannala_brandt.wgsl",
     "reverse/lens_inverse/lens.wgsl",
@@ -104,66 +106,70 @@ embedded![
     "reverse/lens_inverse/start_cold.wgsl",
     "reverse/lens_inverse/start_warm.wgsl",
     "reverse/lens_inverse/table.wgsl",
-    "reverse/line/held.wgsl",
-    "reverse/line/read.wgsl",
+    "reverse/line_poses/cached.wgsl",
+    "reverse/line_poses/uncached.wgsl",
     "reverse/photometric.wgsl",
     "reverse/pixels/one.wgsl",
     "reverse/pixels/several.wgsl",
     "reverse/ray/gauss_newton.wgsl",
     "reverse/ray/interface.wgsl",
-    "reverse/ray/map.wgsl",
+    "reverse/ray/lens_map.wgsl",
     "reverse/ray/pinhole.wgsl",
-    "reverse/rays.wgsl",
     "reverse/reverse.wgsl",
     "reverse/temporal_inverse/constant_depth.wgsl",
     "reverse/temporal_inverse/identity.wgsl",
     "reverse/temporal_inverse/interface.wgsl",
     "reverse/temporal_inverse/line_entry.wgsl",
     "reverse/temporal_inverse/linear.wgsl",
-    "reverse/temporal_inverse/looks/one.wgsl",
-    "reverse/temporal_inverse/looks/several.wgsl",
-    "reverse/temporal_inverse/looks/two.wgsl",
+    "reverse/temporal_inverse/look_ups/one.wgsl",
+    "reverse/temporal_inverse/look_ups/several.wgsl",
+    "reverse/temporal_inverse/look_ups/two.wgsl",
     "reverse/temporal_inverse/pose_table.wgsl",
     "reverse/temporal_inverse/reproject.wgsl",
     "reverse/temporal_inverse/rk2.wgsl",
     "reverse/temporal_inverse/rotation.wgsl",
 ];
 
-/// A slot's name and the file that fills it.
-pub type Slot = (&'static str, &'static str);
+/// Name of a slot, and the file that fills it.
+pub type ShaderSlot = (&'static str, &'static str);
 
-/// Errors of composition: faults of the shader files, not of any input.
+/// Errors of composition. They are inconsistencies of the shader files, not of any input.
 #[derive(Debug, thiserror::Error)]
 pub enum ComposeError {
-    /// No such file.
+    /// A file does not exist.
     #[error("shader file `{0}` does not exist")]
     Missing(String),
-    /// A slot that the key does not fill.
+    /// The pipeline key does not fill a slot.
     #[error("slot `{slot}` of `{file}` is not filled")]
     Unfilled {
-        /// Slot name.
+        /// Name of the slot.
         slot: String,
-        /// Importing file.
+        /// File that imports the slot.
         file: String,
     },
 }
 
-/// The whole WGSL text of `file` with its imports, each once, in order of first need.
+/// WGSL text of `file` with its imports, each once, in order of first use.
 ///
 /// # Errors
 /// A missing file or an unfilled slot.
-pub fn compose(file: &str, slots: &[Slot]) -> Result<String, ComposeError> {
-    let mut seen = Vec::new();
+pub fn compose(file: &str, slots: &[ShaderSlot]) -> Result<String, ComposeError> {
+    let mut included = Vec::new();
     let mut text = String::new();
-    append(file, slots, &mut seen, &mut text)?;
+    append(file, slots, &mut included, &mut text)?;
     Ok(text)
 }
 
-fn append(file: &str, slots: &[Slot], seen: &mut Vec<String>, text: &mut String) -> Result<(), ComposeError> {
-    if seen.iter().any(|name| name == file) {
+fn append(
+    file: &str,
+    slots: &[ShaderSlot],
+    included: &mut Vec<String>,
+    text: &mut String,
+) -> Result<(), ComposeError> {
+    if included.iter().any(|name| name == file) {
         return Ok(());
     }
-    seen.push(file.to_owned());
+    included.push(file.to_owned());
     let source = read(file)?;
     let mut body = format!("// from {file}\n");
     for line in source.lines() {
@@ -179,7 +185,7 @@ fn append(file: &str, slots: &[Slot], seen: &mut Vec<String>, text: &mut String)
                 .find_map(|(name, filling)| (*name == slot).then_some(*filling))
                 .ok_or_else(|| ComposeError::Unfilled { slot: slot.to_owned(), file: file.to_owned() })?,
         };
-        append(target, slots, seen, text)?;
+        append(target, slots, included, text)?;
     }
     text.push_str(&body);
     Ok(())
@@ -197,7 +203,7 @@ fn read(file: &str) -> Result<Cow<'static, str>, ComposeError> {
         .ok_or_else(|| ComposeError::Missing(file.to_owned()))
 }
 
-/// A shader module from a composed file.
+/// Shader module of a composed file.
 ///
 /// # Errors
 /// As [`compose`]. WGSL faults surface as validation errors of the device; a test validates every variant
@@ -206,7 +212,7 @@ pub fn module(
     device: &wgpu::Device,
     label: &str,
     file: &str,
-    slots: &[Slot],
+    slots: &[ShaderSlot],
 ) -> Result<wgpu::ShaderModule, ComposeError> {
     let source = compose(file, slots)?;
     Ok(device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -223,19 +229,19 @@ mod tests {
 
     use super::*;
 
-    fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    fn files_below(folder: &Path, paths: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            if path.is_dir() { files_below(&path, found) } else { found.push(path) }
+            if path.is_dir() { files_below(&path, paths) } else { paths.push(path) }
         }
     }
 
     #[test]
-    fn the_embedded_table_is_the_folder() {
+    fn embedded_table_lists_every_shader_file() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders");
-        let mut found = Vec::new();
-        files_below(&root, &mut found);
-        let mut names: Vec<String> = found
+        let mut paths = Vec::new();
+        files_below(&root, &mut paths);
+        let mut names: Vec<String> = paths
             .iter()
             .map(|p| p.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/"))
             .collect();
@@ -244,10 +250,9 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn missing_files_and_unfilled_slots_are_named() {
         assert!(matches!(compose("no/such.wgsl", &[]), Err(ComposeError::Missing(_))));
-        assert!(
-            matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "keys")
-        );
+        let unfilled = compose("reverse/reverse.wgsl", &[]);
+        assert!(matches!(unfilled, Err(ComposeError::Unfilled { slot, .. }) if slot == "keys"));
     }
 }

@@ -1,19 +1,19 @@
-//! What the host writes for a frame: memory that the frame's commands copy from, used again by a later frame.
-//! `Queue::write_buffer` makes a buffer for each call.
+//! Staging memory for uploads. The commands of a frame copy from it; later frames reuse it.
+//! `Queue::write_buffer` would allocate a buffer for each call.
 
 use crate::context::GpuError;
 
-/// Enough for a frame of a few thousand triangles.
+/// Initial size: enough for a frame of a few thousand triangles.
 const FIRST_BYTES: u64 = 1 << 18;
 
-/// Host memory of one frame in flight, mapped while the frame is recorded.
+/// Staging memory of one frame in flight, mapped while the frame is recorded.
 #[derive(Debug)]
 pub struct Staging {
-    on_host: wgpu::Buffer,
+    buffer: wgpu::Buffer,
     used: u64,
 }
 
-fn mapped(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+fn mapped_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("camsim.staging"),
         size,
@@ -23,19 +23,19 @@ fn mapped(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
 }
 
 impl Staging {
-    /// Ready for a first frame; grows as frames need it.
+    /// Creates the memory; it grows as frames need it.
     #[must_use]
     pub fn new(device: &wgpu::Device) -> Self {
-        Self { on_host: mapped(device, FIRST_BYTES), used: 0 }
+        Self { buffer: mapped_buffer(device, FIRST_BYTES), used: 0 }
     }
 
-    /// Begins a frame. What a frame left that was never submitted is forgotten.
+    /// Begins a frame. Uploads of a frame that was never submitted are dropped.
     pub(crate) fn begin(&mut self) {
         self.used = 0;
     }
 
-    /// Takes `bytes` and records their way to `to`, `offset` bytes from its start. Length and offset are
-    /// multiples of 4.
+    /// Copies `bytes` to the staging memory and records the copy to `to`, `offset` bytes from its start.
+    /// Length and offset are multiples of 4.
     pub(crate) fn write(
         &mut self,
         device: &wgpu::Device,
@@ -48,28 +48,28 @@ impl Staging {
         if size == 0 {
             return Ok(());
         }
-        if self.used + size > self.on_host.size() {
-            // The commands keep the old one as long as they need it.
-            self.on_host.unmap();
-            self.on_host = mapped(device, (self.on_host.size() + size).next_power_of_two());
+        if self.used + size > self.buffer.size() {
+            // The recorded commands keep the old buffer alive.
+            self.buffer.unmap();
+            self.buffer = mapped_buffer(device, (self.buffer.size() + size).next_power_of_two());
             self.used = 0;
         }
         let range = self.used..self.used + size;
-        let fault = |error: wgpu::MapRangeError| GpuError::Device(error.to_string());
-        self.on_host.get_mapped_range_mut(range).map_err(fault)?.copy_from_slice(bytes);
-        commands.copy_buffer_to_buffer(&self.on_host, self.used, to, offset, size);
+        let to_error = |error: wgpu::MapRangeError| GpuError::Device(error.to_string());
+        self.buffer.get_mapped_range_mut(range).map_err(to_error)?.copy_from_slice(bytes);
+        commands.copy_buffer_to_buffer(&self.buffer, self.used, to, offset, size);
         self.used = (self.used + size).next_multiple_of(wgpu::MAP_ALIGNMENT);
         Ok(())
     }
 
-    /// To be called before the commands are submitted: what the device reads may not be mapped.
-    pub(crate) fn end(&mut self) {
-        self.on_host.unmap();
+    /// Unmaps the memory. Must be called before submission: the GPU may not read mapped memory.
+    pub(crate) fn unmap(&mut self) {
+        self.buffer.unmap();
     }
 
-    /// To be called after: asks for the memory back. It is there once the frame has been waited for; a
-    /// failure shows at the next write.
-    pub(crate) fn recall(&mut self) {
-        self.on_host.map_async(wgpu::MapMode::Write, .., |_| {});
+    /// Requests the mapping again. Must be called after submission. The memory is mapped once the frame has
+    /// been waited for; a failure shows at the next write.
+    pub(crate) fn request_mapping(&mut self) {
+        self.buffer.map_async(wgpu::MapMode::Write, .., |_| {});
     }
 }

@@ -1,4 +1,5 @@
-//! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
+//! The scene on the GPU: textures with their mip levels, terrain and mesh buffers. Uploaded once per
+//! sequence.
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
@@ -11,83 +12,83 @@ use crate::{
     tiles::TilePool,
 };
 
-/// A scene's device resources.
+/// GPU resources of a scene.
 #[derive(Debug)]
 pub struct SceneBuffers {
-    /// Terrain, if there is any.
+    /// Terrain, if there is one.
     pub terrain: Option<TerrainBuffers>,
-    /// The scene's meshes.
+    /// Meshes of the scene.
     pub meshes: Arc<SceneBatches>,
-    /// Buffers of each batch of them.
+    /// Buffers of each batch of meshes.
     pub batches: Vec<MeshBatch>,
-    /// Their pictures, once they have been [brought](SceneBuffers::bring_pictures).
-    pub pictures: Vec<wgpu::TextureView>,
-    /// Trilinear, edges held; the shader takes several taps where the footprint is long.
+    /// Textures of the batches, once [uploaded](SceneBuffers::upload_textures).
+    pub textures: Vec<wgpu::TextureView>,
+    /// Trilinear sampler with clamped edges; the shader takes several taps for long footprints.
     pub sampler: wgpu::Sampler,
 }
 
-/// A terrain on the device, without its triangles: each frame brings those that it draws.
+/// Terrain on the GPU, without its triangles: each frame uploads those that it draws.
 #[derive(Debug)]
 pub struct TerrainBuffers {
-    /// On the ground.
-    pub picture: GroundPicture,
+    /// Texture of the terrain.
+    pub texture: TerrainTexture,
 }
 
-/// The picture on the ground.
+/// Texture of the terrain.
 #[derive(Debug)]
-pub enum GroundPicture {
-    /// In one texture, once that has been [brought](SceneBuffers::bring_pictures).
+pub enum TerrainTexture {
+    /// One GPU texture, once [uploaded](SceneBuffers::upload_textures).
     Whole(Option<wgpu::TextureView>),
-    /// Too large for one.
+    /// Larger than a GPU texture: split into tiles.
     Tiles(Box<TilePool>),
 }
 
-/// Meshes that are drawn at once: the same shape and the same material.
+/// Meshes that are drawn together: same shape and material.
 #[derive(Debug)]
 pub struct MeshBatch {
     /// Positions, texture coordinates and tints.
     pub vertices: wgpu::Buffer,
     /// Triangle lists of all levels of detail.
     pub indices: wgpu::Buffer,
-    /// Where in them each level is, the full shape first.
+    /// Range of each level of detail in `indices`, the full shape first.
     pub ranges: Vec<Range<u32>>,
-    /// What it shows outside of the picture.
+    /// Sampler with the wrap modes of the material.
     pub sampler: wgpu::Sampler,
-    /// Normals, where light falls on them.
+    /// Normals, if the mesh is illuminated.
     pub normals: Option<wgpu::Buffer>,
-    /// Light of its own, the alpha below which there is a hole, and the scene's light.
+    /// [`MeshMaterial`]: emission, alpha cut-off, illumination.
     pub material: wgpu::Buffer,
-    /// Which pipeline draws it.
+    /// Pipeline that draws it.
     pub kind: MeshKind,
 }
 
-/// What pipelines of meshes differ in.
+/// Properties in which pipelines of meshes differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MeshKind {
-    /// Triangles that turn away are left out.
+    /// Back faces are culled.
     pub one_sided: bool,
-    /// Samples ask for alpha.
-    pub holes: bool,
-    /// Light falls on it.
+    /// An alpha mask is evaluated per sample.
+    pub masked: bool,
+    /// The mesh is illuminated by sun and sky.
     pub lit: bool,
-    /// Mixed with what is behind it.
+    /// The mesh is blended over what is behind it.
     pub blends: bool,
 }
 
 impl MeshKind {
-    /// What draws its colour, below `shaders/`: where it is mixed alpha makes no hole.
+    /// Shader of its colour, below `shaders/`. Blended meshes have no alpha mask.
     pub(crate) fn shader(self) -> &'static str {
-        match (self.holes && !self.blends, self.lit) {
+        match (self.masked && !self.blends, self.lit) {
             (false, false) => "ideal/mesh.wgsl",
             (false, true) => "ideal/mesh_lit.wgsl",
-            (true, false) => "ideal/mesh_holes.wgsl",
-            (true, true) => "ideal/mesh_holes_lit.wgsl",
+            (true, false) => "ideal/mesh_masked.wgsl",
+            (true, true) => "ideal/mesh_masked_lit.wgsl",
         }
     }
 }
 
 impl SceneBuffers {
-    /// Uploads a scene, but for its pictures.
+    /// Uploads a scene without its textures.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] for what the adapter cannot hold.
@@ -96,45 +97,45 @@ impl SceneBuffers {
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
         let batches = meshes.batches.iter().map(|batch| upload_batch(gpu, batch)).collect();
         meshes.batches.iter().try_for_each(|batch| {
-            check_picture(gpu, &batch.material.texture, "the picture of a mesh or pattern")
+            check_texture(gpu, &batch.material.texture, "the texture of a mesh or pattern")
         })?;
-        Ok(Self { terrain, meshes, batches, pictures: Vec::new(), sampler })
+        Ok(Self { terrain, meshes, batches, textures: Vec::new(), sampler })
     }
 
-    /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the
-    /// device needs none. What several share is uploaded once.
-    pub fn bring_pictures(&mut self, gpu: &GpuContext, scene: &Scene) {
-        if let (Some(terrain), Some(TerrainBuffers { picture: GroundPicture::Whole(picture) })) =
+    /// Uploads the textures of the scene, unless already done: as long as the CPU draws all ideal frames the
+    /// GPU needs none. A texture shared by several batches is uploaded once.
+    pub fn upload_textures(&mut self, gpu: &GpuContext, scene: &Scene) {
+        if let (Some(terrain), Some(TerrainBuffers { texture: TerrainTexture::Whole(texture) })) =
             (&scene.terrain, &mut self.terrain)
         {
-            picture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture, terrain.beyond));
+            texture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture, terrain.beyond));
         }
-        if self.pictures.len() < self.batches.len() {
-            let mut known: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
-            let picture = |batch: &Batch| {
+        if self.textures.len() < self.batches.len() {
+            let mut cached: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
+            let texture = |batch: &Batch| {
                 let texture = &batch.material.texture;
-                known
+                cached
                     .entry(Arc::as_ptr(texture))
                     .or_insert_with(|| upload_texture(gpu, texture, None))
                     .clone()
             };
-            self.pictures = self.meshes.batches.iter().map(picture).collect();
+            self.textures = self.meshes.batches.iter().map(texture).collect();
         }
     }
 
-    /// The tiles of the ground's picture, if it is not whole.
+    /// Tiles of the terrain's texture, if it is split.
     pub(crate) fn tiles(&self) -> Option<&TilePool> {
-        self.terrain.as_ref().and_then(|terrain| match &terrain.picture {
-            GroundPicture::Tiles(tiles) => Some(&**tiles),
-            GroundPicture::Whole(_) => None,
+        self.terrain.as_ref().and_then(|terrain| match &terrain.texture {
+            TerrainTexture::Tiles(tiles) => Some(&**tiles),
+            TerrainTexture::Whole(_) => None,
         })
     }
 
-    /// As [`SceneBuffers::tiles`].
+    /// Tiles of the terrain's texture, if it is split, for changes.
     pub(crate) fn tiles_mut(&mut self) -> Option<&mut TilePool> {
-        self.terrain.as_mut().and_then(|terrain| match &mut terrain.picture {
-            GroundPicture::Tiles(tiles) => Some(&mut **tiles),
-            GroundPicture::Whole(_) => None,
+        self.terrain.as_mut().and_then(|terrain| match &mut terrain.texture {
+            TerrainTexture::Tiles(tiles) => Some(&mut **tiles),
+            TerrainTexture::Whole(_) => None,
         })
     }
 }
@@ -157,14 +158,14 @@ fn create_sampler(gpu: &GpuContext, wrap: [Wrap; 2], nearest: bool) -> wgpu::Sam
 }
 
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
-    let picture = match is_whole(terrain.texture.size_px, gpu.max_picture_px) {
+    let texture = match is_whole(terrain.texture.size_px, gpu.max_picture_px) {
         true => {
-            check_picture(gpu, &terrain.texture, "scene.terrain.ortho")?;
-            GroundPicture::Whole(None)
+            check_texture(gpu, &terrain.texture, "scene.terrain.ortho")?;
+            TerrainTexture::Whole(None)
         }
-        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain, TexelForm::Light))),
+        false => TerrainTexture::Tiles(Box::new(TilePool::new(terrain, TexelForm::Light))),
     };
-    Ok(TerrainBuffers { picture })
+    Ok(TerrainBuffers { texture })
 }
 
 fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
@@ -188,7 +189,7 @@ fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
             usage,
             mapped_at_creation: true,
         });
-        // On a device that is lost there is nothing to write to; it says so itself.
+        // A lost device cannot be written to; it reports that itself.
         if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
             range.copy_from_slice(contents);
         }
@@ -206,14 +207,14 @@ fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
         kind: MeshKind {
             one_sided: material.one_sided,
-            holes: material.cutoff.is_some(),
+            masked: material.cutoff.is_some(),
             lit: light.is_some(),
             blends: material.blends,
         },
     }
 }
 
-/// Of a picture on the device.
+/// Format of a texture on the GPU.
 pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::TextureFormat {
     match (form, encoding) {
         (TexelForm::Light, _) => wgpu::TextureFormat::Rgba16Float,
@@ -222,8 +223,8 @@ pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::Textu
     }
 }
 
-/// Refuses a picture that the adapter cannot hold.
-fn check_picture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), GpuError> {
+/// Checks that a texture fits the adapter.
+fn check_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), GpuError> {
     let [width, height] = texture.size_px;
     if width.max(height) <= gpu.max_side_px() {
         return Ok(());
@@ -233,23 +234,23 @@ fn check_picture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), 
         needed: u64::from(width.max(height)),
         limit_name: "max_texture_dimension_2d",
         limit: u64::from(gpu.max_side_px()),
-        fix: "reduce the picture",
+        fix: "reduce the size of the image",
     })
 }
 
-/// With a border around the smaller versions if there is one.
+/// Uploads a texture with its mip levels, which have a border if one is given.
 fn upload_texture(gpu: &GpuContext, texture: &Texture, border: Option<[u8; 4]>) -> wgpu::TextureView {
     let [width, height] = texture.size_px;
     let form = match (texture.encoding, texture.size_px) {
-        // Every device has the exact light of these bytes, and there are no smaller versions: a half would
-        // only round.
+        // Every device decodes these bytes exactly, and there are no mip levels: half floats would only
+        // round.
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
         _ => TexelForm::Light,
     };
     let mips = texture.mips_with_border(form, border);
     let mut data = texture.texels(&texture.rgba8, form).into_owned();
     mips.iter().for_each(|mip| data.extend_from_slice(&mip.texels));
-    let on_device = gpu.device.create_texture_with_data(
+    let gpu_texture = gpu.device.create_texture_with_data(
         &gpu.queue,
         &wgpu::TextureDescriptor {
             label: Some("camsim.surface.texture"),
@@ -264,5 +265,5 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, border: Option<[u8; 4]>) 
         wgpu::util::TextureDataOrder::LayerMajor,
         &data,
     );
-    on_device.create_view(&wgpu::TextureViewDescriptor::default())
+    gpu_texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

@@ -1,10 +1,11 @@
-//! The flight that ships inside the program: log, terrain, picture, camera, scenario (see `assets/README.md`
-//! for their licences).
+//! The built-in demo flight: log, terrain, ortho-image, camera, scenario. `assets/README.md` states their
+//! licences.
 
 use std::path::{Path, PathBuf};
 
 use crate::write::{WriteError, write_atomic};
 
+/// Embeds files of `assets/` as `FILES`: name and content.
 macro_rules! embedded {
     ($($name:literal),* $(,)?) => {
         const FILES: &[(&str, &[u8])] = &[$(($name, include_bytes!(concat!("../../../assets/", $name)))),*];
@@ -23,15 +24,15 @@ embedded![
     "vignette.png",
 ];
 
-/// Writes the built-in scene to a folder (files that are there already with the same content stay) and gives
-/// the path of `demo.toml`.
+/// Writes the built-in files to a folder and returns the path of `demo.toml`. Files that are already there
+/// with the same content are left alone.
 ///
 /// # Errors
 /// [`WriteError`] names the file.
 pub fn unpack(folder: &Path) -> Result<PathBuf, WriteError> {
     for (name, bytes) in FILES {
         let path = folder.join(name);
-        if std::fs::read(&path).is_ok_and(|there| there == *bytes) {
+        if std::fs::read(&path).is_ok_and(|existing| existing == *bytes) {
             continue;
         }
         write_atomic(&path, bytes)?;

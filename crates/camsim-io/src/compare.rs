@@ -1,7 +1,7 @@
-//! Two pictures or two folders of pictures, compared (`camsim compare`).
+//! Compares two pictures or two folders of pictures (`camsim compare`).
 //!
-//! Values are compared as stored, a code range being 0..=1: so EXR with EXR (linear) and PNG with PNG (as
-//! encoded), never one with the other.
+//! Stored values are compared, integers scaled to 0..=1: EXR with EXR (linear) and PNG with PNG (encoded),
+//! never one with the other.
 
 use std::{
     collections::BTreeSet,
@@ -14,18 +14,19 @@ use exr::prelude::read_first_flat_layer_from_file;
 use serde::Serialize;
 use thiserror::Error;
 
-/// Why two things cannot be compared.
+/// Why two paths cannot be compared.
 #[derive(Debug, Error)]
 pub enum CompareError {
     /// A file or folder cannot be read.
-    #[error("cannot read {}: {message}; give two EXR or PNG pictures, or two folders of them", path.display())]
+    #[error("cannot read {}: {message}; give two EXR or PNG pictures, or two folders of \
+        them", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Reason.
+        /// What is wrong.
         message: String,
     },
-    /// EXR against PNG, a file against a folder, other channels.
+    /// The two are of different kinds: EXR and PNG, a file and a folder, other channels.
     #[error("{} and {} do not compare: {message}", a.display(), b.display())]
     Kind {
         /// First.
@@ -35,18 +36,19 @@ pub enum CompareError {
         /// What differs.
         message: String,
     },
-    /// Sizes differ.
+    /// The sizes differ.
     #[error("{} and {}: {source}", a.display(), b.display())]
     Metric {
         /// First.
         a: PathBuf,
         /// Second.
         b: PathBuf,
-        /// Reason.
+        /// What differs.
         source: MetricError,
     },
-    /// Two folders without a picture of one name.
-    #[error("{} and {} have no EXR or PNG of the same name; compare two output folders of one scenario", a.display(), b.display())]
+    /// Two folders that have no picture of the same name.
+    #[error("{} and {} have no EXR or PNG of the same name; compare two output folders of one \
+        scenario", a.display(), b.display())]
     NothingInCommon {
         /// First.
         a: PathBuf,
@@ -62,13 +64,14 @@ pub struct Figures {
     pub rmse: f64,
     /// Largest absolute difference.
     pub max: f64,
-    /// Peak signal-to-noise ratio for a peak of 1; null for equal pictures.
+    /// Peak signal-to-noise ratio for a peak of 1, dB; null for equal pictures.
     pub psnr_db: Option<f64>,
     /// Structural similarity; null below 11 pixels of width or height.
     pub ssim: Option<f64>,
     /// Share of pixels that differ at all.
     pub differing: f64,
-    /// Pixels with a NaN or an infinity in either picture, left out of the first four.
+    /// Number of pixels with a NaN or an infinity in either picture. RMSE, maximum, PSNR and SSIM leave them
+    /// out.
     pub non_finite: u64,
 }
 
@@ -86,23 +89,23 @@ impl From<&Comparison> for Figures {
     }
 }
 
-/// One file of two folders.
+/// The figures of one file of two folders.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FileFigures {
     /// Path below both folders.
     pub file: String,
-    /// Its figures.
+    /// Figures of the two files of this path.
     #[serde(flatten)]
     pub figures: Figures,
 }
 
-/// What `camsim compare` tells: the figures of all files as one, then file by file.
+/// Result of `camsim compare`: the figures of all files together, then file by file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// All files as one: pooled RMSE, largest maximum, mean SSIM.
+    /// Figures of all files together: pooled RMSE, largest maximum, mean SSIM.
     #[serde(flatten)]
     pub total: Figures,
-    /// File by file; empty for two single files.
+    /// Figures file by file; empty for two single files.
     pub files: Vec<FileFigures>,
     /// Pictures that only the first folder has.
     pub only_in_a: Vec<String>,
@@ -121,7 +124,7 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
             Ok(Report { total, files: vec![], only_in_a: vec![], only_in_b: vec![] })
         }
         (true, true) => compare_folders(a, b),
-        // What is not there is said to be missing before it is said to be no folder.
+        // A missing path is reported as missing, not as a file compared with a folder.
         _ if !a.exists() || !b.exists() => {
             let missing = if a.exists() { b } else { a };
             Err(CompareError::Kind {
@@ -138,6 +141,7 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
     }
 }
 
+/// Compares all pictures of the same path below two folders.
 fn compare_folders(a: &Path, b: &Path) -> Result<Report, CompareError> {
     let (mut in_a, mut in_b) = (BTreeSet::new(), BTreeSet::new());
     pictures_below(a, "", &mut in_a)?;
@@ -154,6 +158,7 @@ fn compare_folders(a: &Path, b: &Path) -> Result<Report, CompareError> {
     Ok(Report { total: (&total).into(), files, only_in_a: only(&in_a, &in_b), only_in_b: only(&in_b, &in_a) })
 }
 
+/// Collects the paths of all pictures below `root`, recursively.
 fn pictures_below(root: &Path, below: &str, names: &mut BTreeSet<String>) -> Result<(), CompareError> {
     let folder = root.join(below);
     let fail =
@@ -162,28 +167,32 @@ fn pictures_below(root: &Path, below: &str, names: &mut BTreeSet<String>) -> Res
         let entry = entry.map_err(fail)?;
         let file = entry.file_name().to_string_lossy().into_owned();
         let name = if below.is_empty() { file } else { format!("{below}/{file}") };
-        // The entry's own type: a link that leads back up would never end.
+        // The type of the entry itself, so that links are not followed: they may form a cycle.
         if entry.file_type().map_err(fail)?.is_dir() {
             pictures_below(root, &name, names)?;
-        } else if kind(Path::new(&name)).is_some() {
+        } else if file_format(Path::new(&name)).is_some() {
             names.insert(name);
         }
     }
     Ok(())
 }
 
-fn kind(path: &Path) -> Option<&'static str> {
+/// `exr` or `png` by the extension; `None` for others.
+fn file_format(path: &Path) -> Option<&'static str> {
     let extension = path.extension()?.to_str()?;
     ["exr", "png"].into_iter().find(|kind| extension.eq_ignore_ascii_case(kind))
 }
 
-struct Picture {
+/// A decoded picture.
+struct ComparedPicture {
     size_px: [u32; 2],
+    /// Names of the channels.
     channels: Vec<String>,
+    /// Interleaved samples, row by row.
     samples: Vec<f32>,
 }
 
-impl Picture {
+impl ComparedPicture {
     fn view(&self, alpha: Option<usize>) -> ImageView<'_> {
         ImageView { size_px: self.size_px, channels: self.channels.len(), alpha, samples: &self.samples }
     }
@@ -192,7 +201,7 @@ impl Picture {
 fn compare_files(a: &Path, b: &Path) -> Result<Comparison, CompareError> {
     let differ = |message: String| CompareError::Kind { a: a.into(), b: b.into(), message };
     let (one, other) = (read(a)?, read(b)?);
-    if kind(a) != kind(b) {
+    if file_format(a) != file_format(b) {
         return Err(differ("one is linear EXR, the other encoded PNG; compare files of one format".into()));
     }
     if one.channels != other.channels {
@@ -210,9 +219,9 @@ fn compare_files(a: &Path, b: &Path) -> Result<Comparison, CompareError> {
     })
 }
 
-fn read(path: &Path) -> Result<Picture, CompareError> {
+fn read(path: &Path) -> Result<ComparedPicture, CompareError> {
     let fail = |message: String| CompareError::Read { path: path.into(), message };
-    match kind(path) {
+    match file_format(path) {
         Some("exr") => read_exr(path).map_err(fail),
         Some(_) => read_png(path).map_err(fail),
         None if path.exists() => Err(fail("it is neither .exr nor .png".into())),
@@ -220,8 +229,8 @@ fn read(path: &Path) -> Result<Picture, CompareError> {
     }
 }
 
-/// Channels in the order R G B A, others after them by name: luminance needs the first three.
-fn read_exr(path: &Path) -> Result<Picture, String> {
+/// Reads the first layer of an EXR, with channels in the order R, G, B, A, and others by name.
+fn read_exr(path: &Path) -> Result<ComparedPicture, String> {
     let layer = read_first_flat_layer_from_file(path).map_err(|error| error.to_string())?.layer_data;
     let mut planes: Vec<(String, Vec<f32>)> = layer
         .channel_data
@@ -238,10 +247,10 @@ fn read_exr(path: &Path) -> Result<Picture, String> {
     }
     let samples = (0..pixels).flat_map(|pixel| planes.iter().map(move |(_, plane)| plane[pixel])).collect();
     let channels = planes.iter().map(|(name, _)| name.clone()).collect();
-    Ok(Picture { size_px: [layer.size.0 as u32, layer.size.1 as u32], channels, samples })
+    Ok(ComparedPicture { size_px: [layer.size.0 as u32, layer.size.1 as u32], channels, samples })
 }
 
-fn read_png(path: &Path) -> Result<Picture, String> {
+fn read_png(path: &Path) -> Result<ComparedPicture, String> {
     let image = image::open(path).map_err(|error| error.to_string())?;
     let size_px = [image.width(), image.height()];
     let names: &[&str] = match image.color().channel_count() {
@@ -256,7 +265,7 @@ fn read_png(path: &Path) -> Result<Picture, String> {
         3 => image.to_rgb32f().into_raw(),
         _ => image.to_rgba32f().into_raw(),
     };
-    Ok(Picture { size_px, channels: names.iter().map(|&name| name.into()).collect(), samples })
+    Ok(ComparedPicture { size_px, channels: names.iter().map(|&name| name.into()).collect(), samples })
 }
 
 #[cfg(test)]
@@ -283,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_files_and_what_does_not_fit() {
+    fn folders_and_files_are_compared_and_mismatches_refused() {
         let dir = tempfile::tempdir().unwrap();
         let [a, b, c] = ["a", "b", "c"].map(|name| dir.path().join(name));
         render(&a, 0.5, 3, 16);

@@ -2,7 +2,7 @@
 //!
 //! | format | columns without a header | frames |
 //! |---|---|---|
-//! | `csv-lla` | t s, lat, lon, height, roll, pitch, yaw | degrees, metres; ZYX angles of the body (FRD) in the tangent frame at the row |
+//! | `csv-lla` | t s, lat, lon, height, roll, pitch, yaw | degrees, metres; ZYX angles of the body (FRD) in the local tangent frame |
 //! | `csv-xya` | t s, north, east, altitude (up), roll, pitch, yaw | metres, degrees |
 //! | `csv-ned` | t s, north, east, down, roll, pitch, yaw | metres, degrees |
 //! | `tum` | t s, x, y, z, qx, qy, qz, qw | see below |
@@ -10,20 +10,21 @@
 //!
 //! Further columns are ignored; the CSV formats may end after the position (then `flight.attitude = "track"`
 //! is needed). A header line, also as a comment, names the columns in any order and takes precedence over the
-//! table; it may name units, which are converted (`names`, `units`). Separators are commas, semicolons (then
-//! decimals may have commas), tabs or blanks; fields may stand in quotes; `#` and `%` begin comments; BOM and
-//! CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only columns
-//! that are used must be numbers.
+//! table; it may name units, which are converted (`column_names`, `units`). Separators are commas, semicolons
+//! (then decimals may have commas), tabs or blanks; fields may stand in quotes; `#` and `%` begin comments;
+//! BOM and CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only
+//! columns that are used must be numbers.
 //!
-//! GPX files are read too (`gpx`), other kinds of files named with what converts them (`sniff`). What is open
-//! to doubt is refused, or taken and said in the log's notes: units that are named nowhere (`resolve`),
-//! clocks that begin again (`clock`), tables merged from several streams (`sparse`). docs/inputs/LOGS.md
-//! lists all names and units; it is made from the tables in here.
+//! GPX files are read too (`gpx`). Other formats are refused with the tool that converts them
+//! (`foreign_formats`). Ambiguities are refused, or resolved with a note in the log: units that no header
+//! names (`time_unit`, `angle_unit`), clocks that roll over (`clock_rollover`), tables merged from several
+//! streams (`sparse_rows`). docs/inputs/LOGS.md lists all names and units; it is generated from the tables in
+//! these modules.
 //!
 //! **TUM and EuRoC** worlds have z up: x is taken as east, y as north. Their quaternions (Hamilton, world
-//! from body) belong to a body with x forward, y left, z up (FLU, as in ROS); it becomes FRD. If the poses
-//! are those of a sensor with other axes, the mount makes up for it. The JPL quaternion of rotation "global
-//! to body" has the same numbers as the Hamilton "body to global", so `open_vins` texts read right.
+//! from body) belong to a body with x forward, y left, z up (FLU, as in ROS), and are converted to FRD. For
+//! poses of a sensor with other axes, `camera.mount` corrects them. The JPL quaternion of rotation "global to
+//! body" has the same numbers as the Hamilton "body to global", so files of `open_vins` need no conversion.
 
 use std::path::{Path, PathBuf};
 
@@ -36,30 +37,33 @@ use camsim_core::{
 };
 use glam::{DQuat, DVec3};
 
-mod choose;
-mod clock;
+mod angle_unit;
+mod clock_rollover;
+mod column_meaning;
+mod column_names;
+mod column_selection;
 mod columns;
 mod detect;
+mod foreign_formats;
 mod gpx;
 mod header;
+mod height_column;
 mod layout;
-mod names;
 mod quaternions;
 mod reference;
-mod resolve;
 mod rows;
-mod sniff;
-mod sparse;
-mod text;
-mod time;
+mod sparse_rows;
+mod text_table;
+mod time_fields;
+mod time_unit;
 mod units;
 
 use columns::{AttitudeColumns, Frame};
-use layout::Layout;
+use layout::TableLayout;
 
 pub use reference::reference;
 
-/// What makes a flight log file unreadable.
+/// Why a flight log cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightLogError {
     /// The file cannot be read.
@@ -67,15 +71,16 @@ pub enum FlightLogError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Not UTF-8 text.
-    #[error("{}: not UTF-8 text (bad byte at offset {offset}); flight logs are text, save it as UTF-8", path.display())]
+    #[error("{}: not UTF-8 text (bad byte at offset {offset}); flight logs are text, save it as \
+        UTF-8", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
-        /// First bad byte.
+        /// Offset of the first byte that is not UTF-8.
         offset: usize,
     },
     /// No data rows.
@@ -89,42 +94,43 @@ pub enum FlightLogError {
     NotANumber {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// From 1.
+        /// Column, from 1.
         column: usize,
-        /// Its name, in brackets.
+        /// Name of the column in brackets, or nothing.
         name: String,
-        /// The field.
+        /// Text of the field.
         text: String,
-        /// What it looks like and what to do.
+        /// Advice by the look of the text, or nothing.
         hint: &'static str,
     },
     /// A row is too long.
     #[error(
-        "{}: line {line} has {found} columns, but only {known} are known: a separator within a field shifts the ones behind it (put the field in quotes)", path.display()
+        "{}: line {line} has {found} columns, but only {known} are known: a separator within a field shifts \
+            the ones behind it (put the field in quotes)", path.display()
     )]
     SurplusColumns {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// Columns there.
+        /// Number of columns of the row.
         found: usize,
-        /// Columns of the header, or of the other rows.
+        /// Number of columns of the header, or of the other rows.
         known: usize,
     },
-    /// Another kind of file.
+    /// A known format that is no flight log.
     #[error("{}: the file is {what}, no flight log that can be read: {advice}", path.display())]
     OtherFormat {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Name of the format.
         what: &'static str,
-        /// How to make a log of it.
+        /// How to convert it.
         advice: &'static str,
     },
-    /// The numbers as a whole say too little, or nonsense.
+    /// The values of the file as a whole are ambiguous or implausible.
     #[error("{}: {problem}", path.display())]
     Values {
         /// The file.
@@ -133,74 +139,78 @@ pub enum FlightLogError {
         problem: String,
     },
     /// A row is too short.
-    #[error("{}: line {line} has {found} columns, {format} needs {needed}; complete the line or set flight.format", path.display())]
+    #[error("{}: line {line} has {found} columns, {format} needs {needed}; complete the line or set \
+        flight.format", path.display())]
     MissingColumns {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// Columns there.
+        /// Number of columns of the row.
         found: usize,
-        /// Columns needed.
+        /// Number of columns that the format needs.
         needed: usize,
-        /// Format as written in a scenario.
+        /// Format, as `flight.format` names it.
         format: &'static str,
     },
-    /// A latitude, longitude or height that cannot be one.
+    /// A latitude, longitude or height out of range.
     #[error("{}: line {line}, column {column}{name}: {value} is no {what}; {advice}", path.display())]
     OutOfRange {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// From 1.
+        /// Column, from 1.
         column: usize,
-        /// Its name, in brackets.
+        /// Name of the column in brackets, or nothing.
         name: String,
         /// `latitude`, `longitude` or `height in metres`.
         what: &'static str,
-        /// As read, in degrees or metres.
+        /// The value, in degrees or metres.
         value: f64,
-        /// What it may be and what to do.
+        /// What the value may be, and what to do.
         advice: &'static str,
     },
-    /// Several layouts fit.
-    #[error("{}: its columns fit {candidates}; set flight.format to the right one (or name the columns in a header line)", path.display())]
+    /// Several formats fit.
+    #[error("{}: its columns fit {candidates}; set flight.format to the right one (or name the columns in a \
+        header line)", path.display())]
     Ambiguous {
         /// The file.
         path: PathBuf,
         /// Formats that fit.
         candidates: &'static str,
     },
-    /// No layout fits.
+    /// No format fits.
     #[error(
-        "{}: {columns} columns without a header fit no known layout; set flight.format (csv-lla, csv-xya, csv-ned, tum, euroc) or name the columns in a header line", path.display()
+        "{}: {columns} columns without a header fit no known layout; set flight.format (csv-lla, csv-xya, \
+            csv-ned, tum, euroc) or name the columns in a header line", path.display()
     )]
     UnknownLayout {
         /// The file.
         path: PathBuf,
-        /// Columns of the first row.
+        /// Number of columns of the table.
         columns: usize,
     },
-    /// A header that does not say enough.
+    /// A header that lacks columns, or is ambiguous.
     #[error("{}: line {line}: {problem}", path.display())]
     Header {
         /// The file.
         path: PathBuf,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
         /// What is missing and what to do.
         problem: String,
     },
     /// KITTI poses.
     #[error(
-        "{}: rows are 3x4 pose matrices without times (KITTI); convert them to TUM lines `t x y z qx qy qz qw` first (evo_traj kitti --save_as_tum)", path.display()
+        "{}: rows are 3x4 pose matrices without times (KITTI); convert them to TUM lines `t x y z qx qy qz \
+            qw` first (evo_traj kitti --save_as_tum)", path.display()
     )]
     PoseMatrices {
         /// The file.
         path: PathBuf,
     },
-    /// The rows are readable but make no log.
+    /// The rows can be read but make no log.
     #[error("{}: {source}", path.display())]
     Log {
         /// The file.
@@ -210,22 +220,21 @@ pub enum FlightLogError {
     },
 }
 
-/// The rows of a file before cleaning, and what there is to say about it.
+/// The rows of a file before cleaning, with notes about them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawLog {
-    /// In the file's order.
+    /// Rows, in the file's order.
     pub rows: Vec<RawRow>,
-    /// What was inferred, chosen, or left out.
+    /// Notes about what was inferred, chosen, or left out.
     pub notes: Vec<Note>,
 }
 
-/// Faster than this between two rows is a jump.
+/// Speed between two rows above which a jump of the position is reported.
 const JUMP_M_S: f64 = 1000.0;
 
-/// Reads and cleans the log at `path` (which replaces `spec.log`: the caller has resolved it) as `spec` says.
+/// Reads and cleans the log at `path` as `spec` says. `path` replaces `spec.log`, which may be relative.
 ///
-/// `height` is the caller's decision, because it depends on the terrain's datum too: no conversion where both
-/// agree.
+/// `height` depends on the terrain's vertical datum too: no conversion where both agree.
 ///
 /// # Errors
 /// [`FlightLogError`] names the file, the line and the column or key, and what to do.
@@ -237,30 +246,30 @@ pub fn read_flight_log(
     let raw = read_raw_rows(path, spec)?;
     let options = LogOptions::from_spec(spec, height);
     let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|source| {
-        // A header may have something like an attitude.
-        let of_attitude: Vec<&str> = raw
+        // Notes about incomplete attitudes explain a missing one.
+        let attitude_notes: Vec<&str> = raw
             .notes
             .iter()
             .filter(|note| note.text.contains("attitude"))
             .map(|note| note.text.as_str())
             .collect();
-        if source == LogError::NoAttitude && !of_attitude.is_empty() {
+        if source == LogError::NoAttitude && !attitude_notes.is_empty() {
             return FlightLogError::Values {
                 path: path.to_owned(),
-                problem: format!("{source}: {}", of_attitude.join("; ")),
+                problem: format!("{source}: {}", attitude_notes.join("; ")),
             };
         }
         FlightLogError::Log { path: path.to_owned(), source }
     })?;
     log.notes = raw.notes;
-    // Local positions may have any unit of length.
+    // Only geodetic positions are known to be in metres; local ones may have any unit of length.
     if raw.rows.iter().any(|row| matches!(row.position, RawPosition::Geodetic(_))) {
         log.notes.extend(jump_note(&log));
     }
     Ok(log)
 }
 
-/// What no cleaning has removed and no aircraft does.
+/// A warning about jumps of the position that are left after cleaning.
 fn jump_note(log: &FlightLog) -> Option<Note> {
     let is_jump = |pair: &&[LogRow]| {
         pair[0].position_ned_m.distance(pair[1].position_ned_m) > JUMP_M_S * (pair[1].t_s - pair[0].t_s)
@@ -272,7 +281,8 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
     Some(Note {
         is_warning: true,
         text: format!(
-            "the flight jumps by {:.0} m within {:.3} s at {:.3} s from its start{}: check the positions and times there",
+            "the flight jumps by {:.0} m within {:.3} s at {:.3} s from its start{}: check the positions and \
+                times there",
             from.position_ned_m.distance(to.position_ned_m),
             to.t_s - from.t_s,
             from.t_s,
@@ -281,14 +291,14 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
     })
 }
 
-/// Reads the rows of a log as the file states them, before any cleaning, in nanoseconds, degrees and metres.
+/// Reads the rows of a log before any cleaning, in nanoseconds, degrees and metres.
 ///
 /// # Errors
 /// As [`read_flight_log`].
 pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
     let bytes =
         std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
-    if let Some((what, advice)) = sniff::refused(&bytes) {
+    if let Some((what, advice)) = foreign_formats::detect(&bytes) {
         return Err(FlightLogError::OtherFormat { path: path.to_owned(), what, advice });
     }
     let content = std::str::from_utf8(&bytes)
@@ -301,30 +311,34 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     if spec.format == LogFormat::Gpx {
         return Err(problem("flight.format is \"gpx\" but the file is no XML; remove the key".to_owned()));
     }
-    let table = text::Table::new(content);
+    let table = text_table::Table::new(content);
     if table.rows.is_empty() {
         return Err(FlightLogError::Empty { path: path.to_owned() });
     }
     let mut notes = Vec::new();
-    let layout = Layout::find(path, &table, spec, &mut notes)?;
+    let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     let mut rows = rows::read(path, &table, &layout)?;
-    resolve::check_degrees(&rows, &layout).map_err(problem)?;
-    let unit_ns = resolve::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
-    resolve::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;
+    angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
+    let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
+    angle_unit::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;
     if let AttitudeColumns::Quaternion(_) = layout.attitude {
         quaternions::normalise(&mut rows.rows, &mut notes).map_err(problem)?;
     }
-    if rows.kind == time::Kind::Number {
+    if rows.time_format == time_fields::TimeFormat::Number {
         for row in &mut rows.rows {
-            row.time = row.time.and_then(|time| time::to_ns(time, unit_ns)).map(i128::from);
+            row.time = row.time.and_then(|time| time_fields::to_ns(time, unit_ns)).map(i128::from);
         }
     }
-    let has_dates = rows.kind == time::Kind::DateTime || rows.has_dates;
+    let has_dates = rows.time_format == time_fields::TimeFormat::DateTime || rows.has_dates;
     if !has_dates {
-        clock::unroll(&mut rows.rows, rows.kind == time::Kind::Clock, &mut notes);
+        clock_rollover::unroll_rollovers(
+            &mut rows.rows,
+            rows.time_format == time_fields::TimeFormat::Clock,
+            &mut notes,
+        );
     }
-    clock::one_flight(&rows.rows).map_err(problem)?;
-    sparse::fill(&mut rows.rows, layout.attitude != AttitudeColumns::None, &mut notes);
+    clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
+    sparse_rows::interpolate_positions(&mut rows.rows, layout.attitude != AttitudeColumns::None, &mut notes);
     if table.has_decimal_commas {
         notes.push(Note {
             is_warning: false,
@@ -334,15 +348,16 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, &layout)).collect(), notes })
 }
 
-/// Half a turn about x: y and z change sign.
+/// Rotation by half a turn about x, which negates y and z.
 const FLU_FROM_FRD: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 
-/// Half a turn about the north-east diagonal: x and y change places, z changes sign.
+/// Rotation by half a turn about the north-east diagonal, which swaps x and y and negates z.
 fn ned_from_enu() -> DQuat {
     DQuat::from_xyzw(std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0)
 }
 
-fn raw_row(row: &rows::Row, layout: &Layout) -> RawRow {
+/// A row in the frames of camsim: geodetic or north-east-down positions, forward-right-down bodies.
+fn raw_row(row: &rows::ParsedRow, layout: &TableLayout) -> RawRow {
     let [a, b, c] = row.position;
     let position = match layout.frame {
         Frame::Geodetic => RawPosition::Geodetic(Geodetic::from_deg(a, b, c)),
@@ -351,8 +366,8 @@ fn raw_row(row: &rows::Row, layout: &Layout) -> RawRow {
         Frame::EastNorthUp => RawPosition::Ned(DVec3::new(b, a, -c)),
     };
     let attitude = match layout.attitude {
-        // Where an attitude is stated in part, it is a faulty one.
-        _ if !row.states_attitude() => RawAttitude::None,
+        // A partial attitude is kept, with NaN: the cleaning treats it as faulty.
+        _ if !row.has_attitude() => RawAttitude::None,
         AttitudeColumns::None => RawAttitude::None,
         AttitudeColumns::Euler(_) => {
             RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]])

@@ -1,49 +1,53 @@
-//! FRAME.toml: somebody else's ideal RGB-D frame and how its camera moved, for `camsim apply`.
+//! FRAME.toml: an ideal RGB-D frame of another program, and the motion of its camera, for `camsim apply`.
 //!
 //! ```toml
 //! color = "ideal.png"                # EXR (linear), PNG, JPEG, BMP, TIFF, WebP; alpha is not read
-//! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR; TIFF of floats must say
-//! color_channels = ["R", "G", "B"]   # of an EXR, one is grey; a whole name, or the end of one: "Combined.R"
-//! color_layer = "ViewLayer.Combined" # of an EXR: its channels are taken from there
-//! depth = "depth.exr"                # EXR Z, PFM, TIFF or .npy of floats in metres, 16-bit PNG, PGM, TIFF or whole .npy with depth_per_metre, or packed
-//! depth_channel = "Depth.Z"          # of an EXR, and depth_layer, as above
-//! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes);
-//!                                    # or "carla": z = 1000 (R + 256 G + 65536 B) / (256^3 - 1)
-//! depth_per_metre = 1000.0           # stored value of one metre, 0.001 to 1e6; of floats 1 if left out
-//! depth_rows = "bottom-up"           # of a PFM: the row that it begins with; "top-down" as AirSim writes them
-//! depth_kind = "planar"              # z along the optical axis; or "range", along the ray; or "inverse": depth_per_metre / z
-//! depth_max_m = 1e9                  # what is stored as that far, or farther, is no depth: the value that stands for the sky
-//! holes = "far"                      # where there is no depth; "nearest": that of the nearest pixel that has one; "mark": nothing is shown
+//! color_space = "srgb"               # or "linear"; default linear for EXR, else srgb; float TIFF needs it
+//! color_channels = ["R", "G", "B"]   # of an EXR, or one name (grey): whole names, or the ends of names
+//! color_layer = "ViewLayer.Combined" # layer of an EXR that has these channels
+//! depth = "depth.exr"                # metres: EXR Z, PFM, TIFF or .npy of floats; with depth_per_metre also
+//!                                    # 16-bit PNG, PGM, TIFF or .npy; or packed bytes
+//! depth_channel = "Depth.Z"          # of an EXR; depth_layer as color_layer
+//! depth_encoding = "plain"           # "packed24": z = 65025 R/255 + 255 G/255 + B/255 (bytes);
+//!                                    # "carla": z = 1000 (R + 256 G + 65536 B) / (256^3 - 1)
+//! depth_per_metre = 1000.0           # stored value of one metre, 0.001 to 1e6; default 1 for floats
+//! depth_rows = "bottom-up"           # row order of a PFM; "top-down" as AirSim writes it
+//! depth_kind = "planar"              # along the optical axis; "range": along the ray;
+//!                                    # "inverse": depth_per_metre / z
+//! depth_max_m = 1e9                  # values at or above this are no depth but the sky
+//! holes = "far"                      # pixels without depth: "far", "nearest" (depth of the nearest pixel
+//!                                    # with depth) or "mark" (invalid)
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
-//! principal_point_px = [543.5, 407.5]  # default: its centre; of an EXR that of the display window
+//! principal_point_px = [543.5, 407.5]  # default: the centre; of an EXR, of the display window
 //! instant_ms = 0.0                   # when it was taken, from the stamp t_i
 //! [motion]                           # a twist about the frame's instant, in camera axes ...
 //! velocity_m_s = [0.0, 0.0, 0.0]
 //! angular_rate_rad_s = [0.0, 0.0, 0.628]
-//! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera), units by name: t_ms, x_mm,
-//! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw without a header, or with a comment that names another order
-//! # stamp_s = 12.5                   #     and the stamp on their clock
-//! # flow = "flow.flo"              # ... or where each pixel goes, whatever moves it: Middlebury .flo, or an EXR
+//! # trajectory = "poses.csv"         # ... or poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera);
+//!                                    #     other units by name: t_ms, x_mm
+//! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw, or the order that a comment names
+//! # stamp_s = 12.5                   #     and the stamp of the frame on their clock
+//! # flow = "flow.flo"              # ... or the optical flow: Middlebury .flo, EXR or .npy
 //! # flow_channels = ["X", "Y"]     #     of an EXR with more than two: right and down
-//! # flow_scale = [1.0, 1.0]        #     times this are pixels; [1.0, -1.0] where y is up
-//! # flow_interval_ms = 33.3        #     after how long; negative: where it was so long before
+//! # flow_scale = [1.0, 1.0]        #     factors that convert to pixels; [1.0, -1.0] where y is up
+//! # flow_interval_ms = 33.3        #     time over which it is measured; negative for backward flow
 //! # [fog]                            # preset "paper" only: linear fog, added after the blur
 //! # end_m = 12000.0
 //! # color = [0.5, 0.6, 0.7]          # stored values
 //! ```
 //!
-//! Many frames in one file: [`list`] says how they are named.
+//! [`list`] documents how one file names many frames.
 //!
-//! Depth that is 0, negative, infinite, at least `depth_max_m` or not a number is **unknown or sky: taken as
-//! infinitely far**, so it moves with the rotation alone, or, with `holes = "nearest"`, as what is beside it
-//! (a depth camera's shadows; not for pictures with sky), or, with `holes = "mark"`, not at all: output
-//! pixels that look there are invalid. A picture of nothing but 0 and infinity may be sky; one of nothing but
-//! what no depth can be (negative, not a number, nearer than a micrometre) is refused: it is in another sign
-//! or unit.
+//! Depth that is 0, negative, infinite, not a number, or at least `depth_max_m` is **unknown or sky**. It is
+//! taken as infinitely far, so that it moves with the rotation only. With `holes = "nearest"` it is that of
+//! the nearest pixel with depth (for the shadows of depth cameras; not for pictures with sky). With `holes =
+//! "mark"` output pixels that see it are invalid. A picture of zeros and infinities only may be sky. One
+//! without any possible depth (negative, not a number, below a micrometre) is refused: its sign or unit is
+//! wrong.
 //!
-//! A twist is constant **in the camera's own axes**: a screw, whose velocity turns with the camera. With
-//! velocity v across rate w the camera flies a circle of radius |v|/|w|; a camera that turns on a straight
-//! flight needs a trajectory.
+//! A twist is constant **in the camera's own axes**, a screw motion: the velocity turns with the camera. With
+//! velocity v perpendicular to rate w the camera flies a circle of radius |v|/|w|. A camera that rotates on a
+//! straight path needs a trajectory.
 
 use std::path::{Path, PathBuf};
 
@@ -78,20 +82,20 @@ pub use set::{FrameSet, read_frame_set};
 /// Why a frame file cannot be used.
 #[derive(Debug, Error)]
 pub enum FrameFileError {
-    /// The file itself: not readable, not TOML, keys or types.
+    /// FRAME.toml cannot be read or parsed, or has wrong keys or types.
     #[error(transparent)]
     File(#[from] ScenarioError),
-    /// A value that does not go with the others.
+    /// A value of FRAME.toml contradicts others, or a file.
     #[error("{}: {key}: {message}", path.display())]
     Key {
-        /// FRAME.toml.
+        /// Path of FRAME.toml.
         path: PathBuf,
         /// The key.
         key: &'static str,
         /// What is wrong and what to do.
         message: String,
     },
-    /// A picture.
+    /// A picture cannot be used.
     #[error("{}: {message}", path.display())]
     Picture {
         /// The picture.
@@ -99,17 +103,17 @@ pub enum FrameFileError {
         /// What is wrong and what to do.
         message: String,
     },
-    /// A table of poses or of frames.
+    /// A table of poses or of frames cannot be read.
     #[error("{}{}: {message}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Poses {
         /// The table.
         path: PathBuf,
-        /// Line from 1, where known.
+        /// Line, from 1, where known.
         line: Option<u64>,
         /// What is wrong and what to do.
         message: String,
     },
-    /// What the table says.
+    /// The poses of a table make no trajectory.
     #[error("{}: {source}", path.display())]
     Track {
         /// The table.
@@ -119,7 +123,7 @@ pub enum FrameFileError {
     },
 }
 
-/// The keys as written, paths resolved.
+/// The keys of FRAME.toml, with resolved paths.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FrameSpec {
@@ -190,7 +194,7 @@ enum DepthEncoding {
     Carla,
 }
 
-/// Which row a PFM file begins with: the format says the bottom one, and not everybody keeps to it.
+/// Row order of a PFM file. The format defines bottom-up, but some programs write top-down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum DepthRows {
@@ -224,7 +228,7 @@ enum TrajectoryFormat {
     Tum,
 }
 
-/// What a whole number in a file's name counts.
+/// Unit of the times in file names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum NameUnit {
@@ -235,7 +239,7 @@ enum NameUnit {
 }
 
 impl FrameSpec {
-    /// The first key that chooses a channel of an EXR's colour.
+    /// The first key given that selects colour channels of an EXR.
     fn color_key(&self) -> Option<&'static str> {
         self.color_channels
             .as_ref()
@@ -243,7 +247,7 @@ impl FrameSpec {
             .or(self.color_layer.as_ref().map(|_| "color_layer"))
     }
 
-    /// The same of its depth.
+    /// The first key given that selects the depth channel of an EXR.
     fn depth_key(&self) -> Option<&'static str> {
         self.depth_channel
             .as_ref()
@@ -252,18 +256,18 @@ impl FrameSpec {
     }
 }
 
-/// A frame file, read with everything that it names.
+/// A frame with its pictures and its motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFile {
     /// The ideal frame.
     pub frame: IdealFrame,
-    /// How its camera moved.
+    /// Motion of its camera.
     pub motion: Motion,
-    /// Fog of the paper's preset.
+    /// Fog, for the paper preset.
     pub fog: Option<LinearFog>,
     /// Share of the pixels whose depth is unknown or sky.
     pub without_depth: f64,
-    /// What of the pictures is not as it seems, or left out.
+    /// Notes about what is not applied, or is unusual.
     pub notes: Vec<String>,
 }
 
@@ -275,7 +279,7 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
     read_frame_set(path)?.read(0)
 }
 
-/// The keys of a frame file, each by itself as it should be.
+/// Reads FRAME.toml and checks each value by itself.
 fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     let mut tree = Tree::read(path, "")?;
     let problems = check::check(&mut tree, &schema::FRAME, "");
@@ -294,7 +298,7 @@ fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     if !spec.instant_ms.is_finite() {
         return fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp");
     }
-    if spec.depth_max_m.is_some_and(|most| most.is_nan() || most <= 0.0) {
+    if spec.depth_max_m.is_some_and(|max| max.is_nan() || max <= 0.0) {
         return fail(
             "depth_max_m",
             "must be above 0, in metres: what is stored as that far, or farther, is no depth",
@@ -312,10 +316,11 @@ fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     Ok(spec)
 }
 
-/// Where the first pixel of an EXR is in the file's own pixels; `None` of other pictures.
+/// Position of the first pixel of an EXR in the pixels of its display window; `None` for other formats.
 type Origin = Option<[i32; 2]>;
 
 /// Reads the pictures of one frame.
+// Long because depth, holes and fog depend on colour and motion.
 fn read_pictures(
     spec: &FrameSpec,
     color: &Path,
@@ -332,15 +337,16 @@ fn read_pictures(
     let mut notes = color.notes;
     let mut inverse_depth = match depth {
         Some(depth) => {
-            let depth::Depth { inverse, notes: of_depth } =
+            let depth::Depth { inverse, notes: depth_notes } =
                 depth::read_depth(depth, spec, &geometry, color.origin_px, path)?;
-            notes.extend(of_depth.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
+            notes.extend(depth_notes.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
             inverse
         }
         None if motion.translates() => {
             return Err(fail(
                 "depth",
-                "is missing, and the camera moves: without depth nothing says by how much surfaces shift; add it, or leave only the rotation",
+                "is missing, and the camera moves: without depth nothing says by how much surfaces shift; \
+                    add it, or leave only the rotation",
             ));
         }
         None => vec![0.0; (width * height) as usize],
@@ -365,7 +371,7 @@ fn read_pictures(
     match spec.holes {
         Holes::Far => {}
         Holes::Nearest => depth::fill_holes(&mut inverse_depth, size_px),
-        // Of a picture without depth, which only turns, nothing is missing.
+        // Without a depth picture the camera only rotates, and no depth is missing.
         Holes::Mark if depth.is_some() => holes = inverse_depth.iter().map(|w| *w == 0.0).collect(),
         Holes::Mark => {}
     }

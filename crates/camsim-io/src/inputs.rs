@@ -1,4 +1,4 @@
-//! The files that a run is made from, told apart by what is in them: `--resume` goes on only with the same.
+//! Fingerprints of the input files of a run. `--resume` continues a run only with the same inputs.
 
 use std::{
     collections::BTreeMap,
@@ -13,16 +13,16 @@ use rayon::prelude::*;
 
 use crate::{gltf_file::referenced_files, terrain::sidecar_files};
 
-/// What is in files, by their paths.
+/// Fingerprints of files by their paths.
 pub type Inputs = BTreeMap<String, String>;
 
-/// Bytes that are read at once.
-const AT_ONCE: usize = 1 << 20;
+/// Size of the read buffer, bytes.
+const BUFFER_BYTES: usize = 1 << 20;
 
-/// Of all files that a scenario names, and of those that these name: a model's buffers and pictures, what
-/// lies beside rasters. Camera files are part of the scenario itself.
+/// Fingerprints of all files that a scenario names, and of those that these need: buffers and pictures of
+/// models, files beside rasters. Camera files are part of the scenario itself.
 #[must_use]
-pub fn of_scenario(scenario: &Scenario) -> Inputs {
+pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
     let scene = &scenario.scene;
     let mut paths = vec![scenario.flight.log.clone()];
     paths.extend(scenario.camera.photometric.vignette.clone());
@@ -38,35 +38,36 @@ pub fn of_scenario(scenario: &Scenario) -> Inputs {
         paths.extend(referenced_files(&model.file));
         paths.extend(model.placements.clone());
     }
-    of_files(paths)
+    file_fingerprints(paths)
 }
 
-/// Of these.
+/// Fingerprints of files.
 #[must_use]
-pub fn of_files(mut paths: Vec<PathBuf>) -> Inputs {
+pub fn file_fingerprints(mut paths: Vec<PathBuf>) -> Inputs {
     paths.sort();
     paths.dedup();
-    paths.par_iter().map(|path| (path.display().to_string(), content(path))).collect()
+    paths.par_iter().map(|path| (path.display().to_string(), fingerprint(path))).collect()
 }
 
-/// What stands for the content of a file that cannot be read.
+/// The fingerprint of a file that cannot be read.
 pub(crate) const NOT_READABLE: &str = "not readable";
 
-/// Length and checksum, or that there is nothing to read.
-fn content(path: &Path) -> String {
+/// Length and CRC-32 of a file, or [`NOT_READABLE`].
+fn fingerprint(path: &Path) -> String {
     match checksum(path) {
         Ok((bytes, crc)) => format!("{bytes} bytes, CRC-32 {crc:08x}"),
         Err(_) => NOT_READABLE.to_owned(),
     }
 }
 
+/// Length in bytes and CRC-32 of a file.
 fn checksum(path: &Path) -> io::Result<(u64, u32)> {
-    // What comes through a pipe has been read, and opening it again would wait for more.
+    // A pipe has been read already, and opening it again would block.
     if !path.metadata()?.is_file() {
         return Err(io::ErrorKind::InvalidInput.into());
     }
     let mut file = File::open(path)?;
-    let (mut buffer, mut hasher, mut bytes) = (vec![0; AT_ONCE], crc32fast::Hasher::new(), 0);
+    let (mut buffer, mut hasher, mut bytes) = (vec![0; BUFFER_BYTES], crc32fast::Hasher::new(), 0);
     loop {
         match file.read(&mut buffer) {
             Ok(0) => return Ok((bytes, hasher.finalize())),
@@ -80,11 +81,11 @@ fn checksum(path: &Path) -> io::Result<(u64, u32)> {
     }
 }
 
-/// Length of a file and when it was changed, for those that are too many to be read for it.
+/// Length and modification time of a file: a fingerprint that needs no reading, for large sets of files.
 #[must_use]
-pub fn dated(path: &Path) -> String {
-    let of = path.metadata().and_then(|of| Ok((of.len(), of.modified()?)));
-    let Ok((bytes, modified)) = of else { return NOT_READABLE.to_owned() };
+pub fn size_and_mtime(path: &Path) -> String {
+    let metadata = path.metadata().and_then(|metadata| Ok((metadata.len(), metadata.modified()?)));
+    let Ok((bytes, modified)) = metadata else { return NOT_READABLE.to_owned() };
     let modified_s = modified.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
     format!("{bytes} bytes, changed {modified_s:.6} s after 1970")
 }
@@ -96,7 +97,7 @@ mod tests {
     use crate::scenario_file::parse_scenario;
 
     #[test]
-    fn a_change_of_any_file_shows_under_its_name() {
+    fn changes_of_any_input_file_change_its_fingerprint() {
         let folder = tempfile::tempdir().unwrap();
         let names = [
             "log.csv",
@@ -112,7 +113,8 @@ mod tests {
             "skin.png",
             "house.gltf",
         ];
-        let model = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "a%20mesh.bin", "byteLength": 1 }, { "uri": "data:,x", "byteLength": 1 }],
+        let model = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "a%20mesh.bin", "byteLength": 1 },
+                { "uri": "data:,x", "byteLength": 1 }],
             "images": [{ "uri": "skin.png" }, { "bufferView": 0 }] }"#;
         for name in names {
             std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" })
@@ -139,19 +141,19 @@ mod tests {
             file = "gone.glb"
         "#;
         let scenario = parse_scenario(text, &folder.path().join("s.toml"), &[]).unwrap();
-        let before = of_scenario(&scenario);
+        let before = scenario_fingerprints(&scenario);
         let path = |name: &str| folder.path().join(name).display().to_string();
         assert_eq!(before[&path("log.csv")], "3 bytes, CRC-32 7a6c86f1");
         assert_eq!(before[&path("gone.glb")], "not readable");
         assert_eq!(before.len(), names.len() + 1);
         for name in names {
-            // Of the same length.
+            // The new content has the same length.
             std::fs::write(
                 folder.path().join(name),
                 if name.ends_with("gltf") { model.replace("2.0", "2.1") } else { "two".to_owned() },
             )
             .unwrap();
-            let now = of_scenario(&scenario);
+            let now = scenario_fingerprints(&scenario);
             let changed: Vec<&String> = now
                 .iter()
                 .filter(|(path, content)| before.get(*path) != Some(content))
@@ -161,6 +163,6 @@ mod tests {
             std::fs::write(folder.path().join(name), if name.ends_with("gltf") { model } else { "one" })
                 .unwrap();
         }
-        assert_eq!(of_scenario(&scenario), before);
+        assert_eq!(scenario_fingerprints(&scenario), before);
     }
 }

@@ -1,39 +1,53 @@
-//! Files in, files out: scenarios, flight logs, calibrations, terrain, pictures; EXR, PNG, tables, manifests.
+//! File formats of camsim: reads scenarios, flight logs, cameras, terrain, models and pictures; writes
+//! frames, tables and manifests.
 //!
-//! Readers give plain data of `camsim-core`; every error names the file and, where there is one, the line or
-//! the key, and says what to do.
+//! Readers return plain data of `camsim-core`. Every error names the file, the line or key if there is one,
+//! and what to do.
+//!
+//! ```no_run
+//! use camsim_io::{load::load_sequence, scenario_file::read_scenario};
+//!
+//! let scenario = read_scenario("scenario.toml".as_ref(), &[], None)?;
+//! let loaded = load_sequence(&scenario)?;
+//! println!("{} frames", loaded.sequence.frames);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | module | reads or writes |
+//! |---|---|
+//! | [`scenario_file`] | scenarios and camera files (TOML), `--set` |
+//! | [`camera_file`] | calibrations of other programs |
+//! | [`flight_log`] | flight logs: CSV, TUM, EuRoC, GPX |
+//! | [`terrain`] | heights and ortho-images |
+//! | [`gltf_file`] | models |
+//! | [`board_file`] | calibration boards |
+//! | [`pictures`] | textures and grey images |
+//! | [`load`] | everything that a scenario names |
+//! | [`frame_file`] | RGB-D frames for `camsim apply` |
+//! | [`write`](mod@write) | frames and tables |
+//! | [`manifest`] | `run.json`; resuming of runs |
+//! | [`inputs`] | fingerprints of input files |
+//! | [`portable`] | relative paths in output folders |
+//! | [`compare`] | comparison of pictures |
+//! | [`builtin`] | the built-in demo flight |
 
 #![warn(missing_docs)]
 
-pub mod scenario_file;
-
-pub mod camera_file;
-
-pub mod frame_file;
-
-pub mod flight_log;
-
-pub mod terrain;
-
-pub mod pictures;
-
 pub mod board_file;
-
-pub mod gltf_file;
-
-pub mod load;
-
 pub mod builtin;
-
-pub mod write;
-
-pub mod inputs;
-
-pub mod portable;
-
-pub mod manifest;
-
+pub mod camera_file;
 pub mod compare;
+pub mod flight_log;
+pub mod frame_file;
+pub mod gltf_file;
+pub mod inputs;
+pub mod load;
+pub mod manifest;
+pub mod pictures;
+pub mod portable;
+pub mod scenario_file;
+pub mod terrain;
+pub mod write;
 
 #[cfg(test)]
 mod inputs_page;

@@ -1,5 +1,4 @@
-//! A scenario's files, read, checked against each other, and brought to one local frame: what rendering
-//! starts from.
+//! Loads all files of a scenario, checks them against each other, and converts them to one local frame.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -22,57 +21,57 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
-mod beyond;
 mod optics;
+mod ortho_coverage;
 mod placements;
 mod scene;
 
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
-pub use scene::board_place;
+pub use scene::board_position_ned_m;
 use scene::load_scene;
 
-/// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of
-/// it would not end.
-const MOST_FRAMES: f64 = 10e6;
+/// Maximum number of frames of a sequence: four days at 30 per second. More is a mistake in `camera.fps`.
+const MAX_FRAMES: f64 = 10e6;
 
 /// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// The flight log.
+    /// The flight log cannot be read.
     #[error(transparent)]
     Log(#[from] FlightLogError),
-    /// The tracker.
+    /// The log cannot be tracked.
     #[error(transparent)]
     Tracker(#[from] TrackerError),
-    /// The mount.
+    /// The mount is not valid.
     #[error(transparent)]
     Mount(#[from] MountError),
-    /// The terrain.
+    /// The terrain cannot be read.
     #[error(transparent)]
     Terrain(#[from] TerrainFileError),
-    /// A picture.
+    /// A picture cannot be read.
     #[error("{source}; check {key}")]
     Picture {
-        /// Which one it is.
+        /// Key that names the picture.
         key: &'static str,
         /// What is wrong.
         source: PictureError,
     },
-    /// A local log over a georeferenced scene.
+    /// A log with local coordinates in a georeferenced scene.
     #[error(
-        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
+        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, \
+            height_m], the place on Earth of the log's (0, 0, 0)"
     )]
     NoOrigin {
         /// The log.
         log: PathBuf,
-        /// What has a place on Earth.
+        /// Key that is georeferenced.
         key: &'static str,
     },
-    /// A model.
+    /// A model cannot be read.
     #[error("scene.gltf: {0}")]
     Gltf(#[from] GltfError),
-    /// A table of places.
+    /// A table of placements cannot be read.
     #[error("{path}: {problem}")]
     Placements {
         /// The file.
@@ -80,44 +79,49 @@ pub enum LoadError {
         /// What is wrong, where, and what to do.
         problem: String,
     },
-    /// A place without ground.
+    /// Models are to stand on the ground where there is none.
     #[error(
-        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east {east_m:.1} m: move it onto the terrain, or leave on_ground out"
+        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east \
+            {east_m:.1} m: move it onto the terrain, or leave on_ground out"
     )]
     NoGround {
         /// The model.
         file: PathBuf,
-        /// The place.
+        /// North of the placement, metres.
         north_m: f64,
-        /// The place.
+        /// East of the placement, metres.
         east_m: f64,
     },
-    /// A model farther away than anything can be.
+    /// A model is farther away than [`FARTHEST_M`].
     #[error(
-        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than {MAX_RADIUS_M:.0e}: check its place and scale"
+        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
+            {MAX_RADIUS_M:.0e}: check its place and scale"
     )]
     TooFar {
         /// The model.
         file: PathBuf,
-        /// How far.
+        /// Largest distance of a vertex from the origin, metres.
         reach_m: f64,
     },
-    /// A calibration board.
+    /// A calibration board cannot be read.
     #[error("scene.board: {0}")]
     Board(#[from] BoardFileError),
-    /// No frame falls into the window.
+    /// The window (start and end in seconds) holds no frame at this frame rate.
     #[error(
-        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher"
+        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or \
+            camera.fps higher"
     )]
     NoFrame(f64, f64, f64),
-    /// More frames than a sequence may have.
+    /// The window holds more frames than [`MAX_FRAMES`]; frames and frame rate.
     #[error(
-        "the window holds {0:.0} frames at {1} frames a second, more than {MOST_FRAMES:.0}: make flight.window_s shorter or camera.fps lower"
+        "the window holds {0:.0} frames at {1} frames a second, more than {MAX_FRAMES:.0}: make \
+            flight.window_s shorter or camera.fps lower"
     )]
     TooManyFrames(f64, f64),
-    /// The zoom track.
+    /// The zoom track cannot be read.
     #[error(
-        "{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` (or t_ms, t_us, t_ns) and rows of finite numbers by ascending time"
+        "{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` (or t_ms, t_us, t_ns) and rows \
+            of finite numbers by ascending time"
     )]
     ZoomTrack {
         /// The file.
@@ -127,49 +131,49 @@ pub enum LoadError {
         /// What is wrong.
         problem: String,
     },
-    /// A zoom lens without a track or the other way round.
+    /// A zoom lens without a track, or a track without a zoom lens.
     #[error("camera.zoom and camera.zoom_track belong together: give both, or neither for a fixed lens")]
     ZoomPair,
 }
 
-/// A loaded scenario and what there is to say about it.
+/// A loaded scenario, with warnings.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// What rendering needs.
+    /// Input of planner and renderers.
     pub sequence: Arc<Sequence>,
     /// The cleaned log; its report counts every repair.
     pub log: Arc<FlightLog>,
-    /// The tracked trajectory with its limits.
+    /// The tracked trajectory, with the limits of the tracker.
     pub tracked: Arc<TrackResult>,
-    /// Where the terrain lies.
+    /// Extent and resolution of the terrain.
     pub terrain: Option<TerrainSummary>,
-    /// What a user should know but need not stop for.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Those of them that came with the scene.
+    /// The part of [`Self::warnings`] that concerns the scene.
     scene_notes: Vec<String>,
 }
 
-/// Reads everything that a scenario names (paths as they stand).
+/// Reads all files that a scenario names. Paths are used as they are.
 ///
 /// # Errors
 /// [`LoadError`] names the file or key and what to do.
 pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
-    load_beside(scenario, None)
+    load_or_reuse(scenario, None)
 }
 
-/// As [`load_sequence`], but what `before` has read for the same keys is not read again, even if files have
-/// changed since: for programs that change a scenario value by value. What is taken over is shared, so that
-/// renderers can see that it is the same.
+/// As [`load_sequence`], but reuses the parts of `before` whose keys are unchanged, even if their files have
+/// changed since. For programs that edit a scenario. Reused parts are shared by `Arc`, so that renderers can
+/// compare pointers.
 ///
 /// # Errors
 /// As [`load_sequence`].
 pub fn reload_sequence(scenario: &Scenario, before: &Loaded) -> Result<Loaded, LoadError> {
-    load_beside(scenario, Some(before))
+    load_or_reuse(scenario, Some(before))
 }
 
-fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
-    let known = before.map(|before| (before, &before.sequence.scenario));
-    let (log, trajectory, tracked) = match known.filter(|(_, of)| reads_same_flight(of, scenario)) {
+fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
+    let reusable = before.map(|before| (before, &before.sequence.scenario));
+    let (log, trajectory, tracked) = match reusable.filter(|(_, old)| reads_same_flight(old, scenario)) {
         Some((before, _)) => {
             (before.log.clone(), before.sequence.path.trajectory.clone(), before.tracked.clone())
         }
@@ -179,12 +183,12 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
         }
     };
     let path = CameraPath::new(trajectory, &scenario.camera.mount)?;
-    let same_scene = |before: &Loaded, of: &Scenario| {
-        of.scene == scenario.scene
-            && of.flight.height == scenario.flight.height
+    let has_same_scene = |before: &Loaded, old: &Scenario| {
+        old.scene == scenario.scene
+            && old.flight.height == scenario.flight.height
             && before.log.frame == log.frame
     };
-    let (scene, terrain, scene_notes) = match known.filter(|(before, of)| same_scene(before, of)) {
+    let (scene, terrain, scene_notes) = match reusable.filter(|(before, old)| has_same_scene(before, old)) {
         Some((before, _)) => {
             (before.sequence.scene.clone(), before.terrain.clone(), before.scene_notes.clone())
         }
@@ -193,11 +197,13 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
             (Arc::new(scene), terrain, notes)
         }
     };
-    let picture = &scenario.camera.photometric.vignette;
-    let of_vignette = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
-    let vignette = match known.filter(|(_, of)| of.camera.photometric.vignette == *picture) {
+    let vignette_path = &scenario.camera.photometric.vignette;
+    let vignette_error = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
+    let vignette = match reusable.filter(|(_, old)| old.camera.photometric.vignette == *vignette_path) {
         Some((before, _)) => before.sequence.vignette.clone(),
-        None => picture.as_deref().map(read_gray_image).transpose().map_err(of_vignette)?.map(Arc::new),
+        None => {
+            vignette_path.as_deref().map(read_gray_image).transpose().map_err(vignette_error)?.map(Arc::new)
+        }
     };
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
@@ -217,28 +223,29 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
 }
 
-/// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all
-/// of the log is tracked.
+/// Whether two scenarios read and track the same log in the same way. The window may differ, as the whole log
+/// is tracked.
 fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
-    let whole = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
-    whole(&a.flight) == whole(&b.flight)
+    let without_window = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
+    without_window(&a.flight) == without_window(&b.flight)
         && a.effective_tracker() == b.effective_tracker()
-        && height_plan(a).0 == height_plan(b).0
+        && height_conversions(a).0 == height_conversions(b).0
 }
 
-/// The log and its trajectory alone: no scene is read.
+/// Reads and tracks the log alone, without the scene.
 ///
 /// # Errors
 /// As [`load_sequence`].
 pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, TrackResult), LoadError> {
-    let (log_height, _) = height_plan(scenario);
+    let (log_height, _) = height_conversions(scenario);
     let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
     let tracked = track(&log.rows, &scenario.effective_tracker())?;
     Ok((log, tracked))
 }
 
-/// Equal vertical datums need no conversion; else whichever is above mean sea level goes through the geoid.
-fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
+/// How heights of the log are converted, and whether those of the terrain are raised by the geoid. Equal
+/// vertical datums need neither; else heights above mean sea level become ellipsoidal.
+fn height_conversions(scenario: &Scenario) -> (HeightConversion, bool) {
     let log = scenario.flight.height;
     let terrain = scenario.scene.terrain.as_ref().map_or(log, |terrain| terrain.height);
     match (log, terrain) {
@@ -248,14 +255,14 @@ fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
     }
 }
 
-/// Start (path time) and number of frames: frame i counts while its stamp is inside the window.
+/// Start (path time, seconds) and number of frames: those whose stamps are inside the window.
 fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), LoadError> {
     let speed = scenario.flight.speed;
     let last_s = log.rows.last().map_or(0.0, |row| row.t_s);
     let [start_s, end_s] = scenario.flight.window_s.map_or([0.0, last_s], |window| window.map(|t| t / speed));
     let camera = &scenario.camera;
-    // Without a window the whole log is flown, its last instant included (a log of one row is a still camera:
-    // one frame); an explicit window is half-open, so that [0, 20] at 30 frames a second holds 600 frames.
+    // Without a window the last instant of the log is included, so that a log of one row gives one frame. An
+    // explicit window is half-open, so that [0, 20] at 30 frames per second holds 600 frames.
     let periods = (end_s - start_s) * camera.fps - camera.phase;
     let count = if scenario.flight.window_s.is_none() {
         (periods + 1e-9).floor() + 1.0
@@ -265,24 +272,24 @@ fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), 
     if count < 1.0 {
         return Err(LoadError::NoFrame(start_s * speed, end_s * speed, camera.fps));
     }
-    if count > MOST_FRAMES {
+    if count > MAX_FRAMES {
         return Err(LoadError::TooManyFrames(count, camera.fps));
     }
     Ok((start_s, count as u64))
 }
 
-/// How many frames have the instant of their image centre, `(i + phase)/fps - delay` after `start_s`, outside
-/// of the log.
+/// Number of frames whose image centre is exposed outside of the log, `(i + phase)/fps - delay` after
+/// `start_s`.
 fn frames_outside(sequence: &Sequence) -> usize {
     let (first_s, last_s) = sequence.path.span_s();
     let camera = &sequence.scenario.camera;
     let centre_s =
         |i: u64| sequence.start_s + (i as f64 + camera.phase) / camera.fps - camera.shutter.delay_ms * 1e-3;
-    // A nanosecond, the resolution of a stamp, is no excursion.
+    // The tolerance is a nanosecond, the resolution of a stamp.
     (0..sequence.frames).filter(|&i| centre_s(i) < first_s - 1e-9 || centre_s(i) > last_s + 1e-9).count()
 }
 
-/// What log and tracker have to say: limits that held the platform back, repairs.
+/// Warnings of log and tracker: limits that the tracker reached, repairs of the log.
 #[must_use]
 pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &TrackResult) -> Vec<String> {
     let mut warnings = tracked.warnings();
@@ -292,37 +299,38 @@ pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &TrackResu
         warnings
             .push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
     }
-    let of_file = log.notes.iter().filter(|note| note.is_warning);
-    warnings.extend(of_file.map(|note| format!("{}: {}", scenario.flight.log.display(), note.text)));
+    let log_warnings = log.notes.iter().filter(|note| note.is_warning);
+    warnings.extend(log_warnings.map(|note| format!("{}: {}", scenario.flight.log.display(), note.text)));
     if !log.report.is_clean() {
         warnings.push(format!("{}: {}", scenario.flight.log.display(), log.report));
     }
     warnings
 }
 
-/// A flight this far from its origin is likelier a slip than a flight.
+/// Distance of the flight from the origin above which a wrong origin is likely.
 const FAR_FROM_ORIGIN_M: f64 = 500e3;
 
-/// Says how much of the picture no ray reaches, by every 16th pixel of a fixed lens.
-fn blind_share_warning(sequence: &Sequence) -> Option<String> {
+/// Warns if the lens has no ray for part of the picture. Samples every 16th pixel of a fixed lens.
+fn invalid_pixels_warning(sequence: &Sequence) -> Option<String> {
     let camera = CameraModel::from_spec(&sequence.scenario.camera).ok()?;
     let [width, height] = camera.size_px;
-    let (mut all, mut blind) = (0_u32, 0_u32);
+    let (mut all, mut invalid) = (0_u32, 0_u32);
     for y in (8..height).step_by(16) {
         for x in (8..width).step_by(16) {
             all += 1;
-            blind += u32::from(camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_none());
+            invalid += u32::from(camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_none());
         }
     }
-    let share = 100.0 * f64::from(blind) / f64::from(all.max(1));
+    let share = 100.0 * f64::from(invalid) / f64::from(all.max(1));
     (share >= 0.5).then(|| {
         format!(
-            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see `camsim lens SCENARIO.toml check`"
+            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see \
+                `camsim lens SCENARIO.toml check`"
         )
     })
 }
 
-/// Times of the shutter that no sensor keeps at this frame rate. They are rendered as they stand.
+/// Warns of shutter times that no sensor has at this frame rate. They are rendered as they are.
 fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
     let period_ms = 1e3 / camera.fps;
     let shutter = &camera.shutter;
@@ -339,16 +347,18 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
             "one field would belong to the frame before; \"field\" is half a period",
         ),
     ];
-    let told = |(key, ms, why): &(&str, f64, &str)| {
+    let message = |(key, ms, reason): &(&str, f64, &str)| {
         format!(
-            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = {}): {why}",
+            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = \
+                {}): {reason}",
             camera.fps
         )
     };
-    // To the hair, so that 33.3334 at 30 frames a second passes.
-    longer.iter().filter(|(_, ms, _)| *ms > 1.0001 * period_ms).map(told).collect()
+    // The tolerance allows rounded values, such as 33.3334 at 30 frames per second.
+    longer.iter().filter(|(_, ms, _)| *ms > 1.0001 * period_ms).map(message).collect()
 }
 
+/// All warnings but those of the scene.
 fn warnings(
     sequence: &Sequence,
     log: &FlightLog,
@@ -356,12 +366,13 @@ fn warnings(
     terrain: Option<&TerrainSummary>,
 ) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
-    warnings.extend(blind_share_warning(sequence));
+    warnings.extend(invalid_pixels_warning(sequence));
     warnings.extend(optics_warnings(sequence));
     let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();
     if far_m > FAR_FROM_ORIGIN_M {
         warnings.push(format!(
-            "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the log's positions",
+            "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the \
+                log's positions",
             far_m / 1e3
         ));
     }
@@ -369,49 +380,65 @@ fn warnings(
         && !sequence.scene.has_triangle_borders_only()
     {
         warnings.push(format!(
-            "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"
+            "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their \
+                pictures, or are mixed with what is behind them, and samples do not show such borders"
         ));
     }
     warnings.extend(shutter_warnings(&sequence.scenario.camera));
-    let fps = sequence.scenario.camera.fps;
     let outside = frames_outside(sequence);
     if outside > 0 {
         warnings.push(format!(
-            "{outside} of {} frames lie outside of the log and fly on at constant velocity: check flight.window_s and camera.shutter.delay_ms",
+            "{outside} of {} frames lie outside of the log and fly on at constant velocity: check \
+                flight.window_s and camera.shutter.delay_ms",
             sequence.frames
         ));
     }
-    warnings.extend(terrain.and_then(|summary| beyond::beyond_picture_warning(sequence, summary)));
-    if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
-        let step = (sequence.frames / 200).max(1);
-        let places = (0..sequence.frames)
-            .step_by(step as usize)
-            .map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
-        let (mut over, mut beside, mut below, mut all) = (0, 0, 0, 0);
-        for place in places {
-            all += 1;
-            if let Some(ground_down_m) = terrain.down_at(place.x, place.y) {
-                over += 1;
-                below += u32::from(place.z > ground_down_m);
-            } else if !(terrain.bounds.min.x..=terrain.bounds.max.x).contains(&place.x)
-                || !(terrain.bounds.min.y..=terrain.bounds.max.y).contains(&place.y)
-            {
-                beside += 1;
-            }
-        }
-        let [lat, lon] = summary.centre_rad.map(f64::to_degrees);
-        if over == 0 && beside < all {
-            warnings.push(format!(
-                "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain without heights (missing, masked or not plausible)",
-                all - beside
-            ));
-        } else if over == 0 {
-            warnings.push(format!("the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} deg"));
-        } else if below > 0 {
-            warnings.push(format!(
-                "the camera is below the ground in {below} of {all} places looked at: check flight.height, scene.terrain.height and scene.terrain.height_unit"
-            ));
+    warnings.extend(terrain.and_then(|summary| ortho_coverage::ortho_coverage_warning(sequence, summary)));
+    warnings.extend(terrain.and_then(|summary| flight_over_terrain_warning(sequence, summary)));
+    warnings
+}
+
+/// Number of instants at which the position of the camera over the terrain is checked.
+const TERRAIN_SAMPLES: u64 = 200;
+
+/// Warns if the flight is never over the terrain, or partly below the ground.
+fn flight_over_terrain_warning(sequence: &Sequence, summary: &TerrainSummary) -> Option<String> {
+    let terrain = sequence.scene.terrain.as_ref()?;
+    let fps = sequence.scenario.camera.fps;
+    let step = (sequence.frames / TERRAIN_SAMPLES).max(1);
+    let positions_ned_m = (0..sequence.frames)
+        .step_by(step as usize)
+        .map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
+    let (mut over, mut outside, mut below, mut all) = (0, 0, 0, 0);
+    for position in positions_ned_m {
+        all += 1;
+        if let Some(ground_down_m) = terrain.down_at(position.x, position.y) {
+            over += 1;
+            below += u32::from(position.z > ground_down_m);
+        } else if !(terrain.bounds.min.x..=terrain.bounds.max.x).contains(&position.x)
+            || !(terrain.bounds.min.y..=terrain.bounds.max.y).contains(&position.y)
+        {
+            outside += 1;
         }
     }
-    warnings
+    if over == 0 && outside < all {
+        Some(format!(
+            "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain \
+             without heights (missing, masked or not plausible)",
+            all - outside
+        ))
+    } else if over == 0 {
+        let [lat, lon] = summary.centre_rad.map(f64::to_degrees);
+        Some(format!(
+            "the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} \
+                deg"
+        ))
+    } else if below > 0 {
+        Some(format!(
+            "the camera is below the ground in {below} of {all} places looked at: check flight.height, \
+             scene.terrain.height and scene.terrain.height_unit"
+        ))
+    } else {
+        None
+    }
 }

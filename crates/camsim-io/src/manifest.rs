@@ -1,8 +1,8 @@
-//! `run.json`: what made the files of a folder, so that the run can be repeated, and resumed only by the same
-//! scenario.
+//! `run.json`: the scenario and inputs of a run, so that it can be repeated, and resumed with the same
+//! scenario only.
 //!
-//! Its paths are relative to it. A folder that was moved, or whose inputs were, is still of the same scenario
-//! if they have the same contents.
+//! Its paths are relative to its folder. A run can be resumed after its folder or its inputs were moved, if
+//! the inputs have the same content.
 
 use std::{
     collections::BTreeMap,
@@ -21,7 +21,7 @@ use crate::{
     write::{WriteError, write_atomic},
 };
 
-/// What `run.json` says of its paths. Those of early versions, which say nothing, are of the working
+/// Value of the key `paths` of `run.json`. Early versions have no such key, and paths relative to the working
 /// directory.
 pub const PATHS: &str = "relative to this file";
 
@@ -30,27 +30,27 @@ pub const PATHS: &str = "relative to this file";
 pub struct RunManifest {
     /// Version of camsim.
     pub version: String,
-    /// Adapter and driver, in words.
+    /// Names of adapter and driver.
     pub adapter: String,
-    /// Seed of every random number (as in the scenario).
+    /// Seed of all random numbers, as in the scenario.
     pub seed: u64,
-    /// How the paths below are meant: [`PATHS`].
+    /// Base of the paths: [`PATHS`].
     pub paths: String,
-    /// The scenario with all defaults and `--set`.
+    /// The scenario with defaults and `--set` applied.
     pub scenario: Scenario,
-    /// What was in the files that it names.
+    /// Fingerprints of the files that the scenario names.
     pub inputs: Inputs,
-    /// Frames that the run covers, `--frames` applied: first and one past the last.
+    /// Frames of the run, `--frames` applied: the first, and one past the last.
     pub frames: [u64; 2],
     /// `[I, N]` of `--shard I/N`, from 1.
     pub shard: Option<[u64; 2]>,
-    /// Frames written.
+    /// Number of frames written.
     pub written: u64,
-    /// Frames that `--resume` found done.
+    /// Number of frames that `--resume` skipped.
     pub skipped: u64,
-    /// Whether the run came to its end; `false` is written at the start.
+    /// Whether the run is finished; `false` is written at its start.
     pub finished: bool,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -62,47 +62,49 @@ pub enum ResumeError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Reason.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// `run.json` is not one.
-    #[error("{} is not a run.json of camsim ({message}); render without --resume, or into another folder", path.display())]
+    /// `run.json` cannot be parsed.
+    #[error("{} is not a run.json of camsim ({message}); render without --resume, or into another \
+        folder", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
-        /// The parser's words.
+        /// Message of the parser.
         message: String,
     },
-    /// Another scenario, or other files.
-    #[error("{} was made {made}: {}; render without --resume, or into another folder", path.display(), shortened(differences))]
+    /// `run.json` is of another scenario, or of other inputs.
+    #[error("{} was made {made}: {}; render without --resume, or into another \
+        folder", path.display(), shortened(differences))]
     Differs {
         /// The file.
         path: PathBuf,
-        /// By what, or from what.
+        /// Rest of the sentence "the folder was made ...".
         made: &'static str,
-        /// `key was old, now new`.
+        /// One text per difference: `key was old, now new`.
         differences: Vec<String>,
     },
 }
 
-/// How a folder was made that has another scenario.
-pub const BY_SCENARIO: &str = "by another scenario";
+/// Value of [`ResumeError::Differs::made`] for another scenario.
+pub const BY_OTHER_SCENARIO: &str = "by another scenario";
 
 impl ResumeError {
-    /// What is wrong, without what to do.
+    /// The message without the advice at its end.
     #[must_use]
-    pub fn what(&self) -> String {
+    pub fn reason(&self) -> String {
         let text = self.to_string();
-        text.strip_suffix(WAY_OUT).map_or_else(|| text.clone(), str::to_owned)
+        text.strip_suffix(ADVICE).map_or_else(|| text.clone(), str::to_owned)
     }
 }
 
-/// How every text of a [`ResumeError`] ends.
-const WAY_OUT: &str = "; render without --resume, or into another folder";
+/// Advice at the end of the message of every [`ResumeError`].
+const ADVICE: &str = "; render without --resume, or into another folder";
 
 impl RunManifest {
-    /// Writes `run.json` into `folder`; a shard also writes `run.I-of-N.json`, so that shards in one folder
-    /// keep their own counts.
+    /// Writes `run.json` into `folder`. A shard also writes `run.I-of-N.json`, so that the counts of all
+    /// shards in one folder are kept.
     ///
     /// # Errors
     /// As [`write_atomic`].
@@ -117,68 +119,71 @@ impl RunManifest {
             ..self.clone()
         };
         let text = serde_json::to_string_pretty(&portable).map_err(fail)? + "\n";
-        if let Some([shard, of]) = self.shard {
-            write_atomic(&folder.join(format!("run.{shard}-of-{of}.json")), text.as_bytes())?;
+        if let Some([shard, shards]) = self.shard {
+            write_atomic(&folder.join(format!("run.{shard}-of-{shards}.json")), text.as_bytes())?;
         }
         write_atomic(&path, text.as_bytes())
     }
 }
 
-/// Inputs by their paths from a folder.
+/// Fingerprints by paths relative to a folder.
 #[must_use]
 pub fn portable_inputs(inputs: &Inputs, folder: &Path) -> Inputs {
     let name = |path: &String| relative_to(Path::new(path), folder).to_string_lossy().into_owned();
-    inputs.iter().map(|(path, content)| (name(path), content.clone())).collect()
+    inputs.iter().map(|(path, fingerprint)| (name(path), fingerprint.clone())).collect()
 }
 
-/// Most differences that an error lists.
-const MOST_LISTED: usize = 5;
+/// Maximum number of differences that an error lists.
+const MAX_LISTED: usize = 5;
 
+/// Differences as text, the first [`MAX_LISTED`] in full.
 fn shortened(differences: &[String]) -> String {
-    let listed = differences[..differences.len().min(MOST_LISTED)].join("; ");
-    let more = differences.len().saturating_sub(MOST_LISTED);
+    let listed = differences[..differences.len().min(MAX_LISTED)].join("; ");
+    let more = differences.len().saturating_sub(MAX_LISTED);
     if more > 0 { format!("{listed}; and {more} more") } else { listed }
 }
 
-/// Whether frames already in `folder` belong to `scenario` and to what is in its files. A folder without
-/// `run.json` holds none: `Ok(false)`.
+/// Checks that the frames in `folder` were made from `scenario` with these inputs. `Ok(false)` if there is no
+/// `run.json`, hence no frames.
 ///
 /// # Errors
-/// `run.json` cannot be read, or another scenario made it, or the same with other files.
+/// `run.json` cannot be read, or is of another scenario or of other inputs.
 pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let Some(run) = read_run(&path)? else { return Ok(false) };
     let parse =
         |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
-    let (mut there, there_inputs) = (part(&run, "scenario", &path)?.clone(), part(&run, "inputs", &path)?);
-    let mut here = as_read(&portable_scenario(scenario, folder).map_err(parse)?).map_err(parse)?;
-    let here_inputs = portable_inputs(inputs, folder);
-    let moved = Moved::between(&mut there, there_inputs, &mut here, &here_inputs);
-    differs(&path, BY_SCENARIO, &there, &here)?;
-    let here_inputs = as_read(&here_inputs).map_err(parse)?;
-    differs(&path, "when a file had something else in it", &moved.inputs(there_inputs), &here_inputs)?;
+    let (mut old, old_inputs) =
+        (value_of(&run, "scenario", &path)?.clone(), value_of(&run, "inputs", &path)?);
+    let mut new = through_text(&portable_scenario(scenario, folder).map_err(parse)?).map_err(parse)?;
+    let new_inputs = portable_inputs(inputs, folder);
+    let moved = MovedFiles::between(&mut old, old_inputs, &mut new, &new_inputs);
+    check_equal(&path, BY_OTHER_SCENARIO, &old, &new)?;
+    let new_inputs = through_text(&new_inputs).map_err(parse)?;
+    check_equal(&path, "when a file had something else in it", &moved.inputs(old_inputs), &new_inputs)?;
     Ok(true)
 }
 
-/// As [`check_resume`], of whatever stands under `key` in `run.json`; `made` is how the folder was made if
-/// that differs.
+/// As [`check_resume`], for the value at `key` of `run.json`. `made` completes the sentence "the folder was
+/// made ..." in the error.
 ///
 /// # Errors
 /// As [`check_resume`].
-pub fn check_resume_of(
+pub fn check_resume_key(
     folder: &Path,
     key: &str,
     made: &'static str,
-    here: &impl Serialize,
+    new: &impl Serialize,
 ) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let Some(run) = read_run(&path)? else { return Ok(false) };
-    let here = as_read(here)
+    let new = through_text(new)
         .map_err(|error| ResumeError::Parse { path: path.clone(), message: error.to_string() })?;
-    differs(&path, made, part(&run, key, &path)?, &here)?;
+    check_equal(&path, made, value_of(&run, key, &path)?, &new)?;
     Ok(true)
 }
 
+/// Parses `run.json`; `None` if there is no such file.
 fn read_run(path: &Path) -> Result<Option<Value>, ResumeError> {
     match std::fs::read_to_string(path) {
         Ok(text) => serde_json::from_str(&text)
@@ -189,18 +194,20 @@ fn read_run(path: &Path) -> Result<Option<Value>, ResumeError> {
     }
 }
 
-fn part<'a>(run: &'a Value, key: &str, path: &Path) -> Result<&'a Value, ResumeError> {
+/// The value at a key of `run.json`.
+fn value_of<'a>(run: &'a Value, key: &str, path: &Path) -> Result<&'a Value, ResumeError> {
     run.get(key).ok_or_else(|| ResumeError::Parse { path: path.into(), message: format!("it has no {key}") })
 }
 
-/// Through text, so that numbers that print alike are alike.
-fn as_read(value: &impl Serialize) -> Result<Value, serde_json::Error> {
+/// Serialises and parses a value, so that numbers with the same text are equal.
+fn through_text(value: &impl Serialize) -> Result<Value, serde_json::Error> {
     serde_json::to_string(value).and_then(|text| serde_json::from_str(&text))
 }
 
-fn differs(path: &Path, made: &'static str, there: &Value, here: &Value) -> Result<(), ResumeError> {
+/// Reports all differences of two values.
+fn check_equal(path: &Path, made: &'static str, old: &Value, new: &Value) -> Result<(), ResumeError> {
     let mut differences = Vec::new();
-    compare(there, here, "", &mut differences);
+    collect_differences(old, new, "", &mut differences);
     if differences.is_empty() {
         Ok(())
     } else {
@@ -208,75 +215,72 @@ fn differs(path: &Path, made: &'static str, there: &Value, here: &Value) -> Resu
     }
 }
 
-/// Files and folders that are elsewhere than when a folder was made, by what is in the files.
-struct Moved {
+/// Files with unchanged content that were moved since a run.
+struct MovedFiles {
+    /// New paths by old paths.
     files: BTreeMap<String, String>,
+    /// New folders of moved files by their old folders.
     folders: BTreeMap<PathBuf, PathBuf>,
 }
 
-impl Moved {
-    /// Pairs the paths under the same keys; those of `there` whose files have the same contents become those
-    /// of `here`.
-    fn between(there: &mut Value, there_inputs: &Value, here: &mut Value, here_inputs: &Inputs) -> Self {
-        let mut now = BTreeMap::new();
-        for_each_path(here, &mut |key, path| {
-            now.insert(key.to_owned(), path.clone());
+impl MovedFiles {
+    /// Compares the paths at equal keys of two scenarios. Old paths whose files have the same content at the
+    /// new path are replaced by it.
+    fn between(old: &mut Value, old_inputs: &Value, new: &mut Value, new_inputs: &Inputs) -> Self {
+        let mut new_paths = BTreeMap::new();
+        for_each_path(new, &mut |key, path| {
+            new_paths.insert(key.to_owned(), path.clone());
         });
         let mut moved = Self { files: BTreeMap::new(), folders: BTreeMap::new() };
-        for_each_path(there, &mut |key, path| {
-            let Some(new) = now.get(key).filter(|new| *new != path) else { return };
-            let contents = (
-                there_inputs.get(path.as_str()).and_then(Value::as_str),
-                here_inputs.get(new).map(String::as_str),
-            );
-            if contents.0.is_none()
-                || contents.0 != contents.1
-                || contents.0 == Some(crate::inputs::NOT_READABLE)
+        for_each_path(old, &mut |key, path| {
+            let Some(new_path) = new_paths.get(key).filter(|new_path| *new_path != path) else { return };
+            let old_fingerprint = old_inputs.get(path.as_str()).and_then(Value::as_str);
+            let new_fingerprint = new_inputs.get(new_path).map(String::as_str);
+            if old_fingerprint.is_none()
+                || old_fingerprint != new_fingerprint
+                || old_fingerprint == Some(crate::inputs::NOT_READABLE)
             {
                 return;
             }
-            if let (Some(from), Some(to)) = (Path::new(path).parent(), Path::new(new).parent()) {
+            if let (Some(from), Some(to)) = (Path::new(path).parent(), Path::new(new_path).parent()) {
                 moved.folders.insert(from.into(), to.into());
             }
-            moved.files.insert(path.clone(), new.clone());
-            path.clone_from(new);
+            moved.files.insert(path.clone(), new_path.clone());
+            path.clone_from(new_path);
         });
         moved
     }
 
-    /// The inputs of then where they are now; what a moved file names moved with it.
-    fn inputs(&self, there: &Value) -> Value {
-        let now = |path: &String| {
-            let beside = || {
+    /// Old fingerprints at the new paths. Files that a moved file needs are expected beside it.
+    fn inputs(&self, old: &Value) -> Value {
+        let new_path = |path: &String| {
+            let beside_moved_file = || {
                 let folder = self.folders.get(Path::new(path).parent()?)?;
                 Some(folder.join(Path::new(path).file_name()?).to_string_lossy().into_owned())
             };
-            self.files.get(path).cloned().or_else(beside).unwrap_or_else(|| path.clone())
+            self.files.get(path).cloned().or_else(beside_moved_file).unwrap_or_else(|| path.clone())
         };
-        let Value::Object(map) = there else { return there.clone() };
-        Value::Object(map.iter().map(|(path, content)| (now(path), content.clone())).collect())
+        let Value::Object(map) = old else { return old.clone() };
+        Value::Object(map.iter().map(|(path, fingerprint)| (new_path(path), fingerprint.clone())).collect())
     }
 }
 
-fn compare(there: &Value, here: &Value, key: &str, differences: &mut Vec<String>) {
-    if let (Value::Object(a), Value::Object(b)) = (there, here) {
+/// Appends `key was old, now new` for each leaf that differs.
+fn collect_differences(old: &Value, new: &Value, key: &str, differences: &mut Vec<String>) {
+    if let (Value::Object(a), Value::Object(b)) = (old, new) {
         for name in a.keys().chain(b.keys().filter(|name| !a.contains_key(*name))) {
             let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-            compare(
-                a.get(name).unwrap_or(&Value::Null),
-                b.get(name).unwrap_or(&Value::Null),
-                &key,
-                differences,
-            );
+            let [a, b] = [a, b].map(|map| map.get(name).unwrap_or(&Value::Null));
+            collect_differences(a, b, &key, differences);
         }
-    } else if there != here {
+    } else if old != new {
         let show = |value: &Value| if value.is_null() { "nothing".to_owned() } else { value.to_string() };
-        differences.push(format!("{key} was {}, now {}", show(there), show(here)));
+        differences.push(format!("{key} was {}, now {}", show(old), show(new)));
     }
 }
 
-/// Whether shard `[i, n]` (i from 1) has frame `index`: every n-th frame, so that shards take about the same
-/// time.
+/// Whether shard `[i, n]` (i from 1) renders frame `index`. A shard has every n-th frame, so that all shards
+/// take about the same time.
 pub fn in_shard(index: u64, [i, n]: [u64; 2]) -> bool {
     n > 0 && index % n + 1 == i
 }
@@ -311,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_reads_back_and_only_its_own_scenario_resumes() {
+    fn manifests_read_back_and_resume_only_their_own_scenario() {
         let dir = tempfile::tempdir().unwrap();
         assert!(!check_resume(dir.path(), &scenario(&[]), &Inputs::new()).unwrap());
         let ours =
@@ -348,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn the_run_of_a_manifest_can_be_made_again() {
+    fn manifests_are_scenarios_that_repeat_the_run() {
         let dir = tempfile::tempdir().unwrap();
         let text = r#"
             seed = 9
@@ -382,7 +386,7 @@ mod tests {
             [output]
             channels = ["color", "coords"]
         "#;
-        // Paths lead from the folder that the manifest is in.
+        // Paths are relative to the folder of the manifest.
         let scenario = parse_scenario(text, &dir.path().join("there/s.toml"), &[]).unwrap();
         let ours = manifest(scenario.clone());
         ours.write(&dir.path().join("out")).unwrap();
@@ -412,40 +416,40 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_was_moved_is_still_its_scenarios() {
+    fn moved_folders_and_inputs_can_be_resumed() {
         let base = tempfile::tempdir().unwrap();
-        let at = |name: &str| base.path().join(name);
-        std::fs::create_dir_all(at("data/maps")).unwrap();
+        let path = |name: &str| base.path().join(name);
+        std::fs::create_dir_all(path("data/maps")).unwrap();
         for name in ["data/a.csv", "data/g.png", "data/maps/g.pgw"] {
-            std::fs::write(at(name), name).unwrap();
+            std::fs::write(path(name), name).unwrap();
         }
         let read = |folder: &str| {
             let text = "[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n";
-            let scenario = parse_scenario(text, &at(folder).join("s.toml"), &[]).unwrap();
-            let mut inputs = crate::inputs::of_scenario(&scenario);
-            // As a world file or a model's buffer stands beside.
-            let beside = at(folder).join("g.pgw");
-            inputs.insert(beside.display().to_string(), "a world file".into());
+            let scenario = parse_scenario(text, &path(folder).join("s.toml"), &[]).unwrap();
+            let mut inputs = crate::inputs::scenario_fingerprints(&scenario);
+            // A file beside an input, such as a world file or a buffer of a model.
+            let world_file = path(folder).join("g.pgw");
+            inputs.insert(world_file.display().to_string(), "a world file".into());
             (scenario, inputs)
         };
         let (scenario, inputs) = read("data");
         let ours = RunManifest { inputs: inputs.clone(), ..manifest(scenario.clone()) };
-        ours.write(&at("runs/out")).unwrap();
-        assert!(check_resume(&at("runs/out"), &scenario, &inputs).unwrap());
-        std::fs::rename(at("runs/out"), at("out")).unwrap();
-        assert!(check_resume(&at("out"), &scenario, &inputs).unwrap(), "the folder is elsewhere");
-        std::fs::rename(at("data"), at("other")).unwrap();
+        ours.write(&path("runs/out")).unwrap();
+        assert!(check_resume(&path("runs/out"), &scenario, &inputs).unwrap());
+        std::fs::rename(path("runs/out"), path("out")).unwrap();
+        assert!(check_resume(&path("out"), &scenario, &inputs).unwrap(), "the folder is elsewhere");
+        std::fs::rename(path("data"), path("other")).unwrap();
         let (scenario, inputs) = read("other");
-        assert!(check_resume(&at("out"), &scenario, &inputs).unwrap(), "the inputs are elsewhere");
-        std::fs::write(at("other/a.csv"), "another log").unwrap();
+        assert!(check_resume(&path("out"), &scenario, &inputs).unwrap(), "the inputs are elsewhere");
+        std::fs::write(path("other/a.csv"), "another log").unwrap();
         let (scenario, inputs) = read("other");
-        let error = check_resume(&at("out"), &scenario, &inputs).unwrap_err().to_string();
+        let error = check_resume(&path("out"), &scenario, &inputs).unwrap_err().to_string();
         assert!(error.contains("flight.log was \"../../data/a.csv\", now \"../other/a.csv\""), "{error}");
     }
 
     #[test]
-    fn every_path_of_a_scenario_is_made_relative() {
-        use crate::scenario_file::{Kind, keys};
+    fn all_paths_of_a_scenario_are_made_relative() {
+        use crate::scenario_file::{ValueKind, keys};
         let text = r#"
             flight = { log = "x/1" }
             [camera]
@@ -462,16 +466,16 @@ mod tests {
         "#;
         let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
         let mut tree = serde_json::to_value(&scenario).unwrap();
-        let mut seen = Vec::new();
-        for_each_path(&mut tree, &mut |key, _| seen.push(key.replace(".0.", ".").replace(".1.", ".")));
-        for (key, _) in keys().iter().filter(|(_, kind)| *kind == Kind::Path) {
-            assert!(seen.iter().any(|seen| seen == key), "{key}");
+        let mut visited = Vec::new();
+        for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));
+        for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
+            assert!(visited.iter().any(|visited| visited == key), "{key}");
         }
-        assert_eq!(seen.len(), 10);
+        assert_eq!(visited.len(), 10);
     }
 
     #[test]
-    fn shards_share_out_all_frames_once() {
+    fn shards_partition_the_frames() {
         for index in 0..20 {
             assert_eq!((1..=4).filter(|&i| in_shard(index, [i, 4])).count(), 1);
         }

@@ -1,7 +1,5 @@
-//! Pictures: textures and grey maps out of PNG, JPEG, WebP, GIF (first frame), BMP and TIFF files. The format
-//! is told by content, not by name.
-//!
-//! A picture that states an orientation (EXIF, or tag 274 of a TIFF) is turned as it says.
+//! Reads textures and grey images from PNG, JPEG, WebP, GIF (first frame), BMP and TIFF files. The format is
+//! detected by content, not by name. An orientation (EXIF, or tag 274 of a TIFF) is applied.
 
 use std::path::{Path, PathBuf};
 
@@ -21,10 +19,10 @@ pub enum PictureError {
     Open {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The content is not what it should be.
+    /// The content cannot be used.
     #[error("{path}: cannot be decoded: {reason}")]
     Decode {
         /// The file.
@@ -39,7 +37,7 @@ impl PictureError {
         Self::Open { path: path.into(), source }
     }
 
-    /// Without the file's name.
+    /// The message without the path.
     pub(crate) fn reason(&self) -> String {
         match self {
             Self::Open { source, .. } => format!("cannot be read: {source}"),
@@ -52,8 +50,7 @@ impl PictureError {
     }
 }
 
-/// Reads a picture as a texture; `encoding` says what its colour values mean. 16-bit values are rounded to 8
-/// bits.
+/// Reads a picture as a texture of 8 bits. `encoding` is the transfer function of its values.
 ///
 /// # Errors
 ///
@@ -63,7 +60,7 @@ pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureE
         let raster = Raster::read(path)?;
         (raster.to_texture(path, encoding)?, raster.geo.orientation)
     } else {
-        let Stored { texture, orientation, .. } = read_stored(path, encoding)?;
+        let StoredPicture { texture, orientation, .. } = read_stored(path, encoding)?;
         (texture, orientation)
     };
     Ok(match orientation {
@@ -72,27 +69,28 @@ pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureE
     })
 }
 
-/// A picture that is no TIFF, its rows as they are stored.
-pub(crate) struct Stored {
+/// A picture other than TIFF, in its stored orientation.
+pub(crate) struct StoredPicture {
+    /// Pixels in stored order, rounded to 8 bits.
     pub(crate) texture: Texture,
-    /// The number of its orientation, if it is another than theirs.
+    /// EXIF orientation (2 to 8), if it is not upright.
     pub(crate) orientation: Option<u64>,
-    /// Its largest value but alpha, where it has 16 bits.
+    /// Largest colour value of a picture of 16 bits.
     pub(crate) largest_of_16_bits: Option<u16>,
 }
 
-/// Reads it.
-pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<Stored, PictureError> {
+/// Reads a picture other than TIFF without applying its orientation.
+pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<StoredPicture, PictureError> {
     let (picture, orientation) = decode(path)?;
     let largest_of_16_bits = largest_of_16_bits(&picture);
     let picture = picture.into_rgba8();
-    let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
+    let exif_orientation = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
     let texture =
         Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
-    Ok(Stored { texture, orientation: number, largest_of_16_bits })
+    Ok(StoredPicture { texture, orientation: exif_orientation, largest_of_16_bits })
 }
 
-/// The largest value but alpha of a picture of 16 bits.
+/// Largest colour value of a picture of 16 bits; `None` for other depths.
 pub(crate) fn largest_of_16_bits(picture: &DynamicImage) -> Option<u16> {
     match picture {
         DynamicImage::ImageLuma16(picture) => picture.iter().max().copied(),
@@ -105,21 +103,21 @@ pub(crate) fn largest_of_16_bits(picture: &DynamicImage) -> Option<u16> {
     }
 }
 
-/// A picture turned as its orientation (1 to 8, EXIF) says.
+/// Applies an EXIF orientation (1 to 8).
 pub(crate) fn oriented(texture: Texture, orientation: u64) -> Texture {
-    let turn =
+    let transform =
         u8::try_from(orientation).ok().and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
     let Texture { size_px: [width, height], rgba8, encoding } = texture;
     let Some(picture) = image::RgbaImage::from_raw(width, height, rgba8) else {
         return Texture::uniform([0; 4], encoding);
     };
     let mut picture = DynamicImage::ImageRgba8(picture);
-    picture.apply_orientation(turn);
+    picture.apply_orientation(transform);
     Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_rgba8().into_raw(), encoding }
 }
 
-/// Reads a picture as stored grey values 0..=1 (a vignette map, say): no transfer curve is undone. Colours
-/// become Rec. 709 luma.
+/// Reads a picture as grey values 0..=1, without undoing a transfer function. For vignettes. Colours become
+/// Rec. 709 luma.
 ///
 /// # Errors
 ///
@@ -128,17 +126,18 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
     if is_tiff(path)? {
         let raster = Raster::read(path)?;
         let pixels = raster.size[0] as usize * raster.size[1] as usize;
-        // Floats of 0 to 255 would be white throughout.
-        let most = if raster.is_integer_depth() == Some(false) {
-            (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max)
+        // Float values up to 255 would all be clipped to white.
+        let max = if raster.is_integer_depth() == Some(false) {
+            (0..pixels).map(|pixel| raster.value(pixel)).fold(0.0, f64::max)
         } else {
             0.0
         };
-        if most > 1.0 + 1e-6 {
+        if max > 1.0 + 1e-6 {
             return Err(PictureError::decode(
                 path,
                 format!(
-                    "grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"
+                    "grey values of floats are 0 to 1, and the largest is {max}: divide them by what white \
+                        is"
                 ),
             ));
         }
@@ -171,6 +170,7 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
     Ok(GrayImage { size_px, values })
 }
 
+/// Rec. 709 luma of a texture.
 pub(crate) fn gray_from_texture(texture: &Texture) -> GrayImage {
     let values = texture
         .rgba8
@@ -180,12 +180,12 @@ pub(crate) fn gray_from_texture(texture: &Texture) -> GrayImage {
     GrayImage { size_px: texture.size_px, values }
 }
 
-/// Equal channels give exactly their value.
+/// Rec. 709 luma; exact for equal channels.
 fn luma([r, g, b]: [f32; 3]) -> f32 {
     if r == g && g == b { r } else { 0.2126 * r + 0.7152 * g + 0.0722 * b }
 }
 
-/// Size of a picture within another file.
+/// Size of an encoded picture in memory, pixels.
 pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
     if bytes.is_empty() {
         return Err("it has no bytes".into());
@@ -199,7 +199,7 @@ pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
     reader.into_dimensions().map(|(width, height)| [width, height]).map_err(|error| error.to_string())
 }
 
-/// A picture within another file.
+/// Decodes a picture in memory.
 pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
     let mut reader = ImageReader::new(std::io::Cursor::new(bytes))
         .with_guessed_format()
@@ -215,7 +215,7 @@ pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
     }
 }
 
-/// The rows as they are stored, and how they are to be turned.
+/// Decodes a file. Returns pixels in stored order, and the orientation.
 fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
     let mut reader = ImageReader::open(path)
@@ -224,16 +224,16 @@ fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     if reader.format().is_none() {
         return Err(PictureError::decode(path, "not a PNG, JPEG, WebP, GIF, BMP or TIFF file"));
     }
-    let wrong = |error: image::ImageError| PictureError::decode(path, error.to_string());
-    // By itself it would stop at 512 MiB, however large the file.
+    let decode_error = |error: image::ImageError| PictureError::decode(path, error.to_string());
+    // The default limit of 512 MiB is raised in proportion to the size of the file.
     let mut limits = image::Limits::default();
     limits.max_alloc = limits.max_alloc.map(|least| least.max(max_decoded_bytes(bytes)));
     reader.limits(limits.clone());
-    let mut decoder = reader.into_decoder().map_err(wrong)?;
-    let orientation = decoder.orientation().map_err(wrong)?;
-    limits.reserve(decoder.total_bytes()).map_err(wrong)?;
-    decoder.set_limits(limits).map_err(wrong)?;
-    let picture = DynamicImage::from_decoder(decoder).map_err(wrong)?;
+    let mut decoder = reader.into_decoder().map_err(decode_error)?;
+    let orientation = decoder.orientation().map_err(decode_error)?;
+    limits.reserve(decoder.total_bytes()).map_err(decode_error)?;
+    decoder.set_limits(limits).map_err(decode_error)?;
+    let picture = DynamicImage::from_decoder(decoder).map_err(decode_error)?;
     if picture.width() == 0 || picture.height() == 0 {
         return Err(PictureError::decode(path, "the picture has no pixel"));
     }
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_told_by_content() {
+    fn formats_are_detected_by_content() {
         let folder = tempfile::tempdir().unwrap();
         let mut picture = image::RgbaImage::from_pixel(3, 2, image::Rgba([10, 20, 30, 255]));
         picture.put_pixel(2, 1, image::Rgba([200, 100, 50, 255]));
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn grey_values_keep_their_depth() {
+    fn grey_values_of_16_bits_are_exact() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep.png");
         image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![1u16, 65535])
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_files_are_named() {
+    fn errors_name_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("missing.png");
         assert!(
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn real_pictures_read() {
+    fn published_pictures_can_be_read() {
         let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
             eprintln!("CAMSIM_DATA is not set: real pictures are not read");
             return;

@@ -1,8 +1,8 @@
-//! Scenario files: TOML, a camera file inside it, `--set` on top, each mistake with its file, line and key.
+//! Scenario and camera files: TOML, changed by `--set`. Errors name file, line and key.
 //!
-//! The order is: parse, put `camera = "file.toml"` in its place, apply `--set`, check keys and types against
-//! the schema, resolve paths against the folder of the file that names them (those of `--set` against the
-//! working directory), deserialise, check ranges.
+//! The steps are: parse; replace `camera = "file.toml"` by the content of that file; apply `--set`; check
+//! keys and types against the schema; resolve paths against the folder of the file that names them (those of
+//! `--set` against the working directory); deserialise; check ranges.
 
 use std::path::{Path, PathBuf};
 
@@ -10,13 +10,13 @@ use camsim_core::scenario::{CameraSpec, Preset, Problem, Scenario, validate, val
 use thiserror::Error;
 
 pub(crate) mod check;
-mod mistaken;
 mod paths;
 pub(crate) mod schema;
 pub(crate) mod tree;
+mod wrong_file_kind;
 
 pub(crate) use paths::for_each_path;
-pub use schema::Kind;
+pub use schema::ValueKind;
 use tree::Tree;
 
 /// Why a scenario cannot be used.
@@ -27,25 +27,27 @@ pub enum ScenarioError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Reason.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Not UTF-8 text.
-    #[error("{}: not UTF-8 text (bad byte at offset {offset}); scenarios and camera files are TOML, which is text: save it as UTF-8", path.display())]
+    #[error("{}: not UTF-8 text (bad byte at offset {offset}); scenarios and camera files are TOML, which is \
+        text: save it as UTF-8", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
-        /// First bad byte.
+        /// Offset of the first byte that is not UTF-8.
         offset: usize,
     },
     /// A camera file that a scenario names cannot be read.
-    #[error("camera: cannot read {}: {source}; the key `camera` of {} names it, relative to that file's folder", path.display(), scenario.display())]
+    #[error("camera: cannot read {}: {source}; the key `camera` of {} names it, relative to that file's \
+        folder", path.display(), scenario.display())]
     ReadCamera {
         /// The camera file.
         path: PathBuf,
-        /// The scenario.
+        /// The scenario that names it.
         scenario: PathBuf,
-        /// The reason.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Not TOML.
@@ -55,18 +57,18 @@ pub enum ScenarioError {
         path: PathBuf,
         /// Line from 1.
         line: usize,
-        /// The parser's words.
+        /// Message of the parser.
         message: String,
     },
-    /// A `--set` that does not fit.
+    /// A `--set` that cannot be applied.
     #[error("--set {set}: {message}")]
     Set {
-        /// As typed.
+        /// `key=value`, as typed.
         set: String,
         /// What is wrong.
         message: String,
     },
-    /// Wrong keys, types or ranges: one line each, with its place.
+    /// Wrong keys, types or ranges: one line each, with file and line.
     #[error("{}", .0.join("\n"))]
     Problems(Vec<String>),
 }
@@ -85,15 +87,16 @@ pub fn read_scenario(
     finish(Tree::read_scenario(path)?, sets, preset)
 }
 
-/// As [`read_scenario`], from text that stands for the file `path`.
+/// As [`read_scenario`], from the text of the file `path`, which is not read.
 ///
 /// # Errors
-/// As there.
+/// As [`read_scenario`].
 pub fn parse_scenario(text: &str, path: &Path, sets: &[(String, String)]) -> Result<Scenario, ScenarioError> {
     finish(Tree::parse(text, path, "")?, sets, None)
 }
 
-/// Reads a camera file: the keys of `[camera]` at its root. Paths are resolved, ranges are not yet checked.
+/// Reads a camera file, which has the keys of `[camera]` at its root. Paths are resolved; ranges are not
+/// checked.
 ///
 /// # Errors
 /// As [`read_scenario`].
@@ -106,35 +109,36 @@ pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
     deserialize(&tree)
 }
 
-/// As [`read_camera`], with the ranges of all values checked.
+/// Reads a camera file and checks the ranges of all values.
 ///
 /// # Errors
-/// As there, and values out of range.
+/// As [`read_camera`], or values are out of range.
 pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
     let camera = read_camera(path)?;
     let problems = validate_camera(&camera);
     if problems.is_empty() {
         return Ok(camera);
     }
-    // In a camera file the keys stand at the root.
+    // The keys of a camera file stand at its root.
     let line = |problem: &Problem| {
         format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."))
     };
     Err(ScenarioError::Problems(problems.iter().map(line).collect()))
 }
 
-/// The commented default scenario: what `camsim render --print-default` prints.
+/// The commented default scenario that `camsim render --print-default` prints.
 pub fn print_default() -> String {
     include_str!("scenario_file/default.toml").to_owned()
 }
 
-/// Every key of a scenario file and what it takes, in the order of `--print-default`; elements of arrays of
-/// tables stand without their index.
+/// Every key of a scenario file and the values it takes, in the order of `--print-default`, without indices
+/// of array elements.
 #[must_use]
-pub fn keys() -> &'static [(&'static str, Kind)] {
+pub fn keys() -> &'static [(&'static str, ValueKind)] {
     schema::SCENARIO.keys
 }
 
+/// Turns a tree into a checked scenario.
 fn finish(
     mut tree: Tree,
     sets: &[(String, String)],
@@ -157,17 +161,17 @@ fn finish(
         return Ok(scenario);
     }
     Err(ScenarioError::Problems(
-        problems.iter().map(|problem| format!("{}: {problem}", tree.place(&problem.key))).collect(),
+        problems.iter().map(|problem| format!("{}: {problem}", tree.location(&problem.key))).collect(),
     ))
 }
 
-/// The schema lets nothing through that the struct does not take; should it, the file is named without a
+/// Deserialises a checked tree. The schema and the structs agree, so an error here is unexpected and names no
 /// line.
 pub(crate) fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
-    let described = |error: toml::de::Error| {
+    let problem = |error: toml::de::Error| {
         ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())])
     };
-    toml::Value::Table(tree.root.clone()).try_into().map_err(described)
+    toml::Value::Table(tree.root.clone()).try_into().map_err(problem)
 }
 
 #[cfg(test)]

@@ -1,23 +1,23 @@
-//! Files out. One folder a channel, one file a frame, each written whole or not at all:
+//! Writes output folders: one folder per channel, one file per frame, each file completely or not at all.
 //!
 //! ```text
 //! OUT/run.json                    version, adapter, resolved scenario, seed, counts
 //! OUT/camera.toml                 the camera, as a camera file
-//! OUT/inputs/vignette.png         copies of what it needs, where that was not in OUT before
-//! OUT/trajectory.csv              the platform's motion
-//! OUT/camera_trajectory.csv       the camera's, with mount and vibration
-//! OUT/frames.csv                  stamp, pose, ideal frame and files of every frame that is written
+//! OUT/inputs/vignette.png         copies of its files, unless they are in OUT already
+//! OUT/trajectory.csv              motion of the platform
+//! OUT/camera_trajectory.csv       motion of the camera, with mount and vibration
+//! OUT/frames.csv                  stamp, pose, ideal frame and files of every written frame
 //! OUT/color/frame_000123.exr      R G B A, linear   (.png: in the encoding of camera.photometric.output)
 //! OUT/depth/frame_000123.exr      Z, metres, 0 = nothing
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
-//! OUT/coords/frame_000123.exr     u v x y dt n e d; of the sky, whose depth is 0, n e d is its direction
+//! OUT/coords/frame_000123.exr     u v x y dt n e d; n e d is the direction where depth is 0 (sky)
 //! OUT/rows/frame_000123.csv       time, pose and velocity of each row
 //! ```
 //!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
 //!
-//! `output.format` chooses the formats of colour; the other channels have one each. An empty `format` writes
-//! no frame files at all.
+//! `output.format` selects the formats of colour; the other channels have one format each. If it is empty, no
+//! frame files are written.
 
 use std::{io, path::PathBuf};
 
@@ -46,46 +46,47 @@ pub use tables::{
 /// Why a file was not written.
 #[derive(Debug, Error)]
 pub enum WriteError {
-    /// The system refused.
+    /// The system reported an error.
     #[error("cannot write {}: {source}; {}", path.display(), advice(source))]
     Io {
         /// The file.
         path: PathBuf,
-        /// Reason.
+        /// Error of the system.
         source: io::Error,
     },
-    /// A file that belongs into the folder cannot be read.
+    /// A file that is to be copied into the folder cannot be read.
     #[error("cannot copy {} beside camera.toml, which needs it: {source}", path.display())]
     Copy {
         /// The file.
         path: PathBuf,
-        /// Reason.
+        /// Error of the system.
         source: io::Error,
     },
-    /// The encoder refused.
+    /// The encoder reported an error.
     #[error("cannot encode {}: {message}", path.display())]
     Encode {
         /// The file.
         path: PathBuf,
-        /// The encoder's words.
+        /// Message of the encoder.
         message: String,
     },
-    /// A frame lacks what the scenario asks for, or its planes do not fill its size.
+    /// A frame lacks a channel of the scenario, or a channel does not match its size.
     #[error("frame {frame} cannot be written: {message}")]
     Frame {
         /// Frame number.
         frame: u64,
-        /// What does not fit.
+        /// What is missing or does not match.
         message: String,
     },
-    /// The threads are gone without an error of their own.
+    /// The writer threads ended without an error of their own.
     #[error("the writer threads ended early; run again")]
     Ended,
-    /// Somebody has asked for it.
+    /// The caller requested a stop.
     #[error("stopped on request; frames that are written stay as they are")]
     Stopped,
 }
 
+/// What to do about an error of the system.
 fn advice(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on the disk and run again",

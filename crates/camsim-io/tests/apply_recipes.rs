@@ -1,4 +1,4 @@
-//! Every recipe of docs/APPLY.md is read, with small pictures in place of the ones that it names.
+//! Reads every recipe of docs/APPLY.md, with small pictures in place of those that it names.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 use camsim_io::frame_file::read_frame_set;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, SmallVec, Vec2, WritableImage};
 
-/// The `toml` blocks of the page.
+/// The `toml` blocks of docs/APPLY.md.
 fn recipes() -> Vec<String> {
     let page = include_str!("../../../docs/APPLY.md");
     page.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
@@ -20,7 +20,7 @@ fn write_exr(path: &Path, channels: &[&str]) {
     image.write().to_file(path).unwrap();
 }
 
-/// What a name stands for, by its ending and by what it is for. A * is two times.
+/// Writes a small file for a name in a recipe, by key and extension. A * becomes two times.
 fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
     let path = folder.join(name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -44,7 +44,7 @@ fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
                 "ViewLayer.Vector.W",
             ],
         ),
-        // The colour's own file has it already.
+        // A colour file that exists has the depth too.
         ("depth", "exr") if path.is_file() => {}
         ("depth", "exr") => write_exr(&path, &["Depth.V"]),
         ("color", "png") => image::RgbImage::from_pixel(4, 3, image::Rgb([90, 80, 70])).save(&path).unwrap(),
@@ -82,12 +82,12 @@ fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
         ("trajectory", "csv") => {
             fs::write(&path, "t_s,x,y,z,qw,qx,qy,qz\n12,0,0,0,1,0,0,0\n13,1,0,0,1,0,0,0\n").unwrap()
         }
-        other => panic!("the page names {name} as {other:?}: teach the test what that is"),
+        other => panic!("the page names {name} as {other:?}, which this test does not know"),
     }
 }
 
 #[test]
-fn every_recipe_is_read() {
+fn all_recipes_can_be_read() {
     let recipes = recipes();
     assert!(recipes.len() >= 6, "the page has {} recipes", recipes.len());
     for recipe in recipes {
@@ -110,7 +110,7 @@ fn every_recipe_is_read() {
                 file.without_depth < 1.0 && file.frame.inverse_depth.iter().any(|w| *w > 0.0),
                 "{recipe}"
             );
-            // Sky, where a stub has some, is told from the rest.
+            // Share of sky in the files written above.
             let sky = if recipe.contains("65504") {
                 0.5
             } else if recipe.contains("tiff") {

@@ -1,5 +1,5 @@
-//! Flight logs as users' files look when they go wrong, and every real one: the right value, or words that
-//! help.
+//! Faulty logs as users have them, and published real logs: each is read with the known values, or refused
+//! with a message that helps.
 
 #![allow(clippy::unwrap_used)]
 
@@ -37,24 +37,25 @@ fn format(format: LogFormat) -> FlightSpec {
     FlightSpec { format, ..spec() }
 }
 
-/// What a log must give.
+/// Expected values of a log.
 #[derive(Clone, Copy)]
 struct Flight {
     rows: usize,
     seconds: f64,
-    /// North and up from the first row to the last.
+    /// Motion north from the first row to the last.
     north_m: f64,
+    /// Motion up from the first row to the last.
     climb_m: f64,
     yaw_deg: f64,
-    /// Rows that were left out: without a fix, without a height, unusable.
+    /// Numbers of rows left out: without a fix, without a height, unusable.
     left_out: [usize; 3],
-    /// Of a geodetic log, degrees and metres.
+    /// Origin of a geodetic log: latitude, longitude (degrees), height (metres).
     origin: Option<[f64; 3]>,
-    /// Parts of the warnings; there are no others.
+    /// Substrings of all warnings.
     warnings: &'static [&'static str],
 }
 
-/// 20 s, 200 m north, 20 m up, yaw 30 degrees, from 47 N, 8 E, 500 m: most files of the folder.
+/// Values of most files: 20 s, 200 m north, 20 m up, yaw 30 degrees, from 47 N, 8 E, 500 m.
 const USUAL: Flight = Flight {
     rows: 21,
     seconds: 20.0,
@@ -67,8 +68,9 @@ const USUAL: Flight = Flight {
 };
 
 enum Expected {
+    /// It is read with these values.
     Gives(Flight),
-    /// The message has all of these.
+    /// It is refused with a message that contains all of these.
     Refused(&'static [&'static str]),
 }
 
@@ -87,7 +89,7 @@ fn yaw_deg(log: &FlightLog) -> f64 {
 }
 
 #[test]
-fn every_log_gives_its_value_or_says_why_not() {
+fn faulty_logs_are_read_or_refused_as_expected() {
     let level = || Flight { climb_m: 0.0, ..USUAL };
     let usual = || USUAL;
     let local = || Flight { origin: None, ..USUAL };
@@ -188,7 +190,7 @@ fn every_log_gives_its_value_or_says_why_not() {
             format(LogFormat::CsvNed),
             Gives(Flight { warnings: &["read as ms", "2021"], ..airsim() }),
         ),
-        // Two columns for one quantity, angles without a unit.
+        // Two columns for one quantity; angles without a unit.
         ("two-columns/heading_and_yaw.csv", spec(), Refused(&["`heading`", "`yaw`", "line 1"])),
         ("two-columns/heading_and_yaw.csv", track(), Gives(Flight { yaw_deg: 0.0, ..level() })),
         (
@@ -287,7 +289,7 @@ fn every_log_gives_its_value_or_says_why_not() {
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 
-    // Every file of the folder has its row.
+    // All files of the folder are tested.
     for folder in std::fs::read_dir(field()).unwrap().map(|entry| entry.unwrap().path()) {
         let name = folder.file_name().unwrap().to_str().unwrap().to_owned();
         let Some(name) = name.strip_prefix("log-") else { continue };
@@ -312,20 +314,20 @@ fn check(result: &Result<FlightLog, String>, expected: &Expected) -> Result<(), 
     };
     let (first, last) = (log.rows.first().unwrap(), log.rows.last().unwrap());
     let moved = last.position_ned_m - first.position_ned_m;
-    let near = |what: &str, found: f64, expected: f64, within: f64| {
-        if expected.is_nan() || (found - expected).abs() <= within {
+    let check_near = |quantity: &str, value: f64, expected: f64, tolerance: f64| {
+        if expected.is_nan() || (value - expected).abs() <= tolerance {
             Ok(())
         } else {
-            Err(format!("{what} {found}, not {expected}"))
+            Err(format!("{quantity} {value}, not {expected}"))
         }
     };
-    near("rows", log.rows.len() as f64, flight.rows as f64, 0.0)?;
-    near("seconds", log.duration_s(), flight.seconds, 2e-6)?;
-    // Feet with two decimals and degrees with eight are good to millimetres; the Earth's curvature is 3 mm
-    // over 200 m.
-    near("north", moved.x, flight.north_m, 0.05)?;
-    near("climb", -moved.z, flight.climb_m, 0.01)?;
-    near("yaw", yaw_deg(log), flight.yaw_deg, 0.05)?;
+    check_near("rows", log.rows.len() as f64, flight.rows as f64, 0.0)?;
+    check_near("seconds", log.duration_s(), flight.seconds, 2e-6)?;
+    // Feet with two decimals and degrees with eight are exact to millimetres. The curvature of the Earth is 3
+    // mm over 200 m.
+    check_near("north", moved.x, flight.north_m, 0.05)?;
+    check_near("climb", -moved.z, flight.climb_m, 0.01)?;
+    check_near("yaw", yaw_deg(log), flight.yaw_deg, 0.05)?;
     let report = &log.report;
     let left_out = [report.null_fixes.count, report.null_heights.count, report.unusable.count];
     if left_out != flight.left_out {
@@ -335,9 +337,9 @@ fn check(result: &Result<FlightLog, String>, expected: &Expected) -> Result<(), 
         (None, None) => {}
         (Some([lat, lon, height]), Some(frame)) => {
             let origin = frame.origin();
-            near("latitude", origin.lat_deg(), lat, 1e-8)?;
-            near("longitude", origin.lon_deg(), lon, 1e-8)?;
-            near("height", origin.height_m, height, 0.01)?;
+            check_near("latitude", origin.lat_deg(), lat, 1e-8)?;
+            check_near("longitude", origin.lon_deg(), lon, 1e-8)?;
+            check_near("height", origin.height_m, height, 0.01)?;
         }
         _ => return Err("one of origin and frame".into()),
     }
@@ -355,12 +357,12 @@ fn check(result: &Result<FlightLog, String>, expected: &Expected) -> Result<(), 
 }
 
 #[test]
-fn a_prose_header_shifts_no_columns() {
+fn prose_in_a_header_does_not_shift_columns() {
     let log = read(&field().join("log-tum-header/format_header.txt"), &spec()).unwrap();
     for row in &log.rows {
         let radius_m = DVec3::new(row.position_ned_m.x, row.position_ned_m.y, 0.0).length();
         assert!((radius_m - 20.0).abs() < 1e-5 && (row.position_ned_m.z + 5.0).abs() < 1e-12, "{row:?}");
-        // FLU on the circle: yaw of the quaternion is the angle run through, 0 is east.
+        // A circular flight: the yaw of the quaternion (FLU) is the angle of the arc, 0 is east.
         let turned = (row.t_s * 0.3).to_degrees();
         let yaw = row.ned_from_body.to_euler(EulerRot::ZYX).0.to_degrees();
         assert!((yaw - (90.0 - turned)).abs() < 1e-3, "{} s: {yaw}", row.t_s);
@@ -368,7 +370,7 @@ fn a_prose_header_shifts_no_columns() {
 }
 
 #[test]
-fn angles_in_radians_without_a_unit_are_those() {
+fn unitless_radians_are_inferred_unless_the_key_says_degrees() {
     let log = read(&field().join("log-two-columns/rad_nounit.csv"), &spec()).unwrap();
     let (yaw, pitch, roll) = log.rows[0].ned_from_body.to_euler(EulerRot::ZYX);
     assert!(
@@ -380,14 +382,14 @@ fn angles_in_radians_without_a_unit_are_those() {
     assert!((log.rows[0].ned_from_body.to_euler(EulerRot::ZYX).0.to_degrees() - 2.8).abs() < 1e-9);
 }
 
-/// Every real flight: what it gives, as a table in the documentation.
+/// Reads every real flight, and compares the results with the table in docs/inputs.
 #[test]
-fn every_real_flight_gives_its_value_or_says_why_not() {
+fn published_flights_are_read_or_refused_as_expected() {
     let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
         eprintln!("CAMSIM_DATA is not set: skipped");
         return;
     };
-    // File, how it is read, rows or a part of the message.
+    // File, settings, and number of rows or a substring of the message.
     let ned = || format(LogFormat::CsvNed);
     let cases: [(&str, FlightSpec, Result<usize, &str>); 21] = [
         ("flights/demo_brighton_lawnmower_x0.05.csv", spec(), Ok(5886)),
@@ -413,7 +415,9 @@ fn every_real_flight_gives_its_value_or_says_why_not() {
         ("camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv", ned(), Ok(60)),
     ];
     let mut table = String::from(
-        "# Real flights, as they are read\n\nMade by a test from the files in CAMSIM_DATA. Speed: the 99.9th percentile. Warnings are the reader's; repairs are in the report.\n\n| file | read with | rows | seconds | m/s | what is said |\n|---|---|---|---|---|---|\n",
+        "# Real flights, as they are read\n\nMade by a test from the files in CAMSIM_DATA. Speed: the 99.9th \
+            percentile. Warnings are the reader's; repairs are in the report.\n\n| file | read with | rows | \
+            seconds | m/s | what is said |\n|---|---|---|---|---|---|\n",
     );
     let mut faults = Vec::new();
     for (file, spec, expected) in &cases {
@@ -427,15 +431,16 @@ fn every_real_flight_gives_its_value_or_says_why_not() {
         table += &match &result {
             Ok(log) => {
                 let report = log.report.to_string();
-                let said = report.split_once("; ").map_or(String::new(), |(_, repairs)| repairs.to_owned());
+                let repairs =
+                    report.split_once("; ").map_or(String::new(), |(_, repairs)| repairs.to_owned());
                 let notes = log.notes.iter().map(|note| note.text.clone());
-                let said: Vec<String> = notes.chain([said]).filter(|text| !text.is_empty()).collect();
+                let texts: Vec<String> = notes.chain([repairs]).filter(|text| !text.is_empty()).collect();
                 let speed = log.speed_percentile_m_s(0.999);
                 format!(
                     "| {file} | {key} | {} | {:.2} | {speed:.2} | {} |\n",
                     log.rows.len(),
                     log.duration_s(),
-                    name(said.join("; "))
+                    name(texts.join("; "))
                 )
             }
             Err(error) => format!(

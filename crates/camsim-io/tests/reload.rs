@@ -1,4 +1,4 @@
-//! Loading beside what is already loaded gives what loading alone gives, and reads only what has changed.
+//! Reloading gives the same result as loading, and reads only what has changed.
 
 #![allow(clippy::unwrap_used)]
 
@@ -29,9 +29,9 @@ fn assert_alike(a: &Loaded, b: &Loaded, what: &str) {
 }
 
 #[test]
-fn only_what_has_changed_is_read_again() {
+fn only_changed_parts_are_read_again() {
     let before = load_sequence(&demo(&[])).unwrap();
-    // Change, and whether flight, scene and vignette are taken over.
+    // Key, value, and whether flight, scene and vignette are reused.
     let cases: [(&str, &str, [bool; 3]); 8] = [
         ("camera.lens.coefficients", "[0.1, 0.0]", [true, true, true]),
         ("camera.mount.angles_deg", "[0.0, -90.0, 0.0]", [true, true, true]),
@@ -42,22 +42,22 @@ fn only_what_has_changed_is_read_again() {
         ("camera.photometric.noise_sigma", "0.5", [true, true, true]),
         ("flight.height", "ellipsoid", [false, false, true]),
     ];
-    for (key, value, kept) in cases {
+    for (key, value, expected_reuse) in cases {
         let scenario = demo(&[(key, value)]);
-        let beside = reload_sequence(&scenario, &before).unwrap();
-        assert_alike(&beside, &load_sequence(&scenario).unwrap(), key);
-        let vignettes = [&beside, &before].map(|loaded| loaded.sequence.vignette.clone().unwrap());
+        let reloaded = reload_sequence(&scenario, &before).unwrap();
+        assert_alike(&reloaded, &load_sequence(&scenario).unwrap(), key);
+        let vignettes = [&reloaded, &before].map(|loaded| loaded.sequence.vignette.clone().unwrap());
         let shared = [
-            Arc::ptr_eq(&beside.log, &before.log),
-            Arc::ptr_eq(&beside.sequence.scene, &before.sequence.scene),
+            Arc::ptr_eq(&reloaded.log, &before.log),
+            Arc::ptr_eq(&reloaded.sequence.scene, &before.sequence.scene),
             Arc::ptr_eq(&vignettes[0], &vignettes[1]),
         ];
-        assert_eq!(shared, kept, "{key}: flight, scene, vignette");
+        assert_eq!(shared, expected_reuse, "{key}: flight, scene, vignette");
     }
 }
 
 #[test]
-fn a_file_that_is_named_anew_is_read() {
+fn changed_paths_are_read() {
     let before = load_sequence(&demo(&[])).unwrap();
     let error = reload_sequence(&demo(&[("camera.photometric.vignette", "nowhere.png")]), &before)
         .unwrap_err()

@@ -1,5 +1,5 @@
-//! What is written fits together: source coordinates with the frame that they are in, the sky with the rows'
-//! poses, stamps with their clock.
+//! Consistency of written truth: source coordinates with the camera of `frames.csv`, directions of the sky
+//! with poses of rows, stamps with their clock.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -19,7 +19,7 @@ use glam::{DQuat, DVec2, DVec3};
 const SIZE_PX: [u32; 2] = [64, 48];
 const CHANNELS: [Channel; 3] = [Channel::Color, Channel::Coords, Channel::Depth];
 
-/// The built-in flight through a small camera that looks at the horizon.
+/// The built-in flight with a small camera that looks at the horizon.
 fn demo(sets: &[(&str, &str)]) -> Loaded {
     let folder = tempfile::tempdir().unwrap();
     let path = builtin::unpack(folder.path()).unwrap();
@@ -35,7 +35,7 @@ fn demo(sets: &[(&str, &str)]) -> Loaded {
 }
 
 #[test]
-fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
+fn source_coordinates_are_pixels_of_the_camera_in_frames_csv() {
     let sequence = demo(&[]).sequence;
     let planner = Planner::new(sequence.clone(), &CHANNELS, 16_384).unwrap();
     let oracle = Oracle::new(sequence.clone()).unwrap();
@@ -55,38 +55,38 @@ fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
             continue;
         }
         let from_source = if depths[i] > 0.0 { vector - source.pose.position_ned_m } else { vector };
-        let seen = source.pose.ned_from_camera.conjugate() * from_source;
-        let at_px =
-            DVec2::from(source.focal_px) * seen.truncate() / seen.z + DVec2::from(source.principal_px);
-        // Points are f32: 1 km in steps of 6e-5 m, seen from 100 m or more.
-        assert!(at_px.distance(DVec2::new(x, y)) < 1e-3, "{at_px} ({x}, {y})");
-        // What the row's own pose gives.
+        let in_camera = source.pose.ned_from_camera.conjugate() * from_source;
+        let position_px = DVec2::from(source.focal_px) * in_camera.truncate() / in_camera.z
+            + DVec2::from(source.principal_px);
+        // Points are f32: steps of 6e-5 m at 1 km, at a distance of 100 m or more.
+        assert!(position_px.distance(DVec2::new(x, y)) < 1e-3, "{position_px} ({x}, {y})");
+        // The same by the pose of the row.
         let row = &frame.rows[i / SIZE_PX[0] as usize];
         let uv = DVec2::new(f64::from(coords[i][0]), f64::from(coords[i][1]));
-        let way = row.ned_from_camera * uv.extend(1.0);
+        let ray_ned = row.ned_from_camera * uv.extend(1.0);
         assert!((row.t_mid_ns - frame.stamp_ns - (dt_s * 1e9).round() as i64).abs() < 10, "{dt_s}");
         if depths[i] > 0.0 {
-            assert!(vector.distance(row.position_ned_m + f64::from(depths[i]) * way) < 2e-3);
+            assert!(vector.distance(row.position_ned_m + f64::from(depths[i]) * ray_ned) < 2e-3);
             ground += 1;
         } else {
             assert!(
-                vector.distance(way.normalize()) < 1e-6 && (vector.length() - 1.0).abs() < 1e-6,
+                vector.distance(ray_ned.normalize()) < 1e-6 && (vector.length() - 1.0).abs() < 1e-6,
                 "{vector}"
             );
             sky += 1;
         }
     }
     assert!(ground > 500 && sky > 200, "{ground} on the ground, {sky} in the sky, {none} without a ray");
-    // And the instant is that of the pose.
-    let at = sequence.path.pose((source.t_ns - sequence.epoch_ns) as f64 * 1e-9);
+    // The instant is that of the pose.
+    let pose = sequence.path.pose((source.t_ns - sequence.epoch_ns) as f64 * 1e-9);
     assert!(
-        at.position_ned_m.distance(source.pose.position_ned_m) < 1e-6
-            && DQuat::angle_between(at.ned_from_camera, source.pose.ned_from_camera) < 1e-6
+        pose.position_ned_m.distance(source.pose.position_ned_m) < 1e-6
+            && DQuat::angle_between(pose.ned_from_camera, source.pose.ned_from_camera) < 1e-6
     );
 }
 
 #[test]
-fn stamps_begin_where_they_are_told_to() {
+fn stamps_start_at_the_configured_epoch() {
     let stamps = |sets: &[(&str, &str)]| {
         let loaded = demo(sets);
         let frame = Oracle::new(loaded.sequence.clone()).unwrap();
@@ -123,17 +123,17 @@ fn stamps_begin_where_they_are_told_to() {
 }
 
 #[test]
-fn shutters_that_no_sensor_has_are_named() {
+fn impossible_shutter_times_are_warned_of() {
     let warnings = |sets: &[(&str, &str)]| demo(sets).warnings.join("\n");
     assert!(!warnings(&[("camera.shutter.readout_ms", "33.3333")]).contains("longer than a frame's period"));
     for (key, ms) in [("readout_ms", "40"), ("exposure_ms", "33.5"), ("interlace_ms", "70")] {
         let key = format!("camera.shutter.{key}");
-        let said = warnings(&[(&key, ms)]);
+        let text = warnings(&[(&key, ms)]);
         assert!(
-            said.contains(&format!(
+            text.contains(&format!(
                 "{key} = {ms} is longer than a frame's period of 33.333 ms (camera.fps = 30)"
             )),
-            "{said}"
+            "{text}"
         );
     }
 }

@@ -1,8 +1,8 @@
 //! Run time against error: every case with every method, in one table (`camsim bench`).
 //!
-//! Time is that of frames rendered and read back, measured in interleaved rounds ([`rounds`]). Error is
-//! measured against the oracle ([`truth`]): of the source coordinates in pixels of the ideal frame, and of
-//! the picture in decibels on linear values with peak 1.
+//! Time is that of frames rendered and read back, measured in interleaved rounds ([`rounds`]). Errors are
+//! against the reference renderer ([`truth`]): source error in pixels of the ideal frame, and picture error
+//! as PSNR of linear values with peak 1.
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
@@ -16,29 +16,30 @@ use crate::{
 };
 
 pub mod ablation;
-mod blit;
-mod confirm;
-pub mod knobs;
-mod measure;
+mod case_rows;
+mod confirmation;
+mod frame_copy;
+pub mod methods;
 mod pareto;
 pub mod rounds;
 mod row;
 mod table;
+mod targets;
 pub mod truth;
 
 pub use ablation::AblationRow;
 pub use pareto::Violation;
 pub use row::{Refused, Row};
 
-use knobs::{Variant, WHOLE, variants};
-use rounds::Effort;
+use methods::{ALL_EFFECTS_CASE, Method, methods};
+use rounds::RoundLimits;
 
-/// Cases of the short form: one of each kind.
+/// Cases of the short form.
 const QUICK: [&str; 4] = ["plane-30", "terrain-100", "buildings-15", "blender-plane"];
-/// Size of the short form.
+/// Frame size of the short form.
 const QUICK_PX: [u32; 2] = [320, 240];
 
-/// Errors of the bench.
+/// Why a benchmark failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// A case that cannot be made.
@@ -47,89 +48,104 @@ pub enum BenchError {
     /// A mount that cannot be used.
     #[error(transparent)]
     Mount(#[from] MountError),
-    /// The renderer.
+    /// Rendering failed.
     #[error(transparent)]
     Render(#[from] RenderError<Infallible>),
-    /// The device.
+    /// The adapter failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The oracle's camera or shutter.
+    /// The reference renderer cannot use the camera or shutter.
     #[error(transparent)]
     Oracle(#[from] OracleError),
-    /// The plot.
+    /// The plot failed.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// A name that no case has.
+    /// No case or group has this name.
     #[error("there is no case or group \"{name}\"; cases are {cases}; groups are {groups}")]
     NoSuchCase {
-        /// What was asked for.
+        /// The name.
         name: String,
-        /// The cases there are.
+        /// Names of all cases.
         cases: String,
-        /// The groups there are.
+        /// Names of all groups.
         groups: String,
     },
 }
 
-/// What to measure.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Names of cases or groups; all if empty.
-    pub cases: Vec<String>,
-    /// Few cases, small pictures, few rounds.
-    pub quick: bool,
+/// Another renderer that is timed in the same rounds.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared<'a> {
+    /// Name of its column.
+    pub name: &'static str,
+    /// The renderer; `None` if this machine has none, which the column then says.
+    pub engine: Option<&'a Engine>,
 }
 
-/// Everything that was measured.
+/// What to measure.
+#[derive(Clone, Debug, Default)]
+pub struct Options<'a> {
+    /// Names of cases or groups; all if empty.
+    pub cases: Vec<String>,
+    /// Few cases, small frames, few rounds.
+    pub quick: bool,
+    /// Renderers to time beside the main one.
+    pub compared: &'a [Compared<'a>],
+}
+
+/// Results of a benchmark.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct BenchReport {
     /// camsim's version.
     pub version: &'static str,
-    /// The adapter.
+    /// The renderer.
     pub adapter: String,
+    /// Names of the renderers that were timed beside it.
+    #[serde(skip)]
+    pub compared: Vec<&'static str>,
     /// Processor threads of this machine.
     pub cpu_threads: usize,
     /// Whether this is the short form.
     pub quick: bool,
-    /// Cases measured, and all that were asked for: fewer while the run goes on, and if it was interrupted.
+    /// Numbers of cases measured so far and of cases to measure.
     pub cases: [usize; 2],
     /// The table.
     pub rows: Vec<Row>,
-    /// The whole camera without its effects.
+    /// The case with every effect, with effects left out.
     pub ablation: Vec<AblationRow>,
-    /// Rows chosen by the plan that a faster row of the same case beats.
+    /// Choices of the planner that another method of the same case dominates.
     pub violations: Vec<Violation>,
-    /// Rows that this version cannot render.
+    /// Methods that this version cannot render.
     pub refused: Vec<Refused>,
-    /// What each case shows.
+    /// Description of each case.
     pub about: BTreeMap<String, &'static str>,
-    /// How long it took, seconds.
+    /// Time since the begin, seconds.
     pub elapsed_s: f64,
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Debug)]
 pub enum Step<'a> {
-    /// Something begins.
+    /// A case or table begins.
     Begins(&'a str),
-    /// A case is in the report.
-    Done(&'a Report),
+    /// The report has one case more.
+    Done(&'a BenchReport),
 }
 
-/// Measures; `watch` hears about each case before and after, and ends the run by an error of its own.
+/// Measures all cases. `progress` is called before and after each case; its error ends the run.
 ///
 /// # Errors
-/// An unknown case, or whatever the renderer or `watch` meets.
+/// An unknown case, any error of rendering, or that of `progress`.
 pub fn run<E: From<BenchError>>(
     engine: &Engine,
-    options: &Options,
-    watch: &mut dyn FnMut(Step<'_>) -> Result<(), E>,
-) -> Result<Report, E> {
+    options: &Options<'_>,
+    progress: &mut dyn FnMut(Step<'_>) -> Result<(), E>,
+) -> Result<BenchReport, E> {
     let begin = Instant::now();
     let chosen = choose(cases().map_err(BenchError::from)?, options)?;
-    let mut report = Report {
+    let mut report = BenchReport {
         version: env!("CARGO_PKG_VERSION"),
         adapter: engine.to_string(),
+        compared: options.compared.iter().map(|compared| compared.name).collect(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         quick: options.quick,
         cases: [0, chosen.len()],
@@ -140,57 +156,58 @@ pub fn run<E: From<BenchError>>(
         about: chosen.iter().map(|case| (case.name.to_owned(), case.about)).collect(),
         elapsed_s: 0.0,
     };
-    let effort = effort(options.quick);
-    let work =
-        |case: &Case, variants: &[Variant]| variants.iter().map(|variant| cost(case, variant)).sum::<f64>();
-    let prepared: Vec<_> = chosen.iter().map(|case| (case, usable(case, options.quick))).collect();
-    let (mut left, mut done) =
-        (prepared.iter().map(|(case, (variants, _))| work(case, variants)).sum::<f64>(), 0.0);
-    for (case, (variants, refused)) in prepared {
-        let rest = match report.cases[0] {
+    let limits = round_limits(options.quick);
+    let total_cost =
+        |case: &Case, methods: &[Method]| methods.iter().map(|method| cost(case, method)).sum::<f64>();
+    let prepared: Vec<_> = chosen.iter().map(|case| (case, usable_methods(case, options.quick))).collect();
+    let mut left: f64 = prepared.iter().map(|(case, (methods, _))| total_cost(case, methods)).sum();
+    let mut done = 0.0;
+    for (case, (methods, refused)) in prepared {
+        let time_left = match report.cases[0] {
             0 => String::new(),
             _ => format!(", about {} left", minutes(begin.elapsed().as_secs_f64() * left / done)),
         };
-        let place = report.cases[0] + 1;
-        watch(Step::Begins(&format!(
-            "{place} of {}: {}, {} rows{rest}",
+        let number = report.cases[0] + 1;
+        progress(Step::Begins(&format!(
+            "{number} of {}: {}, {} rows{time_left}",
             report.cases[1],
             case.name,
-            variants.len()
+            methods.len()
         )))?;
         report.refused.extend(refused);
-        let mut rows = measure::case(engine, case, &variants, effort)?;
+        let mut rows = case_rows::rows(engine, options.compared, case, &methods, limits)?;
         pareto::mark_fronts(&mut rows);
-        report.violations.extend(confirm::confirmed(engine, &variants, pareto::violations(&rows), effort)?);
+        let suspected = pareto::violations(&rows);
+        report.violations.extend(confirmation::confirmed(engine, &methods, suspected, limits)?);
         report.rows.extend(rows);
-        if case.name == WHOLE && !options.quick {
-            watch(Step::Begins("each effect left out"))?;
-            report.ablation = ablation::measure(engine, &case.sequence, effort)?;
+        if case.name == ALL_EFFECTS_CASE && !options.quick {
+            progress(Step::Begins("each effect left out"))?;
+            report.ablation = ablation::measure(engine, &case.sequence, limits)?;
         }
-        report.cases[0] = place;
+        report.cases[0] = number;
         report.elapsed_s = begin.elapsed().as_secs_f64();
-        watch(Step::Done(&report))?;
-        done += work(case, &variants);
-        left -= work(case, &variants);
+        progress(Step::Done(&report))?;
+        done += total_cost(case, &methods);
+        left -= total_cost(case, &methods);
     }
     Ok(report)
 }
 
-fn effort(quick: bool) -> Effort {
+fn round_limits(quick: bool) -> RoundLimits {
     use std::time::Duration;
     match quick {
-        true => Effort { burst: FRAMES, min_rounds: 3, max_rounds: 5, budget: Duration::from_secs(4) },
-        false => Effort { burst: FRAMES, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(6) },
+        true => RoundLimits { burst: FRAMES, min_rounds: 3, max_rounds: 5, budget: Duration::from_secs(4) },
+        false => RoundLimits { burst: FRAMES, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(6) },
     }
 }
 
-/// How long a row takes compared with others, roughly: for the time that is left.
-fn cost(case: &Case, variant: &Variant) -> f64 {
-    let camera = &variant.sequence.scenario.camera;
+/// Relative run time of a row, roughly: for the estimate of the time left.
+fn cost(case: &Case, method: &Method) -> f64 {
+    let camera = &method.sequence.scenario.camera;
     let megapixels = camera.size_px.iter().map(|&side| f64::from(side)).product::<f64>() / 1e6;
-    let of_houses = if case.has_houses() { 3.0 } else { 1.0 };
-    let of_blur = if camera.shutter.exposure_ms > 0.0 { 2.0 } else { 1.0 };
-    megapixels * of_houses * of_blur
+    let house_factor = if case.has_houses() { 3.0 } else { 1.0 };
+    let blur_factor = if camera.shutter.exposure_ms > 0.0 { 2.0 } else { 1.0 };
+    megapixels * house_factor * blur_factor
 }
 
 fn minutes(seconds: f64) -> String {
@@ -198,46 +215,48 @@ fn minutes(seconds: f64) -> String {
     format!("{}:{:02} min", seconds / 60, seconds % 60)
 }
 
-/// The cases asked for, in their order; in the short form small, and if none is named a few.
-fn choose(all: Vec<Case>, options: &Options) -> Result<Vec<Case>, BenchError> {
+/// The cases to measure, in their order. The short form has smaller frames, and only [`QUICK`] if no case is
+/// named.
+fn choose(all: Vec<Case>, options: &Options<'_>) -> Result<Vec<Case>, BenchError> {
     for name in &options.cases {
         if !all.iter().any(|case| case.name == name || case.group.name() == name) {
             let cases = all.iter().map(|case| case.name).collect::<Vec<_>>().join(", ");
             let mut groups: Vec<&str> = all.iter().map(|case| case.group.name()).collect();
-            // Cases of a group stand together.
+            // Cases of a group are neighbours.
             groups.dedup();
             return Err(BenchError::NoSuchCase { name: name.clone(), cases, groups: groups.join(", ") });
         }
     }
-    let named = |case: &Case| options.cases.iter().any(|name| case.name == name || case.group.name() == name);
-    let wanted = |case: &Case| match options.cases.is_empty() {
+    let is_named =
+        |case: &Case| options.cases.iter().any(|name| case.name == name || case.group.name() == name);
+    let is_wanted = |case: &Case| match options.cases.is_empty() {
         true => !options.quick || QUICK.contains(&case.name),
-        false => named(case),
+        false => is_named(case),
     };
-    let mut chosen: Vec<Case> = all.into_iter().filter(wanted).collect();
+    let mut chosen: Vec<Case> = all.into_iter().filter(is_wanted).collect();
     if options.quick {
         for case in &mut chosen {
             let mut sequence = (*case.sequence).clone();
-            knobs::resize(&mut sequence.scenario, QUICK_PX);
+            methods::resize(&mut sequence.scenario, QUICK_PX);
             case.sequence = Arc::new(sequence);
         }
     }
     Ok(chosen)
 }
 
-/// The rows that this version renders, and the others with the reason.
-fn usable(case: &Case, quick: bool) -> (Vec<Variant>, Vec<Refused>) {
+/// The methods that this version renders, and the refused ones with the reason.
+fn usable_methods(case: &Case, quick: bool) -> (Vec<Method>, Vec<Refused>) {
     let (mut usable, mut refused) = (Vec::new(), Vec::new());
-    for variant in variants(case, quick) {
-        // The log, the scene and the vignette are in memory and not in the scenario.
-        let problem = validate(&variant.sequence.scenario)
+    for method in methods(case, quick) {
+        // Log, scene and vignette are in memory, so keys other than `quality` are not valid.
+        let problem = validate(&method.sequence.scenario)
             .into_iter()
             .find(|problem| problem.key.starts_with("quality"));
         match problem {
-            None => usable.push(variant),
+            None => usable.push(method),
             Some(problem) => refused.push(Refused {
                 case: case.name.into(),
-                knob: variant.knob,
+                knob: method.name,
                 reason: problem.to_string(),
             }),
         }
@@ -248,7 +267,7 @@ fn usable(case: &Case, quick: bool) -> (Vec<Variant>, Vec<Refused>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use knobs::DEFAULT;
+    use methods::DEFAULT_METHOD;
     use rounds::Times;
 
     fn row(case: &str, group: &'static str, knob: &str, ms: f64, rms_px: f64) -> Row {
@@ -259,7 +278,7 @@ mod tests {
         row
     }
 
-    fn left_out(without: &str, ms: f64, to_full_ms: [f64; 3]) -> AblationRow {
+    fn ablation_row(without: &str, ms: f64, to_full_ms: [f64; 3]) -> AblationRow {
         AblationRow {
             without: without.into(),
             ms_per_frame_p50: 1.5 * ms,
@@ -271,19 +290,23 @@ mod tests {
         }
     }
 
-    fn report() -> Report {
-        Report {
+    fn report() -> BenchReport {
+        BenchReport {
             version: "0",
             adapter: "an adapter".into(),
+            compared: vec!["gpu"],
             cpu_threads: 2,
             quick: false,
             cases: [2, 2],
             rows: vec![
-                row("plane-30", "smooth", DEFAULT, 10.0, 0.01),
+                row("plane-30", "smooth", DEFAULT_METHOD, 10.0, 0.01),
                 row("plane-30", "smooth", "rk2", 8.0, 0.1),
-                row("blender-plane", "all effects", DEFAULT, 12.0, 0.02),
+                row("blender-plane", "all effects", DEFAULT_METHOD, 12.0, 0.02),
             ],
-            ablation: vec![left_out("nothing", 20.0, [0.0; 3]), left_out("lens", 25.0, [4.0, 5.0, 6.0])],
+            ablation: vec![
+                ablation_row("nothing", 20.0, [0.0; 3]),
+                ablation_row("lens", 25.0, [4.0, 5.0, 6.0]),
+            ],
             violations: Vec::new(),
             refused: Vec::new(),
             about: BTreeMap::from([
@@ -295,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stable_keys_of_a_row_are_there() {
+    fn json_has_the_stable_keys_of_a_row() {
         let json = serde_json::to_value(report()).expect("JSON");
         assert!(json["adapter"].is_string() && json["version"].is_string());
         let keys = [
@@ -316,12 +339,12 @@ mod tests {
             for key in keys {
                 assert!(row.get(key).is_some(), "{key} in {row}");
             }
-            assert!(row["psnr_db"].is_null(), "what was not measured is null");
+            assert!(row["psnr_db"].is_null(), "null if not measured");
         }
     }
 
     #[test]
-    fn tables_have_every_row_and_say_what_was_not_kept() {
+    fn tables_have_every_row_and_name_missed_targets() {
         let report = report();
         let text = report.markdown();
         for line in text.lines().filter(|line| line.starts_with('|')) {
@@ -334,7 +357,7 @@ mod tests {
             "{table:#?}"
         );
         assert!(text.contains("| Blender Cycles, two cores | 8900 |"), "{text}");
-        // A frame without its lens takes longer: the promise is not kept, and the table says so.
+        // A frame without its lens takes longer, so the target is missed.
         assert!(
             text.contains(
                 "| sampled alike, a frame takes no more time without an effect | more without lens | no |"
@@ -350,7 +373,8 @@ mod tests {
     fn cases_are_chosen_by_name_and_by_group() {
         let all = cases().expect("cases");
         let names = |list: &[&str], quick: bool| {
-            let options = Options { cases: list.iter().map(|name| (*name).to_owned()).collect(), quick };
+            let cases = list.iter().map(|name| (*name).to_owned()).collect();
+            let options = Options { cases, quick, compared: &[] };
             choose(all.clone(), &options).map(|cases| cases.iter().map(|case| case.name).collect::<Vec<_>>())
         };
         assert_eq!(

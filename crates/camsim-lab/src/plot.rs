@@ -10,41 +10,41 @@ use plotters::{
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
-    /// (x, y) in the order in which they are joined.
+    /// Points (x, y), in the order in which they are joined.
     pub points: Vec<(f64, f64)>,
     /// Whether points are joined by a line.
     pub joined: bool,
 }
 
-/// What a plot shows.
+/// A plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// Above it.
+    /// Text above the plot.
     pub title: String,
-    /// Under it, with unit.
+    /// Label of the x axis, with unit.
     pub x_label: String,
-    /// Beside it, with unit.
+    /// Label of the y axis, with unit.
     pub y_label: String,
-    /// Whether each axis is logarithmic; then values of 0 and below are left out.
+    /// Whether the x and the y axis are logarithmic. Logarithmic axes leave out values of 0 and below.
     pub log: [bool; 2],
     /// The curves.
     pub series: Vec<Series>,
 }
 
-/// A plot without anything to show, or one that could not be drawn.
+/// Why a plot could not be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// No finite point.
+    /// There is no finite point.
     #[error("the plot \"{0}\" has no point to show")]
     Empty(String),
-    /// The drawing library.
+    /// The drawing library failed.
     #[error("the plot \"{title}\" could not be drawn: {reason}")]
     Draw {
-        /// Its title.
+        /// Title of the plot.
         title: String,
-        /// Why.
+        /// Message of the library.
         reason: String,
     },
 }
@@ -56,7 +56,7 @@ impl Plot {
     /// The plot as an SVG document.
     ///
     /// # Errors
-    /// Nothing to show.
+    /// [`PlotError`].
     pub fn svg(&self) -> Result<String, PlotError> {
         let [x, y] = [0, 1]
             .map(|axis| self.range(axis))
@@ -74,13 +74,17 @@ impl Plot {
         Ok(text)
     }
 
-    /// Points that can be shown.
+    /// Points that are within the axes.
     fn shown<'a>(&'a self, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let fits = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
-        series.points.iter().copied().filter(move |&(x, y)| fits(x, self.log[0]) && fits(y, self.log[1]))
+        let is_shown = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
+        series
+            .points
+            .iter()
+            .copied()
+            .filter(move |&(x, y)| is_shown(x, self.log[0]) && is_shown(y, self.log[1]))
     }
 
-    /// Smallest and largest value of an axis, with some room.
+    /// Smallest and largest value of an axis, with a margin.
     fn range(&self, axis: usize) -> Option<Range<f64>> {
         let values = self
             .series
@@ -95,37 +99,39 @@ impl Plot {
         if self.log[axis] {
             return Some(low / 1.5..high * 1.5);
         }
-        let room = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
-        Some(low - room..high + room)
+        let margin = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+        Some(low - margin..high + margin)
     }
 
-    /// The corner where the legend hides least of the curves.
+    /// The corner in which the legend hides the fewest points of the curves.
     fn emptiest_corner(&self, x: &Range<f64>, y: &Range<f64>) -> SeriesLabelPosition {
         let share = |value: f64, range: &Range<f64>, log: bool| match log {
             false => (value - range.start) / (range.end - range.start),
             true => (value / range.start).ln() / (range.end / range.start).ln(),
         };
-        let mut places: Vec<(f64, f64)> = Vec::new();
+        let mut positions: Vec<(f64, f64)> = Vec::new();
         for series in &self.series {
             let points: Vec<_> = self
                 .shown(series)
                 .map(|(u, v)| (share(u, x, self.log[0]), share(v, y, self.log[1])))
                 .collect();
             if series.joined {
-                // Along the lines too.
+                // Points on the joining lines count too.
                 let between = |pair: &[(f64, f64)], k: f64| {
                     (pair[0].0 + k * (pair[1].0 - pair[0].0), pair[0].1 + k * (pair[1].1 - pair[0].1))
                 };
-                places.extend(
+                positions.extend(
                     points.windows(2).flat_map(|pair| [0.2, 0.4, 0.6, 0.8].map(|k| between(pair, k))),
                 );
             }
-            places.extend(points);
+            positions.extend(points);
         }
         let (width, height) = (0.4, 0.06 * self.series.len() as f64 + 0.05);
         let hidden = |right: bool, top: bool| {
-            let inside = |at: f64, far: bool, size: f64| if far { at > 1.0 - size } else { at < size };
-            places.iter().filter(|(u, v)| inside(*u, right, width) && inside(*v, top, height)).count()
+            let inside = |position: f64, far: bool, size: f64| {
+                if far { position > 1.0 - size } else { position < size }
+            };
+            positions.iter().filter(|(u, v)| inside(*u, right, width) && inside(*v, top, height)).count()
         };
         use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
         let corners = [
@@ -149,16 +155,16 @@ impl Plot {
         let label = |value: &f64| {
             if value.abs() < 1e-3 && *value != 0.0 { format!("{value:.0e}") } else { label(value) }
         };
-        let said = |error: DrawingAreaErrorKind<_>| error.to_string();
+        let message = |error: DrawingAreaErrorKind<_>| error.to_string();
         let root = SVGBackend::with_string(text, SIZE_PX).into_drawing_area();
-        root.fill(&WHITE).map_err(said)?;
+        root.fill(&WHITE).map_err(message)?;
         let mut chart = ChartBuilder::on(&root)
             .caption(&self.title, ("sans-serif", 18))
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(70)
             .build_cartesian_2d(x, y)
-            .map_err(said)?;
+            .map_err(message)?;
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
@@ -167,18 +173,18 @@ impl Plot {
             .y_label_formatter(&label)
             .light_line_style(WHITE)
             .draw()
-            .map_err(said)?;
+            .map_err(message)?;
         for (i, series) in self.series.iter().enumerate() {
             let color = Palette99::pick(i).to_rgba();
             let points: Vec<_> = self.shown(series).collect();
             if series.joined {
                 chart
                     .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))
-                    .map_err(said)?;
+                    .map_err(message)?;
             }
             chart
-                .draw_series(points.iter().map(|&at| Circle::new(at, 3, color.filled())))
-                .map_err(said)?
+                .draw_series(points.iter().map(|&point| Circle::new(point, 3, color.filled())))
+                .map_err(message)?
                 .label(&series.name)
                 .legend(move |(x, y)| Circle::new((x + 10, y), 3, color.filled()));
         }
@@ -188,8 +194,8 @@ impl Plot {
             .border_style(BLACK.mix(0.3))
             .position(legend)
             .draw()
-            .map_err(said)?;
-        root.present().map_err(said)
+            .map_err(message)?;
+        root.present().map_err(message)
     }
 }
 
@@ -203,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_shown_is_left_out_and_nothing_at_all_is_refused() {
+    fn unplottable_points_are_left_out_and_empty_plots_refused() {
         let svg = plot(vec![(1.0, 0.1), (2.0, f64::NAN), (0.0, 3.0), (10.0, 1.0)], [true, true])
             .svg()
             .expect("a plot");
@@ -214,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_stays_off_the_curve() {
+    fn legend_is_in_the_emptiest_corner() {
         let corner = |points: &[(f64, f64)], log| {
             plot(points.to_vec(), log).emptiest_corner(&(1.0..100.0), &(1.0..100.0))
         };

@@ -1,9 +1,8 @@
-//! The experiments of the paper's section 8, done again: what its text and figures claim, measured against
-//! truth.
+//! The experiments of section 8 of the paper, with errors measured against ground truth.
 //!
-//! Each experiment is one file and gives a [`Report`]: tables, plots, pictures and remarks. Inputs that are
-//! not part of camsim (the paper's flight log, its calibrations and camera poses) come from a data folder;
-//! without one an experiment runs on a built-in substitute and says so in its first remark.
+//! Each experiment is one file and returns an [`ExperimentReport`] of tables, plots, pictures and notes.
+//! Inputs that are not part of camsim (the paper's flight log and camera poses) come from a data folder.
+//! Without it an experiment uses a built-in substitute and says so in its first note.
 
 use std::{
     convert::Infallible,
@@ -19,23 +18,23 @@ use camsim_io::{
 use crate::plot::PlotError;
 
 mod blur;
+mod circle_grid;
 mod circles;
-mod displace;
+mod displacement;
 mod interlace;
 mod lens;
 mod map;
-mod pattern;
 mod report;
-mod rig;
 mod shutter;
 mod speed;
 mod table;
+mod test_bench;
 #[cfg(test)]
 mod tests;
 mod time;
 mod tracking;
 
-pub use report::{Picture, Report};
+pub use report::{ExperimentReport, Picture};
 pub use table::{Table, short};
 
 /// An experiment of section 8.
@@ -53,14 +52,14 @@ pub enum Experiment {
     Shutter,
     /// 8.7, fig. 20: interlacing.
     Interlace,
-    /// 8.8, fig. 21: everything over terrain.
+    /// 8.8, fig. 21: all effects over terrain.
     Map,
-    /// 8.9: frames a second.
+    /// 8.9: frame rates.
     Speed,
 }
 
 impl Experiment {
-    /// All, in the paper's order.
+    /// All experiments, in the order of the paper.
     pub const ALL: [Self; 8] = [
         Self::Tracking,
         Self::Lens,
@@ -72,7 +71,7 @@ impl Experiment {
         Self::Speed,
     ];
 
-    /// Its name on the command line and of its folder.
+    /// Name on the command line and of the output folder.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -87,7 +86,7 @@ impl Experiment {
         }
     }
 
-    /// What it shows, with its place in the paper.
+    /// Section and figures of the paper, and the subject.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
@@ -102,11 +101,11 @@ impl Experiment {
         }
     }
 
-    /// Does it.
+    /// Runs the experiment.
     ///
     /// # Errors
-    /// [`ReproduceError`]: a file of the data folder, the device.
-    pub fn run(self, setup: &Setup<'_>) -> Result<Report, ReproduceError> {
+    /// [`ReproduceError`].
+    pub fn run(self, setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
         match self {
             Self::Tracking => tracking::run(setup),
             Self::Lens => lens::run(setup),
@@ -120,83 +119,82 @@ impl Experiment {
     }
 }
 
-/// What experiments run with.
+/// Inputs of the experiments.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
-    /// The device.
+    /// The renderer.
     pub engine: &'a Engine,
-    /// The folder that holds `camsim/` (log, calibrations and poses of the paper's program), `flights/`,
-    /// `terrain/`.
+    /// Folder with `camsim/` (log, calibrations and poses of the paper's program), `flights/` and `terrain/`.
     pub data: Option<&'a Path>,
-    /// Where inputs made here are put (the built-in flight).
+    /// Folder for the files of the built-in flight.
     pub scratch: &'a Path,
-    /// Width of the pictures; the paper's are 640 x 480. Smaller ones are quicker, with the same field of
-    /// view.
+    /// Width of the frames, which are 640 x 480 in the paper. Smaller frames have the same field of view.
     pub width_px: u32,
 }
 
 impl Setup<'_> {
-    /// The file `name` of the data folder, if there is a data folder.
+    /// Path of a file in the data folder, if there is a data folder.
     fn data_file(&self, name: &str) -> Option<PathBuf> {
         self.data.map(|folder| folder.join(name))
     }
 }
 
-/// Why an experiment could not be done.
+/// Why an experiment failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
-    /// The flight log.
+    /// The flight log cannot be read.
     #[error(transparent)]
     Log(#[from] FlightLogError),
-    /// A calibration.
+    /// A calibration cannot be read.
     #[error(transparent)]
     Camera(#[from] CameraFileError),
-    /// A picture.
+    /// A picture cannot be read.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// A scenario.
+    /// A scenario cannot be read.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// What a scenario names.
+    /// A file of a scenario cannot be loaded.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The device.
+    /// The adapter failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// Rendering.
+    /// Rendering failed.
     #[error(transparent)]
     Render(#[from] RenderError<Infallible>),
-    /// A file of the report.
+    /// A file of the report cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A plot.
+    /// A plot failed.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// Pictures in which nothing is found to measure.
+    /// No circle of the target was detected.
     #[error(
-        "no circle of the target was found in the pictures of {calibration}'s calibration, {width_px} px wide: circles of fewer than {least_px} \
-         dark pixels are not told from noise; take a larger width (the paper's is 640)"
+        "no circle of the target was found in the frames of {calibration}'s calibration, {width_px} px wide: \
+         circles of fewer than {least_px} dark pixels are ignored as noise; choose a larger --width (640 in \
+         the paper)"
     )]
     NoCircle {
-        /// Whose camera.
+        /// Name of the calibration.
         calibration: &'static str,
-        /// Width of the pictures.
+        /// Width of the frames, pixels.
         width_px: u32,
-        /// Fewest pixels of a circle.
+        /// Smallest area of a detected circle, pixels.
         least_px: usize,
     },
-    /// A picture too small for what is measured on it, or a setting that makes no camera.
-    #[error("{what} of the experiment cannot be used: {reason}; take a width of 96 to 4096 px")]
-    Made {
-        /// What was made.
+    /// An experiment's own camera, motion or frame is invalid.
+    #[error("{what} of the experiment cannot be used: {reason}; choose a --width of 96 to 4096 px")]
+    Setup {
+        /// The invalid part.
         what: &'static str,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
     },
 }
 
 impl ReproduceError {
-    fn made(what: &'static str, reason: impl ToString) -> Self {
-        Self::Made { what, reason: reason.to_string() }
+    fn setup(what: &'static str, reason: impl ToString) -> Self {
+        Self::Setup { what, reason: reason.to_string() }
     }
 }

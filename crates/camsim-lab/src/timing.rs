@@ -1,17 +1,16 @@
-//! Clock, processor time and memory, and what is said about a set of such times.
+//! Processor time, memory, and quantiles of measurements.
 
 pub use camsim_engine::peak_memory_mb;
 use std::time::Duration;
 
-/// Milliseconds.
+/// Converts a duration to milliseconds.
 #[must_use]
 pub fn ms(duration: Duration) -> f64 {
     1e3 * duration.as_secs_f64()
 }
 
-/// Time that this program's threads have had a processor, milliseconds; those that have ended count too, so
-/// that it never falls. With a software adapter that is the work itself, whatever else runs on the machine.
-/// `None` on systems without such a clock.
+/// Processor time of this program, milliseconds: the sum over all threads, including those that have ended.
+/// Other programs hardly affect it. `None` on systems without such a clock.
 #[must_use]
 pub fn processor_ms() -> Option<f64> {
     #[cfg(unix)]
@@ -23,15 +22,15 @@ pub fn processor_ms() -> Option<f64> {
     None
 }
 
-/// The value below which `part` of the values lie, 0..=1, linear between neighbours; NaN without values.
+/// Quantile `part` (0..=1) of the values, interpolated linearly; NaN without values.
 #[must_use]
 pub fn quantile(values: &[f64], part: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let place = part.clamp(0.0, 1.0) * (sorted.len().saturating_sub(1)) as f64;
-    let (below, rest) = (place.floor() as usize, place.fract());
+    let position = part.clamp(0.0, 1.0) * (sorted.len().saturating_sub(1)) as f64;
+    let (below, fraction) = (position.floor() as usize, position.fract());
     let value = |i: usize| sorted.get(i).or(sorted.last()).copied().unwrap_or(f64::NAN);
-    value(below) + rest * (value(below + 1) - value(below))
+    value(below) + fraction * (value(below + 1) - value(below))
 }
 
 /// Lower quartile, median, upper quartile.
@@ -45,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_lie_between_their_neighbours() {
+    fn quantiles_are_interpolated() {
         assert_eq!(quartiles(&[4.0, 1.0, 3.0, 2.0, 5.0]), [2.0, 3.0, 4.0]);
         assert_eq!(quartiles(&[1.0, 2.0]), [1.25, 1.5, 1.75]);
         assert_eq!(quantile(&[7.0], 0.99), 7.0);
@@ -54,7 +53,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn memory_once_held_stays_in_the_peak() {
+    fn peak_memory_includes_freed_memory() {
         let before = peak_memory_mb().expect("status");
         let held = std::hint::black_box(vec![1_u8; 256 << 20]);
         drop(held);
@@ -62,7 +61,7 @@ mod tests {
         assert!(peak > 200.0 && peak < before + 4096.0, "{before} {peak}");
     }
 
-    fn work_for(time: Duration) -> f64 {
+    fn busy_loop(time: Duration) -> f64 {
         let begin = std::time::Instant::now();
         let mut sum = 0.0_f64;
         while begin.elapsed() < time {
@@ -73,13 +72,13 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn work_shows_in_processor_time_and_stays_there_when_its_thread_ends() {
+    fn processor_time_includes_ended_threads() {
         let mut before = processor_ms().expect("a clock of this process");
         for _ in 0..4 {
-            let worker = std::thread::spawn(|| work_for(Duration::from_millis(60)));
-            worker.join().expect("work");
+            let worker = std::thread::spawn(|| busy_loop(Duration::from_millis(60)));
+            worker.join().expect("the thread");
             let used = processor_ms().expect("a clock of this process");
-            // Another process may have had this processor for most of the time.
+            // Another process may have used this processor for most of the time.
             assert!(used > before + 5.0, "{used} after {before}");
             before = used;
         }

@@ -12,7 +12,7 @@ use camsim_core::{
 };
 use camsim_engine::{AdapterChoice, Engine, Finished};
 use camsim_lab::{
-    bench::{knobs::resize, rounds::FRAME, truth::Truth},
+    bench::{methods::resize, rounds::FRAME, truth::Truth},
     cases::cases,
 };
 use camsim_plan::{EdgeStage, FramePlan, Planner};
@@ -78,7 +78,8 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             let ratio = measured_dn / predicted_dn;
             let scale = plan.ideal.scale(&plan.camera);
             eprintln!(
-                "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
+                "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} \
+                 and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
                 case.name, predicted.resampling_dn, predicted.blur_dn, plan.surface_reads, plan.taps
             );
             assert_eq!(predicted.picture_error_kept, predicted.picture_dn() <= max_error_dn, "{}", case.name);
@@ -158,7 +159,8 @@ fn sources_beside_their_place_cost_what_is_predicted() {
             seen += 1;
             let ratio = measured_dn / predicted_dn;
             eprintln!(
-                "{:<22} {name:<18} measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by displacement, {:.2e} px), ratio {ratio:.2}",
+                "{:<22} {name:<18} measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by \
+                 displacement, {:.2e} px), ratio {ratio:.2}",
                 case.name, predicted.misregistration_dn, predicted.total_px
             );
             if !(BELOW..ABOVE).contains(&ratio) {
@@ -280,7 +282,8 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
             let measured_dn = (all_dn * all_dn - smooth_dn * smooth_dn).max(0.0).sqrt();
             let ratio = measured_dn / predicted.error_dn;
             eprintln!(
-                "{} at {scale}, {samples}: all {all_dn:.3}, without silhouettes {smooth_dn:.3}, so by them {measured_dn:.3}; {predicted:.3?}, ratio {ratio:.2}",
+                "{} at {scale}, {samples}: all {all_dn:.3}, without silhouettes {smooth_dn:.3}, so by them \
+                 {measured_dn:.3}; {predicted:.3?}, ratio {ratio:.2}",
                 case.name
             );
             assert!(
@@ -356,7 +359,8 @@ fn a_coarser_terrain_costs_what_is_predicted() {
             let predicted_dn = others_dn.hypot(ground.surface_dn);
             let ratio = measured_dn / predicted_dn;
             eprintln!(
-                "{name} {allowed_px} px: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by {:.3} px), ratio {ratio:.2}",
+                "{name} {allowed_px} px: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by \
+                 {:.3} px), ratio {ratio:.2}",
                 ground.surface_dn, ground.displacement_px
             );
             assert!(

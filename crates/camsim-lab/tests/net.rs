@@ -99,7 +99,8 @@ fn pictures_are_those_of_the_golden_file() {
             eprintln!("{of}: renderers {apart_dn:.4} dn apart, {validity} pixels valid in one alone");
             if apart_dn > RENDERERS_APART_DN || validity > VALID_IN_ONE {
                 faults.push(format!(
-                    "{of} color: renderers are {apart_dn:.3} dn apart, {validity} pixels are valid in one alone"
+                    "{of} color: renderers are {apart_dn:.3} dn apart, {validity} pixels are valid in one \
+                     alone"
                 ));
             }
         }

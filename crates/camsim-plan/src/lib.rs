@@ -61,5 +61,5 @@ pub use ir::{
     stages::{BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, TemporalStage},
 };
 pub use planner::Planner;
-pub use source_error::pixel_truth::PixelTruth;
+pub use source_error::pixel_truth::{FrameRays, PixelHit, PixelTruth};
 pub use view::lens_reach::LensReach;

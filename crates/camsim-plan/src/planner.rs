@@ -11,7 +11,6 @@ use camsim_core::{
     sequence::Sequence,
     temporal::IdealGeometry,
 };
-use glam::DVec2;
 
 use crate::{
     choose::{
@@ -30,7 +29,7 @@ use crate::{
         dry_run::DryRun,
         error_map::error_map,
         exact_sources::{ExactSources, phases, terrain_detail},
-        pixel_truth::{PixelTruth, pixel_truth},
+        pixel_truth::FrameRays,
         temporal_method::{TemporalMethod, is_of_twist},
     },
 };
@@ -211,12 +210,11 @@ impl Planner {
         row_records(plan, self.inputs.path(), self.inputs.sequence.epoch_ns)
     }
 
-    /// What the ray `uv` of a pixel meets, each at its own instant: source at exposure phase `phase` (-0.5 to
-    /// 0.5), point and depth at mid-exposure. The terrain is met at full detail, which what was drawn is
-    /// within [`FramePlan::terrain_error_px`] of.
+    /// Rays of the pixels of a frame, each at its own instant; coordinates are of exposure phase `phase`
+    /// (-0.5 to 0.5).
     #[must_use]
-    pub fn pixel_truth(&self, plan: &FramePlan, pixel: [u32; 2], uv: DVec2, phase: f64) -> PixelTruth {
-        pixel_truth(self.inputs.path(), &self.inputs.scene.surfaces, plan, pixel, uv, phase)
+    pub fn frame_rays<'a>(&'a self, plan: &'a FramePlan, phase: f64) -> FrameRays<'a> {
+        FrameRays::new(self.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
     }
 
     /// The predicted source error of a frame from pixel to pixel, by the dry runs that its plan was chosen

@@ -87,7 +87,7 @@ pub struct IdealCamera {
     pub pad2: f32,
 }
 
-/// Mirror of `Truth` in shaders/reverse/edges/seen.wgsl.
+/// Mirror of `Truth` in shaders/reverse/edges/truth.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]

@@ -1,4 +1,4 @@
-//! The window: panes around a picture, wishes to the state, requests to the engine.
+//! The window: draws panes, applies their messages to the state, sends requests to the engine.
 
 use std::{
     path::PathBuf,
@@ -10,50 +10,49 @@ use camsim_core::sequence::Sequence;
 use eframe::egui;
 
 use crate::{
-    drop,
-    engine::{ExactWanted, Handle, Picture, Wanted},
+    display_image, dropped_files,
+    engine::{EngineHandle, FrameRequest, OracleRequest, Picture},
     export::Exporter,
     fonts,
+    frame_rate::FrameRateMonitor,
     message::{Message, Outbox},
     panes,
-    pulse::Pulse,
     settings::Settings,
-    sheet,
-    state::{Leaving, State},
+    state::{State, UnsavedPrompt},
 };
 
-/// Under which settings are stored.
+/// Key that settings are stored under.
 const SETTINGS_KEY: &str = "camsim";
-/// Wait between two looks at the clock while frames play, at most.
-const FRAME: Duration = Duration::from_millis(16);
+/// Time between repaints during play, at most.
+const PLAY_INTERVAL: Duration = Duration::from_millis(16);
 
 /// The viewer.
 pub struct Viewer {
-    /// All that panes see.
+    /// What panes draw from.
     pub state: State,
-    engine: Handle,
-    asked: Option<Wanted>,
-    /// What the oracle was asked for, to ask once.
-    asked_exact: Option<ExactKey>,
-    pulse: Option<Pulse>,
+    engine: EngineHandle,
+    last_request: Option<FrameRequest>,
+    /// The last request to the oracle; equal ones are not sent again.
+    last_oracle_request: Option<OracleRequestKey>,
+    frame_rate: Option<FrameRateMonitor>,
     title: String,
 }
 
-/// A request to the oracle by what tells it from others.
+/// Identity of a request to the oracle.
 #[derive(Debug)]
-struct ExactKey {
+struct OracleRequestKey {
     sequence: Weak<Sequence>,
     frame: Option<u64>,
     against: Option<(Weak<Picture>, f32)>,
 }
 
-impl ExactKey {
-    fn of(wanted: &ExactWanted) -> Self {
-        let against = wanted.against.as_ref().map(|(picture, gain)| (Arc::downgrade(picture), *gain));
-        Self { sequence: Arc::downgrade(&wanted.sequence), frame: wanted.frame, against }
+impl OracleRequestKey {
+    fn new(request: &OracleRequest) -> Self {
+        let against = request.against.as_ref().map(|(picture, gain)| (Arc::downgrade(picture), *gain));
+        Self { sequence: Arc::downgrade(&request.sequence), frame: request.frame, against }
     }
 
-    fn is(&self, other: &Self) -> bool {
+    fn equals(&self, other: &Self) -> bool {
         let same_against = match (&self.against, &other.against) {
             (Some((a, gain)), Some((b, other))) => a.ptr_eq(b) && gain.to_bits() == other.to_bits(),
             (None, None) => true,
@@ -64,32 +63,39 @@ impl ExactKey {
 }
 
 impl Viewer {
-    /// Starts the engine; `scenario` is opened at once.
+    /// Starts the engine, and opens `scenario` if there is one.
     pub fn new(
         context: &egui::Context,
         scenario: Option<PathBuf>,
         settings: Settings,
         exporter: Option<Exporter>,
     ) -> Self {
-        panes::tips::unhurried(context);
+        panes::tooltips::configure(context);
         fonts::install(context);
         let repaint = context.clone();
-        let engine = Handle::start(move || repaint.request_repaint());
+        let engine = EngineHandle::start(move || repaint.request_repaint());
         let mut state = State::new(settings, exporter);
         if let Some(path) = scenario {
             state.open(path);
         }
-        Self { state, engine, asked: None, asked_exact: None, pulse: Pulse::from_env(), title: String::new() }
+        Self {
+            state,
+            engine,
+            last_request: None,
+            last_oracle_request: None,
+            frame_rate: FrameRateMonitor::from_env(),
+            title: String::new(),
+        }
     }
 
-    /// As eframe starts it, with what was remembered.
-    pub fn restored(
+    /// A viewer in an eframe window, with stored settings.
+    pub fn from_eframe(
         creation: &eframe::CreationContext<'_>,
         scenario: Option<PathBuf>,
         exporter: Option<Exporter>,
     ) -> Self {
         if let Some(render) = &creation.wgpu_render_state {
-            sheet::register(&creation.egui_ctx, render);
+            display_image::register(&creation.egui_ctx, render);
         }
         let settings = creation
             .storage
@@ -98,64 +104,63 @@ impl Viewer {
         Self::new(&creation.egui_ctx, scenario, settings, exporter)
     }
 
-    /// One pass: hears, draws, does what panes wish, asks.
+    /// One pass of egui: takes replies, draws panes, applies their messages, sends requests.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
-        self.listen(&context);
+        self.receive_replies(&context);
         panes::shortcuts::listen(&context, &mut self.state);
         let mut out = Outbox::new();
-        take_drops(&context, &mut out);
+        push_dropped_files(&context, &mut out);
         self.guard_close(&context, &mut out);
-        out.extend(self.state.browsed());
+        out.extend(self.state.poll_file_dialog());
         panes::show(ui, &self.state, &mut out);
-        // What is told of an edit stands after it, since edits take away what was told before.
-        out.sort_by_key(|message| matches!(message, Message::Refused(_)));
+        // After the edits, which clear the rejected input before.
+        out.sort_by_key(|message| matches!(message, Message::InputRejected(_)));
         out.into_iter().for_each(|message| self.state.apply(message, &context));
-        self.ask();
-        self.name_window(&context);
-        self.plan_repaint(&context);
-        if let Some(pulse) = &mut self.pulse {
-            pulse.beat(&self.state, &context);
+        self.send_requests();
+        self.set_title(&context);
+        self.schedule_repaint(&context);
+        if let Some(frame_rate) = &mut self.frame_rate {
+            frame_rate.count_pass(&self.state, &context);
         }
     }
 
-    /// What goes on also while the window is hidden.
-    fn listen(&mut self, context: &egui::Context) {
+    /// Advances time and takes the engine's replies.
+    fn receive_replies(&mut self, context: &egui::Context) {
         self.state.tick(context.input(|input| input.time));
         let replies: Vec<_> = self.engine.replies().collect();
-        replies.into_iter().for_each(|reply| self.state.hear(reply, context));
+        replies.into_iter().for_each(|reply| self.state.receive(reply, context));
     }
 
-    fn ask(&mut self) {
-        let wanted = self.state.wanted();
-        if let Some(wanted) = &wanted
-            && self.asked.as_ref() != Some(wanted)
+    fn send_requests(&mut self) {
+        let request = self.state.frame_request();
+        if let Some(request) = &request
+            && self.last_request.as_ref() != Some(request)
         {
-            self.engine.want(wanted.clone());
+            self.engine.request_frame(request.clone());
         }
-        self.asked = wanted;
-        let Some(exact) = self.state.wanted_exact() else { return };
-        let key = ExactKey::of(&exact);
-        if !self.asked_exact.as_ref().is_some_and(|asked| asked.is(&key)) {
-            self.engine.want_exact(exact);
-            self.asked_exact = Some(key);
+        self.last_request = request;
+        let Some(request) = self.state.oracle_request() else { return };
+        let key = OracleRequestKey::new(&request);
+        if !self.last_oracle_request.as_ref().is_some_and(|last| last.equals(&key)) {
+            self.engine.request_oracle(request);
+            self.last_oracle_request = Some(key);
         }
     }
 
-    /// Changes are not lost by a wrong click: a second wish to close, out of the question about them, is
-    /// obeyed.
+    /// Asks before the window closes with unsaved changes; a second close request, while asked, is obeyed.
     fn guard_close(&self, context: &egui::Context, out: &mut Outbox) {
         if context.input(|input| input.viewport().close_requested())
             && self.state.is_unsaved()
-            && self.state.leaving != Some(Leaving::Closing)
+            && self.state.unsaved_prompt != Some(UnsavedPrompt::Close)
         {
             context.send_viewport_cmd(egui::ViewportCommand::CancelClose);
             out.push(Message::Close);
         }
     }
 
-    /// The file's name stands in the title, for whoever has several windows.
-    fn name_window(&mut self, context: &egui::Context) {
+    /// Sets the title to the name of the scenario's file.
+    fn set_title(&mut self, context: &egui::Context) {
         let name = self
             .state
             .document
@@ -170,11 +175,11 @@ impl Viewer {
         }
     }
 
-    fn plan_repaint(&self, context: &egui::Context) {
+    fn schedule_repaint(&self, context: &egui::Context) {
         if self.state.timeline.playing {
-            context.request_repaint_after(FRAME);
-        } else if let Some(rest_s) = self.state.rests_in_s() {
-            context.request_repaint_after_secs(rest_s as f32 + 0.001);
+            context.request_repaint_after(PLAY_INTERVAL);
+        } else if let Some(idle_s) = self.state.idle_in_s() {
+            context.request_repaint_after_secs(idle_s as f32 + 0.001);
         }
     }
 }
@@ -193,9 +198,9 @@ impl eframe::App for Viewer {
     }
 }
 
-fn take_drops(context: &egui::Context, out: &mut Outbox) {
+fn push_dropped_files(context: &egui::Context, out: &mut Outbox) {
     let dropped = context.input(|input| input.raw.dropped_files.clone());
     let mut paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_path_buf()).collect();
-    paths.sort_by_key(|path| drop::rank(path));
+    paths.sort_by_key(|path| dropped_files::drop_order(path));
     out.extend(paths.into_iter().map(Message::Drop));
 }

@@ -1,19 +1,17 @@
-//! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks
-//! with them.
+//! Threads that load and render for the window, and the messages between them and it.
 //!
-//! The window never waits, but when it closes: then for the frame that is at work. What it wants stands in a
-//! [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a channel, and a repaint
-//! is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a
-//! device has one queue, in order, and a hand that moves on must not wait for a full frame, nor the window
-//! for either. Finished pictures cross by way of the host, as `camsim render` reads them. What is loaded is
-//! shared.
+//! The window never waits for them, except at its end for the frame in progress. Requests go through a
+//! [`Mailbox`], which holds only the latest; [`Reply`]s come back through a channel, each with a repaint
+//! request. Previews, full frames and egui have a device each, because a device has one queue, in order: a
+//! preview must not wait for a full frame, nor the window for either. Pictures are read back to the CPU, as
+//! in `camsim render`. Loaded files are shared.
 
-mod errors;
-mod exact;
-mod library;
+mod error_overlay;
 mod mailbox;
 mod messages;
+mod oracle;
 mod picture;
+mod scenario_cache;
 mod variants;
 mod worker;
 
@@ -26,117 +24,122 @@ use std::{
     thread::JoinHandle,
 };
 
-pub use errors::{DECADES, Errors};
-use library::Library;
+pub use error_overlay::{DECADES, ErrorOverlay};
 pub use mailbox::Mailbox;
-pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Truth, Wanted};
+pub use messages::{
+    DepthPicture, FrameReply, FrameRequest, OraclePicture, OracleRequest, Reply, Size, Stage,
+};
 pub use picture::{Difference, Picture, ramp};
-pub use variants::{preview_factor, staged};
+use scenario_cache::ScenarioCache;
+pub use variants::{preview_factor, stage_scenario};
 
-/// The engine's threads as the window sees them. Dropping it ends them and waits until they have: whoever
-/// ends the program while one of them still gives its device back may do so in a driver that is just being
-/// unloaded, which is a fault of memory now and then.
+/// Handle of the engine's threads. Dropping it ends them and waits for them: ending the program while a
+/// thread releases its device can crash in a driver that is being unloaded.
 #[derive(Debug)]
-pub struct Handle {
-    previews: Arc<Mailbox<Wanted>>,
-    frames: Arc<Mailbox<Wanted>>,
-    exact: Arc<Mailbox<ExactWanted>>,
-    library: Arc<Library>,
+pub struct EngineHandle {
+    previews: Arc<Mailbox<FrameRequest>>,
+    full_frames: Arc<Mailbox<FrameRequest>>,
+    oracle: Arc<Mailbox<OracleRequest>>,
+    scenarios: Arc<ScenarioCache>,
     replies: Receiver<Reply>,
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Where replies go; each asks for a repaint.
+/// Sends replies to the window, each with a repaint request.
 #[derive(Clone)]
-pub struct Speaker {
-    replies: Sender<Reply>,
+pub struct ReplySender {
+    sender: Sender<Reply>,
     repaint: Arc<dyn Fn() + Send + Sync>,
 }
 
-impl std::fmt::Debug for Speaker {
+impl std::fmt::Debug for ReplySender {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Speaker")
+        f.write_str("ReplySender")
     }
 }
 
-impl Speaker {
-    /// A closed window ends the conversation: nothing to do about a failed send.
-    pub(crate) fn say(&self, reply: Reply) {
-        let _ = self.replies.send(reply);
+impl ReplySender {
+    /// Sends a reply. A send that fails because the window is closed is ignored.
+    pub(crate) fn send(&self, reply: Reply) {
+        let _ = self.sender.send(reply);
         (self.repaint)();
     }
 }
 
-impl Handle {
-    /// Starts the threads; `repaint` is called with each reply, from theirs.
+impl EngineHandle {
+    /// Starts the threads. They call `repaint` after each reply.
     pub fn start(repaint: impl Fn() + Send + Sync + 'static) -> Self {
         let (sender, replies) = channel();
-        let speaker = Speaker { replies: sender, repaint: Arc::new(repaint) };
-        let (previews, frames, exact) =
+        let reply_sender = ReplySender { sender, repaint: Arc::new(repaint) };
+        let (previews, full_frames, oracle) =
             (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
-        let library = Arc::new(Library::default());
+        let scenarios = Arc::new(ScenarioCache::default());
         let mut threads = Vec::new();
-        for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &frames)] {
-            let (mailbox, library, voice) = (mailbox.clone(), library.clone(), speaker.clone());
-            threads.extend(spawn(name, speaker.clone(), move || worker::run(&mailbox, &library, &voice)));
+        for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &full_frames)] {
+            let (mailbox, scenarios, replies) = (mailbox.clone(), scenarios.clone(), reply_sender.clone());
+            threads.extend(spawn(name, reply_sender.clone(), move || {
+                worker::run(&mailbox, &scenarios, &replies)
+            }));
         }
-        let (mailbox, voice) = (exact.clone(), speaker.clone());
-        threads.extend(spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice)));
-        Self { previews, frames, exact, library, replies, threads }
+        let (mailbox, replies_of_oracle) = (oracle.clone(), reply_sender.clone());
+        threads.extend(spawn("camsim oracle", reply_sender, move || {
+            oracle::run(&mailbox, &replies_of_oracle);
+        }));
+        Self { previews, full_frames, oracle, scenarios, replies, threads }
     }
 
-    /// Replaces what is wanted of the renderer.
-    pub fn want(&self, wanted: Wanted) {
-        self.library.announce(wanted.reading);
-        match wanted.size {
+    /// Replaces the request to the renderer. A preview also withdraws a full frame that has not begun.
+    pub fn request_frame(&self, request: FrameRequest) {
+        self.scenarios.announce(request.reload_count);
+        match request.size {
             Size::Preview => {
-                self.frames.clear();
-                self.previews.put(wanted);
+                self.full_frames.clear();
+                self.previews.put(request);
             }
-            Size::Full => self.frames.put(wanted),
+            Size::Full => self.full_frames.put(request),
         }
     }
 
-    /// Replaces what is wanted of the oracle.
-    pub fn want_exact(&self, wanted: ExactWanted) {
-        self.exact.put(wanted);
+    /// Replaces the request to the oracle.
+    pub fn request_oracle(&self, request: OracleRequest) {
+        self.oracle.put(request);
     }
 
-    /// What has been said since the last time.
+    /// Takes the replies that have arrived.
     pub fn replies(&self) -> impl Iterator<Item = Reply> + '_ {
         self.replies.try_iter()
     }
 }
 
-impl Drop for Handle {
+impl Drop for EngineHandle {
     fn drop(&mut self) {
         self.previews.close();
-        self.frames.close();
-        self.exact.close();
+        self.full_frames.close();
+        self.oracle.close();
         for thread in self.threads.drain(..) {
-            // Its panics are caught and told where they happen.
+            // `spawn` catches and reports panics.
             let _ = thread.join();
         }
     }
 }
 
-/// A thread that comes back after a panic, with a word about it: a fault in one frame must not leave the
-/// window with nothing behind it.
-fn spawn(name: &str, speaker: Speaker, body: impl Fn() + Send + 'static) -> Option<JoinHandle<()>> {
-    let voice = speaker.clone();
+/// A thread that reports a panic and goes on: a fault in one frame must not leave the window without
+/// renderer.
+fn spawn(name: &str, replies: ReplySender, body: impl Fn() + Send + 'static) -> Option<JoinHandle<()>> {
+    let thread_replies = replies.clone();
     let body = move || {
         while catch_unwind(AssertUnwindSafe(&body)).is_err() {
-            voice.say(Reply::Failed(
-                "the renderer stopped at a fault of its own; it goes on with the next change".into(),
+            thread_replies.send(Reply::Failed(
+                "internal error in the renderer; it continues with the next change".into(),
             ));
         }
     };
-    let no_thread = |error: &std::io::Error| {
-        speaker.say(Reply::Failed(format!(
-            "no thread for the renderer: {error}; close other programs and open the viewer again"
+    let report = |error: &std::io::Error| {
+        replies.send(Reply::Failed(format!(
+            "cannot start a thread for the renderer: {error}; close other programs and open the viewer again"
         )));
     };
-    std::thread::Builder::new().name(name.into()).spawn(body).inspect_err(no_thread).ok()
+    std::thread::Builder::new().name(name.into()).spawn(body).inspect_err(report).ok()
 }
 
 #[cfg(test)]
@@ -144,12 +147,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_thread_outlives_the_handle() {
-        let held = Arc::new(());
+    fn dropping_the_handle_ends_all_threads() {
+        let token = Arc::new(());
         for _ in 0..20 {
-            let by_threads = held.clone();
-            drop(Handle::start(move || drop(by_threads.clone())));
-            assert_eq!(Arc::strong_count(&held), 1, "threads still speak");
+            let held_by_threads = token.clone();
+            drop(EngineHandle::start(move || drop(held_by_threads.clone())));
+            assert_eq!(Arc::strong_count(&token), 1, "a thread still runs");
         }
     }
 }

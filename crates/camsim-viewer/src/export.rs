@@ -1,7 +1,6 @@
-//! Rendering a range of frames to files, beside the window.
+//! Export of a range of frames to files, on a thread of its own.
 //!
-//! How frames are written is the command line's business: it hands the viewer an [`Exporter`] that does what
-//! `camsim render` does.
+//! The command line passes an [`Exporter`] that renders and writes as `camsim render` does.
 
 use std::{
     path::PathBuf,
@@ -14,39 +13,39 @@ use std::{
 
 use camsim_core::scenario::Scenario;
 
-/// What to render, and how far it is.
+/// An export: what to render, and its progress.
 #[derive(Debug)]
 pub struct ExportJob {
-    /// The scenario, legal and with its paths resolved.
+    /// The scenario, legal and with resolved paths.
     pub scenario: Scenario,
     /// Output folder.
     pub folder: PathBuf,
-    /// First frame, and the one after the last.
+    /// First frame, and the frame after the last.
     pub frames: [u64; 2],
     cancelled: AtomicBool,
     progress: Mutex<Progress>,
-    begun: Instant,
+    began: Instant,
     repaint: Option<eframe::egui::Context>,
 }
 
-/// How far an export is.
+/// Progress of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// Frames that are done.
+    /// Number of finished frames.
     pub done: u64,
-    /// How it ended: what there is to say, or what went wrong.
+    /// How it ended: a summary, or an error; `None` while it runs.
     pub ended: Option<Result<String, String>>,
 }
 
-/// Renders a job, tells each finished frame by [`ExportJob::tick`], and stops soon after that says so. The
-/// text says what was done.
+/// Renders a job, calls [`ExportJob::tick`] after each frame, and stops soon after that returns `false`.
+/// Returns a summary or an error.
 pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sync>;
 
 impl ExportJob {
-    /// A job that nobody has started.
+    /// A job that is not started.
     pub fn new(scenario: Scenario, folder: PathBuf, frames: [u64; 2]) -> Self {
         let (cancelled, progress) = (AtomicBool::new(false), Mutex::default());
-        Self { scenario, folder, frames, cancelled, progress, begun: Instant::now(), repaint: None }
+        Self { scenario, folder, frames, cancelled, progress, began: Instant::now(), repaint: None }
     }
 
     /// Starts `exporter` on its own thread.
@@ -58,55 +57,57 @@ impl ExportJob {
         context: &eframe::egui::Context,
     ) -> Arc<Self> {
         let job = Arc::new(Self { repaint: Some(context.clone()), ..Self::new(scenario, folder, frames) });
-        let (exporter, of_thread) = (exporter.clone(), job.clone());
+        let (exporter, thread_job) = (exporter.clone(), job.clone());
         let spawned = std::thread::Builder::new().name("camsim export".into()).spawn(move || {
-            let run = std::panic::AssertUnwindSafe(|| exporter(&of_thread));
-            let ended = std::panic::catch_unwind(run)
-                .unwrap_or_else(|_| Err("the export stopped at a fault of its own".into()));
-            of_thread.end(ended);
+            let run = std::panic::AssertUnwindSafe(|| exporter(&thread_job));
+            let ended =
+                std::panic::catch_unwind(run).unwrap_or_else(|_| Err("internal error in the export".into()));
+            thread_job.end(ended);
         });
         if let Err(error) = spawned {
-            job.end(Err(format!("no thread for the export: {error}; close other programs and try again")));
+            job.end(Err(format!(
+                "cannot start a thread for the export: {error}; close other programs and try again"
+            )));
         }
         job
     }
 
-    /// One more frame is done. Whether to go on.
+    /// Counts a finished frame; returns whether to continue.
     pub fn tick(&self) -> bool {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).done += 1;
-        self.tell();
+        self.request_repaint();
         !self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Asks it to stop.
+    /// Requests cancellation.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was asked to stop.
+    /// Whether cancellation was requested.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// How far it is.
+    /// The progress.
     pub fn progress(&self) -> Progress {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Seconds that the rest will take if it goes on as it went so far; `None` before the second frame: the
-    /// first takes what is done once, too.
-    pub fn left_s(&self) -> Option<f64> {
+    /// Estimated remaining time, seconds, from the mean so far; `None` before the second frame, because the
+    /// first includes setup.
+    pub fn remaining_s(&self) -> Option<f64> {
         let done = self.progress().done;
         let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;
-        (done >= 2).then(|| left as f64 * self.begun.elapsed().as_secs_f64() / done as f64)
+        (done >= 2).then(|| left as f64 * self.began.elapsed().as_secs_f64() / done as f64)
     }
 
     fn end(&self, ended: Result<String, String>) {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).ended = Some(ended);
-        self.tell();
+        self.request_repaint();
     }
 
-    fn tell(&self) {
+    fn request_repaint(&self) {
         if let Some(context) = &self.repaint {
             context.request_repaint();
         }

@@ -1,6 +1,6 @@
-//! Glyphs that egui's own fonts lack, as those of Chinese, Japanese and Korean names: from a font of the
-//! system, if there is one. None is carried along: they are larger than the whole program. Nothing is read
-//! before a character asks for it, and what cannot be read is passed over.
+//! Fallback fonts of the system for glyphs that egui's fonts lack, such as Chinese, Japanese and Korean ones.
+//! None is bundled: such fonts are larger than the program. Fonts are read when a character needs them;
+//! unreadable ones are skipped.
 
 use std::{
     path::{Path, PathBuf},
@@ -11,17 +11,17 @@ use eframe::egui::{
     Context, FallbackRequest, FontData, FontFamily, FontInsert, FontPriority, FontProvider, InsertFontFamily,
 };
 
-/// Fonts that are tried for a character, at most.
-const MOST: usize = 6;
-/// Folders in folders that are looked into.
-const DEPTH: usize = 5;
-/// Files that are looked at, at most: nobody waits for a name longer than a moment.
-const MOST_FILES: usize = 20_000;
+/// Fonts tried for a character, at most.
+const MAX_FALLBACKS: usize = 6;
+/// Depth of the search for fonts in folders.
+const MAX_DEPTH: usize = 5;
+/// Files visited by the search, at most, to bound its time.
+const MAX_FILES: usize = 20_000;
 
-/// Letters that fonts are made for.
+/// Scripts that fallback fonts cover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Script {
-    /// Chinese characters, and what is written between them.
+    /// Chinese characters and CJK punctuation.
     Han,
     /// Japanese.
     Kana,
@@ -33,8 +33,7 @@ enum Script {
 
 use Script::{Han, Hangul, Kana, Other};
 
-/// Beginnings of file names, small letters, with what is in those fonts. The first that is there is tried
-/// first.
+/// Prefixes of file names, lower case, with the scripts of the fonts, in order of preference.
 const FONTS: &[(&str, &[Script])] = &[
     ("notosanscjk", &[Han, Kana, Hangul]),
     ("sourcehansans", &[Han, Kana, Hangul]),
@@ -77,26 +76,26 @@ const FONTS: &[(&str, &[Script])] = &[
     ("segoeui", &[Other]),
     ("lucidagrande", &[Other]),
 ];
-/// Cuts that are not taken where there is a plain one.
-const CUTS: &[&str] =
+/// Words of styles that are avoided if there is a regular font.
+const STYLES: &[&str] =
     &["bold", "black", "heavy", "light", "thin", "medium", "italic", "oblique", "mono", "condensed", "serif"];
 
-/// Lets a window find them.
+/// Registers the fallback fonts with egui.
 pub fn install(context: &Context) {
     install_from(context, folders());
 }
 
 fn install_from(context: &Context, folders: Vec<PathBuf>) {
-    let found = Arc::new(Found { folders, fonts: OnceLock::new() });
-    // egui takes the next one's font where that of the first has no such glyph.
-    for place in 0..MOST {
-        context.add_font_provider(Arc::new(Nth { found: found.clone(), place }));
+    let fonts = Arc::new(SystemFonts { folders, fonts: OnceLock::new() });
+    // egui asks the next provider if the font of the first lacks the glyph.
+    for index in 0..MAX_FALLBACKS {
+        context.add_font_provider(Arc::new(FallbackProvider { fonts: fonts.clone(), index }));
     }
 }
 
-/// Where systems have their fonts.
+/// FontFile folders of the operating system.
 fn folders() -> Vec<PathBuf> {
-    let of =
+    let folder_in =
         |variable: &str, below: &str| std::env::var_os(variable).map(|folder| Path::new(&folder).join(below));
     let fixed: &[&str] = if cfg!(target_os = "macos") {
         &["/System/Library/Fonts", "/Library/Fonts", "/System/Library/AssetsV2/com_apple_MobileAsset_Font7"]
@@ -111,46 +110,50 @@ fn folders() -> Vec<PathBuf> {
         ]
     };
     let own = if cfg!(target_os = "macos") {
-        vec![of("HOME", "Library/Fonts")]
+        vec![folder_in("HOME", "Library/Fonts")]
     } else if cfg!(windows) {
-        vec![of("WINDIR", "Fonts"), of("LOCALAPPDATA", "Microsoft/Windows/Fonts")]
+        vec![folder_in("WINDIR", "Fonts"), folder_in("LOCALAPPDATA", "Microsoft/Windows/Fonts")]
     } else {
-        vec![of("XDG_DATA_HOME", "fonts"), of("HOME", ".local/share/fonts"), of("HOME", ".fonts")]
+        vec![
+            folder_in("XDG_DATA_HOME", "fonts"),
+            folder_in("HOME", ".local/share/fonts"),
+            folder_in("HOME", ".fonts"),
+        ]
     };
     fixed.iter().map(PathBuf::from).chain(own.into_iter().flatten()).collect()
 }
 
-/// The fonts that there are, looked for once, when the first of them is needed.
-struct Found {
+/// Fonts of the system, searched once, when first needed.
+struct SystemFonts {
     folders: Vec<PathBuf>,
-    fonts: OnceLock<Vec<Font>>,
+    fonts: OnceLock<Vec<FontFile>>,
 }
 
-/// One of them, read when it is needed.
-struct Font {
+/// A font file, read when first needed.
+struct FontFile {
     path: PathBuf,
     scripts: &'static [Script],
     data: OnceLock<Option<FontData>>,
 }
 
-impl Found {
-    /// The nth font that is made for a script.
-    fn nth(&self, script: Script, place: usize) -> Option<&Font> {
+impl SystemFonts {
+    /// The nth font that covers a script.
+    fn nth(&self, script: Script, index: usize) -> Option<&FontFile> {
         let fonts = self.fonts.get_or_init(|| search(&self.folders));
-        fonts.iter().filter(|font| font.scripts.contains(&script)).nth(place)
+        fonts.iter().filter(|font| font.scripts.contains(&script)).nth(index)
     }
 }
 
-/// What egui asks, one for each font that may be tried.
-struct Nth {
-    found: Arc<Found>,
-    place: usize,
+/// Provider of the fallback font with a given index.
+struct FallbackProvider {
+    fonts: Arc<SystemFonts>,
+    index: usize,
 }
 
-impl FontProvider for Nth {
+impl FontProvider for FallbackProvider {
     fn font_for(&self, request: &FallbackRequest<'_>) -> Option<FontInsert> {
         let script = script_of(request.cluster.chars().next()?)?;
-        let font = self.found.nth(script, self.place)?;
+        let font = self.fonts.nth(script, self.index)?;
         let data =
             font.data.get_or_init(|| std::fs::read(&font.path).ok().map(FontData::from_owned)).clone()?;
         let families = [FontFamily::Proportional, FontFamily::Monospace];
@@ -160,7 +163,7 @@ impl FontProvider for Nth {
     }
 }
 
-/// What kind of font a character is looked for in; `None` for what is in none.
+/// The script of a character; `None` for ASCII and private use.
 fn script_of(character: char) -> Option<Script> {
     Some(match character {
         '\0'..='\u{7f}' | '\u{e000}'..='\u{f8ff}' => return None,
@@ -179,25 +182,25 @@ fn script_of(character: char) -> Option<Script> {
     })
 }
 
-/// The best file for each entry of the list, in its order.
-fn search(folders: &[PathBuf]) -> Vec<Font> {
+/// The best file for each entry of [`FONTS`], in its order.
+fn search(folders: &[PathBuf]) -> Vec<FontFile> {
     let mut files = Vec::new();
-    let mut left = MOST_FILES;
-    folders.iter().for_each(|folder| list(folder, DEPTH, &mut left, &mut files));
+    let mut left = MAX_FILES;
+    folders.iter().for_each(|folder| list(folder, MAX_DEPTH, &mut left, &mut files));
     let name =
         |path: &Path| path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
     let named: Vec<(String, PathBuf)> = files.into_iter().map(|path| (name(&path), path)).collect();
     let best = |start: &str| {
-        let of_start = named.iter().filter(|(name, _)| name.starts_with(start));
-        of_start.min_by_key(|(name, path)| {
-            (CUTS.iter().filter(|cut| name[start.len()..].contains(*cut)).count(), name.len(), path)
+        let matching = named.iter().filter(|(name, _)| name.starts_with(start));
+        matching.min_by_key(|(name, path)| {
+            (STYLES.iter().filter(|style| name[start.len()..].contains(*style)).count(), name.len(), path)
         })
     };
     let fonts = FONTS.iter().filter_map(|(start, scripts)| Some((best(start)?.1.clone(), *scripts)));
-    fonts.map(|(path, scripts)| Font { path, scripts, data: OnceLock::new() }).collect()
+    fonts.map(|(path, scripts)| FontFile { path, scripts, data: OnceLock::new() }).collect()
 }
 
-/// Font files in a folder and in those below it.
+/// Lists font files in a folder and below it.
 fn list(folder: &Path, depth: usize, left: &mut usize, into: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
@@ -220,7 +223,7 @@ mod tests {
 
     use super::*;
 
-    fn names(fonts: &[Font]) -> Vec<String> {
+    fn names(fonts: &[FontFile]) -> Vec<String> {
         fonts
             .iter()
             .map(|font| font.path.file_name().expect("a name").to_string_lossy().into_owned())
@@ -228,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plain_cut_of_the_font_with_most_letters_comes_first() {
+    fn regular_styles_of_wide_fonts_come_first() {
         let folder = tempfile::tempdir().expect("a folder");
         let put = |name: &str| {
             let path = folder.path().join(name);
@@ -244,15 +247,16 @@ mod tests {
         put("a/b/c/d/e/f/g/wqy-zenhei.ttc");
         let fonts = search(&[folder.path().join("gone"), folder.path().into()]);
         assert_eq!(names(&fonts), ["NotoSansCJK-Regular.ttc", "malgun.ttf"]);
-        let found = Found { folders: vec![folder.path().into()], fonts: OnceLock::new() };
-        let nth =
-            |script, place| found.nth(script, place).map(|font| names(std::slice::from_ref(font))[0].clone());
+        let system_fonts = SystemFonts { folders: vec![folder.path().into()], fonts: OnceLock::new() };
+        let nth = |script, index| {
+            system_fonts.nth(script, index).map(|font| names(std::slice::from_ref(font))[0].clone())
+        };
         assert_eq!(nth(Hangul, 1).as_deref(), Some("malgun.ttf"));
         assert!(nth(Han, 1).is_none() && nth(Other, 0).is_none());
     }
 
     #[test]
-    fn characters_are_looked_for_where_they_may_be() {
+    fn characters_have_the_expected_script() {
         let expected = [
             ('\u{98db}', Some(Han)),
             ('\u{3002}', Some(Han)),
@@ -266,8 +270,8 @@ mod tests {
         }
     }
 
-    /// A window whose system has its fonts in a folder, and whether it has glyphs.
-    fn has(folders: Vec<PathBuf>, text: &str) -> bool {
+    /// Whether a window with these font folders has glyphs for a text.
+    fn has_glyphs(folders: Vec<PathBuf>, text: &str) -> bool {
         let context = Context::default();
         install_from(&context, folders);
         let mut has = false;
@@ -275,36 +279,36 @@ mod tests {
             ui.label(text);
             has = ui.ctx().fonts_mut(|fonts| fonts.has_glyphs(&FontId::proportional(14.0), text));
         });
-        // Nobody draws it.
+        // egui expects textures to be drawn.
         output.textures_delta.clear();
         has
     }
 
     #[test]
-    fn what_is_no_font_or_has_no_such_glyph_is_passed_over() {
+    fn files_that_are_no_font_or_lack_the_glyph_are_skipped() {
         let folder = tempfile::tempdir().expect("a folder");
         let text = "\u{98db}\u{884c}\u{d55c}\u{30ab}";
-        assert!(!has(vec![folder.path().into()], text), "nothing there");
+        assert!(!has_glyphs(vec![folder.path().into()], text), "no fonts");
         std::fs::write(folder.path().join("NotoSansCJK-Regular.ttc"), "no font").expect("written");
         let latin = eframe::egui::FontDefinitions::default().font_data["Ubuntu-Light"].clone();
         let latin: &[u8] = (*latin.font).as_ref();
         std::fs::write(folder.path().join("wqy-zenhei.ttc"), latin).expect("written");
-        assert!(!has(vec![folder.path().into()], text), "and nothing that breaks");
+        assert!(!has_glyphs(vec![folder.path().into()], text), "no usable font");
     }
 
     #[test]
-    fn a_font_of_the_system_has_what_its_name_says() {
-        // Of Droid's fallback there are cuts without Korean.
+    fn system_fonts_have_the_glyphs_of_their_scripts() {
+        // Hangul is left out: some versions of Droid Sans Fallback lack it.
         for (text, script) in
             [("\u{98db}\u{884c}", Han), ("\u{30ab}\u{30e1}\u{30e9}", Kana), ("\u{531}", Other)]
         {
-            let found = Found { folders: folders(), fonts: OnceLock::new() };
-            // Not every machine has one.
-            if found.nth(script, 0).is_some() {
+            let system_fonts = SystemFonts { folders: folders(), fonts: OnceLock::new() };
+            // Some machines have no such font.
+            if system_fonts.nth(script, 0).is_some() {
                 assert!(
-                    has(folders(), text),
+                    has_glyphs(folders(), text),
                     "{text} in none of {:?}",
-                    names(found.fonts.get().expect("looked for"))
+                    names(system_fonts.fonts.get().expect("searched"))
                 );
             }
         }

@@ -1,54 +1,52 @@
-//! The egui viewer: scrub a flight, see what each imperfection does, and ask any pixel why it is as it is. It
-//! shows the pixels that `camsim render` writes, by the same engine and plan.
+//! The egui viewer: scrub a flight, compare the stages of the camera's imperfections, and inspect single
+//! pixels. It shows the pixels that `camsim render` writes, by the same planner and renderers.
 //!
-//! ```text
-//! panes (draw from State, send Messages) -> State -> Wanted -> engine threads -> Reply -> State
+//! ```no_run
+//! camsim_viewer::run(Some("demo.toml".into()), None)?;
+//! # Ok::<(), anyhow::Error>(())
 //! ```
 //!
-//! No pane touches the device, and the window never waits for it.
+//! The data flow of one pass; panes never wait for the engine:
+//!
+//! ```text
+//! panes (draw from State) -> Message -> State -> FrameRequest -> engine threads -> Reply -> State
+//! ```
+//!
+//! | module | holds |
+//! |---|---|
+//! | `app` | the window: one pass of egui |
+//! | `state`, `engine_state`, `document`, `timeline`, `view`, `settings` | what panes draw from |
+//! | `message` | what panes request |
+//! | `panes` | the panes and their widgets |
+//! | `engine` | threads that load and render |
+//! | `series`, `motion`, `orbit` | computations for plots, overlays and the 3D view |
+//! | `params` | unit, range and meaning of each key of a scenario |
+//! | `display_image`, `fonts` | images and glyphs on the screen |
+//! | `dropped_files`, `file_dialog`, `export` | files in and out |
+//! | `headless`, `frame_rate` | pictures without a window, and measurements |
 
 #![warn(missing_docs)]
 
 mod app;
-
-mod browse;
-
+mod display_image;
 mod document;
-
-mod drop;
-
+mod dropped_files;
 mod engine;
-
+mod engine_state;
 mod export;
-
+mod file_dialog;
 mod fonts;
-
-mod heard;
-
+mod frame_rate;
+mod headless;
 mod message;
-
 mod motion;
-
 mod orbit;
-
 mod panes;
-
 mod params;
-
-mod pulse;
-
 mod series;
-
 mod settings;
-
-mod sheet;
-
 mod state;
-
-mod still;
-
 mod timeline;
-
 mod view;
 
 #[cfg(test)]
@@ -59,14 +57,13 @@ use std::path::PathBuf;
 use anyhow::{Context, anyhow};
 
 pub use export::{ExportJob, Exporter, Progress};
-pub use still::{Still, still};
+pub use headless::{HeadlessFrame, render_headless};
 
 /// Opens the viewer on a scenario, or on the built-in flight, and returns when its window is closed.
-/// `exporter` renders to files.
+/// `exporter` renders frames to files; without one the export page is empty.
 ///
 /// # Errors
-/// No display, or nothing that a window can be drawn with. What is wrong with a scenario, or on the way, is
-/// shown in the window.
+/// No display, or no graphics adapter. Faults of a scenario are shown in the window.
 pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Result<()> {
     if let Some(text) = no_display() {
         return Err(anyhow!(text));
@@ -86,28 +83,28 @@ pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Res
             .with_app_id("camsim")
             .with_title("camsim"),
         renderer: eframe::Renderer::Wgpu,
-        // Pixels are shown as they are.
+        // Screen pixels must have the codes of the picture.
         dithering: false,
         ..Default::default()
     };
     let start = move |creation: &eframe::CreationContext<'_>| {
-        let viewer = app::Viewer::restored(creation, Some(path), exporter);
+        let viewer = app::Viewer::from_eframe(creation, Some(path), exporter);
         Ok(Box::new(viewer) as Box<dyn eframe::App>)
     };
     eframe::run_native("camsim", options, Box::new(start)).map_err(|error| {
         anyhow!(
-            "the viewer's window cannot be opened: {error}; it needs a display (on a remote machine use `camsim render`) and a Vulkan, Metal or \
-             DirectX 12 adapter (`camsim info` lists them)"
+            "cannot open the viewer's window: {error}; it needs a display (on a remote machine use \
+             `camsim render`) and a Vulkan, Metal or DirectX 12 adapter (`camsim info` lists them)"
         )
     })
 }
 
-/// On systems whose windows are another program's: what to do where that is not there.
+/// The error on Unix systems without a display server.
 fn no_display() -> Option<&'static str> {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let needed = cfg!(all(unix, not(target_os = "macos")));
     (needed && !["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().any(is_set)).then_some(
-        "the viewer needs a display, and neither WAYLAND_DISPLAY nor DISPLAY is set: open it from a desktop session, over `ssh -X`, or in `xvfb-run`; \
-         `camsim render` needs none",
+        "the viewer needs a display, and neither WAYLAND_DISPLAY nor DISPLAY is set: open it from a desktop \
+         session, over `ssh -X`, or in `xvfb-run`; `camsim render` needs none",
     )
 }

@@ -1,4 +1,4 @@
-//! What panes ask for. They draw from the state and change nothing of it themselves.
+//! Messages from panes to the state. Panes draw from the state and do not change it.
 
 use std::path::PathBuf;
 
@@ -10,75 +10,75 @@ use crate::{
     view::{Tab, View},
 };
 
-/// A wish.
+/// An action that a pane requests.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
-    /// To a frame.
+    /// Shows a frame.
     Seek(u64),
-    /// So many frames on or back.
+    /// Steps by a number of frames, forwards or backwards.
     Step(i64),
-    /// Play, or stop.
+    /// Starts or stops play.
     TogglePlay,
-    /// Other settings of the timeline: speed, loop, whether it is dragged.
+    /// Changes settings of the timeline: speed, loop, whether it is dragged.
     Timeline(Timeline),
-    /// Other settings of the picture pane.
+    /// Changes settings of the picture pane.
     View(View),
-    /// A page on the right.
+    /// Shows a page of the right panel.
     Tab(Tab),
-    /// The pixel under the cursor, of the camera; `None` for none.
+    /// Sets the camera pixel under the cursor.
     Hover(Option<[u32; 2]>),
-    /// Keeps the pixel in the inspector, or lets it go.
+    /// Pins a pixel in the inspector, or unpins it.
     Pin(Option<[u32; 2]>),
-    /// Another value for a key; `None` leaves it out. `bool`: a hand still drags it.
+    /// Sets a key to a value, or removes it (`None`). `true` while a drag is in progress.
     Set(String, Option<Value>, bool),
-    /// What was asked for was not taken as it was.
-    Refused(Refusal),
-    /// The hand has let go.
+    /// Reports an input that was not accepted as given.
+    InputRejected(RejectedInput),
+    /// Ends a drag: later edits of the key are a new undo step.
     EndGesture,
-    /// The value at opening.
+    /// Resets a key to its value when the file was opened.
     Reset(String),
-    /// Another camera.
+    /// Replaces the camera.
     Camera(Box<CameraSpec>),
-    /// One step back.
+    /// Undoes one step.
     Undo,
-    /// One step on.
+    /// Redoes one step.
     Redo,
-    /// Opens a scenario; asks first if that loses changes.
+    /// Opens a scenario; asks first if unsaved changes would be lost.
     Open(PathBuf),
-    /// The same, whatever it loses.
-    OpenAnyway(PathBuf),
-    /// The hand wants to close the window: asks first if that loses changes.
+    /// Opens a scenario and discards unsaved changes.
+    OpenDiscarding(PathBuf),
+    /// Asks before the window closes with unsaved changes.
     Close,
-    /// What was asked for stays undone.
-    Stay,
-    /// Something dropped on the window.
+    /// Cancels opening or closing, and keeps the changes.
+    CancelLeaving,
+    /// Opens or uses a file that was dropped on the window.
     Drop(PathBuf),
     /// Reads all files again.
     Reload,
-    /// Saves under a name.
+    /// Saves the scenario to a file.
     Save(PathBuf),
-    /// The scenario as TOML, to the clipboard.
+    /// Copies the scenario as TOML to the clipboard.
     CopyToml,
-    /// The command line that renders it, to the clipboard.
+    /// Copies the command line that renders the scenario to the clipboard.
     CopyCommand,
     /// Renders frames to a folder.
-    Export(ExportWish),
-    /// Stops that.
+    Export(ExportRequest),
+    /// Cancels the export.
     CancelExport,
-    /// A notice has been read.
+    /// Dismisses a notice, by its index.
     Dismiss(usize),
-    /// What a dropped picture is for: the key, or nothing.
+    /// Uses the dropped picture for a key, or for nothing.
     UsePicture(Option<&'static str>),
-    /// The list of shortcuts.
-    Help(bool),
-    /// The desktop's own file dialog for what is asked.
+    /// Shows or hides the list of shortcuts.
+    ShowShortcuts(bool),
+    /// Opens the desktop's file dialog for the path that is asked for.
     Browse,
-    /// The window with the path to open or to save to; `None` closes it.
-    Ask(Option<Question>),
+    /// Shows the prompt for a path to open or to save to; `None` closes it.
+    Prompt(Option<PathPrompt>),
 }
 
 impl Message {
-    /// Whether it gives the scenario other values.
+    /// Whether the message may change values of the scenario.
     pub fn edits_scenario(&self) -> bool {
         matches!(
             self,
@@ -88,50 +88,50 @@ impl Message {
                 | Self::Undo
                 | Self::Redo
                 | Self::Open(_)
-                | Self::OpenAnyway(_)
+                | Self::OpenDiscarding(_)
                 | Self::Drop(_)
         )
     }
 
-    /// Whether it sets something of the window alone.
+    /// Whether the message changes settings of the window only.
     pub fn edits_window(&self) -> bool {
         matches!(self, Self::Seek(_) | Self::Step(_) | Self::Timeline(_) | Self::View(_))
     }
 }
 
-/// A value that was not taken as a hand gave it.
+/// An input that was not accepted as given.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// The key, with the place in its list, or another field's name.
+pub struct RejectedInput {
+    /// The key, with an index in brackets for an element of a list, or the name of another field.
     pub name: String,
-    /// What was wrong, what is legal, and which value is in force.
+    /// What was wrong, the legal range, and the value in force.
     pub text: String,
 }
 
-impl Refusal {
-    /// The name without a place in a list.
+impl RejectedInput {
+    /// The name without an index.
     pub fn key(&self) -> &str {
         self.name.split('[').next().unwrap_or(&self.name)
     }
 }
 
-/// What a path is asked for.
+/// Prompt for a path.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Question {
-    /// Whether it is to be saved to, not opened.
+pub struct PathPrompt {
+    /// Whether the path is to be saved to, not opened.
     pub saves: bool,
-    /// As typed so far.
+    /// Path typed so far.
     pub path: String,
 }
 
 /// Frames to render to files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ExportWish {
-    /// Folder.
+pub struct ExportRequest {
+    /// Output folder.
     pub folder: PathBuf,
-    /// First frame, and the one after the last.
+    /// First frame, and the frame after the last.
     pub frames: [u64; 2],
 }
 
-/// Wishes of one pass over all panes, in order.
+/// Messages of one pass over all panes, in order.
 pub type Outbox = Vec<Message>;

@@ -1,5 +1,4 @@
-//! Panes: small files that draw from the state and say what they wish. None of them touches the device or
-//! waits for anything.
+//! Panes: they draw from the state and push messages. None of them uses the device or waits.
 
 mod export;
 mod image_view;
@@ -7,39 +6,41 @@ mod inspector;
 mod map;
 mod menu;
 mod notices;
-mod numbers;
+mod number_field;
 pub(crate) mod parameters;
 mod plan;
 mod plots;
 pub mod shortcuts;
-pub(crate) mod space;
 mod timeline;
-pub(crate) mod tips;
+pub(crate) mod tooltips;
+pub(crate) mod view3d;
 mod widgets;
 
 use eframe::egui;
 
-use self::tips::Aside;
+use self::tooltips::TooltipPlacement;
 use crate::{
     message::{Message, Outbox},
     state::State,
     view::Tab,
 };
 
-/// Widths of a window, points, below which it has no parameters, and no pages.
-const NARROW: [f32; 2] = [640.0, 860.0];
+/// Least width of a window with the parameters, points.
+const MIN_WIDTH_PARAMETERS: f32 = 640.0;
+/// Least width of a window with parameters and pages, points.
+const MIN_WIDTH_PAGES: f32 = 860.0;
 
-/// All panes.
+/// Draws all panes.
 pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
-    // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass
-    // on a software adapter.
+    // Panels are transparent, because the window is cleared in their colour: painting it again would dominate
+    // the time of a pass on a software adapter.
     let style = ui.global_style();
     let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
     egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
     egui::Panel::bottom("timeline").frame(panel).show(ui, |ui| timeline::show(ui, state, out));
-    // Beside the picture only as far as there is room: panels would lie on it, and on each other.
+    // Side panels are left out of narrow windows, where they would cover the picture.
     let width = ui.available_width();
-    if width >= NARROW[0] {
+    if width >= MIN_WIDTH_PARAMETERS {
         egui::Panel::left("parameters")
             .frame(panel)
             .resizable(true)
@@ -47,7 +48,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             .size_range(180.0..=(0.4 * width).clamp(180.0, 600.0))
             .show(ui, |ui| parameters::show(ui, state, out));
     }
-    if width >= NARROW[1] {
+    if width >= MIN_WIDTH_PAGES {
         egui::Panel::right("pages")
             .frame(panel)
             .resizable(true)
@@ -58,20 +59,21 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     egui::CentralPanel::default()
         .frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT))
         .show(ui, |ui| {
-            Aside::Below(egui::Rangef::point(ui.max_rect().top())).set(ui.ctx());
+            TooltipPlacement::Below(egui::Rangef::point(ui.max_rect().top())).set(ui.ctx());
             notices::show(ui, state, out);
             image_view::show(ui, state, out);
         });
     menu::windows(ui.ctx(), state, out);
-    hovering(ui.ctx());
+    hovered_files(ui.ctx());
     shortcuts::window(ui.ctx(), state, out);
 }
 
-/// Files that a hand holds over the window: that they can be dropped, and which.
-fn hovering(context: &egui::Context) {
+/// Names the files that are dragged over the window.
+fn hovered_files(context: &egui::Context) {
     let names: Vec<String> = context.input(|input| {
-        let of = |path: &std::path::PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-        input.raw.hovered_files.iter().filter_map(|file| file.path.as_ref().and_then(of)).collect()
+        let name =
+            |path: &std::path::PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        input.raw.hovered_files.iter().filter_map(|file| file.path.as_ref().and_then(name)).collect()
     });
     if names.is_empty() {
         return;
@@ -91,8 +93,9 @@ fn hovering(context: &egui::Context) {
         });
 }
 
+/// The right panel: tabs, and the page of the chosen one.
 fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
-    Aside::Left(ui.max_rect().x_range()).set(ui.ctx());
+    TooltipPlacement::Left(ui.max_rect().x_range()).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
         for tab in Tab::ALL {
             if ui.selectable_label(state.view.tab == tab, tab.label()).clicked() {
@@ -108,13 +111,13 @@ fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             Tab::Plan => plan::show(ui, state),
             Tab::Plots => plots::show(ui, state, out),
             Tab::Map => map::show(ui, state, out),
-            Tab::Space => space::show(ui, state, out),
+            Tab::View3d => view3d::show(ui, state, out),
             Tab::Export => export::show(ui, state, out),
         },
     );
 }
 
-/// From dark blue (0) to yellow (1).
+/// Colour scale from dark blue (0) to yellow (1).
 fn ramp_color(share: f64) -> egui::Color32 {
     let [r, g, b] = crate::engine::ramp(share);
     egui::Color32::from_rgb(r, g, b)

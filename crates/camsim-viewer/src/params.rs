@@ -1,18 +1,17 @@
-//! What people should know of each key of a scenario: unit, range that makes sense, and the paper's symbol
-//! for it. A test holds this table against the format's own.
+//! Unit, range and tooltip of each key of a scenario. A test compares the list with the format's keys.
 
-/// A key's facts.
+/// Description of a key.
 #[derive(Clone, Copy, Debug)]
 pub struct Param {
-    /// Dotted key.
+    /// Dotted key, without indices of lists.
     pub key: &'static str,
-    /// Unit, for display.
+    /// Unit; empty for none.
     pub unit: &'static str,
-    /// Range of sliders and drags; what is legal is decided elsewhere.
+    /// Range of the number field; `validate` decides what is legal.
     pub range: [f64; 2],
-    /// Change a point of drag.
+    /// Change per point of drag.
     pub speed: f64,
-    /// What it means; names the paper's symbol or equation where it has one.
+    /// Tooltip: meaning, with the paper's symbol or equation if there is one.
     pub tip: &'static str,
 }
 
@@ -26,33 +25,34 @@ const fn param(
     Param { key, unit, range, speed, tip }
 }
 
-/// Where numbers have no range of their own.
+/// Range of keys without one of their own.
 const ANY: [f64; 2] = [-1e9, 1e9];
+/// Range of keys that are not negative.
 const POSITIVE: [f64; 2] = [0.0, 1e9];
 
-/// The facts of a key.
-pub fn of(key: &str) -> Option<&'static Param> {
+/// The description of a key.
+pub fn find(key: &str) -> Option<&'static Param> {
     PARAMS.iter().find(|param| param.key == key)
 }
 
-/// In the order of the format.
+/// All keys, in the order of the format.
 pub const PARAMS: &[Param] = &[
     param("seed", "", [0.0, 1e9], 1.0, "seed of every random number; the same seed gives the same noise"),
     param("flight.log", "", ANY, 1.0, "the flight log: time, position, attitude (the paper's section 3)"),
-    param("flight.format", "", ANY, 1.0, "columns of the log; auto refuses what could be two of them"),
+    param("flight.format", "", ANY, 1.0, "format of the log; auto refuses ambiguous files"),
     param(
         "flight.time_unit",
         "",
         ANY,
         1.0,
-        "unit of times whose column names none; auto refuses what the values leave in doubt",
+        "unit of times whose column names none; auto refuses ambiguous values",
     ),
     param(
         "flight.angle_unit",
         "",
         ANY,
         1.0,
-        "unit of roll, pitch and yaw whose columns name none; auto refuses what the values leave in doubt",
+        "unit of roll, pitch and yaw whose columns name none; auto refuses ambiguous values",
     ),
     param("flight.angles", "", ANY, 1.0, "whether angles wrap or count turns"),
     param(
@@ -60,7 +60,7 @@ pub const PARAMS: &[Param] = &[
         "",
         ANY,
         1.0,
-        "the log's own attitude, or heading, bank and climb from the flown path",
+        "attitude of the log, or heading, bank and climb derived from the path",
     ),
     param(
         "flight.origin",
@@ -69,9 +69,9 @@ pub const PARAMS: &[Param] = &[
         0.0001,
         "origin of the local north-east-down frame: the first row, or latitude, longitude, height",
     ),
-    param("flight.height", "", ANY, 1.0, "what the log's heights are above"),
-    param("flight.window_s", "s", [0.0, 1e6], 0.05, "part of the log that is flown, from its first good row"),
-    param("flight.speed", "x", [0.01, 100.0], 0.01, "2 flies twice as fast"),
+    param("flight.height", "", ANY, 1.0, "vertical datum of the log's heights"),
+    param("flight.window_s", "s", [0.0, 1e6], 0.05, "part of the log to fly, from its first good row"),
+    param("flight.speed", "x", [0.01, 100.0], 0.01, "speed-up of the log: 2 flies twice as fast"),
     param(
         "tracker.kind",
         "",
@@ -101,7 +101,7 @@ pub const PARAMS: &[Param] = &[
         "",
         ANY,
         1.0,
-        "part of the seed of the noise: cameras of other names have other noise",
+        "part of the noise seed: cameras of different name have different noise",
     ),
     param("camera.size_px", "px", [1.0, 8192.0], 1.0, "width and height of the picture (W, H)"),
     param("camera.focal_px", "px", [1.0, 20_000.0], 0.5, "focal lengths f_x, f_y"),
@@ -119,13 +119,14 @@ pub const PARAMS: &[Param] = &[
         "deg",
         [-180.0, 180.0],
         0.1,
-        "roll, pitch, yaw of the camera on the platform; 0 looks along the nose, pitch -90 straight down (eqs. 3-5)",
+        "roll, pitch, yaw of the camera on the platform; 0 looks along the nose, pitch -90 straight down \
+         (eqs. 3-5)",
     ),
     param("camera.mount.offset_m", "m", [-100.0, 100.0], 0.01, "lever arm forward, right, down (eqs. 3-5)"),
-    param("camera.mount.vibration", "", ANY, 1.0, "sinusoids added to the mount"),
-    param("camera.mount.vibration.axis", "", ANY, 1.0, "what it shakes"),
-    param("camera.mount.vibration.amplitude_deg", "deg", [0.0, 45.0], 0.005, "of a rotation"),
-    param("camera.mount.vibration.amplitude_m", "m", [0.0, 10.0], 0.001, "of a translation"),
+    param("camera.mount.vibration", "", ANY, 1.0, "sinusoidal vibration of the mount"),
+    param("camera.mount.vibration.axis", "", ANY, 1.0, "axis of rotation or translation"),
+    param("camera.mount.vibration.amplitude_deg", "deg", [0.0, 45.0], 0.005, "amplitude of a rotation"),
+    param("camera.mount.vibration.amplitude_m", "m", [0.0, 10.0], 0.001, "amplitude of a translation"),
     param("camera.mount.vibration.hz", "Hz", [0.0, 2000.0], 0.2, "frequency"),
     param(
         "camera.mount.vibration.phase_deg",
@@ -142,18 +143,24 @@ pub const PARAMS: &[Param] = &[
         0.001,
         "k1 k2 p1 p2 k3 k4 k5 k6 (eqs. 8 and 9), or k1 k2 k3 k4 of kannala-brandt",
     ),
-    param("camera.zoom", "", ANY, 1.0, "calibrations over zoom; go with a zoom track"),
+    param("camera.zoom", "", ANY, 1.0, "calibrations by zoom value; need a zoom track"),
     param("camera.zoom.at", "", ANY, 0.01, "zoom value of this calibration"),
-    param("camera.zoom.focal_px", "px", [1.0, 20_000.0], 0.5, "focal lengths there"),
-    param("camera.zoom.principal_point_px", "px", [-8192.0, 8192.0], 0.1, "principal point there"),
-    param("camera.zoom.coefficients", "", [-10.0, 10.0], 0.001, "distortion there"),
-    param("camera.zoom_track", "", ANY, 1.0, "CSV t_s,zoom"),
+    param("camera.zoom.focal_px", "px", [1.0, 20_000.0], 0.5, "focal lengths at this zoom value"),
+    param(
+        "camera.zoom.principal_point_px",
+        "px",
+        [-8192.0, 8192.0],
+        0.1,
+        "principal point at this zoom value",
+    ),
+    param("camera.zoom.coefficients", "", [-10.0, 10.0], 0.001, "distortion coefficients at this zoom value"),
+    param("camera.zoom_track", "", ANY, 1.0, "CSV file with columns t_s,zoom"),
     param(
         "camera.shutter.delay_ms",
         "ms",
         [0.0, 10_000.0],
         0.2,
-        "how much older than its stamp the image centre is: -t_d",
+        "exposure of the image centre before the stamp: -t_d",
     ),
     param(
         "camera.shutter.readout_ms",
@@ -162,20 +169,20 @@ pub const PARAMS: &[Param] = &[
         0.2,
         "rolling shutter t_r: from the first row to the last",
     ),
-    param("camera.shutter.readout", "", ANY, 1.0, "where the readout begins"),
+    param("camera.shutter.readout", "", ANY, 1.0, "side at which the readout begins"),
     param(
         "camera.shutter.exposure_ms",
         "ms",
         [0.0, 1000.0],
         0.1,
-        "exposure t_e, about each row's middle (eq. 20): motion blur",
+        "exposure t_e, centred at each row's time (eq. 20): motion blur",
     ),
     param(
         "camera.shutter.interlace_ms",
         "ms",
         [0.0, 1000.0],
         0.2,
-        "lag t_i between the two fields (eq. 21); field is half a frame period",
+        "lag t_i between the two fields (eq. 21); \"field\" is half a frame period",
     ),
     param("camera.shutter.first_field", "", ANY, 1.0, "rows of the earlier field, counted from 0"),
     param(
@@ -202,29 +209,29 @@ pub const PARAMS: &[Param] = &[
     ),
     param("camera.photometric.output", "", ANY, 1.0, "encoding of PNG files; the viewer always shows sRGB"),
     param("scene.terrain.dem", "", ANY, 1.0, "GeoTIFF of heights"),
-    param("scene.terrain.ortho", "", ANY, 1.0, "picture on the terrain"),
-    param("scene.terrain.height", "", ANY, 1.0, "what the terrain's heights are above"),
-    param("scene.terrain.epsg", "", [0.0, 65_535.0], 1.0, "coordinate system, where the file does not say"),
-    param("scene.terrain.height_unit", "", ANY, 1.0, "unit of the heights, where the file does not say"),
+    param("scene.terrain.ortho", "", ANY, 1.0, "orthophoto of the terrain"),
+    param("scene.terrain.height", "", ANY, 1.0, "vertical datum of the terrain's heights"),
+    param("scene.terrain.epsg", "", [0.0, 65_535.0], 1.0, "coordinate system, if the file has none"),
+    param("scene.terrain.height_unit", "", ANY, 1.0, "unit of the heights, if the file has none"),
     param(
         "scene.terrain.ortho_white",
         "",
         [1.0, 65_535.0],
         1.0,
-        "stored number of the picture that is white, where not all bits are used",
+        "stored value of white, if the orthophoto does not use all bits",
     ),
-    param("scene.terrain.beyond", "", ANY, 1.0, "what is seen of ground without a picture"),
+    param("scene.terrain.beyond", "", ANY, 1.0, "appearance of terrain beyond the orthophoto"),
     param(
         "scene.pattern.image",
         "",
         ANY,
         1.0,
-        "a level picture at the origin's height, its top to the north",
+        "image of a level pattern at the origin's height, top to the north",
     ),
     param("scene.pattern.width_m", "m", POSITIVE, 1.0, "width of the pattern on the ground"),
     param("scene.pattern.at", "m", ANY, 1.0, "centre of the pattern: the origin, or north, east, down"),
     param("scene.board.target", "", ANY, 1.0, "Kalibr's target YAML, in place of the keys below"),
-    param("scene.board.kind", "", ANY, 1.0, "what is on the board"),
+    param("scene.board.kind", "", ANY, 1.0, "kind of calibration board"),
     param(
         "scene.board.columns",
         "",
@@ -232,16 +239,16 @@ pub const PARAMS: &[Param] = &[
         0.1,
         "inner corners, squares, circles or tags from left to right",
     ),
-    param("scene.board.rows", "", [1.0, 80.0], 0.1, "the same from top to bottom"),
-    param("scene.board.size_m", "m", POSITIVE, 0.001, "side of a square or tag, or spacing of circles"),
     param(
-        "scene.board.row_size_m",
-        "m",
-        POSITIVE,
-        0.001,
-        "height of a chessboard's squares, if it is another",
+        "scene.board.rows",
+        "",
+        [1.0, 80.0],
+        0.1,
+        "inner corners, squares, circles or tags from top to bottom",
     ),
-    param("scene.board.diameter_m", "m", POSITIVE, 0.001, "of a circle; half the spacing if left out"),
+    param("scene.board.size_m", "m", POSITIVE, 0.001, "side of a square or tag, or spacing of circles"),
+    param("scene.board.row_size_m", "m", POSITIVE, 0.001, "height of a chessboard's squares, if not square"),
+    param("scene.board.diameter_m", "m", POSITIVE, 0.001, "diameter of circles; default: half the spacing"),
     param(
         "scene.board.spacing",
         "",
@@ -250,69 +257,69 @@ pub const PARAMS: &[Param] = &[
         "gap between the tags of an AprilGrid, as a share of their side",
     ),
     param("scene.board.marker_m", "m", POSITIVE, 0.001, "side of a ChArUco board's markers"),
-    param("scene.board.dictionary", "", ANY, 1.0, "of a ChArUco board's markers"),
+    param("scene.board.dictionary", "", ANY, 1.0, "dictionary of a ChArUco board's markers"),
     param("scene.board.first_id", "", [0.0, 586.0], 0.2, "number of the first tag or marker"),
-    param("scene.board.margin_m", "m", [0.0, 1e6], 0.001, "white around the board, at least"),
+    param("scene.board.margin_m", "m", [0.0, 1e6], 0.001, "least white margin around the board"),
     param("scene.board.at", "m", ANY, 0.1, "middle of the board: the origin, or north, east, down"),
     param("scene.board.geodetic", "deg deg m", ANY, 0.1, "middle of the board: latitude, longitude, height"),
-    param("scene.board.angles_deg", "deg", ANY, 0.1, "roll, pitch, yaw: 0 0 0 lies face up; pitch 90 stands"),
-    param("scene.gltf", "", ANY, 1.0, "models, each once or wherever a table says"),
-    param("scene.gltf.file", "", ANY, 1.0, ".gltf or .glb"),
-    param("scene.gltf.at", "m", ANY, 0.1, "where its origin is: the origin, or north, east, down"),
-    param("scene.gltf.geodetic", "deg deg m", ANY, 0.1, "the same: latitude, longitude, height"),
-    param("scene.gltf.placements", "", ANY, 1.0, "a table of places"),
-    param("scene.gltf.heading_deg", "deg", ANY, 0.1, "where its front looks, degrees east of north"),
-    param("scene.gltf.scale", "x", POSITIVE, 0.01, "metres for each of its metres"),
-    param("scene.gltf.on_ground", "", ANY, 1.0, "put on the terrain, whatever height its place has"),
-    param("scene.gltf.scene", "", [0.0, 1e6], 0.1, "which of the file's scenes"),
-    param("scene.gltf.time_s", "s", ANY, 0.01, "instant of its animation"),
-    param("scene.gltf.animation", "", [0.0, 1e6], 0.1, "which of the file's animations"),
+    param("scene.board.angles_deg", "deg", ANY, 0.1, "roll, pitch, yaw; 0 0 0 is face up, pitch 90 upright"),
+    param("scene.gltf", "", ANY, 1.0, "models, each at one place or at those of a placement table"),
+    param("scene.gltf.file", "", ANY, 1.0, "model file, .gltf or .glb"),
+    param("scene.gltf.at", "m", ANY, 0.1, "position of the model: the origin, or north, east, down"),
+    param("scene.gltf.geodetic", "deg deg m", ANY, 0.1, "position of the model: latitude, longitude, height"),
+    param("scene.gltf.placements", "", ANY, 1.0, "CSV table of placements"),
+    param("scene.gltf.heading_deg", "deg", ANY, 0.1, "heading of the model's front, east of north"),
+    param("scene.gltf.scale", "x", POSITIVE, 0.01, "scale factor of the model"),
+    param("scene.gltf.on_ground", "", ANY, 1.0, "place on the terrain, ignoring the height"),
+    param("scene.gltf.scene", "", [0.0, 1e6], 0.1, "index of the scene in the file"),
+    param("scene.gltf.time_s", "s", ANY, 0.01, "time of the animation"),
+    param("scene.gltf.animation", "", [0.0, 1e6], 0.1, "index of the animation in the file"),
     param("scene.sky", "sRGB", [0.0, 1.0], 0.005, "colour of the sky"),
     param(
         "scene.fog_visibility_m",
         "m",
         [1.0, 1e6],
         50.0,
-        "visibility V: 1 - exp(-3.912 d / V) of a colour is the sky's",
+        "visibility V: fog share 1 - exp(-3.912 d / V) at distance d",
     ),
     param(
         "scene.light.sun_azimuth_deg",
         "deg",
         [-360.0, 360.0],
         0.5,
-        "where the sun is, east of north; without any of these colours are as they are",
+        "azimuth of the sun, east of north; without a light the scene is unshaded",
     ),
-    param("scene.light.sun_elevation_deg", "deg", [0.0, 90.0], 0.2, "how high the sun is above the horizon"),
-    param(
-        "scene.light.sun",
-        "x",
-        [0.0, 1.0],
-        0.005,
-        "of a colour that the sun meets at right angles; no shadows",
-    ),
+    param("scene.light.sun_elevation_deg", "deg", [0.0, 90.0], 0.2, "elevation of the sun above the horizon"),
+    param("scene.light.sun", "x", [0.0, 1.0], 0.005, "direct light on surfaces facing the sun; no shadows"),
     param(
         "scene.light.sky",
         "x",
         [0.0, 1.0],
         0.005,
-        "of a colour that looks up, half of it for walls; with the sun at most 1",
+        "diffuse light on upward surfaces, half of it on walls; sun + sky is at most 1",
     ),
-    param("quality.preset", "", ANY, 1.0, "paper: the paper's own methods, to measure against"),
+    param("quality.preset", "", ANY, 1.0, "paper: the methods as published, for comparison"),
     param(
         "quality.max_error_px",
         "px",
         [0.001, 10.0],
         0.001,
-        "bound on 99 % of the pixels' source coordinates",
+        "tolerance of the source error, 99th percentile",
     ),
     param(
         "quality.max_error_dn",
         "1/255",
         [0.01, 50.0],
         0.01,
-        "RMS of the picture from resampling, blur samples, sources beside their place and at silhouettes",
+        "tolerance of the RMS picture error: resampling, blur samples, misregistration, silhouettes",
     ),
-    param("quality.max_terrain_error_px", "px", [0.01, 50.0], 0.01, "level of detail of the terrain"),
+    param(
+        "quality.max_terrain_error_px",
+        "px",
+        [0.01, 50.0],
+        0.01,
+        "tolerance of the terrain's level of detail",
+    ),
     param(
         "quality.solver",
         "",
@@ -321,50 +328,50 @@ pub const PARAMS: &[Param] = &[
         "temporal inverse: linear is eq. 16, rk2 eq. 18, reproject exact poses with depth",
     ),
     param("quality.iterations", "", [1.0, 64.0], 0.1, "depth look-ups of reproject"),
-    param("quality.blur_samples", "", [1.0, 4096.0], 0.1, "samples for each pixel of path"),
-    param("quality.footprint_taps", "", [1.0, 64.0], 0.1, "taps along each side of a pixel, at most"),
-    param("quality.ideal_scale", "", [1.0, 5.0], 0.01, "pixels of the ideal frame for each of the camera's"),
+    param("quality.blur_samples", "", [1.0, 4096.0], 0.1, "exposure samples per pixel of path"),
+    param("quality.footprint_taps", "", [1.0, 64.0], 0.1, "texture taps along each side of a pixel, at most"),
+    param(
+        "quality.ideal_scale",
+        "",
+        [1.0, 5.0],
+        0.01,
+        "pixels of the ideal frame per camera pixel, along a side",
+    ),
     param(
         "quality.ideal_samples",
         "",
         [1.0, 4.0],
         1.0,
-        "samples of each of its pixels, 1 or 4: with several, borders are known to a part of a pixel",
+        "samples per pixel of the ideal frame, 1 or 4; 4 locate silhouettes within a pixel",
     ),
-    param("quality.key_frames", "", [1.0, 4.0], 0.05, "ideal frames for each output frame"),
-    param(
-        "quality.frames_per_ideal",
-        "",
-        [1.0, 64.0],
-        0.1,
-        "output frames that may be made from one ideal frame",
-    ),
-    param("quality.silhouettes", "", ANY, 1.0, "rays of their own for pixels at borders of surfaces"),
-    param("output.channels", "", ANY, 1.0, "what is written for each frame"),
+    param("quality.key_frames", "", [1.0, 4.0], 0.05, "ideal frames per output frame"),
+    param("quality.frames_per_ideal", "", [1.0, 64.0], 0.1, "output frames per ideal frame, at most"),
+    param("quality.silhouettes", "", ANY, 1.0, "silhouette rays for pixels at borders of surfaces"),
+    param("output.channels", "", ANY, 1.0, "channels written for each frame"),
     param("output.format", "", ANY, 1.0, "file formats of colour"),
     param(
         "output.stamps",
         "",
         ANY,
         1.0,
-        "clock of stamps: the log's, or one that shows output.epoch_ns at the beginning of the window",
+        "clock of stamps: the log's, or one that starts at output.epoch_ns at the window's begin",
     ),
-    param("output.epoch_ns", "ns", ANY, 1.0, "what that clock shows at the beginning of the window"),
+    param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
-    param("output.exr_compression", "", ANY, 1.0, "compression of EXR"),
+    param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
 ];
 
 #[cfg(test)]
 mod tests {
-    use camsim_io::scenario_file::{Kind, keys};
+    use camsim_io::scenario_file::{ValueKind, keys};
 
     use super::*;
 
     #[test]
-    fn every_key_of_the_format_has_its_facts_and_no_other() {
+    fn params_lists_exactly_the_keys_of_the_format() {
         let known: Vec<&str> = PARAMS.iter().map(|param| param.key).collect();
         let format: Vec<&str> =
-            keys().iter().filter(|(_, kind)| *kind != Kind::Later).map(|(key, _)| *key).collect();
+            keys().iter().filter(|(_, kind)| *kind != ValueKind::Unsupported).map(|(key, _)| *key).collect();
         assert_eq!(known, format);
         for param in PARAMS {
             assert!(

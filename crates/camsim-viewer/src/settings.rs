@@ -1,4 +1,4 @@
-//! What is remembered from run to run, beside egui's own memory of windows and panels.
+//! Settings stored between runs, beside egui's own memory of windows and panels.
 
 use std::path::PathBuf;
 
@@ -10,8 +10,8 @@ use crate::view::View;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// How pictures are shown.
+    /// Settings of the picture pane.
     pub view: View,
-    /// Files opened lately, the last one first.
+    /// Recently opened files, the latest first.
     pub recent: Vec<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! Everything that the window knows, and what a wish of a pane does to it.
+//! The state of the window, and how messages of panes change it.
 
 use std::{
     path::{Path, PathBuf},
@@ -8,42 +8,42 @@ use std::{
 use eframe::egui;
 
 use crate::{
-    browse::{Answer, Browse},
     document::Document,
-    drop,
-    engine::{ExactWanted, Picture, Reply, Size, Stage, Wanted},
+    dropped_files,
+    engine::{FrameRequest, OracleRequest, Picture, Reply, Size, Stage},
+    engine_state::EngineState,
     export::{ExportJob, Exporter},
-    heard::Heard,
-    message::{Message, Question, Refusal},
+    file_dialog::{DialogResult, FileDialog},
+    message::{Message, PathPrompt, RejectedInput},
     settings::Settings,
     timeline::Timeline,
     view::{Compare, Tab, View},
 };
 
-/// A hand rests when it has done nothing for so long, seconds.
-pub const REST_S: f64 = 0.2;
-/// In play, frames that take longer than this in full size are shown as previews, ms.
-const QUICK_MS: f64 = 60.0;
-/// News are told for so long, seconds.
-const NEWS_S: f64 = 6.0;
-/// Recent files that are remembered.
-const MOST_RECENT: usize = 8;
+/// Time without input after which full frames are rendered in place of previews, seconds.
+pub const IDLE_S: f64 = 0.2;
+/// Render time of a full frame above which play shows previews, ms.
+const PREVIEW_ABOVE_MS: f64 = 60.0;
+/// How long a status message is shown, seconds.
+const STATUS_S: f64 = 6.0;
+/// Length of the list of recent files.
+const MAX_RECENT: usize = 8;
 
-/// What would lose changes that are not saved.
+/// The action that would lose unsaved changes, while the user is asked about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Leaving {
-    /// Another scenario.
-    For(PathBuf),
-    /// The end.
-    Closing,
+pub enum UnsavedPrompt {
+    /// Opening another scenario.
+    Open(PathBuf),
+    /// Closing the window.
+    Close,
 }
 
-/// That something was done as it was wished.
+/// A confirmation that disappears after [`STATUS_S`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct News {
-    /// In words.
+pub struct StatusMessage {
+    /// Text of the message.
     pub text: String,
-    /// egui's time from which on it is not told any more.
+    /// egui's time at which it disappears, seconds.
     pub until_s: f64,
 }
 
@@ -51,172 +51,179 @@ pub struct News {
 pub struct State {
     /// The scenario, if one is open.
     pub document: Option<Document>,
-    /// Which frame.
+    /// Frame, play and loop.
     pub timeline: Timeline,
-    /// How it is shown.
+    /// Settings of the picture pane.
     pub view: View,
-    /// What the engine said.
-    pub heard: Heard,
-    /// Faults that nobody has dismissed, and what else must not go unread.
+    /// What the engine has reported.
+    pub engine: EngineState,
+    /// Faults and warnings that stay until dismissed.
     pub notices: Vec<String>,
-    /// What was done, for a moment.
-    pub news: Option<News>,
-    /// What was last asked for and not taken as it was; gone with the next edit.
-    pub refused: Option<Refusal>,
-    /// Pixel under the cursor.
+    /// Confirmation of the last action.
+    pub status: Option<StatusMessage>,
+    /// The last input that was not accepted as given; cleared by the next edit.
+    pub rejected_input: Option<RejectedInput>,
+    /// Camera pixel under the cursor.
     pub hovered: Option<[u32; 2]>,
-    /// Pixel that is kept in the inspector.
+    /// Camera pixel pinned in the inspector.
     pub pinned: Option<[u32; 2]>,
     /// Whether the shortcuts are listed.
-    pub help: bool,
-    /// A path being asked for.
-    pub question: Option<Question>,
-    /// A dropped picture whose use is not yet known.
+    pub shows_shortcuts: bool,
+    /// The prompt for a path, while it is shown.
+    pub path_prompt: Option<PathPrompt>,
+    /// A dropped picture, while the user is asked for its use.
     pub dropped_picture: Option<PathBuf>,
-    /// What is wanted but would lose changes.
-    pub leaving: Option<Leaving>,
+    /// The action that would lose unsaved changes, while the user is asked.
+    pub unsaved_prompt: Option<UnsavedPrompt>,
     /// The last export.
     pub export: Option<Arc<ExportJob>>,
-    /// Files opened lately, the last one first.
+    /// Recently opened files, the latest first.
     pub recent: Vec<PathBuf>,
-    /// The desktop's own dialog, while it is open.
-    browse: Option<Browse>,
+    /// The desktop's file dialog, while it is open.
+    file_dialog: Option<FileDialog>,
     exporter: Option<Exporter>,
-    /// egui's time now, and when a hand was at work last.
+    /// egui's time, seconds.
     now_s: f64,
-    touched_s: f64,
+    /// egui's time of the last input, seconds.
+    last_input_s: f64,
 }
 
 impl State {
-    /// Nothing open yet.
+    /// A state without open scenario.
     pub fn new(settings: Settings, exporter: Option<Exporter>) -> Self {
         Self {
             document: None,
             timeline: Timeline::default(),
             view: settings.view,
-            heard: Heard::default(),
+            engine: EngineState::default(),
             notices: Vec::new(),
-            news: None,
-            refused: None,
+            status: None,
+            rejected_input: None,
             hovered: None,
             pinned: None,
-            help: false,
-            question: None,
+            shows_shortcuts: false,
+            path_prompt: None,
             dropped_picture: None,
-            leaving: None,
+            unsaved_prompt: None,
             export: None,
             recent: settings.recent,
-            browse: None,
+            file_dialog: None,
             exporter,
             now_s: 0.0,
-            touched_s: 0.0,
+            last_input_s: 0.0,
         }
     }
 
-    /// What is remembered for the next run.
+    /// The settings to store for the next run.
     pub fn settings(&self) -> Settings {
         Settings { view: self.view.clone(), recent: self.recent.clone() }
     }
 
-    /// Whether frames can be rendered to files.
+    /// Whether the viewer has an exporter.
     pub fn can_export(&self) -> bool {
         self.exporter.is_some()
     }
 
-    /// Time goes on.
+    /// Advances to egui's time `now_s`.
     pub fn tick(&mut self, now_s: f64) {
         let seconds = now_s - self.now_s;
         self.now_s = now_s;
-        self.news.take_if(|news| news.until_s <= now_s);
+        self.status.take_if(|status| status.until_s <= now_s);
         self.timeline.advance(seconds);
     }
 
-    /// A hand is at work now.
-    pub fn touch(&mut self) {
-        self.touched_s = self.now_s;
+    /// Records an input at the present time.
+    pub fn note_input(&mut self) {
+        self.last_input_s = self.now_s;
     }
 
-    /// Seconds until the hand counts as resting; `None` if it rests.
-    pub fn rests_in_s(&self) -> Option<f64> {
-        let left_s = self.touched_s + REST_S - self.now_s;
-        (left_s > 0.0).then_some(left_s)
+    /// Seconds until input counts as idle; `None` if it is.
+    pub fn idle_in_s(&self) -> Option<f64> {
+        let remaining_s = self.last_input_s + IDLE_S - self.now_s;
+        (remaining_s > 0.0).then_some(remaining_s)
     }
 
-    /// Takes in what the engine said.
-    pub fn hear(&mut self, reply: Reply, context: &egui::Context) {
-        if self.is_out_of_date(&reply) {
+    /// Takes a reply of the engine.
+    pub fn receive(&mut self, reply: Reply, context: &egui::Context) {
+        if self.is_outdated(&reply) {
             return;
         }
         match reply {
-            Reply::Told(text) => self.notice(text),
-            reply => self.heard.take(reply, context),
+            Reply::Notice(text) => self.notice(text),
+            reply => self.engine.receive(reply, context),
         }
-        if let Some(sequence) = self.heard.sequence() {
-            self.timeline.fit(sequence.frames, sequence.scenario.camera.fps);
+        if let Some(sequence) = self.engine.sequence() {
+            self.timeline.set_sequence(sequence.frames, sequence.scenario.camera.fps);
         }
     }
 
-    /// Previews and full frames come from two threads: what the hand has left behind must not take the place
-    /// of what it is at.
-    fn is_out_of_date(&self, reply: &Reply) -> bool {
+    /// Whether a reply must be ignored. Previews and full frames come from two threads: an outdated full
+    /// frame must not replace a newer preview, nor a preview the full frame of the same request.
+    fn is_outdated(&self, reply: &Reply) -> bool {
         match reply {
             Reply::Loaded(loaded) => {
                 self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario)
             }
             Reply::Frame(reply) => {
-                let (Some(wanted), Some(shown)) = (self.wanted(), &self.heard.shown) else { return false };
-                match reply.wanted.size {
+                let (Some(request), Some(shown)) = (self.frame_request(), &self.engine.shown) else {
+                    return false;
+                };
+                match reply.request.size {
                     Size::Full => {
-                        let at_rest =
-                            Wanted { size: Size::Full, errors: reply.wanted.errors, ..wanted.clone() };
-                        wanted.size == Size::Preview && at_rest != reply.wanted
+                        let full_request = FrameRequest {
+                            size: Size::Full,
+                            errors: reply.request.errors,
+                            ..request.clone()
+                        };
+                        request.size == Size::Preview && full_request != reply.request
                     }
-                    Size::Preview => shown.reply.wanted == wanted,
+                    Size::Preview => shown.reply.request == request,
                 }
             }
             _ => false,
         }
     }
 
-    /// What is to be rendered now.
-    pub fn wanted(&self) -> Option<Wanted> {
+    /// What the renderer should render now.
+    pub fn frame_request(&self) -> Option<FrameRequest> {
         let document = self.document.as_ref()?;
         let stages = self.view.rendered_stages();
         let compares = self.view.compare == Compare::Difference && stages.len() == 2;
-        let moving = self.timeline.dragged || self.rests_in_s().is_some();
-        let playing = self.timeline.playing && self.heard.full_ms.is_none_or(|ms| ms > QUICK_MS);
-        let size = if moving || playing { Size::Preview } else { Size::Full };
-        Some(Wanted {
+        let has_input = self.timeline.dragged || self.idle_in_s().is_some();
+        let plays_previews =
+            self.timeline.playing && self.engine.full_ms.is_none_or(|ms| ms > PREVIEW_ABOVE_MS);
+        let size = if has_input || plays_previews { Size::Preview } else { Size::Full };
+        Some(FrameRequest {
             scenario: document.scenario.clone(),
-            reading: document.reading,
+            reload_count: document.reload_count,
             frame: self.timeline.frame,
             gain: compares.then_some(self.view.gain),
             stages,
             size,
-            truth: self.view.overlays.depth,
+            depth: self.view.overlays.depth,
             errors: size == Size::Full && self.shows_errors(),
         })
     }
 
-    /// Whether something on show is about the predicted error from place to place.
+    /// Whether predicted errors over the image are shown.
     pub fn shows_errors(&self) -> bool {
         self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel
     }
 
-    /// What the oracle is to do now: once a frame in full size is on show, looks into it; and its own picture
-    /// if that is on show.
-    pub fn wanted_exact(&self) -> Option<ExactWanted> {
-        let (shown, sequence) = (self.heard.shown.as_ref()?, self.heard.sequence()?);
-        let rests =
-            shown.reply.wanted.size == Size::Full && Some(&shown.reply.wanted) == self.wanted().as_ref();
-        rests.then(|| {
+    /// What the oracle should do once a full frame is shown: rays for single pixels, and its picture if that
+    /// is shown.
+    pub fn oracle_request(&self) -> Option<OracleRequest> {
+        let (shown, sequence) = (self.engine.shown.as_ref()?, self.engine.sequence()?);
+        let is_full = shown.reply.request.size == Size::Full
+            && Some(&shown.reply.request) == self.frame_request().as_ref();
+        is_full.then(|| {
             let other = self.view.stages().into_iter().find(|stage| *stage != Stage::Oracle);
             let picture = other.and_then(|stage| {
                 shown.reply.pictures.iter().find(|picture: &&Arc<Picture>| picture.stage == stage)
             });
             let compares = self.view.compare == Compare::Difference && self.view.wants_oracle();
             let against = picture.filter(|_| compares).map(|picture| (picture.clone(), self.view.gain));
-            ExactWanted {
+            OracleRequest {
                 sequence: sequence.clone(),
                 frame: self.view.wants_oracle().then_some(shown.reply.frame),
                 against,
@@ -224,51 +231,53 @@ impl State {
         })
     }
 
-    /// Does what a pane wishes. What only the window can do is left to it.
+    /// Applies a message of a pane.
     pub fn apply(&mut self, message: Message, context: &egui::Context) {
-        let of_scenario = |refusal: &Refusal| {
-            self.document.as_ref().is_some_and(|document| document.value(refusal.key()).is_some())
+        // Long because: one arm per message.
+        let is_of_scenario = |rejected: &RejectedInput| {
+            self.document.as_ref().is_some_and(|document| document.value(rejected.key()).is_some())
         };
         if message.edits_scenario()
-            || message.edits_window() && !self.refused.as_ref().is_some_and(of_scenario)
+            || message.edits_window() && !self.rejected_input.as_ref().is_some_and(is_of_scenario)
         {
-            self.refused = None;
+            self.rejected_input = None;
         }
         if self.apply_to_document(&message, context) {
-            self.touch();
+            self.note_input();
             return;
         }
         match message {
             Message::Seek(frame) => {
                 self.timeline.seek(frame);
-                self.touch();
+                self.note_input();
             }
-            Message::Step(by) => {
-                self.timeline.step(by);
-                self.touch();
+            Message::Step(frames) => {
+                self.timeline.step(frames);
+                self.note_input();
             }
             Message::TogglePlay => self.timeline.toggle(),
             Message::Timeline(timeline) => self.timeline = timeline,
             Message::View(view) => self.view = view,
             Message::Tab(tab) => self.view.tab = tab,
-            Message::Refused(refusal) => self.refused = Some(refusal),
+            Message::InputRejected(rejected) => self.rejected_input = Some(rejected),
             Message::Hover(pixel) => self.hovered = pixel,
             Message::Pin(pixel) => self.pinned = pixel,
-            Message::Dismiss(at) if at < self.notices.len() => {
-                self.notices.remove(at);
+            Message::Dismiss(index) if index < self.notices.len() => {
+                self.notices.remove(index);
             }
-            Message::Help(open) => self.help = open,
-            Message::Ask(question) => self.question = question,
+            Message::ShowShortcuts(open) => self.shows_shortcuts = open,
+            Message::Prompt(path_prompt) => self.path_prompt = path_prompt,
             Message::Browse => {
-                let question = self.question.as_ref();
-                self.browse =
-                    question.map(|question| Browse::ask(question.saves, Path::new(&question.path), context));
+                let path_prompt = self.path_prompt.as_ref();
+                self.file_dialog = path_prompt.map(|path_prompt| {
+                    FileDialog::open(path_prompt.saves, Path::new(&path_prompt.path), context)
+                });
             }
-            Message::Export(wish) => {
+            Message::Export(request) => {
                 if let (Some(document), Some(exporter)) = (&self.document, &self.exporter) {
                     let scenario = (*document.scenario).clone();
                     self.export =
-                        Some(ExportJob::start(exporter, scenario, wish.folder, wish.frames, context));
+                        Some(ExportJob::start(exporter, scenario, request.folder, request.frames, context));
                 }
             }
             Message::CancelExport => {
@@ -277,23 +286,24 @@ impl State {
                 }
             }
             Message::Open(path) if self.is_unsaved() => {
-                (self.question, self.leaving) = (None, Some(Leaving::For(path)))
+                (self.path_prompt, self.unsaved_prompt) = (None, Some(UnsavedPrompt::Open(path)))
             }
-            Message::Open(path) | Message::OpenAnyway(path) => self.open(path),
-            Message::Close => self.leaving = Some(Leaving::Closing),
-            Message::Stay => self.leaving = None,
-            Message::Drop(path) => drop::take(self, &path),
-            Message::UsePicture(key) => drop::use_picture(self, key),
+            Message::Open(path) | Message::OpenDiscarding(path) => self.open(path),
+            Message::Close => self.unsaved_prompt = Some(UnsavedPrompt::Close),
+            Message::CancelLeaving => self.unsaved_prompt = None,
+            Message::Drop(path) => dropped_files::apply_dropped(self, &path),
+            Message::UsePicture(key) => dropped_files::use_picture(self, key),
             _ => {}
         }
     }
 
-    /// Messages that change the document; whether this was one.
+    /// Applies a message that concerns the document; returns whether it was one.
     fn apply_to_document(&mut self, message: &Message, context: &egui::Context) -> bool {
         let Some(document) = &mut self.document else { return false };
-        let told: Result<Option<String>, String> = match message {
-            Message::Set(key, value, ongoing) => {
-                document.set(key, value.clone(), *ongoing);
+        // The confirmation to show, or the error.
+        let outcome: Result<Option<String>, String> = match message {
+            Message::Set(key, value, is_dragged) => {
+                document.set(key, value.clone(), *is_dragged);
                 Ok(None)
             }
             Message::EndGesture => {
@@ -314,68 +324,70 @@ impl State {
                 Ok(None)
             }
             Message::Reload => {
-                document.reading += 1;
+                document.reload_count += 1;
                 Ok(None)
             }
             Message::Save(path) => {
-                self.question = None;
+                self.path_prompt = None;
                 document.save(path).map(|()| Some(format!("saved {}", path.display())))
             }
             Message::CopyToml => document.to_toml(None).map(|text| {
                 context.copy_text(text);
-                Some("the scenario is on the clipboard".into())
+                Some("copied the scenario".into())
             }),
             Message::CopyCommand => {
                 context.copy_text(document.command_line());
-                match document.left_out().as_slice() {
-                    [] => Ok(Some("the command line is on the clipboard".into())),
+                match document.removed_keys().as_slice() {
+                    [] => Ok(Some("copied the command line".into())),
                     keys => {
                         let keys = keys.join(", ");
                         Err(format!(
-                            "the command line is on the clipboard; it cannot leave out {keys}: save the scenario for that"
+                            "the command line is on the clipboard, without the removal of {keys}: \
+                             save the scenario to keep that"
                         ))
                     }
                 }
             }
             _ => return false,
         };
-        match told {
+        match outcome {
             Ok(None) => {}
-            Ok(Some(text)) => self.news = Some(News { text, until_s: self.now_s + NEWS_S }),
+            Ok(Some(text)) => self.status = Some(StatusMessage { text, until_s: self.now_s + STATUS_S }),
             Err(text) => self.notice(text),
         }
         true
     }
 
-    /// Opens a scenario; what is open stays if it cannot be.
+    /// Opens a scenario; if that fails, the open one stays.
     pub fn open(&mut self, path: PathBuf) {
-        (self.question, self.leaving) = (None, None);
+        (self.path_prompt, self.unsaved_prompt) = (None, None);
         match Document::open(&path) {
             Ok(mut document) => {
-                document.reading = self.document.as_ref().map_or(0, |before| before.reading + 1);
+                document.reload_count = self.document.as_ref().map_or(0, |before| before.reload_count + 1);
                 self.document = Some(document);
                 self.timeline = Timeline { speed: self.timeline.speed, ..Timeline::default() };
                 (self.pinned, self.hovered) = (None, None);
                 self.recent.retain(|known| *known != path);
                 self.recent.insert(0, path);
-                self.recent.truncate(MOST_RECENT);
-                self.touch();
+                self.recent.truncate(MAX_RECENT);
+                self.note_input();
             }
             Err(error) => self.notice(error),
         }
     }
 
-    /// What the desktop's dialog has answered, if it has: the wish that follows.
-    pub fn browsed(&mut self) -> Option<Message> {
-        let answer = self.browse.as_ref().and_then(Browse::answer)?;
-        self.browse = None;
-        match answer {
-            Answer::Chosen(path, true) => Some(Message::Save(path)),
-            Answer::Chosen(path, false) => Some(Message::Open(path)),
-            Answer::Dismissed => None,
-            Answer::NoDialog => {
+    /// The message that follows from the answer of the desktop's file dialog, if it has answered.
+    pub fn poll_file_dialog(&mut self) -> Option<Message> {
+        let result = self.file_dialog.as_ref().and_then(FileDialog::result)?;
+        self.file_dialog = None;
+        match result {
+            DialogResult::Chosen(path, true) => Some(Message::Save(path)),
+            DialogResult::Chosen(path, false) => Some(Message::Open(path)),
+            DialogResult::Dismissed => None,
+            DialogResult::NoDialog => {
                 self.notice(
-                    "this desktop has no file dialog (on Linux: xdg-desktop-portal or zenity); type the path, or choose from the list"
+                    "this desktop has no file dialog (on Linux: xdg-desktop-portal or zenity); \
+                     type the path, or choose from the list"
                         .into(),
                 );
                 None
@@ -383,12 +395,12 @@ impl State {
         }
     }
 
-    /// Whether there are changes that are in no file.
+    /// Whether the document has unsaved changes.
     pub fn is_unsaved(&self) -> bool {
         self.document.as_ref().is_some_and(Document::is_unsaved)
     }
 
-    /// Tells something until it is dismissed.
+    /// Shows a notice until it is dismissed.
     pub fn notice(&mut self, text: String) {
         if self.notices.last() != Some(&text) {
             self.notices.push(text);

@@ -1,14 +1,14 @@
-//! The whole window, headless, against the real engine on a software adapter.
+//! Tests of the whole window, headless, with the real engine on a software adapter.
 
-mod drops;
+mod accessibility;
+mod dropped_files;
 mod editing;
 pub mod harness;
-mod leaving;
-mod limits;
-mod looks;
-mod names;
+mod layout;
 mod pages;
+mod pane_snapshots;
 mod pictures;
-mod room;
 mod scrubbing;
-mod space;
+mod unsaved_changes;
+mod value_ranges;
+mod view3d;

@@ -1,6 +1,6 @@
-//! Which frame is shown, and how that changes by itself.
+//! The shown frame, play and loop.
 
-/// Slowest and fastest play, times the flight's own time.
+/// Range of play speed, times real time.
 pub const SPEEDS: [f64; 2] = [0.1, 10.0];
 
 /// Position and play of the timeline. Frames are counted from 0.
@@ -8,19 +8,19 @@ pub const SPEEDS: [f64; 2] = [0.1, 10.0];
 pub struct Timeline {
     /// Number of frames; 0 before anything is loaded.
     pub frames: u64,
-    /// Frames a second of the flight's time.
+    /// Frame rate of the camera, 1/s.
     pub fps: f64,
     /// The frame shown.
     pub frame: u64,
-    /// Whether time goes on.
+    /// Whether play is on.
     pub playing: bool,
-    /// Times the flight's own time, within [`SPEEDS`].
+    /// Play speed, times real time, within [`SPEEDS`].
     pub speed: f64,
-    /// First and last frame of the loop; play then stays within.
+    /// First and last frame of the loop; `None` plays all frames once.
     pub range: Option<[u64; 2]>,
-    /// Whether a hand drags it at the moment.
+    /// Whether the timeline is being dragged.
     pub dragged: bool,
-    /// Part of a frame that has gone by in play.
+    /// Fraction of a frame that play has advanced beyond `frame`.
     pub carry: f64,
 }
 
@@ -40,13 +40,13 @@ impl Default for Timeline {
 }
 
 impl Timeline {
-    /// The last frame; 0 without any.
+    /// The last frame; 0 without frames.
     pub fn last(&self) -> u64 {
         self.frames.saturating_sub(1)
     }
 
-    /// For another sequence: the frame stays as far as there is one.
-    pub fn fit(&mut self, frames: u64, fps: f64) {
+    /// Sets the length and rate of another sequence, and clamps frame and loop to it.
+    pub fn set_sequence(&mut self, frames: u64, fps: f64) {
         (self.frames, self.fps) = (frames, fps);
         self.frame = self.frame.min(self.last());
         let last = self.last();
@@ -54,16 +54,16 @@ impl Timeline {
             self.range.map(|range| range.map(|frame| frame.min(last))).filter(|[first, end]| first < end);
     }
 
-    /// To a frame; the last one if there are fewer.
+    /// Goes to a frame, clamped to the last one.
     pub fn seek(&mut self, frame: u64) {
         self.frame = frame.min(self.last());
         self.carry = 0.0;
     }
 
-    /// So many frames on, or back; play stops.
-    pub fn step(&mut self, by: i64) {
+    /// Steps forwards or backwards, and stops play.
+    pub fn step(&mut self, frames: i64) {
         self.playing = false;
-        self.seek(self.frame.saturating_add_signed(by));
+        self.seek(self.frame.saturating_add_signed(frames));
     }
 
     /// First and last frame that play visits.
@@ -71,13 +71,13 @@ impl Timeline {
         self.range.unwrap_or([0, self.last()])
     }
 
-    /// Time goes on by `seconds` on the wall; frames for which there is no time are left out. Without a loop,
-    /// play stops at the end.
+    /// Advances play by `seconds` of real time, skipping frames as necessary. Without a loop, play stops at
+    /// the end.
     pub fn advance(&mut self, seconds: f64) {
         if !self.playing || self.dragged {
             return;
         }
-        // A window that was hidden for long comes back where it was, not at the end.
+        // At most one second: a window that was hidden for long continues from its frame.
         self.carry += seconds.clamp(0.0, 1.0) * self.speed.clamp(SPEEDS[0], SPEEDS[1]) * self.fps;
         let whole = self.carry.floor();
         self.carry -= whole;
@@ -92,7 +92,7 @@ impl Timeline {
         }
     }
 
-    /// Starts or stops; at the end it starts over.
+    /// Starts or stops play; at the end it starts over.
     pub fn toggle(&mut self) {
         self.playing = !self.playing && self.frames > 1;
         if self.playing && self.frame >= self.bounds()[1] {
@@ -100,7 +100,7 @@ impl Timeline {
         }
     }
 
-    /// Seconds from frame 0's stamp.
+    /// Stamp of a frame, seconds after frame 0's.
     pub fn seconds(&self, frame: u64) -> f64 {
         frame as f64 / self.fps
     }
@@ -115,14 +115,14 @@ impl Timeline {
 mod tests {
     use super::*;
 
-    fn of(frames: u64) -> Timeline {
+    fn with_frames(frames: u64) -> Timeline {
         Timeline { frames, ..Timeline::default() }
     }
 
     #[test]
-    fn play_keeps_the_clock_whatever_the_steps() {
+    fn play_advances_by_time_for_any_number_of_passes() {
         for steps in [1, 7, 60] {
-            let mut timeline = Timeline { playing: true, speed: 0.5, ..of(100) };
+            let mut timeline = Timeline { playing: true, speed: 0.5, ..with_frames(100) };
             for _ in 0..steps {
                 timeline.advance(1.0 / f64::from(steps));
             }
@@ -136,19 +136,19 @@ mod tests {
 
     #[test]
     fn play_stops_at_the_end_or_loops() {
-        let mut timeline = Timeline { playing: true, frame: 95, ..of(100) };
+        let mut timeline = Timeline { playing: true, frame: 95, ..with_frames(100) };
         timeline.advance(1.0);
         assert_eq!((timeline.frame, timeline.playing), (99, false));
         timeline.toggle();
         assert_eq!((timeline.frame, timeline.playing), (0, true), "starts over");
-        let mut timeline = Timeline { playing: true, frame: 18, range: Some([10, 19]), ..of(100) };
+        let mut timeline = Timeline { playing: true, frame: 18, range: Some([10, 19]), ..with_frames(100) };
         timeline.advance(0.1);
         assert_eq!((timeline.frame, timeline.playing), (11, true), "18, 19, 10, 11");
     }
 
     #[test]
     fn steps_stay_within_the_sequence_and_stop_play() {
-        let mut timeline = Timeline { playing: true, ..of(3) };
+        let mut timeline = Timeline { playing: true, ..with_frames(3) };
         timeline.step(-1);
         assert_eq!((timeline.frame, timeline.playing), (0, false));
         timeline.step(7);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_sequence_does_nothing() {
+    fn an_empty_sequence_stays_at_frame_0() {
         let mut timeline = Timeline::default();
         timeline.toggle();
         timeline.step(1);
@@ -165,11 +165,11 @@ mod tests {
     }
 
     #[test]
-    fn a_shorter_sequence_keeps_the_frame_as_far_as_there_is_one() {
-        let mut timeline = Timeline { frame: 50, range: Some([40, 80]), ..of(100) };
-        timeline.fit(60, 30.0);
+    fn a_shorter_sequence_clamps_frame_and_loop() {
+        let mut timeline = Timeline { frame: 50, range: Some([40, 80]), ..with_frames(100) };
+        timeline.set_sequence(60, 30.0);
         assert_eq!((timeline.frame, timeline.range), (50, Some([40, 59])));
-        timeline.fit(20, 30.0);
+        timeline.set_sequence(20, 30.0);
         assert_eq!((timeline.frame, timeline.range), (19, None));
     }
 }

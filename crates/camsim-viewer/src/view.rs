@@ -1,28 +1,28 @@
-//! What the picture pane shows, and how. Plain settings: they are remembered from run to run.
+//! Settings of the picture pane, stored between runs.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{engine::Stage, orbit::Orbit};
 
-/// How two pictures are held against each other.
+/// How two pictures are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Compare {
     /// One picture alone.
     #[default]
     Single,
-    /// The second is to the right of a line that can be dragged.
+    /// The second picture to the right of a movable line.
     Wipe,
-    /// One beside the other, in step.
+    /// Both pictures side by side, with common zoom and pan.
     SideBySide,
-    /// The first less the second, enlarged.
+    /// The first picture less the second, times a gain.
     Difference,
 }
 
 impl Compare {
-    /// All of them.
+    /// All, in the order of their buttons.
     pub const ALL: [Self; 4] = [Self::Single, Self::Wipe, Self::SideBySide, Self::Difference];
 
-    /// For buttons.
+    /// Text of its button.
     pub fn label(self) -> &'static str {
         match self {
             Self::Single => "single",
@@ -33,24 +33,24 @@ impl Compare {
     }
 }
 
-/// What is drawn over pictures.
+/// Overlays of pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Overlays {
-    /// Pixels without a ray, in the paper's red.
+    /// Invalid pixels in red, as in the paper.
     pub invalid: bool,
-    /// Lines of equal ideal ray.
+    /// Distortion grid: lines of equal u or v of the ideal ray.
     pub grid: bool,
-    /// What each place moves by from the stamp's instant to its row's, and its way over the exposure.
+    /// Displacement from the stamp to the row's time, and path over the exposure.
     pub motion: bool,
-    /// Colours and times of the rows.
+    /// Mid-exposure times of rows.
     pub rows: bool,
-    /// Predicted error, enlarged.
+    /// Predicted source error in colours.
     pub error: bool,
     /// Depth in place of colour.
     pub depth: bool,
 }
 
-/// Pages of the panel on the right.
+/// Pages of the right panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tab {
     /// The pixel under the cursor.
@@ -60,26 +60,27 @@ pub enum Tab {
     Plan,
     /// The flight over time.
     Plots,
-    /// The flight from above.
+    /// The flight on a map.
     Map,
-    /// The flight in three dimensions.
-    Space,
+    /// The flight in 3D. `Space` is its name in stored settings.
+    #[serde(rename = "Space")]
+    View3d,
     /// Rendering to files.
     Export,
 }
 
 impl Tab {
-    /// All of them.
-    pub const ALL: [Self; 6] = [Self::Pixel, Self::Plan, Self::Plots, Self::Map, Self::Space, Self::Export];
+    /// All, in the order of their tabs.
+    pub const ALL: [Self; 6] = [Self::Pixel, Self::Plan, Self::Plots, Self::Map, Self::View3d, Self::Export];
 
-    /// For buttons.
+    /// Text of its tab.
     pub fn label(self) -> &'static str {
         match self {
             Self::Pixel => "Pixel",
             Self::Plan => "Plan",
             Self::Plots => "Plots",
             Self::Map => "Map",
-            Self::Space => "3D",
+            Self::View3d => "3D",
             Self::Export => "Export",
         }
     }
@@ -89,29 +90,28 @@ impl Tab {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct View {
-    /// First picture.
+    /// Stage of the first picture.
     pub a: Stage,
-    /// Second picture.
+    /// Stage of the second picture.
     pub b: Stage,
-    /// How they are shown.
+    /// How they are compared.
     pub compare: Compare,
-    /// Enlargement of their difference.
+    /// Gain of their difference.
     pub gain: f32,
-    /// Place of the wipe's line, 0 to 1 over the picture's width.
+    /// Position of the wipe line, 0 to 1 over the picture's width.
     pub wipe: f32,
-    /// Pixels of the screen (not points, of which one may have several) for each pixel of the camera; `None`
-    /// fits the picture into the pane.
+    /// Screen pixels (not points) per camera pixel; `None` fits the picture into the pane.
     pub zoom: Option<f32>,
-    /// Pixel of the camera in the middle of the pane, as a share of its size; of no meaning for a fitted
+    /// Camera position in the centre of the pane, as a share of the picture's size; ignored for a fitted
     /// picture.
     pub centre: [f32; 2],
-    /// What is drawn over it.
+    /// Overlays.
     pub overlays: Overlays,
-    /// Page on the right.
+    /// Page of the right panel.
     pub tab: Tab,
-    /// Whether plots show the tracker's errors, not log and tracker.
+    /// Whether plots show tracking errors in place of log and tracker.
     pub plot_errors: bool,
-    /// Where the 3D page is seen from.
+    /// Viewpoint of the 3D page.
     pub orbit: Orbit,
 }
 
@@ -134,18 +134,18 @@ impl Default for View {
 }
 
 impl View {
-    /// The stages on show.
+    /// The stages shown.
     pub fn stages(&self) -> Vec<Stage> {
         if self.compare == Compare::Single || self.a == self.b { vec![self.a] } else { vec![self.a, self.b] }
     }
 
-    /// Whether the oracle's picture is on show.
+    /// Whether the oracle's picture is shown.
     pub fn wants_oracle(&self) -> bool {
         self.stages().contains(&Stage::Oracle)
     }
 
-    /// The stages that the renderer draws: beside the oracle alone there is always one, to look at until it
-    /// is done.
+    /// The stages to render: those shown without the oracle, or the photometric one, which is shown until the
+    /// oracle's picture is ready.
     pub fn rendered_stages(&self) -> Vec<Stage> {
         let mut stages = self.stages();
         stages.retain(|stage| *stage != Stage::Oracle);
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_renderer_always_has_something_to_draw() {
+    fn there_is_always_a_stage_to_render() {
         for a in Stage::ALL {
             for b in Stage::ALL {
                 for compare in Compare::ALL {

@@ -1,4 +1,4 @@
-// The ideal frame's values are linear light and have their fog.
+// The ideal frame holds linear light and already includes fog.
 fn after_gather(ray: Ray, color: vec3<f32>) -> vec3<f32> {
     return color;
 }

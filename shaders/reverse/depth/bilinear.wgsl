@@ -1,4 +1,4 @@
-// The depth that a constant-depth solver takes: as the other stages read it.
-fn constant_depth(at_px: vec2<f32>) -> f32 {
-    return inverse_depth(at_px);
+// Depth for the constant-depth solvers: interpolated, as in the other stages.
+fn constant_depth(position_px: vec2<f32>) -> f32 {
+    return inverse_depth(position_px);
 }

@@ -1,5 +1,5 @@
-// Of the pixels that the reverse pass has listed, those whose rays may meet another surface than the plain
-// gather did. Slots as in reverse.wgsl.
+// Filters the pixels listed by the reverse pass: keeps those whose rays may hit another surface than the
+// plain gather did. Slots as in reverse.wgsl.
 #import common/frame.wgsl
 #import reverse/ideal_frame.wgsl
 #import <slot:keys>
@@ -7,12 +7,12 @@
 #import <slot:depth>
 #import <slot:temporal_inverse>
 #import <slot:gather>
-#import reverse/edges/seen.wgsl
+#import reverse/edges/truth.wgsl
 #import <slot:emit>
-#import reverse/edges/list.wgsl
-#import reverse/edges/near.wgsl
+#import reverse/edges/pixel_list.wgsl
+#import reverse/edges/near_silhouette.wgsl
 
-// As in edges/list.wgsl.
+// Layout as in edges/pixel_list.wgsl.
 struct Candidates {
     groups: vec3<u32>,
     count: u32,
@@ -21,30 +21,33 @@ struct Candidates {
 
 @group(3) @binding(3) var<storage, read> candidates: Candidates;
 
-// Whether rays of this pixel may meet another surface than the plain gather did: at the ends and in the
-// middle of the exposure, since the corner of a surface may pass by in between.
-fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
-    let nodes = told(frame.nodes);
+// Whether rays of this pixel may hit another surface than the plain gather did: at the ends and in the middle
+// of the exposure, since the corner of a surface may pass by in between.
+fn may_hit_others(pixel: vec2<u32>, ray: Ray) -> bool {
+    let nodes = unspecialised(frame.nodes);
     for (var node = 0u; node < nodes; node += max(nodes - 1u, 1u)) {
-        if (near_edge(ray.uv, pose_at_node(pixel, node))) {
+        if (is_near_silhouette(ray.uv, table_pose(pixel, node))) {
             return true;
         }
     }
-    return (EMITS_RAYS || nodes > 1u) && near_edge(ray.uv, pose_mid(pixel));
+    return (EMITS_RAYS || nodes > 1u) && is_near_silhouette(ray.uv, table_mid_pose(pixel));
 }
 
 @compute @workgroup_size(64)
-fn ask(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    frame = given_frame;
-    let place = id.y * groups.x * 64u + id.x;
-    if (place >= candidates.count) {
+fn filter_candidates(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+) {
+    frame = frame_uniforms;
+    let list_index = id.y * groups.x * 64u + id.x;
+    if (list_index >= candidates.count) {
         return;
     }
-    let word = candidates.pixels[place];
+    let word = candidates.pixels[list_index];
     let pixel = vec2<u32>(word & 0x7fffu, (word >> 15u) & 0x7fffu);
-    let marked = (word >> 31u) != 0u;
-    use_key_of_line(pixel);
-    if (marked || may_meet_others(pixel, lens_ray(pixel))) {
-        add_to_list(pixel, marked);
+    let touched_edge = (word >> 31u) != 0u;
+    select_key_of_line(pixel);
+    if (touched_edge || may_hit_others(pixel, lens_ray(pixel))) {
+        add_to_list(pixel, touched_edge);
     }
 }

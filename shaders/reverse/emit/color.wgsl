@@ -1,4 +1,4 @@
-// Only the picture is wanted.
+// Output: colour only.
 const EMITS_RAYS: bool = false;
 
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;

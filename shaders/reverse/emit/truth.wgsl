@@ -1,8 +1,8 @@
-// Picture, depth and coordinates.
+// Output: colour and truth.
 const EMITS_RAYS: bool = true;
 
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
-// `Truth`, two words of four numbers each: as many stores, which llvmpipe makes lane by lane.
+// `Truth` as two vec4 per pixel: this makes two stores, which llvmpipe executes lane by lane.
 @group(3) @binding(1) var<storage, read_write> out_truth: array<array<vec4<f32>, 2>>;
 
 fn emit(pixel: vec2<u32>, color: vec4<f32>) {

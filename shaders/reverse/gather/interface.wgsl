@@ -1,8 +1,8 @@
-// What an output pixel collects.
+// Result of the gather.
 struct Gathered {
-    // R G B as the ideal frame has them; alpha is 1, or less where the samples met a silhouette.
+    // R G B of the ideal frame; alpha is 1, or less where the samples touched edge pixels.
     color: vec4<f32>,
     inside: bool,
-    // Where the exposure's begin and end would look if what they see were infinitely far, ideal pixels.
+    // Sources of the exposure's begin and end if the surface were infinitely far, ideal pixels.
     far_px: array<vec2<f32>, 2>,
 }

@@ -1,7 +1,7 @@
-// Brown-Conrady, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin:
+// Brown-Conrady model, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin:
 // lens/brown_conrady.rs.
 
-// Starts are kept this far inside the fold, where the Jacobian is safely regular.
+// Initial values are limited to this share of the fold radius, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f32 = 0.95;
 const MIN_DETERMINANT: f32 = 1e-4;
 
@@ -15,8 +15,8 @@ fn denominator(r2: f32) -> f32 {
     return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
 }
 
-// Where the lens images a point, less where it should. Of the factor of the radius only what it has above 1
-// is multiplied, so that what is rounded is small.
+// Forward model minus the given distorted point. Only the excess of the radial factor over 1 is multiplied,
+// so that rounding is small.
 fn residual_of(ideal: vec2f, distorted: vec2f) -> vec2f {
     let r2 = dot(ideal, ideal);
     let above = lens.radial - lens.rational;
@@ -47,8 +47,8 @@ fn scaled_to(ideal: vec2f, radius: f32) -> vec2f {
     return ideal * (radius / max(length(ideal), 1e-30));
 }
 
-// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `origin`
-// and the fold.
+// `to` if it is inside the fold; else the point in its direction mid-way between the radius of `origin` and
+// the fold.
 fn inside(origin: vec2f, to: vec2f) -> vec2f {
     let radius = length(to);
     if radius < lens.fold_min {
@@ -61,7 +61,7 @@ fn inside(origin: vec2f, to: vec2f) -> vec2f {
     return scaled_to(to, 0.5 * (min(length(origin), fold) + fold));
 }
 
-fn table_start(distorted: vec2f) -> vec2f {
+fn table_initial_value(distorted: vec2f) -> vec2f {
     return distorted * radial_ratio(length(distorted));
 }
 
@@ -72,10 +72,10 @@ fn newton_step(ideal: vec2f, residual: vec2f) -> vec2f {
     return vec2f(j.y * residual.y - j.z * residual.x, j.y * residual.x - j.x * residual.y) / det;
 }
 
-// Guarded Newton. Ideal u, v, and 1 if there is such a point on the principal branch, else 0.
+// Damped Newton iteration. Returns ideal u, v, and 1 if a solution exists on the principal branch, else 0.
 fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
     let nothing = vec3f(INVALID_UV, INVALID_UV, 0.0);
-    // Written so that NaN is refused.
+    // Written so that NaN is rejected.
     if !(length(distorted) <= lens.distorted_max) {
         return nothing;
     }
@@ -89,7 +89,7 @@ fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
         let last = length(step * lens.focal_px) < LAST_STEP_PX;
         let next = inside(ideal, ideal + step);
         let next_residual = residual_of(next, distorted);
-        // The last step is within rounding of the solution: whether its residual grew says nothing.
+        // The last step is within rounding of the solution: growth of its residual means nothing.
         if last || dot(next_residual, next_residual) <= dot(residual, residual) {
             ideal = next;
             residual = next_residual;

@@ -1,4 +1,4 @@
-// lens_inverse: the lens map. Each texel holds the ideal (u, v) of its pixel's centre, or INVALID_UV twice.
+// Makes the lens map: each texel holds the ideal (u, v) of its pixel's centre, or INVALID_UV twice.
 
 @group(0) @binding(2) var lens_map: texture_storage_2d<rg32float, write>;
 
@@ -9,6 +9,6 @@ fn lens_inverse(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let distorted = distorted_from_pixel(pixel);
-    let ideal = undistort(distorted, start_of(pixel, distorted));
+    let ideal = undistort(distorted, initial_value(pixel, distorted));
     textureStore(lens_map, pixel, vec4f(ideal.xy, 0.0, 0.0));
 }

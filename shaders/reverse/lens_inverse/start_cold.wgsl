@@ -1,5 +1,5 @@
-// Start of the inverse: the radial table.
+// Initial value of the inverse: the radial table.
 
-fn start_of(pixel: vec2u, distorted: vec2f) -> vec2f {
-    return table_start(distorted);
+fn initial_value(pixel: vec2u, distorted: vec2f) -> vec2f {
+    return table_initial_value(distorted);
 }

@@ -1,18 +1,18 @@
-// The prepared data of a distorting lens: FOLD_RAYS fold radii, then RADIAL_TABLE_LEN start ratios.
+// Tables of a distorting lens: FOLD_RAYS fold radii, then RADIAL_TABLE_LEN ratios for initial values.
 
 @group(0) @binding(1) var<storage, read> lens_table: array<f32>;
 
 const FOLD_RAYS: u32 = 720u;
 const RADIAL_TABLE_LEN: u32 = 257u;
-// Neighbouring rays that differ more belong to different sheets of the fold: the nearer one counts.
+// Neighbouring fold radii with a larger ratio belong to different sheets of the fold: the nearer one counts.
 const SHEET_RATIO: f32 = 1.1;
 
-// Ideal radius of the border of the principal branch in the direction of an ideal point.
+// Ideal radius of the border of the principal branch, in the direction of an ideal point.
 fn fold_radius(ideal: vec2f) -> f32 {
-    // atan2 of the origin is undefined; any ray serves there.
+    // atan2 is undefined at the origin; any direction serves there.
     let phi = select(0.0, atan2(ideal.y, ideal.x), dot(ideal, ideal) > 0.0);
-    let turns = phi * 0.15915494;
-    let position = (turns - floor(turns)) * f32(FOLD_RAYS);
+    let revolutions = phi * 0.15915494;
+    let position = (revolutions - floor(revolutions)) * f32(FOLD_RAYS);
     let ray = u32(position) % FOLD_RAYS;
     let here = lens_table[ray];
     let next = lens_table[(ray + 1u) % FOLD_RAYS];

@@ -1,7 +1,7 @@
-// A thread takes one pixel.
-fn take_pixels(group: vec2<u32>, place: vec2<u32>) {
-    let pixel = SIDE * group + place;
-    if (is_in_picture(pixel)) {
-        show(pixel);
+// A thread processes one pixel.
+fn process_pixels(group: vec2<u32>, local_px: vec2<u32>) {
+    let pixel = SIDE * group + local_px;
+    if (is_in_image(pixel)) {
+        render_pixel(pixel);
     }
 }

@@ -1,9 +1,10 @@
-// The paper's lens inverse, for each pixel of each frame: Gauss-Newton from the distorted point, without a
-// guard. It misses rays and accepts false ones, and is here to be measured. Twin: camsim_core::lens::paper.
+// The paper's lens inverse, for each pixel of each frame: Gauss-Newton from the distorted point, without
+// safeguards. It misses rays and accepts false ones, and serves for comparison. Twin:
+// camsim_core::lens::paper.
 #import reverse/ray/interface.wgsl
 
 const GAUSS_NEWTON_STEPS: u32 = 50u;
-// Picture sizes times normalised coordinates.
+// Residual norms: image size times normalised coordinates.
 const GAUSS_NEWTON_RESIDUAL: f32 = 0.1;
 const GAUSS_NEWTON_DIVERGED: f32 = 500.0;
 
@@ -12,7 +13,7 @@ fn radial_factor(r2: f32) -> f32 {
     return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
 }
 
-// Eqs. 8 and 9.
+// Forward model, eqs. 8 and 9.
 fn distort(ideal: vec2<f32>) -> vec2<f32> {
     let r2 = dot(ideal, ideal);
     let p = frame.lens_tangential;
@@ -34,27 +35,27 @@ fn gauss_newton_step(ideal: vec2<f32>, residual: vec2<f32>) -> vec2<f32> {
 
 fn lens_ray(pixel: vec2<u32>) -> Ray {
     let none = vec2<f32>(0.0);
-    // What the vignette hides needs no ray, unless somebody asks for coordinates.
+    // Pixels that the vignette hides need no ray, unless coordinates are output.
     if (!EMITS_RAYS && vignette_weight(pixel) <= 0.0) {
         return Ray(none, none, none, true);
     }
     let distorted = (vec2<f32>(pixel) - frame.principal_px) / frame.focal_px;
     let size = vec2<f32>(frame.size_px);
-    var at = distorted;
-    var residual = distorted - distort(at);
+    var ideal_uv = distorted;
+    var residual = distorted - distort(ideal_uv);
     var error = 1e30;
     for (var i = 0u; i < GAUSS_NEWTON_STEPS; i++) {
-        let next = at + gauss_newton_step(at, residual);
+        let next = ideal_uv + gauss_newton_step(ideal_uv, residual);
         residual = distorted - distort(next);
         let next_error = length(size * residual);
-        // Written so that NaN ends the search too.
+        // Written so that NaN ends the iteration too.
         if (!(next_error <= error && next_error <= GAUSS_NEWTON_DIVERGED)) {
             return Ray(none, none, none, false);
         }
-        at = next;
+        ideal_uv = next;
         error = next_error;
         if (error < GAUSS_NEWTON_RESIDUAL) {
-            return Ray(at, none, none, true);
+            return Ray(ideal_uv, none, none, true);
         }
     }
     return Ray(none, none, none, false);

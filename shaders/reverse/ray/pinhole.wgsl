@@ -1,4 +1,4 @@
-// No lens: the ray is closed form.
+// Ray of a pinhole camera, in closed form.
 #import reverse/ray/interface.wgsl
 
 fn lens_ray(pixel: vec2<u32>) -> Ray {

@@ -1,4 +1,4 @@
-// Relative poses: x_key = R x_line + t, one entry a key, line and exposure node, made in f64 on the CPU.
+// Relative poses x_key = R x_line + t, one entry per key, line and exposure node, made in f64 on the CPU.
 #import reverse/temporal_inverse/line_entry.wgsl
 
 struct Pose {
@@ -10,11 +10,11 @@ struct Pose {
 
 @group(1) @binding(3) var<storage, read> poses: array<Pose>;
 
-fn pose_at_node(pixel: vec2<u32>, node: u32) -> Pose {
+fn table_pose(pixel: vec2<u32>, node: u32) -> Pose {
     return poses[line_entry(pixel) + node];
 }
 
-fn pose_mid(pixel: vec2<u32>) -> Pose {
+fn table_mid_pose(pixel: vec2<u32>) -> Pose {
     return poses[line_entry(pixel) + select(frame.nodes, 0u, frame.nodes == 1u)];
 }
 

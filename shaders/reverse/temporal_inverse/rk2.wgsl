@@ -1,19 +1,19 @@
-// Heun's steps of at most `frame.rk2_step_rad` of rotation (eq. 18). Twin:
+// Heun steps of at most `frame.rk2_step_rad` of rotation (eq. 18). Twin:
 // camsim_core::temporal::displacement::rk2.
 #import reverse/temporal_inverse/constant_depth.wgsl
 
 // As camsim_core::temporal::displacement::RK2_MAX_STEPS.
 const MAX_STEPS: f32 = 4096.0;
 
-// Where the point now seen at uv was dt_s ago.
-fn displaced(uv: vec2<f32>, w: f32, dt_s: f32) -> vec2<f32> {
+// Position dt_s ago of the point now at uv.
+fn displaced_uv(uv: vec2<f32>, w: f32, dt_s: f32) -> vec2<f32> {
     let steps = u32(min(abs(dt_s) * frame.key_rate_rad_s.w / frame.rk2_step_rad, MAX_STEPS - 1.0)) + 1u;
     let step_s = dt_s / f32(steps);
-    var at = uv;
+    var uv_now = uv;
     for (var i = 0u; i < steps; i++) {
-        let here = image_rate(at, w);
-        let there = image_rate(at - here * step_s, w);
-        at -= 0.5 * step_s * (here + there);
+        let rate_begin = image_rate(uv_now, w);
+        let rate_end = image_rate(uv_now - rate_begin * step_s, w);
+        uv_now -= 0.5 * step_s * (rate_begin + rate_end);
     }
-    return at;
+    return uv_now;
 }

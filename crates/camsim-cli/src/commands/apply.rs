@@ -72,7 +72,7 @@ Examples:
   camsim apply CAMERA.toml FRAME.toml --solver rk2 -o linear.exr
   camsim apply CAMERA.toml FRAME.toml --preset paper --blur-samples 10 -o paper.png
   camsim apply CAMERA.toml FRAMES.toml -o out --frames 0..100 --resume")]
-pub struct Args {
+pub struct ApplyArgs {
     /// Camera file: the keys of [camera] at its root
     camera: PathBuf,
     /// The ideal image and the motion of its camera
@@ -103,7 +103,7 @@ pub struct Args {
     resume: bool,
     /// For several frames: colour formats [default: exr]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
-    format: Vec<folder::Format>,
+    format: Vec<folder::ImageFormatArg>,
     /// Number of the (first) frame, which the noise depends on
     #[arg(long, default_value_t = 0, value_name = "N")]
     frame_number: u64,
@@ -121,17 +121,18 @@ enum SolverArg {
 }
 
 /// Reads, renders, writes.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &ApplyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     // The same rule as for a scenario.
     if args.preset == PresetArg::Paper && args.solver.is_some_and(|solver| solver != SolverArg::Rk2) {
         return Err(Failure::bad_input(anyhow!(
             "--solver is rk2 with --preset paper; leave it out, or leave --preset out"
         )));
     }
-    let is_picture = ends_as_picture(args);
+    let is_picture = is_picture_path(args);
     if !is_picture && args.output.extension().is_some() && !args.output.is_dir() {
         return Err(Failure::bad_input(anyhow!(
-            "-o {}: the name must end in .exr or .png, which selects the format; for several frames it is a folder, whose name has no ending",
+            "-o {}: the name must end in .exr or .png, which selects the format; for several frames it is a \
+             folder, whose name has no ending",
             args.output.display()
         )));
     }
@@ -153,7 +154,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if set.is_several() {
         return folder::run(args, &spec, &set, vignette.as_ref(), console);
     }
-    refuse_options_of_many(args, is_picture)?;
+    refuse_folder_options(args, is_picture)?;
     let file = read(args, &set, 0, console)?;
     file.notes.iter().for_each(|note| console.warn(note));
     let begin = Instant::now();
@@ -163,25 +164,25 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         .or_bad_input()?;
     let (picture, no_source) = pipeline.render_and_count(vignette.as_ref());
     let elapsed_s = begin.elapsed().as_secs_f64();
-    folder::tell_gaps(args, &spec, &set, &[0], console)?;
+    folder::warn_of_gaps(args, &spec, &set, &[0], console)?;
     write_picture(&args.output, &picture, spec.photometric.output).or_failed()?;
 
     let [width, height] = spec.size_px;
     console.note(format_args!("{}: {width}x{height}, {elapsed_s:.2} s", args.output.display()));
     warn_no_source(&no_source, f64::from(width) * f64::from(height), console);
-    tell_reach(args, &pipeline, console);
+    warn_of_extrapolation(args, &pipeline, console);
     console.detail(format_args!("{:.1} % of the ideal image has no depth", 100.0 * file.without_depth));
     console.detail(format_args!("{} exposure nodes", pipeline.nodes()));
     Ok(())
 }
 
-fn ends_as_picture(args: &Args) -> bool {
+fn is_picture_path(args: &ApplyArgs) -> bool {
     let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     ["exr", "png"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// Checks the options for a single frame, which cannot be selected or resumed.
-fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> {
+fn refuse_folder_options(args: &ApplyArgs, is_picture: bool) -> Result<(), Failure> {
     if !is_picture {
         let message =
             "a single frame is an image, whose name must end in .exr or .png, which selects the format";
@@ -202,17 +203,24 @@ fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> 
 }
 
 /// Frame `index`, with a warning if it has no depth.
-fn read(args: &Args, set: &FrameSet, index: usize, console: &mut Console<'_>) -> Result<FrameFile, Failure> {
+fn read(
+    args: &ApplyArgs,
+    set: &FrameSet,
+    index: usize,
+    console: &mut Console<'_>,
+) -> Result<FrameFile, Failure> {
     let file = set.read(index).or_bad_input()?;
     if file.without_depth == 1.0 && file.motion.translates() {
         let frame = args.frame.display();
-        console
-            .warn(format_args!("{frame}: no pixel has a depth: everything is taken as infinitely far, and the camera's velocity has no effect"));
+        console.warn(format_args!(
+            "{frame}: no pixel has a depth: everything is taken as infinitely far, and \
+                                the camera's velocity has no effect"
+        ));
     }
     Ok(file)
 }
 
-fn settings(args: &Args, file: &FrameFile, index: u64) -> Settings {
+fn settings(args: &ApplyArgs, file: &FrameFile, index: u64) -> Settings {
     Settings {
         preset: if args.preset == PresetArg::Paper { Preset::Paper } else { Preset::Default },
         solver: args.solver.map(|solver| match solver {
@@ -255,7 +263,7 @@ fn warn_no_source(no_source: &NoSourceCounts, pixels: f64, console: &mut Console
 }
 
 /// Warns if a flow is extrapolated far beyond its interval.
-fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
+fn warn_of_extrapolation(args: &ApplyArgs, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
     let Some([first, last]) = pipeline.flow_shares() else { return };
     let reach = format!(
         "the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the ideal image"
@@ -263,8 +271,8 @@ fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
     if first.abs().max(last.abs()) > 1.0 + 1e-9 {
         let frame = args.frame.display();
         console.warn(format_args!(
-            "{frame}: {reach}: the flow is extrapolated by more than its own interval; check instant_ms and flow_interval_ms, or use a flow \
-             over a longer interval"
+            "{frame}: {reach}: the flow is extrapolated by more than its own interval; check instant_ms and \
+             flow_interval_ms, or use a flow over a longer interval"
         ));
     } else {
         let beyond = if first < 0.0 || last > 1.0 { ": outside of it the flow is extrapolated" } else { "" };
@@ -273,7 +281,7 @@ fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
 }
 
 /// Prefixes an error with the file that it concerns.
-fn in_file(args: &Args, error: &ApplyError) -> anyhow::Error {
+fn in_file(args: &ApplyArgs, error: &ApplyError) -> anyhow::Error {
     let file = match error {
         ApplyError::Camera(_) | ApplyError::Shutter(_) => &args.camera,
         ApplyError::Frame { .. } | ApplyError::Motion(_) | ApplyError::Fog => &args.frame,

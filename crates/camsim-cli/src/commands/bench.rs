@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_lab::bench::{BenchError, Options, Report, Step, run as measure};
+use camsim_lab::bench::{BenchError, BenchReport, Options, Step, run as measure};
 
 use crate::{
     backend::BackendArgs,
@@ -15,11 +15,12 @@ use crate::{
 /// Measure run time and error on this machine, for every case with every method
 ///
 /// Times are for frames rendered and read back; methods alternate within the same rounds. Errors are against
-/// the oracle: source errors in pixels, picture errors in dB. On two otherwise idle CPU cores without a GPU,
-/// all cases take about 15 minutes, and --quick about half a minute. Other load makes the run longer and the
-/// times less reliable. Files are written after each case, so an interrupted run keeps its results; it cannot
-/// be resumed. Columns: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame,
-/// coord_rms_px, coord_p99_px, coord_max_px, psnr_db, predicted_px and further ones; null is not measured.
+/// the reference renderer: source errors in pixels, picture errors in dB. On two otherwise idle CPU cores
+/// without a GPU, all cases take about 15 minutes, and --quick about half a minute. Other load makes the run
+/// longer and the times less reliable. Files are written after each case, so an interrupted run keeps its
+/// results; it cannot be resumed. Columns: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99,
+/// cpu_ms_per_frame, coord_rms_px, coord_p99_px, coord_max_px, psnr_db, predicted_px and further ones; null
+/// is not measured.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -28,7 +29,7 @@ Examples:
   camsim bench --cases buildings,lens-s3      cases or groups by name; groups are smooth, vibration, buildings,
                                               \"1 s windows\", exposure, lenses, \"all effects\"
   camsim bench --quick --check                exit code 1 if another method is faster and more accurate than the planner's choice")]
-pub struct Args {
+pub struct BenchArgs {
     /// Cases or groups, separated by commas (quote names with blanks: "1 s windows"); an unknown name lists
     /// all
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -57,8 +58,8 @@ pub struct Args {
 }
 
 /// Measures and prints.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let options = Options { cases: args.cases.clone(), quick: args.quick };
+pub fn run(args: &BenchArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let options = Options { cases: args.cases.clone(), quick: args.quick, ..Options::default() };
     check_files(args)?;
     let engine = args.backend.open()?;
     console.note(format_args!("rendering on {engine}"));
@@ -77,15 +78,16 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.note(report.summary());
     match report.violations.len() {
-        beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow!(
-            "{beaten} choices of the planner have a higher time and a higher error than another method; the table lists them"
+        dominated if args.check && dominated > 0 => Err(Failure::failed(anyhow!(
+            "{dominated} choices of the planner have a higher time and a higher error than another method; \
+             the table lists them"
         ))),
         _ => Ok(()),
     }
 }
 
 /// Checks that all files can be written, before ten minutes of measurements.
-fn check_files(args: &Args) -> Result<(), Failure> {
+fn check_files(args: &BenchArgs) -> Result<(), Failure> {
     if let Some(plot) = args
         .plot
         .as_ref()
@@ -101,7 +103,7 @@ fn check_files(args: &Args) -> Result<(), Failure> {
 }
 
 /// Writes the requested files.
-fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), Failure> {
+fn files(args: &BenchArgs, report: &BenchReport, console: &mut Console<'_>) -> Result<(), Failure> {
     let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     if let Some(path) = beside("bench.md") {
         write(&path, &report.markdown(), console)?;
@@ -118,7 +120,7 @@ fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), 
     Ok(())
 }
 
-fn json(report: &Report) -> Result<String, Failure> {
+fn json(report: &BenchReport) -> Result<String, Failure> {
     let mut text = serde_json::to_string_pretty(report).or_failed()?;
     text.push('\n');
     Ok(text)

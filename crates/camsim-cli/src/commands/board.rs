@@ -10,7 +10,7 @@ use camsim_core::{
 };
 use camsim_io::{
     board_file::read_board,
-    load::{board_place, load_flight},
+    load::{board_position_ned_m, load_flight},
     scenario_file::read_scenario,
     write::write_picture,
 };
@@ -27,7 +27,7 @@ use crate::{
 Examples:
   camsim board flight.toml -o board.png --points points.csv
   camsim board april_6x6.yaml -o board.png")]
-pub struct Args {
+pub struct BoardArgs {
     /// Scenario with a [scene.board], or Kalibr's target YAML
     board: PathBuf,
     /// Image file: .png or linear .exr
@@ -40,7 +40,7 @@ pub struct Args {
 }
 
 /// Runs `camsim board`.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     args.output.as_deref().map_or(Ok(()), check_output)?;
     let yaml = args
         .board
@@ -58,7 +58,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         let spec =
             spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
         let (log, _) = load_flight(&scenario).or_bad_input()?;
-        let centre_ned_m = board_place(&scenario, spec, &log).or_bad_input()?;
+        let centre_ned_m = board_position_ned_m(&scenario, spec, &log).or_bad_input()?;
         (read_board(spec).or_bad_input()?, Some((centre_ned_m, ned_from_board(spec.angles_deg))))
     };
     if let Some(path) = &args.output {

@@ -13,13 +13,13 @@ use crate::{
 
 /// Work with camera files
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CameraArgs {
     #[command(subcommand)]
-    command: Command,
+    command: CameraCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum CameraCommand {
     Import(ImportArgs),
 }
 
@@ -46,9 +46,9 @@ struct ImportArgs {
 }
 
 /// Runs a camera command.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &CameraArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     match &args.command {
-        Command::Import(args) => import(args, console),
+        CameraCommand::Import(args) => import(args, console),
     }
 }
 
@@ -78,7 +78,8 @@ fn keep_vignette_in_reach(imported: &mut ImportedCamera, calibration: &Path) {
     match calibration.parent().unwrap_or(Path::new("")).join(&vignette).canonicalize() {
         Ok(found) => *vignette = found,
         Err(_) => imported.notes.push(format!(
-            "the vignette map {} is not beside the calibration: put it there, or correct photometric.vignette",
+            "the vignette map {} is not beside the calibration: put it there, or correct \
+             photometric.vignette",
             vignette.display()
         )),
     }

@@ -15,7 +15,7 @@ use crate::{
 /// (encoded). In folders, images of the same name are compared.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim compare out/color other/color --json")]
-pub struct Args {
+pub struct CompareArgs {
     /// First image or folder
     a: PathBuf,
     /// Second image or folder
@@ -26,7 +26,7 @@ pub struct Args {
 }
 
 /// Prints the differences.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &CompareArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let report = compare_paths(&args.a, &args.b).or_bad_input()?;
     if args.json {
         return Ok(console.json(&report)?);

@@ -13,7 +13,7 @@ use crate::{
     backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
-    frame_source::Device,
+    frame_source::EngineSource,
     inputs::{self, ScenarioArgs},
     render_run::{self, Job},
 };
@@ -31,7 +31,7 @@ const SHEET_SHRINK: u32 = 2;
 /// Writes EXR and PNG frames, a contact sheet, and one frame of the perfect and the imperfect camera side by
 /// side.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct DemoArgs {
     /// Output folder
     #[arg(short, long, value_name = "DIR", default_value = "camsim-demo")]
     output: PathBuf,
@@ -40,7 +40,7 @@ pub struct Args {
 }
 
 /// Renders the built-in flight.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let folder = &args.output;
     // The adapter first: without one there is no need to read anything.
     let engine = args.backend.open()?;
@@ -50,7 +50,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
-    let go_on = console.command();
+    let resume_command = console.command();
     let warnings = &loaded.warnings;
     let job = Job {
         sequence: &loaded.sequence,
@@ -59,19 +59,23 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         shard: None,
         resume: false,
         warnings,
-        go_on: &go_on,
+        resume_command: &resume_command,
     };
     let mut thumbnails = Vec::new();
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;
-    let outcome =
-        render_run::run(&job, &mut Device::new(&engine, &loaded.sequence)?, console, &mut |finished| {
+    let outcome = render_run::run(
+        &job,
+        &mut EngineSource::new(&engine, &loaded.sequence)?,
+        console,
+        &mut |finished| {
             if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
                 thumbnails.push(finished.frame.clone());
             }
             seen += 1;
             ControlFlow::Continue(())
-        })?;
+        },
+    )?;
     let sheet = folder.join("contact-sheet.png");
     contact_sheet(&sheet, &thumbnails, SHEET_COLUMNS, SHEET_SHRINK).or_failed()?;
     let pair = folder.join("perfect-and-real.png");

@@ -26,7 +26,7 @@ const MAX_SIDE_PX: u32 = 16_384;
 /// Show the plan of a frame: passes, sizes, samples, error bounds, and what is skipped and why
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim explain flight.toml --frame 7 --set camera.shutter.exposure_ms=0")]
-pub struct Args {
+pub struct ExplainArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Frame number, from 0
@@ -40,23 +40,23 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Explained<'a> {
+struct ExplainReport<'a> {
     frames: u64,
-    log: Log,
-    tracker: Tracker,
-    terrain: Option<Terrain>,
+    log: LogFacts,
+    tracker: TrackerFacts,
+    terrain: Option<TerrainFacts>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
     placement: Placement,
-    source_frame: Source,
+    source_frame: SourceFrameFields,
     level_of_detail: Option<LevelOfDetail>,
-    models: Option<Models>,
-    memory: Option<Memory>,
+    models: Option<ModelFacts>,
+    memory: Option<MemoryFacts>,
 }
 
 /// The frame to which the source coordinates x, y of `coords` refer, with the names of `frames.csv`.
 #[derive(Serialize)]
-struct Source {
+struct SourceFrameFields {
     ideal_width_px: u32,
     ideal_height_px: u32,
     ideal_fx_px: f64,
@@ -69,7 +69,7 @@ struct Source {
     ideal_q_wxyz: [f64; 4],
 }
 
-impl Source {
+impl SourceFrameFields {
     fn of(frame: &SourceFrame) -> Self {
         let SourceFrame { size_px, focal_px, principal_px, t_ns, pose } = *frame;
         let q = pose.ned_from_camera;
@@ -88,7 +88,7 @@ impl Source {
 }
 
 #[derive(Serialize)]
-struct Log {
+struct LogFacts {
     file: String,
     rows: usize,
     span_s: [f64; 2],
@@ -96,7 +96,7 @@ struct Log {
 }
 
 #[derive(Serialize)]
-struct Tracker {
+struct TrackerFacts {
     rate_hz: f64,
     limits: ResolvedLimits,
     saturation: Saturation,
@@ -119,17 +119,17 @@ pub(super) struct LevelOfDetail {
 
 /// Level of detail of models and patterns in the ideal frame.
 #[derive(Serialize)]
-struct Models {
+struct ModelFacts {
     #[serde(flatten)]
     detail: ModelLod,
     /// Bound on the displacement by the level of detail, output px.
     tolerance_px: f64,
 }
 
-/// Memory for a terrain and its texture, bytes. The GPU holds only what is in sight, except for a texture
-/// that is not tiled.
+/// MemoryFacts for a terrain and its texture, bytes. The GPU holds only what is in sight, except for a
+/// texture that is not tiled.
 #[derive(Serialize)]
-struct Memory {
+struct MemoryFacts {
     /// Host memory: heights, with the data of the level of detail.
     heights_bytes: u64,
     /// Host memory: the texture, with its mip levels if it is tiled.
@@ -141,7 +141,7 @@ struct Memory {
 }
 
 #[derive(Serialize)]
-struct Terrain {
+struct TerrainFacts {
     epsg: u16,
     size: [u32; 2],
     south_west_deg: [f64; 2],
@@ -153,7 +153,7 @@ struct Terrain {
 }
 
 /// Loads the scenario and prints the plan of one frame.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames = loaded.sequence.frames;
@@ -165,8 +165,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         }));
     }
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        console
-            .warn("quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan of the default solver");
+        console.warn(
+            "quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan \
+                   of the default solver",
+        );
     }
     let engine = args.backend.open()?;
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, engine.max_side_px())
@@ -177,13 +179,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
     let models = models(&loaded.sequence, &plan);
     let memory = memory(&loaded.sequence, &plan);
-    let source_frame = Source::of(&source_frame(&loaded.sequence, &plan));
+    let source_frame = SourceFrameFields::of(&source_frame(&loaded.sequence, &plan));
     let tracked = &loaded.tracked;
     let tracker =
-        Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
+        TrackerFacts { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
         let warnings = &loaded.warnings;
-        return Ok(console.json(&Explained {
+        return Ok(console.json(&ExplainReport {
             frames,
             log,
             tracker,
@@ -227,7 +229,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     {
         console.line("terrain in this frame")?;
         console.line(format_args!(
-            "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance {tolerance_px:.3})"
+            "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance \
+             {tolerance_px:.3})"
         ))?;
         console.line(format_args!(
             "  seen from straight above, depth is off by at most {depth_share:.1e} of itself"
@@ -239,21 +242,24 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             print_memory(&memory, triangle_bytes, console)?;
         }
     }
-    if let Some(Models { detail: ModelLod { meshes, triangles, finest_triangles }, tolerance_px }) = models {
+    if let Some(ModelFacts { detail: ModelLod { meshes, triangles, finest_triangles }, tolerance_px }) =
+        models
+    {
         console.line("models in this frame")?;
         console.line(format_args!(
-            "  {meshes} meshes with {triangles} triangles, displaced by at most {tolerance_px:.3} output px; {finest_triangles} triangles at the finest level"
+            "  {meshes} meshes with {triangles} triangles, displaced by at most {tolerance_px:.3} output px; \
+             {finest_triangles} triangles at the finest level"
         ))?;
     }
     Ok(())
 }
 
 /// Level of detail that the ideal pass chooses for its middle key frame.
-fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
+fn models(sequence: &Sequence, plan: &FramePlan) -> Option<ModelFacts> {
     let scene = &sequence.scene;
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
     let detail = || ModelLod::new(scene, &SceneLods::new(scene), &plan.ideal_pose(), &tolerance);
-    (!scene.meshes.is_empty()).then(|| Models {
+    (!scene.meshes.is_empty()).then(|| ModelFacts {
         detail: detail(),
         tolerance_px: tolerance.error_px / plan.ideal.scale(&plan.camera),
     })
@@ -287,12 +293,12 @@ fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a
     )
 }
 
-fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
+fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<MemoryFacts> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let picture = terrain.texture.rgba8.len() as u64;
     let heights_bytes = terrain.memory_bytes();
     if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
-        return Some(Memory {
+        return Some(MemoryFacts {
             heights_bytes,
             texture_bytes: picture,
             texture_gpu_bytes: 8 * picture / 3,
@@ -302,7 +308,7 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let ground = TerrainTiles::new(terrain);
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
     let all = u64::from(ground.grid.count);
-    Some(Memory {
+    Some(MemoryFacts {
         heights_bytes,
         texture_bytes: 4 * picture / 3,
         texture_gpu_bytes: tiles * tile_bytes(TexelForm::Light),
@@ -310,22 +316,28 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     })
 }
 
-fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
+fn print_memory(memory: &MemoryFacts, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (heights, picture) = (mib(memory.heights_bytes), mib(memory.texture_bytes));
     console.line(format_args!("  memory: {heights:.1} MiB of heights, {picture:.1} MiB of texture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.texture_gpu_bytes));
     match memory.tiles {
-        None => console.line(format_args!("  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {picture:.1} MiB of texture"))?,
+        None => console.line(format_args!(
+            "  gpu memory, if the gpu renders it: {triangles:.1} MiB of \
+             triangles, {picture:.1} MiB of texture"
+        ))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  GPU memory, if the GPU draws it: {triangles:.1} MiB of triangles, {tiles} of {all} texture tiles in {picture:.1} MiB (the cache holds at most twice the largest need of a frame, plus 32 MiB)"
+            "  gpu memory, if the gpu renders it: {triangles:.1} MiB of triangles, {tiles} of {all} texture \
+             tiles in {picture:.1} MiB (the cache holds at most twice the largest need of a frame, plus 32 \
+             MiB)"
         ))?,
     }
     Ok(())
 }
 
-fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Failure> {
-    let Terrain { epsg, size: [columns, rows], south_west_deg, north_east_deg, height_range_m, .. } = terrain;
+fn print_terrain(terrain: &TerrainFacts, console: &mut Console<'_>) -> Result<(), Failure> {
+    let TerrainFacts { epsg, size: [columns, rows], south_west_deg, north_east_deg, height_range_m, .. } =
+        terrain;
     console.line(format_args!("terrain of {columns}x{rows} heights, EPSG:{epsg}"))?;
     console.line(format_args!(
         "  latitude {:.5} to {:.5}, longitude {:.5} to {:.5} deg, heights {:.1} to {:.1} m",
@@ -345,8 +357,12 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
 }
 
 /// Prints the frame to which x and y of `coords` refer.
-fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) -> Result<(), Failure> {
-    let Source {
+fn print_source(
+    source: &SourceFrameFields,
+    plan: &FramePlan,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    let SourceFrameFields {
         ideal_width_px,
         ideal_height_px,
         ideal_fx_px,
@@ -357,11 +373,13 @@ fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) ->
         ..
     } = source;
     console.line(format_args!(
-        "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
+        "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal \
+         length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
     ))?;
     let ([n, e, d], [w, x, y, z]) = (source.ideal_ned_m, source.ideal_q_wxyz);
     console.line(format_args!(
-        "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z {z:.9}, stamp {ideal_t_ns} ns"
+        "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z \
+         {z:.9}, stamp {ideal_t_ns} ns"
     ))?;
     if plan.shared_frames.is_some() {
         console.line("  this is the frame's own geometry, although several frames share one ideal frame")?;
@@ -374,7 +392,8 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
     let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
     let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
     let from = format!(
-        "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky {sky}"
+        "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky \
+         {sky}"
     );
     let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
         (Some(summary), Some(terrain)) => {
@@ -384,7 +403,8 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
                 times => format!(", upsampled {times} times"),
             };
             format!(
-                "; baked into the terrain texture of {width}x{height} px{finer}, in steps of 8 bits that are not in the predicted error"
+                "; baked into the terrain texture of {width}x{height} px{finer}, in steps of 8 bits that are \
+                 not in the predicted error"
             )
         }
         _ => String::new(),
@@ -393,10 +413,10 @@ fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure
     Ok(())
 }
 
-fn log_facts(loaded: &Loaded) -> Log {
+fn log_facts(loaded: &Loaded) -> LogFacts {
     let rows = &loaded.log.rows;
     let (first_s, last_s) = (rows.first().map_or(0.0, |row| row.t_s), rows.last().map_or(0.0, |row| row.t_s));
-    Log {
+    LogFacts {
         file: loaded.sequence.scenario.flight.log.display().to_string(),
         rows: rows.len(),
         span_s: [first_s, last_s],
@@ -404,9 +424,9 @@ fn log_facts(loaded: &Loaded) -> Log {
     }
 }
 
-fn terrain_facts(summary: &TerrainSummary) -> Terrain {
+fn terrain_facts(summary: &TerrainSummary) -> TerrainFacts {
     let [columns, rows] = summary.size.map(|heights| u64::from(heights.saturating_sub(1)));
-    Terrain {
+    TerrainFacts {
         epsg: summary.epsg,
         size: summary.size,
         south_west_deg: summary.south_west_rad.map(f64::to_degrees),

@@ -9,9 +9,12 @@ use crate::{backend::BackendArgs, console::Console, failure::Failure};
 /// Show what renders: graphics adapters with driver and limits, the processor, and which is used
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. A software adapter (Mesa's llvmpipe) runs on the processor:\nthere the cpu renderer makes all passes that it vectorises, and the adapter the others. --backend cpu needs no adapter\nat all. Pictures of the two differ by rounding. Exit code 3 if an adapter is demanded and there is none."
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. A software adapter (Mesa's llvmpipe) \
+                  runs on the processor:\nthere the cpu renderer makes all passes that it vectorises, and \
+                  the adapter the others. --backend cpu needs no adapter\nat all. Pictures of the two differ \
+                  by rounding. Exit code 3 if an adapter is demanded and there is none."
 )]
-pub struct Args {
+pub struct InfoArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -50,7 +53,7 @@ impl Adapter {
 }
 
 /// Prints the adapters of this machine.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = args.backend.open()?;
     let info = info(&engine);
     if args.json {

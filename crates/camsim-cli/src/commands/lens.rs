@@ -25,15 +25,15 @@ Examples:
   echo 'x_px,y_px
   319.5,239.5' | camsim lens flight.toml undistort
   camsim lens CAMERA.toml check --json")]
-pub struct Args {
+pub struct LensArgs {
     /// Camera file, or a scenario: its [camera] is used
     camera: PathBuf,
     #[command(subcommand)]
-    command: Command,
+    command: LensCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum LensCommand {
     /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px (NaN if u or v is not finite)
     Distort(PointsArgs),
     /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no inverse)
@@ -57,12 +57,12 @@ struct PointsArgs {
 }
 
 /// Runs a lens command.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let camera = read_camera(&args.camera)?;
     match &args.command {
-        Command::Distort(points) => distort(&camera, points, console),
-        Command::Undistort(points) => undistort(&camera, points, console),
-        Command::Check { json } => check(&camera, *json, console),
+        LensCommand::Distort(points) => distort(&camera, points, console),
+        LensCommand::Undistort(points) => undistort(&camera, points, console),
+        LensCommand::Check { json } => check(&camera, *json, console),
     }
 }
 
@@ -97,18 +97,19 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
     })?;
     if beyond > 0 {
         console.warn(format_args!(
-            "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but no real lens images them there",
+            "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but \
+             no real lens images them there",
             points.len()
         ));
     }
     if unknown > 0 {
         console.warn(format_args!("{unknown} of {} points are not finite and have no pixels", points.len()));
     }
-    warn_of_none(&points, console);
+    warn_if_empty(&points, console);
     Ok(())
 }
 
-fn warn_of_none(points: &[DVec2], console: &mut Console<'_>) {
+fn warn_if_empty(points: &[DVec2], console: &mut Console<'_>) {
     if points.is_empty() {
         console.warn("there are no points: only the header is written");
     }
@@ -126,7 +127,7 @@ fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>)
         }
         Ok(())
     })?;
-    warn_of_none(&points, console);
+    warn_if_empty(&points, console);
     Ok(())
 }
 
@@ -175,14 +176,14 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
         .from_reader(input);
-    let mut places = None;
+    let mut column_indices = None;
     let mut points = Vec::new();
     for record in reader.records() {
         let record = record?;
         let line = record.position().map_or(0, csv::Position::line);
-        if places.is_none() {
-            if let Some(found) = header(&record, columns) {
-                places = Some(found);
+        if column_indices.is_none() {
+            if let Some(indices) = header(&record, columns) {
+                column_indices = Some(indices);
                 continue;
             }
             if record.len() != 2 {
@@ -192,10 +193,11 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
                 );
             }
         }
-        let places = *places.get_or_insert([0, 1]);
+        let column_indices = *column_indices.get_or_insert([0, 1]);
         let number = |i: usize| -> anyhow::Result<f64> {
-            let text =
-                record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
+            let text = record
+                .get(column_indices[i])
+                .ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
             text.parse().map_err(|_| {
                 anyhow!(
                     "line {line}: {} is `{text}`, which is not a number; expected the columns {}",
@@ -211,10 +213,10 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
 
 /// Indices of the columns, if the row names both. A byte-order mark may precede the first name.
 fn header(row: &csv::StringRecord, columns: [&str; 2]) -> Option<[usize; 2]> {
-    let place = |name: &str| {
+    let index = |name: &str| {
         row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
     };
-    Some([place(columns[0])?, place(columns[1])?])
+    Some([index(columns[0])?, index(columns[1])?])
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::{
     console::Console,
     failure::{FAILED, Failure, OrFail},
     frame_list::{FrameList, Shard},
-    frame_source::{Device, FrameSource, Rays},
+    frame_source::{EngineSource, FrameSource, ReferenceSource},
     inputs::{self, Changes, ScenarioArgs},
     render_run::{self, Job},
     times_table::TimesTable,
@@ -43,7 +43,7 @@ Examples:
   camsim render flight.toml --format none --frames 0..50 --times
                                                       how fast, and where the time goes
   camsim render --print-default > flight.toml         a scenario to start from")]
-pub struct Args {
+pub struct RenderArgs {
     /// Scenario (TOML), or the run.json of an earlier run
     #[arg(required_unless_present = "print_default")]
     scenario: Option<PathBuf>,
@@ -57,14 +57,14 @@ pub struct Args {
     changes: Changes,
     /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "oracle"]
     #[arg(long, value_enum)]
-    backend: Option<Backend>,
+    backend: Option<RenderBackend>,
     /// Channels, in place of output.channels
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = channel_parser())]
     outputs: Option<Vec<Channel>>,
     /// File formats, in place of output.format; none renders and reads back without writing frames (for
     /// timing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
-    format: Option<Vec<Format>>,
+    format: Option<Vec<FormatArg>>,
     /// Keep frames whose files exist already (files are written completely, so they are not read again);
     /// refused if the folder belongs to another scenario, or one of its input files has changed
     #[arg(long)]
@@ -81,7 +81,7 @@ pub struct Args {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Backend {
+enum RenderBackend {
     /// This machine's processor alone; needs no Vulkan driver
     Cpu,
     /// The graphics adapter alone, a software adapter where there is no card
@@ -91,19 +91,19 @@ enum Backend {
     Reference,
 }
 
-impl Backend {
+impl RenderBackend {
     /// The renderer of the engine, if it is one.
-    fn renderer(self) -> Option<backend::Backend> {
+    fn renderer(self) -> Option<backend::EngineBackend> {
         match self {
-            Self::Cpu => Some(backend::Backend::Cpu),
-            Self::Gpu => Some(backend::Backend::Gpu),
+            Self::Cpu => Some(backend::EngineBackend::Cpu),
+            Self::Gpu => Some(backend::EngineBackend::Gpu),
             Self::Reference => None,
         }
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+enum FormatArg {
     /// OpenEXR, linear
     Exr,
     /// PNG in the encoding of camera.photometric.output
@@ -128,7 +128,7 @@ fn channel_parser() -> impl TypedValueParser<Value = Channel> {
 }
 
 /// Renders a scenario.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(path) = args.scenario.clone() else {
         return Ok(console.print(&print_default())?);
     };
@@ -142,7 +142,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         None => (0..loaded.sequence.frames).collect(),
         Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
     };
-    let go_on = console.command_with("--resume");
+    let resume_command = console.command_with("--resume");
     let job = Job {
         sequence: &loaded.sequence,
         folder: &folder,
@@ -150,28 +150,29 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         shard: args.shard,
         resume: args.resume,
         warnings: &loaded.warnings,
-        go_on: &go_on,
+        resume_command: &resume_command,
     };
-    let renderer = args.backend.and_then(Backend::renderer);
+    let renderer = args.backend.and_then(RenderBackend::renderer);
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        Box::new(times.timed("ray-casting structures", is_quiet, || Rays::new(&loaded.sequence))?)
+        Box::new(times.timed("ray-casting structures", is_quiet, || ReferenceSource::new(&loaded.sequence))?)
     } else {
         engine = times.timed("adapter", is_quiet, || backend::open(renderer))?;
-        let mut device = times.timed("scene upload", is_quiet, || Device::new(&engine, &loaded.sequence))?;
+        let mut engine_source =
+            times.timed("scene upload", is_quiet, || EngineSource::new(&engine, &loaded.sequence))?;
         if args.times {
-            device.time_passes();
+            engine_source.time_passes();
         }
-        Box::new(device)
+        Box::new(engine_source)
     };
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let mut look = |finished: &Finished| {
+    let mut on_frame = |finished: &Finished| {
         times.add(&finished.times);
         ControlFlow::Continue(())
     };
-    let outcome = render_run::run(&job, &mut *source, console, &mut look).inspect_err(|failure| {
+    let outcome = render_run::run(&job, &mut *source, console, &mut on_frame).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
-            console.note(format_args!("written frames are kept; to resume: {go_on}"));
+            console.note(format_args!("written frames are kept; to resume: {resume_command}"));
         }
     })?;
     if !console.is_quiet() {
@@ -185,7 +186,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         ))?;
     }
     if args.times {
-        times.begun("plan of the first frame", outcome.first_plan);
+        times.add_start("plan of the first frame", outcome.first_plan);
         console.print(&times.text())?;
     }
     Ok(())
@@ -199,19 +200,19 @@ fn default_folder(scenario: &Path) -> PathBuf {
 
 /// `--backend reference` becomes part of the scenario, so that frames of the two renderers never mix in one
 /// folder.
-fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scenario, Failure> {
+fn with_backend(mut scenario: Scenario, backend: Option<RenderBackend>) -> Result<Scenario, Failure> {
     let oracle = Auto::Value(Solver::Oracle);
     let refused = |what: &str| {
         Err(Failure::bad_input(anyhow!(
-            "{what} cannot be combined with --backend reference, which always casts exact rays: leave --backend out, or use the default \
-             preset and solver (--preset default --set quality.solver=auto)"
+            "{what} cannot be combined with --backend reference, which always casts exact rays: leave \
+             --backend out, or use the default preset and solver (--preset default --set quality.solver=auto)"
         )))
     };
     match backend {
-        Some(Backend::Reference) if scenario.quality.preset == Preset::Paper => {
+        Some(RenderBackend::Reference) if scenario.quality.preset == Preset::Paper => {
             return refused("quality.preset = \"paper\"");
         }
-        Some(Backend::Reference) => {
+        Some(RenderBackend::Reference) => {
             match scenario.quality.solver {
                 Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = oracle,
                 Auto::Value(Solver::Linear) => return refused("quality.solver = \"linear\""),
@@ -225,9 +226,10 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
                 )));
             }
         }
-        Some(Backend::Cpu | Backend::Gpu) if scenario.quality.solver == oracle => {
+        Some(RenderBackend::Cpu | RenderBackend::Gpu) if scenario.quality.solver == oracle => {
             return Err(Failure::bad_input(anyhow!(
-                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or change the solver (--set quality.solver=auto)"
+                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or \
+                 change the solver (--set quality.solver=auto)"
             )));
         }
         _ => {}
@@ -236,18 +238,18 @@ fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scen
 }
 
 /// `--outputs` and `--format` in place of `[output]`.
-fn with_outputs(mut scenario: Scenario, args: &Args) -> Result<Scenario, Failure> {
+fn with_outputs(mut scenario: Scenario, args: &RenderArgs) -> Result<Scenario, Failure> {
     if let Some(channels) = &args.outputs {
         scenario.output.channels = without_repeats(channels);
     }
     if let Some(formats) = &args.format {
         let images = formats.iter().filter_map(|format| match format {
-            Format::Exr => Some(ImageFormat::Exr),
-            Format::Png => Some(ImageFormat::Png),
-            Format::None => None,
+            FormatArg::Exr => Some(ImageFormat::Exr),
+            FormatArg::Png => Some(ImageFormat::Png),
+            FormatArg::None => None,
         });
         scenario.output.format = without_repeats(&images.collect::<Vec<_>>());
-        if formats.contains(&Format::None) && !scenario.output.format.is_empty() {
+        if formats.contains(&FormatArg::None) && !scenario.output.format.is_empty() {
             return Err(Failure::bad_input(anyhow!(
                 "--format none cannot be combined with other formats: leave it out, or the others"
             )));

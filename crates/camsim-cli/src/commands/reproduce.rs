@@ -42,10 +42,10 @@ Examples:
   camsim reproduce time blur -o out                 two of them
   camsim reproduce tracking --data ~/camsim-data    on the paper's own log: ~/camsim-data/camsim/path_lawnmower.csv
   camsim reproduce time --width 160                 small frames, fast")]
-pub struct Args {
+pub struct ReproduceArgs {
     /// Experiments [default: all]
     #[arg(value_name = "EXPERIMENT", value_enum)]
-    experiments: Vec<Which>,
+    experiments: Vec<ExperimentArg>,
     /// Output folder, with a folder for each experiment
     #[arg(short, long, value_name = "DIR", default_value = "camsim-reproduce")]
     output: PathBuf,
@@ -63,7 +63,7 @@ pub struct Args {
 
 /// An experiment, on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Which {
+enum ExperimentArg {
     Tracking,
     Lens,
     Time,
@@ -74,7 +74,7 @@ enum Which {
     Speed,
 }
 
-impl Which {
+impl ExperimentArg {
     fn experiment(self) -> Experiment {
         match self {
             Self::Tracking => Experiment::Tracking,
@@ -90,7 +90,7 @@ impl Which {
 }
 
 /// Runs the experiments, prints their tables, writes their folders.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &ReproduceArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     if !WIDTHS_PX.contains(&args.width) {
         let (least, most) = (WIDTHS_PX.start(), WIDTHS_PX.end());
         return Err(Failure::bad_input(anyhow!("--width {}: must be {least} to {most} pixels", args.width)));
@@ -107,7 +107,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.note(format_args!("rendering on {engine}"));
     if data.is_none() {
         console.note(format_args!(
-            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"
+            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on \
+             built-in substitutes"
         ));
     }
     let scratch = args.output.join("inputs");
@@ -163,7 +164,7 @@ fn one(
 }
 
 /// The folder named by the command line or the environment; it must be there.
-fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
+fn data_folder(args: &ReproduceArgs) -> Result<Option<PathBuf>, Failure> {
     let (folder, named_by) =
         match (&args.data, std::env::var_os(DATA_VARIABLE).filter(|value| !value.is_empty())) {
             (Some(folder), _) => (folder.clone(), "--data"),
@@ -174,8 +175,8 @@ fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
         return Ok(Some(folder));
     }
     Err(Failure::bad_input(anyhow!(
-        "{named_by}: {} has no folder camsim/ with the paper's inputs (path_lawnmower.csv and others); name the folder above it, or leave \
-         {named_by} out to run on built-in substitutes",
+        "{named_by}: {} has no folder camsim/ with the paper's inputs (path_lawnmower.csv and others); name \
+         the folder above it, or leave {named_by} out to run on built-in substitutes",
         folder.display()
     )))
 }

@@ -38,12 +38,12 @@ Examples:
   camsim track flight.toml -o traj.csv
   camsim track flight.toml --of camera --rate 1000 -o poses.csv
   camsim track flight.toml --report --set tracker.kind=spline")]
-pub struct Args {
+pub struct TrackArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Whose motion is printed
     #[arg(long, value_enum, default_value = "body")]
-    of: Of,
+    of: Subject,
     /// Rows per second [default: tracker.rate_hz]
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -60,7 +60,7 @@ pub struct Args {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Of {
+enum Subject {
     /// The platform, whose motion the log contains
     Body,
     /// The camera on it, with lever arm, mount and vibration
@@ -68,7 +68,7 @@ enum Of {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct TrackSummary<'a> {
     rate_hz: f64,
     #[serde(flatten)]
     measured: &'a TrackReport,
@@ -82,7 +82,7 @@ struct Report<'a> {
 const SHOWN_INTERVALS: usize = 10;
 
 /// Tracks the log, writes the motion, prints the report.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &TrackArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
     let (log, tracked) = inputs::load_flight_only(&scenario, console)?;
     let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
@@ -92,11 +92,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, window_start_s(&scenario));
         let instants = (0..rows).map(|k| span_s[0] + k as f64 / rate_hz);
         let table = match args.of {
-            Of::Body => trajectory_csv(instants.map(|t_s| body_at(&tracked.trajectory, epoch_ns, t_s))),
-            Of::Camera => {
+            Subject::Body => trajectory_csv(instants.map(|t_s| body_at(&tracked.trajectory, epoch_ns, t_s))),
+            Subject::Camera => {
                 let path =
                     CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount).or_bad_input()?;
-                warn_of_few(&path, rate_hz, console);
+                warn_of_low_rate(&path, rate_hz, console);
                 camera_trajectory_csv(instants.map(|t_s| camera_at(&path, epoch_ns, t_s)))
             }
         };
@@ -126,11 +126,12 @@ fn span_s(scenario: &Scenario, trajectory: &Trajectory) -> [f64; 2] {
     scenario.flight.window_s.map_or([all.0, all.1], |window| window.map(|t_s| t_s / scenario.flight.speed))
 }
 
-fn warn_of_few(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
+fn warn_of_low_rate(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
     let vibration_hz = path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
-            "{rate_hz} rows per second are too few for the mount's vibration of {vibration_hz} Hz: use --rate {:.0} or more",
+            "{rate_hz} rows per second are too few for the mount's vibration of {vibration_hz} Hz: use \
+             --rate {:.0} or more",
             8.0 * vibration_hz
         ));
     }
@@ -170,7 +171,13 @@ fn report(
         })
         .collect();
     if json {
-        return Ok(console.json(&Report { rate_hz, measured, limits, saturation, saturation_intervals })?);
+        return Ok(console.json(&TrackSummary {
+            rate_hz,
+            measured,
+            limits,
+            saturation,
+            saturation_intervals,
+        })?);
     }
     let TrackReport { rms, max_error, max_used, samples, .. } = measured;
     console.line(format_args!("{samples} instants at {rate_hz} Hz, against the interpolated log"))?;

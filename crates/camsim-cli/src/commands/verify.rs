@@ -26,7 +26,7 @@ use crate::{
 /// Number of frames to verify by default.
 const DEFAULT_FRAMES: u64 = 5;
 
-/// Measure the errors of frames against the oracle, and compare them with the predicted errors
+/// Measure the errors of frames against the reference renderer, and compare them with the predicted errors
 ///
 /// The source error is the distance, in pixels of the ideal frame, between the source that was used for a
 /// pixel and that of its exact ray. Pixels within 3 px of a silhouette, and pixels whose point the ideal
@@ -48,15 +48,15 @@ const DEFAULT_FRAMES: u64 = 5;
 #[command(after_help = "\
 Examples:
   camsim verify flight.toml                            five frames, evenly spread over the sequence
-  camsim verify flight.toml --frames 0..10 --pictures  the picture error as well, against the oracle's frame (slow)
+  camsim verify flight.toml --frames 0..10 --pictures  the picture error too, against reference frames (slow)
   camsim verify flight.toml --set quality.max_error_px=0.001 --json")]
-pub struct Args {
+pub struct VerifyArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: five, evenly spread]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
-    /// Measure the picture error too; the oracle renders each frame with many rays per pixel
+    /// Measure the picture error too; the reference renderer casts many rays per pixel
     #[arg(long)]
     pictures: bool,
     /// Print JSON
@@ -67,7 +67,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct VerifyReport {
     adapter: String,
     tolerance_px: f64,
     tolerance_dn: f64,
@@ -171,11 +171,12 @@ impl From<ErrorStats> for Figures {
 }
 
 /// Measures and compares.
-pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         return Err(Failure::bad_input(anyhow!(
-            "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set quality.solver=auto"
+            "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set \
+             quality.solver=auto"
         )));
     }
     let loaded = inputs::load(&scenario, console)?;
@@ -191,14 +192,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
     let tolerance_px = scenario.quality.max_error_px;
     let tolerance_dn = scenario.quality.max_error_dn;
-    let mut report = Report { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
+    let mut report = VerifyReport { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
     if !args.json {
         let allowed_px = scenario.quality.max_terrain_error_px;
         console.line(format_args!(
             "source errors in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"
         ))?;
         console.line(format_args!(
-            "terrain LOD: bound on the displacement by the terrain's level of detail, output px; quality.max_terrain_error_px = {allowed_px}"
+            "terrain detail: bound on the displacement by the terrain's level of detail, output px; \
+             quality.max_terrain_error_px = {allowed_px}"
         ))?;
         console.line(HEADER)?;
     }
@@ -218,18 +220,18 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if report.kept {
         return Ok(());
     }
-    let frames_where = |is_broken: &dyn Fn(&Verified) -> bool| {
-        let broken: Vec<String> = report
+    let frames_where = |is_exceeded: &dyn Fn(&Verified) -> bool| {
+        let frames: Vec<String> = report
             .frames
             .iter()
-            .filter(|frame| is_broken(frame))
+            .filter(|frame| is_exceeded(frame))
             .map(|frame| frame.frame.to_string())
             .collect();
-        broken.join(", ")
+        frames.join(", ")
     };
-    let of_truth = |frame: &Verified| frame.truth.as_ref().is_some_and(|truth| !truth.kept);
-    if report.frames.iter().all(|frame| frame.kept) && report.frames.iter().any(of_truth) {
-        let frames = frames_where(&of_truth);
+    let has_truth_fault = |frame: &Verified| frame.truth.as_ref().is_some_and(|truth| !truth.kept);
+    if report.frames.iter().all(|frame| frame.kept) && report.frames.iter().any(has_truth_fault) {
+        let frames = frames_where(&has_truth_fault);
         return Err(Failure::failed(anyhow!(
             "frame {frames}: depths or points belong to no surface within {tolerance_px} px of their pixel"
         )));
@@ -243,7 +245,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let frames = frames_where(&|frame| !frame.kept);
     Err(Failure::failed(anyhow!(
         "frame {frames}: the source error exceeds the tolerance of {tolerance_px} px: {}",
-        why_broken(first)
+        exceeded_reason(first)
     )))
 }
 
@@ -254,14 +256,15 @@ fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::bad_input(anyhow!(
-        "camera.size_px = [{width}, {height}] is {} pixels, and this adapter can measure at most {most} in one frame: make camera.size_px smaller, \
-         and camera.focal_px and camera.principal_point_px in proportion",
+        "camera.size_px = [{width}, {height}] is {} pixels, and this adapter can measure at most {most} in \
+         one frame: make camera.size_px smaller, and camera.focal_px and camera.principal_point_px in \
+         proportion",
         width * height
     )))
 }
 
 /// Why a frame exceeds its tolerance.
-fn why_broken(frame: &Verified) -> String {
+fn exceeded_reason(frame: &Verified) -> String {
     let more = if is_more_than_predicted(frame.as_predicted, frame.measured.judged_by) {
         ", and the error is larger than predicted"
     } else {
@@ -294,12 +297,12 @@ fn verify(
     tolerance_px: f64,
     pictures: bool,
 ) -> Result<Verified, Failure> {
-    let first = at_phase(session, frame, 0.0)?;
+    let first = render_at_phase(session, frame, 0.0)?;
     let mut errors = measure(oracle, &first, 0.0)?;
     for phase in phases(&first.plan) {
-        let found = measure(oracle, &at_phase(session, frame, phase)?, f64::from(phase))?;
-        if found.verdict().p99_px() > errors.verdict().p99_px() {
-            errors = found;
+        let candidate = measure(oracle, &render_at_phase(session, frame, phase)?, f64::from(phase))?;
+        if candidate.verdict().p99_px() > errors.verdict().p99_px() {
+            errors = candidate;
         }
     }
     let verdict = errors.verdict();
@@ -353,7 +356,7 @@ fn disocclusion_of(oracle: &Oracle, plan: &FramePlan) -> Disocclusion {
     disocclusion(oracle, plan.frame, &plan.key_poses(), phases)
 }
 
-fn at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finished, Failure> {
+fn render_at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finished, Failure> {
     session.set_coords_phase(phase);
     let mut finished = None;
     session.render::<Infallible>([frame], &mut |done| {
@@ -401,7 +404,10 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
 /// `judged_by` of a frame without a percentile.
 const VOID: &str = "nothing";
 
-const HEADER: &str = " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain LOD |";
+const HEADER: &str = concat!(
+    " frame |  predicted   measured        rms        max | at silhouettes        rms        max ",
+    "| falsely valid  missing | terrain detail |"
+);
 
 fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
@@ -419,8 +425,14 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         _ => String::new(),
     };
     console.line(format_args!(
-        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
-        predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
+        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | \
+         {falsely_valid:>13} {missing:>8} | {terrain_off:>14} | {verdict}{why}",
+        predicted.total_px,
+        smooth.p99_px,
+        smooth.rms_px,
+        smooth.max_px,
+        silhouettes.rms_px,
+        silhouettes.max_px
     ))?;
     let Predicted {
         resampling_dn, blur_dn, misregistration_dn, terrain, blended_depth, disocclusion, ..
@@ -444,7 +456,8 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
         console.line(format_args!(
-            "       | picture: PSNR {all}, away from silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
+            "       | picture: PSNR {all}, away from silhouettes {smooth}, at silhouettes {silhouettes}, \
+             largest difference {max:.3}"
         ))?;
         let verdict = match (*kept, *predicted_dn > tolerance_dn) {
             (true, _) => "kept",
@@ -452,8 +465,11 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
             (false, false) => "EXCEEDED, not predicted",
         };
         console.line(format_args!(
-            "       | picture error {rms_dn:.3} DN (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; away from silhouettes, predicted {}",
-            estimate(resampling_dn.hypot(*blur_dn).hypot(*misregistration_dn).hypot(surface_dn).hypot(blended_dn))
+            "       | picture error {rms_dn:.3} DN (RMS), predicted {predicted_dn:.3}: quality.max_error_dn \
+             = {tolerance_dn} is {verdict}; away from silhouettes, predicted {}",
+            estimate(
+                resampling_dn.hypot(*blur_dn).hypot(*misregistration_dn).hypot(surface_dn).hypot(blended_dn)
+            )
         ))?;
         for cause in &verified.not_in_the_picture {
             console.line(format_args!("       | not predicted: {cause}"))?;
@@ -470,7 +486,9 @@ fn describe_truth(truth: &Truth) -> String {
     };
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
-        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and {point_faults}: {}",
+        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error \
+         {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and \
+         {point_faults}: {}",
         largest(depth_max),
         largest(point_max),
         if *kept { "kept" } else { "FAULTS" }

@@ -10,19 +10,19 @@ use camsim_viewer::ExportJob;
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
-    frame_source::{Device, FrameSource, Rays},
-    render_run::{self, Job, go_on},
+    frame_source::{EngineSource, FrameSource, ReferenceSource},
+    render_run::{self, Job, resume_command},
 };
 
 /// Open the viewer
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ViewerArgs {
     /// Scenario to open; without one, the built-in flight
     scenario: Option<PathBuf>,
 }
 
 /// Opens the window and returns when it is closed.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &ViewerArgs) -> Result<(), Failure> {
     let exporter = Arc::new(|job: &ExportJob| {
         export(job).map_err(|failure| failure.to_string().trim_start_matches("error: ").to_owned())
     });
@@ -38,7 +38,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let [first, end] = job.frames;
     let frames: Vec<u64> = (first..end.min(loaded.sequence.frames)).collect();
     let folder = &job.folder;
-    let go_on = go_on(folder);
+    let resume_command = resume_command(folder);
     let warnings = &loaded.warnings;
     let run = Job {
         sequence: &loaded.sequence,
@@ -47,18 +47,18 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
         shard: None,
         resume: false,
         warnings,
-        go_on: &go_on,
+        resume_command: &resume_command,
     };
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle)
     {
-        Box::new(Rays::new(&loaded.sequence)?)
+        Box::new(ReferenceSource::new(&loaded.sequence)?)
     } else {
         engine = Engine::open(Backend::Auto)?;
-        Box::new(Device::new(&engine, &loaded.sequence)?)
+        Box::new(EngineSource::new(&engine, &loaded.sequence)?)
     };
-    let mut look = |_: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let outcome = render_run::run(&run, &mut *source, &mut console, &mut look)?;
+    let mut on_frame = |_: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let outcome = render_run::run(&run, &mut *source, &mut console, &mut on_frame)?;
     let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
     Ok(format!("{} frames in {seconds:.1} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))
 }

@@ -9,7 +9,7 @@ use anyhow::anyhow;
 use camsim_core::scenario::Scenario;
 use camsim_io::{
     inputs::Inputs,
-    manifest::{BY_SCENARIO, ResumeError, check_resume, check_resume_of},
+    manifest::{BY_OTHER_SCENARIO, ResumeError, check_resume, check_resume_key},
     write::FrameFiles,
 };
 
@@ -21,14 +21,14 @@ use crate::{
 
 /// State of the frame files in a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum FolderState {
     /// They belong to this scenario, or there are none.
     Ours,
     /// They belong to another scenario, and all of them will be replaced.
     Replaced,
 }
 
-/// As [`standing`], with messages to the user.
+/// Checks the folder with [`folder_state`], and prints warnings.
 pub fn check(
     job: &Job<'_>,
     files: &FrameFiles,
@@ -36,41 +36,41 @@ pub fn check(
     adapter: &str,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    match standing(job, files, inputs)? {
-        Standing::Replaced if job.frames.iter().any(|&frame| files.exist(frame)) => {
+    match folder_state(job, files, inputs)? {
+        FolderState::Replaced if job.frames.iter().any(|&frame| files.exist(frame)) => {
             console.warn(format_args!(
                 "{} belongs to another scenario, or its input files have changed: its frames are replaced",
                 job.folder.display()
             ));
         }
-        Standing::Ours if job.resume => warn_of_adapter(job, adapter, console),
+        FolderState::Ours if job.resume => warn_of_adapter(job, adapter, console),
         _ => {}
     }
     Ok(())
 }
 
-/// State of a folder. Frames of another scenario are never kept among those of this one.
-pub fn standing(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<Standing, Failure> {
+/// Determines the state of a folder. Frames of different scenarios never mix in one folder.
+pub fn folder_state(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<FolderState, Failure> {
     let error = match check_resume(job.folder, &job.sequence.scenario, inputs) {
-        Ok(true) => return Ok(Standing::Ours),
+        Ok(true) => return Ok(FolderState::Ours),
         Ok(false) => None,
         Err(error) => Some(error),
     };
     match error {
         // Other files of the same frames do not contradict each other.
-        Some(ResumeError::Differs { made: BY_SCENARIO, differences, .. })
+        Some(ResumeError::Differs { made: BY_OTHER_SCENARIO, differences, .. })
             if !job.resume && differences.iter().all(|text| is_of_files(text)) =>
         {
-            Ok(Standing::Ours)
+            Ok(FolderState::Ours)
         }
         Some(error) if job.resume => Err(Failure::bad_input(error)),
         Some(error @ ResumeError::Differs { .. }) => {
-            refuse_others(job.frames, files, &error.what())?;
-            Ok(Standing::Replaced)
+            refuse_others(job.frames, files, &error.reason())?;
+            Ok(FolderState::Replaced)
         }
         _ => {
             refuse_unknown(job.folder, job.frames, files, job.resume)?;
-            Ok(Standing::Replaced)
+            Ok(FolderState::Replaced)
         }
     }
 }
@@ -82,11 +82,12 @@ fn is_of_files(difference: &str) -> bool {
 
 /// Refuses a folder with frame files other than those that will be replaced.
 pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<(), Failure> {
-    let others = files.others(frames);
+    let others = files.unlisted_frame_files(frames);
     let Some(first) = others.first() else { return Ok(()) };
     let count = others.len();
     Err(Failure::bad_input(anyhow!(
-        "{why}, and {count} files of other frames would remain ({first} is the first): choose another folder with -o, or remove that one"
+        "{why}, and {count} files of other frames would remain ({first} is the first): choose another folder \
+         with -o, or remove that one"
     )))
 }
 
@@ -108,10 +109,11 @@ pub fn refuse_unknown(
 
 fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
     if let Err(ResumeError::Differs { path, .. }) =
-        check_resume_of(job.folder, "adapter", "by another adapter", &adapter)
+        check_resume_key(job.folder, "adapter", "by another adapter", &adapter)
     {
         console.warn(format_args!(
-            "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from new ones by rounding",
+            "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from \
+             new ones by rounding",
             path.display()
         ));
     }

@@ -33,7 +33,8 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     let rows = (planner.stamp_s(sequence.frames - 1) - planner.stamp_s(0)) * rate_hz;
     if rows > MOST_TRAJECTORY_ROWS {
         return Err(Failure::bad_input(anyhow!(
-            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make flight.window_s shorter or tracker.rate_hz lower"
+            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make \
+             flight.window_s shorter or tracker.rate_hz lower"
         )));
     }
     let (first_s, last_s) =
@@ -47,8 +48,9 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
-            "camera_trajectory.csv has {rate_hz} rows per second, too few for the mount's vibration of {vibration_hz} Hz (which the frames contain exactly): \
-             `camsim track SCENARIO.toml --of camera --rate {:.0} -o poses.csv` writes more",
+            "camera_trajectory.csv has {rate_hz} rows per second, too few for the mount's vibration of \
+             {vibration_hz} Hz (which the frames contain exactly): `camsim track SCENARIO.toml --of camera \
+             --rate {:.0} -o poses.csv` writes more",
             8.0 * vibration_hz
         ));
     }
@@ -59,7 +61,7 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
 pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
     let path = frames_path(job.folder);
     let mut table = if is_ours { FrameTable::read(&path) } else { FrameTable::default() };
-    table.keep_what_is_in(job.folder, &|_| false);
+    table.retain_existing(job.folder, &|_| false);
     table.write(&path).or_failed()
 }
 
@@ -86,7 +88,7 @@ pub fn end_frames(
             table.insert(&record(job.sequence, files, planner, frame, source_frame(job.sequence, &plan)));
         }
     }
-    table.keep_what_is_in(job.folder, &|frame| !writes && made.contains_key(&frame));
+    table.retain_existing(job.folder, &|frame| !writes && made.contains_key(&frame));
     table.write(&path).or_failed()
 }
 

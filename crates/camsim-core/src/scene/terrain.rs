@@ -29,6 +29,7 @@ mod terrain_tiles;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod walk;
 
 use std::{fmt, sync::Arc};
 
@@ -47,6 +48,7 @@ pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh};
 pub use terrain_tiles::TerrainTiles;
 use tree::BlockTree;
+pub use walk::TerrainTriangle;
 
 use super::Texture;
 

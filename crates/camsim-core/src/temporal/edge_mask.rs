@@ -1,5 +1,5 @@
 //! Edge mask of an ideal frame: the pixels that, with their neighbours, show more than one surface. f64 twin
-//! of `shaders/ideal/marks.wgsl` and `shaders/ideal/spread/`.
+//! of `shaders/ideal/edge_mask.wgsl` and `shaders/ideal/thin_surfaces/`.
 
 use super::supersampled::PixelCentre;
 

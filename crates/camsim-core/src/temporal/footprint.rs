@@ -142,7 +142,7 @@ fn spread(side: DVec2, taps: u32) -> DVec2 {
 ///
 /// Each tap reads one cell at one instant, so cell and instant must be uncorrelated: in plain row order, a
 /// path across the rows would appear longer or shorter than it is. These orders were found by search
-/// (scripts/order_of_reads.py). They minimise the error at borders of any direction for paths of 0.8 to 8
+/// (scripts/gather_order.py). They minimise the error at borders of any direction for paths of 0.8 to 8
 /// ideal pixels, and their mean stays near the pixel's centre wherever the sequence stops.
 const TAP_ORDERS: [([u32; 2], u64); 6] = [
     ([4, 1], 0x1302),

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Second difference of inverse depth, relative to the largest of the three, from which a depth is checked by
 /// a ray. Unchecked depths err by at most a quarter of it.
-const BEND: f32 = 1e-3;
+const BEND: f32 = 4e-4;
 /// Relative change of inverse depth by a ray from which the neighbours of the pixel are checked too.
 const CHANGE: f32 = 5e-4;
 

@@ -1,5 +1,5 @@
 //! Textures with their mip levels, and filtered reads of them. Twin of `shaders/ideal/surface.wgsl`,
-//! `shaders/ideal/reads` and `shaders/ideal/picture`.
+//! `shaders/ideal/prefilter` and `shaders/ideal/texture`.
 
 use std::sync::Arc;
 

@@ -33,7 +33,7 @@ use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
 const FOG_AT_VISIBILITY: f64 = 3.912;
 /// Share of the light from behind blended surfaces below which nothing is seen of it.
 const HIDDEN: f32 = 1e-7;
-/// Samples this far from a mark are read for the border's line, pixels.
+/// Distance from an edge pixel at which samples are read for an edge line, pixels.
 const READ_PX: usize = 5;
 /// Samples of a pixel.
 const SAMPLES: usize = SAMPLE_POSITIONS.len();
@@ -81,8 +81,8 @@ impl CastScene {
         let frame = FrameCaster::new(self, plan, key, 1);
         let size_px = plan.ideal.size_px;
         let (mut color_rgba, inverse_depth) = match plan.samples_a_pixel {
-            0 | 1 => frame.middles(size_px),
-            _ => frame.means_of_samples(size_px),
+            0 | 1 => frame.centres(size_px),
+            _ => frame.sample_means(size_px),
         };
         if plan.preset == Preset::Paper {
             color_rgba.par_iter_mut().for_each(|value| *value = stored(*value));
@@ -161,8 +161,8 @@ impl<'a> FrameCaster<'a> {
         Self { trees: &cast.trees, shader }
     }
 
-    /// Linear R G B A and inverse depth at the middles of all pixels.
-    fn middles(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
+    /// Linear R G B A and inverse depth at the centres of all pixels.
+    fn centres(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
         let (width, height) = (width as usize, height as usize);
         let mut color = vec![[0.0; 4]; width * height];
         let mut depth = vec![0.0; width * height];
@@ -179,8 +179,8 @@ impl<'a> FrameCaster<'a> {
         (color.into_flattened(), depth)
     }
 
-    /// Linear R G B A of all pixels as means over their samples, and inverse depth at their middles.
-    fn means_of_samples(&self, size_px: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
+    /// Linear R G B A of all pixels as means over their samples, and inverse depth at their centres.
+    fn sample_means(&self, size_px: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
         let [width, height] = size_px.map(|side| side as usize);
         let mut color = vec![[0.0; 4]; width * height];
         let mut samples = vec![[0.0; SAMPLES]; width * height];
@@ -195,7 +195,7 @@ impl<'a> FrameCaster<'a> {
                 }
             },
         );
-        (color.into_flattened(), middle_depths(size_px, &samples))
+        (color.into_flattened(), centre_depths(size_px, &samples))
     }
 
     /// Inverse depths and colours of the samples of all pixels.
@@ -330,11 +330,12 @@ impl<'a> FrameCaster<'a> {
     }
 }
 
-/// Inverse depths at the middles of pixels from those of their samples. Twin of `shaders/ideal/samples.wgsl`.
-fn middle_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
+/// Resolves the inverse depths of samples to those of pixel centres. Twin of
+/// `shaders/ideal/resolve_depth.wgsl`.
+fn centre_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
     let [width, height] = size_px.map(|side| side as usize);
     let first = |x: usize, y: usize| samples[y * width + x][0];
-    // The smaller one of the changes on both sides: the other one may go over a border.
+    // The smaller of the differences to both neighbours, since the other may cross a border.
     let slope = |before: f32, here: f32, after: f32| {
         let (left, right) = (here - before, after - here);
         if left.abs() < right.abs() { left } else { right }
@@ -349,7 +350,7 @@ fn middle_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
     (0..width * height).into_par_iter().map(depth).collect()
 }
 
-/// Pixels within reach of the marks that the depths of pixels' middles make.
+/// Pixels near the edge pixels that the depths at pixel centres give.
 fn near_marks(size_px: [u32; 2], inverse_depth: &[f32]) -> Vec<bool> {
     let [width, height] = size_px.map(|side| side as usize);
     let middle = |[x, y]: [i64; 2]| f64::from(inverse_depth[y as usize * width + x as usize]);

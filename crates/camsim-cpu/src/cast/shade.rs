@@ -15,7 +15,7 @@ use super::{
     trace::{SceneRay, Triangle, terrain_position},
 };
 
-/// Alpha below which the colour of a blended surface cannot be told.
+/// Alpha below which the colour of a blended surface is undefined.
 const LEAST_ALPHA: f32 = 1e-6;
 
 /// A key camera, by pixels of its ideal frame or by finer ones.

@@ -1,4 +1,4 @@
-//! Depth and coordinates of pixels beside their colour. Twin of `shaders/reverse/edges/seen.wgsl`.
+//! Depth and coordinates of pixels beside their colour. Twin of `shaders/reverse/edges/truth.wgsl`.
 
 use glam::{DVec2, DVec3};
 

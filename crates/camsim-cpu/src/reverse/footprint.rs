@@ -1,74 +1,80 @@
-//! Area of a pixel in the ideal frame and what reads it: twin of shaders/reverse/gather/footprint.wgsl and
-//! its taps.
+//! Footprint of an output pixel in the ideal frame, and its taps: twin of
+//! shaders/reverse/gather/footprint.wgsl and its taps.
 
 use camsim_core::temporal::{MAX_AREA_SIDE_PX, tap_offsets};
 
-use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole, within};
+use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, clamp_to, fast_max, fast_min, per_lane, to_index};
 use camsim_core::temporal::TapStage;
 
-use camsim_plan::placement::MOST_VECTOR_TAPS as MOST_TAPS;
+use camsim_plan::placement::MOST_VECTOR_TAPS as MAX_GRID_TAPS;
 /// As in camsim_core::temporal::footprint.
 const NARROW_AREA_PX: f32 = 1.000_05;
-/// A bilinear read has itself the variance of a pixel this wide.
+/// Width of a box with the variance of one bilinear tap, ideal pixels.
 const WIDEST_SPLINE_PX: f32 = 1.732_050_8;
 
-/// Where the reads of every grid lie, as shares of its sides, in their order.
+/// Offsets of the taps of every grid, as shares of its sides, in the order in which they are read.
 #[derive(Debug)]
-pub(super) struct Cells {
-    /// Of all grids, one after the other.
-    shares: Vec<[f32; 2]>,
-    /// Where those of a grid begin.
-    begins: [u32; (MOST_TAPS * MOST_TAPS) as usize],
+pub(super) struct GridTaps {
+    /// Offsets of all grids, one after the other.
+    offsets: Vec<[f32; 2]>,
+    /// Index of each grid's first offset.
+    first_offsets: [u32; (MAX_GRID_TAPS * MAX_GRID_TAPS) as usize],
 }
 
-impl Cells {
+impl GridTaps {
     pub fn new() -> Self {
-        let mut cells = Self { shares: Vec::new(), begins: [0; (MOST_TAPS * MOST_TAPS) as usize] };
-        for (grid, begin) in (0..).zip(&mut cells.begins) {
-            *begin = cells.shares.len() as u32;
-            cells.shares.extend(tap_offsets([grid % MOST_TAPS + 1, grid / MOST_TAPS + 1]));
+        let mut grid_taps =
+            Self { offsets: Vec::new(), first_offsets: [0; (MAX_GRID_TAPS * MAX_GRID_TAPS) as usize] };
+        for (grid, begin) in (0..).zip(&mut grid_taps.first_offsets) {
+            *begin = grid_taps.offsets.len() as u32;
+            grid_taps.offsets.extend(tap_offsets([grid % MAX_GRID_TAPS + 1, grid / MAX_GRID_TAPS + 1]));
         }
-        cells
+        grid_taps
     }
 }
 
-/// What reads each of some pixels.
+/// Footprints of a block of pixels.
 pub(super) struct Footprint<'a> {
-    /// Grids of reads, if there are any.
+    /// Grids of bilinear taps, if the stage has any.
     grid: Option<Grid<'a>>,
-    /// How soft the spline is that reads narrow pixels, if one does.
+    /// Softness of the spline for narrow pixels, if the stage has one.
     pub softness: Option<Lanes2>,
-    /// Sides of the areas that are read of wide ones, if they are; 1 of narrow ones.
+    /// Sides of the rectangles for wide pixels, if the stage averages areas; 1 for narrow pixels.
     pub area: Option<Lanes2>,
 }
 
 struct Grid<'a> {
     dx: Lanes2,
     dy: Lanes2,
-    shares: &'a [[f32; 2]],
-    /// Where a pixel's shares begin, and how many there are.
+    offsets: &'a [[f32; 2]],
+    /// Index of the first offset of each pixel's grid.
     begin: [u32; LANES],
     count: Lanes,
-    /// Whether that is the same for all.
+    /// Whether all pixels have the same grid.
     is_common: bool,
 }
 
 impl<'a> Footprint<'a> {
-    /// For pixels with these sides, ideal pixels, up to so many reads along each.
+    /// Footprints of pixels with these sides, ideal pixels, with up to `max_taps` taps along each side.
     #[inline(always)]
-    pub fn new(cells: &'a Cells, tap: TapStage, sides: impl FnOnce() -> [Lanes2; 2], most: u32) -> Self {
+    pub fn new(
+        grid_taps: &'a GridTaps,
+        tap: TapStage,
+        sides: impl FnOnce() -> [Lanes2; 2],
+        max_taps: u32,
+    ) -> Self {
         if tap == TapStage::Bilinear {
             return Self { grid: None, softness: None, area: None };
         }
         let sides = sides();
-        // Written out: what `then` calls may be compiled without the vectors that this is.
+        // No `then` here: its closure may be compiled without the enabled vector instructions.
         let softness = if matches!(tap, TapStage::Spline | TapStage::Area | TapStage::SplineOrGrid { .. }) {
             Some(softness(&sides))
         } else {
             None
         };
         let grid = if matches!(tap, TapStage::Grid { .. } | TapStage::SplineOrGrid { .. }) {
-            Some(Grid::new(cells, &sides, most))
+            Some(Grid::new(grid_taps, &sides, max_taps))
         } else {
             None
         };
@@ -76,129 +82,145 @@ impl<'a> Footprint<'a> {
         Self { grid, softness, area }
     }
 
-    /// Whether something else than the spline reads a pixel.
+    /// Whether the pixel is too wide for the spline.
     #[inline(always)]
     pub fn is_wide(&self, i: usize) -> bool {
         self.area.as_ref().map_or_else(
-            || self.reads(i) > 1.0,
+            || self.tap_count(i) > 1.0,
             |sides| (sides.x[i] > NARROW_AREA_PX) | (sides.y[i] > NARROW_AREA_PX),
         )
     }
 
-    /// Reads of a pixel that see all of it.
+    /// Number of taps that cover a pixel.
     #[inline(always)]
-    pub fn reads(&self, i: usize) -> f32 {
+    pub fn tap_count(&self, i: usize) -> f32 {
         self.grid.as_ref().map_or(1.0, |grid| grid.count[i])
     }
 
-    /// Where read number `tap` (cyclic) of each pixel lies.
+    /// Position of tap `tap` (cyclic) of each pixel.
     #[inline(always)]
-    pub fn moved(&self, at_px: &Lanes2, tap: &Lanes) -> Lanes2 {
-        let Some(grid) = &self.grid else { return *at_px };
-        let Lanes2 { x: across, y: down } = grid.shares_of(tap);
+    pub fn tap_position_px(&self, position_px: &Lanes2, tap: &Lanes) -> Lanes2 {
+        let Some(grid) = &self.grid else { return *position_px };
+        let Lanes2 { x: across, y: down } = grid.tap_offsets_at(tap);
         let Grid { dx, dy, .. } = grid;
         Lanes2 {
-            x: each(|i| at_px.x[i] + dx.x[i] * across[i] + dy.x[i] * down[i]),
-            y: each(|i| at_px.y[i] + dx.y[i] * across[i] + dy.y[i] * down[i]),
+            x: per_lane(|i| position_px.x[i] + dx.x[i] * across[i] + dy.x[i] * down[i]),
+            y: per_lane(|i| position_px.y[i] + dx.y[i] * across[i] + dy.y[i] * down[i]),
         }
     }
 }
 
 impl<'a> Grid<'a> {
     #[inline(always)]
-    fn new(cells: &'a Cells, sides: &[Lanes2; 2], most: u32) -> Self {
-        let most = most.clamp(1, MOST_TAPS) as f32;
-        let (dx, across) = spread(&sides[0], most);
-        let (dy, down) = spread(&sides[1], most);
+    fn new(grid_taps: &'a GridTaps, sides: &[Lanes2; 2], max_taps: u32) -> Self {
+        let max_taps = max_taps.clamp(1, MAX_GRID_TAPS) as f32;
+        let (dx, across) = grid_extent(&sides[0], max_taps);
+        let (dy, down) = grid_extent(&sides[1], max_taps);
         let mut begin = [0; LANES];
         for i in 0..LANES {
-            begin[i] = cells.begins[(whole(down[i]) * MOST_TAPS + whole(across[i]) - MOST_TAPS - 1) as usize
-                % cells.begins.len()];
+            begin[i] = grid_taps.first_offsets[(to_index(down[i]) * MAX_GRID_TAPS + to_index(across[i])
+                - MAX_GRID_TAPS
+                - 1) as usize
+                % grid_taps.first_offsets.len()];
         }
         let is_common = begin.iter().all(|&of| of == begin[0]);
-        Self { dx, dy, shares: &cells.shares, begin, count: each(|i| across[i] * down[i]), is_common }
+        Self {
+            dx,
+            dy,
+            offsets: &grid_taps.offsets,
+            begin,
+            count: per_lane(|i| across[i] * down[i]),
+            is_common,
+        }
     }
 
-    /// Shares of the sides at which read number `tap` (cyclic) of each pixel lies.
+    /// Offset of tap `tap` (cyclic) of each pixel, as shares of the sides.
     #[inline(always)]
-    fn shares_of(&self, tap: &Lanes) -> Lanes2 {
-        // Half a read further the quotient is never so near a whole number that rounding could pass it.
-        let turn = each(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
-        let share = |i: usize| {
-            self.shares.get((self.begin[i] + whole(turn[i])) as usize).copied().unwrap_or_default()
+    fn tap_offsets_at(&self, tap: &Lanes) -> Lanes2 {
+        // With half a tap added, rounding cannot move the quotient past a whole number.
+        let tap_in_grid = per_lane(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
+        let offset_at = |i: usize| {
+            self.offsets.get((self.begin[i] + to_index(tap_in_grid[i])) as usize).copied().unwrap_or_default()
         };
-        if self.is_common && turn.iter().all(|&of| of == turn[0]) {
-            let [across, down] = share(0);
+        if self.is_common && tap_in_grid.iter().all(|&of| of == tap_in_grid[0]) {
+            let [across, down] = offset_at(0);
             return Lanes2 { x: [across; LANES], y: [down; LANES] };
         }
-        let mut shares = Lanes2::ZERO;
+        let mut offsets = Lanes2::ZERO;
         for i in 0..LANES {
-            [shares.x[i], shares.y[i]] = share(i);
+            [offsets.x[i], offsets.y[i]] = offset_at(i);
         }
-        shares
+        offsets
     }
 }
 
-/// Sides of the grids of reads, and how many reads there are along them.
+/// Sides of the grids, and number of taps along them.
 #[inline(always)]
-fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
-    let stretch = side.length();
-    let taps = each(|i| {
-        if stretch[i] > WIDEST_SPLINE_PX { lower(higher((stretch[i] - 0.1).ceil(), 1.0), most) } else { 1.0 }
+fn grid_extent(side: &Lanes2, max_taps: f32) -> (Lanes2, Lanes) {
+    let length_px = side.length();
+    let taps = per_lane(|i| {
+        if length_px[i] > WIDEST_SPLINE_PX {
+            fast_min(fast_max((length_px[i] - 0.1).ceil(), 1.0), max_taps)
+        } else {
+            1.0
+        }
     });
-    // What the reads have themselves the grid need not have.
-    let factor = each(|i| {
-        let wide = (higher(stretch[i] * stretch[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i]))).sqrt()
-            / stretch[i];
+    // The taps have variance of their own, which the grid need not have.
+    let factor = per_lane(|i| {
+        let wide = (fast_max(length_px[i] * length_px[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i])))
+            .sqrt()
+            / length_px[i];
         if taps[i] > 1.0 { wide } else { 0.0 }
     });
-    (Lanes2 { x: each(|i| side.x[i] * factor[i]), y: each(|i| side.y[i] * factor[i]) }, taps)
+    (Lanes2 { x: per_lane(|i| side.x[i] * factor[i]), y: per_lane(|i| side.y[i] * factor[i]) }, taps)
 }
 
-/// A pixel's variance beyond the ideal pixel's own, as the spline has it.
+/// Softness of the spline with the variance of a pixel beyond that of an ideal pixel.
 #[inline(always)]
 fn softness(sides: &[Lanes2; 2]) -> Lanes2 {
-    let along =
-        |side: &Lanes2| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0));
+    let along = |side: &Lanes2| {
+        per_lane(|i| clamp_to(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0))
+    };
     Lanes2 { x: along(&sides[0]), y: along(&sides[1]) }
 }
 
-/// Sides of the area of each pixel along the frame's axes: its variance, but for an ideal pixel's own.
+/// Sides of the axis-aligned rectangle with the variance of each pixel, less that of an ideal pixel.
 #[inline(always)]
 fn area(sides: &[Lanes2; 2]) -> Lanes2 {
     const WIDEST: f32 = MAX_AREA_SIDE_PX as f32;
     let [across, down] = sides;
     let along = |of: &Lanes, other: &Lanes| {
-        each(|i| {
-            lower(higher(of[i].mul_add(of[i], other[i].mul_add(other[i], -1.0)), 1.0), WIDEST * WIDEST).sqrt()
+        per_lane(|i| {
+            fast_min(fast_max(of[i].mul_add(of[i], other[i].mul_add(other[i], -1.0)), 1.0), WIDEST * WIDEST)
+                .sqrt()
         })
     };
     Lanes2 { x: along(&across.x, &down.x), y: along(&across.y, &down.y) }
 }
 
-/// A cubic spline over the texels around places: four by four without the corners.
-pub(super) struct Spline {
-    /// Column and row of the second texel each.
+/// Cubic spline over 4x4 texels without the corners.
+pub(super) struct BlockSpline {
+    /// Column and row of the second texel of each axis.
     pub base: Lanes2,
-    /// Weights of columns, and of rows; without the corners the products are 1 together.
+    /// Weights of the columns.
     pub columns: [Lanes; 4],
     pub rows: [Lanes; 4],
 }
 
-/// A spline as five bilinear reads, axis by axis: the one between, those above and below it, those left and
-/// right of it.
+/// The spline as five bilinear reads, by column and row of the read: centre, above, below, left, right.
 pub(super) const SPLINE_READS: [[usize; 2]; 5] = [[1, 1], [1, 0], [1, 2], [0, 1], [2, 1]];
 
-impl Spline {
-    /// Around places. Softness 0 is Catmull-Rom's, 1 the B-spline.
+impl BlockSpline {
+    /// Spline at positions. Softness 0 is Catmull-Rom, 1 the cubic B-spline.
     #[inline(always)]
-    pub fn around(at_px: &Lanes2, softness: &Lanes2) -> Self {
-        let base = Lanes2 { x: each(|i| at_px.x[i].floor()), y: each(|i| at_px.y[i].floor()) };
-        let columns = weights(&at_px.x, &base.x, &softness.x);
-        let mut rows = weights(&at_px.y, &base.y, &softness.y);
+    pub fn texel_neighbourhoods(position_px: &Lanes2, softness: &Lanes2) -> Self {
+        let base =
+            Lanes2 { x: per_lane(|i| position_px.x[i].floor()), y: per_lane(|i| position_px.y[i].floor()) };
+        let columns = weights(&position_px.x, &base.x, &softness.x);
+        let mut rows = weights(&position_px.y, &base.y, &softness.y);
         let ([x0, x1, x2, x3], [y0, y1, y2, y3]) = (&columns, &rows);
-        // All together: nothing is lost with the corners.
-        let part = each(|i| {
+        // Normalises the weights: the corners are missing.
+        let part = per_lane(|i| {
             let (x, y) = (x1[i] + x2[i], y1[i] + y2[i]);
             1.0 / (x * y + x * (y0[i] + y3[i]) + y * (x0[i] + x3[i]))
         });
@@ -210,21 +232,21 @@ impl Spline {
         Self { base, columns, rows }
     }
 
-    /// Place of one of its [reads](SPLINE_READS) and its weight.
+    /// Position and weight of one of the [reads](SPLINE_READS).
     #[inline(always)]
     pub fn read(&self, [x, y]: [usize; 2]) -> (Lanes2, Lanes) {
         let ([x_px, x], [y_px, y]) =
             (of_read(&self.base.x, &self.columns, x), of_read(&self.base.y, &self.rows, y));
-        (Lanes2 { x: x_px, y: y_px }, each(|i| x[i] * y[i]))
+        (Lanes2 { x: x_px, y: y_px }, per_lane(|i| x[i] * y[i]))
     }
 }
 
-/// Weights along an axis of the texels before, at, and after `base`.
+/// Weights along an axis of the texel before `base`, at `base`, and of the two after.
 #[inline(always)]
-fn weights(at_px: &Lanes, base: &Lanes, softness: &Lanes) -> [Lanes; 4] {
+fn weights(position_px: &Lanes, base: &Lanes, softness: &Lanes) -> [Lanes; 4] {
     let mut weights = [ZERO; 4];
     for i in 0..LANES {
-        let f = at_px[i] - base[i];
+        let f = position_px[i] - base[i];
         let g = 1.0 - f;
         let mix = |sharp: f32, soft: f32| sharp + softness[i] * (soft - sharp);
         weights[0][i] = mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0);
@@ -235,20 +257,20 @@ fn weights(at_px: &Lanes, base: &Lanes, softness: &Lanes) -> [Lanes; 4] {
     weights
 }
 
-/// Of one axis: place and weight of the read before, of the one between and of the one after.
+/// Position and weight along one axis of the read before, at, and after.
 #[inline(always)]
 fn of_read(base: &Lanes, [before, first, second, after]: &[Lanes; 4], which: usize) -> [Lanes; 2] {
     match which {
-        0 => [each(|i| base[i] - 1.0), *before],
-        1 => [each(|i| base[i] + second[i] / (first[i] + second[i])), each(|i| first[i] + second[i])],
-        _ => [each(|i| base[i] + 2.0), *after],
+        0 => [per_lane(|i| base[i] - 1.0), *before],
+        1 => [per_lane(|i| base[i] + second[i] / (first[i] + second[i])), per_lane(|i| first[i] + second[i])],
+        _ => [per_lane(|i| base[i] + 2.0), *after],
     }
 }
 
-/// A number for each of both axes.
+/// Both axes times a factor each.
 #[inline(always)]
 pub(super) fn scaled(lanes: &Lanes2, [x, y]: [f32; 2]) -> Lanes2 {
-    let times = |lanes: &Lanes, by: f32| each(|i| lanes[i] * by);
+    let times = |lanes: &Lanes, by: f32| per_lane(|i| lanes[i] * by);
     Lanes2 { x: times(&lanes.x, x), y: times(&lanes.y, y) }
 }
 
@@ -257,23 +279,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_of_every_grid_come_in_their_order_over_and_over() {
-        let cells = Cells::new();
-        // As many reads along a side as it has ideal pixels: lanes have the same grid, or each its own.
-        let side = |length: &dyn Fn(usize) -> u32| each(|i| length(i) as f32 + 0.05);
-        for grid in 0..MOST_TAPS * MOST_TAPS {
+    fn taps_of_every_grid_follow_their_order_cyclically() {
+        let grid_taps = GridTaps::new();
+        // The number of taps follows from the side in ideal pixels; lanes share a grid, or have one each.
+        let side = |length: &dyn Fn(usize) -> u32| per_lane(|i| length(i) as f32 + 0.05);
+        for grid in 0..MAX_GRID_TAPS * MAX_GRID_TAPS {
             for own in [0, 1] {
                 let taps = |i: usize| {
-                    let grid = (grid + own * i as u32) % (MOST_TAPS * MOST_TAPS);
-                    [grid % MOST_TAPS + 1, grid / MOST_TAPS + 1]
+                    let grid = (grid + own * i as u32) % (MAX_GRID_TAPS * MAX_GRID_TAPS);
+                    [grid % MAX_GRID_TAPS + 1, grid / MAX_GRID_TAPS + 1]
                 };
                 let across = Lanes2 { x: side(&|i| taps(i)[0]), y: [0.0; LANES] };
                 let down = Lanes2 { x: [0.0; LANES], y: side(&|i| taps(i)[1]) };
-                let of = Grid::new(&cells, &[across, down], MOST_TAPS);
+                let of = Grid::new(&grid_taps, &[across, down], MAX_GRID_TAPS);
                 assert_eq!(of.is_common, own == 0);
                 let orders = [0, 1, 2, 3].map(|i| tap_offsets(taps(i)));
                 for tap in 0..1000 {
-                    let found = of.shares_of(&[tap as f32; LANES]);
+                    let found = of.tap_offsets_at(&[tap as f32; LANES]);
                     for (i, order) in orders.iter().enumerate() {
                         assert_eq!(of.count[i], order.len() as f32);
                         assert_eq!([found.x[i], found.y[i]], order[tap % order.len()], "{:?} {tap}", taps(i));
@@ -284,31 +306,32 @@ mod tests {
     }
 
     #[test]
-    fn areas_and_splines_are_their_twins() {
+    fn areas_and_splines_equal_their_twins() {
         use camsim_core::temporal::{Footprint as Twin, Kernel, TapStage};
         use glam::DVec2;
-        let cells = Cells::new();
+        let grid_taps = GridTaps::new();
         let (mut splines, mut areas) = (0, 0);
         for block in 0..100 {
-            // Narrow and wide ones in a block, on both sides of the width that tells them apart, turned and
-            // mirrored.
+            // Narrow and wide pixels in a block, on both sides of the threshold, rotated and mirrored.
             let width = |i: usize| {
                 0.2 + 1.25
                     * (((block * LANES + i) as f32 * 0.618_034).fract()
                         * if i.is_multiple_of(3) { 5.0 } else { 1.3 })
             };
-            let turn = |i: usize| (block * LANES + i) as f32 * 0.754_878;
-            let across =
-                Lanes2 { x: each(|i| width(i) * turn(i).cos()), y: each(|i| width(i) * turn(i).sin()) };
-            let down = Lanes2 {
-                x: each(|i| 0.9 * width(i) * turn(i).sin()),
-                y: each(|i| -0.9 * width(i) * turn(i).cos()),
+            let tap_in_grid = |i: usize| (block * LANES + i) as f32 * 0.754_878;
+            let across = Lanes2 {
+                x: per_lane(|i| width(i) * tap_in_grid(i).cos()),
+                y: per_lane(|i| width(i) * tap_in_grid(i).sin()),
             };
-            let found = Footprint::new(&cells, TapStage::Area, || [across, down], 1);
+            let down = Lanes2 {
+                x: per_lane(|i| 0.9 * width(i) * tap_in_grid(i).sin()),
+                y: per_lane(|i| -0.9 * width(i) * tap_in_grid(i).cos()),
+            };
+            let found = Footprint::new(&grid_taps, TapStage::Area, || [across, down], 1);
             let [sides, softness] = [found.area, found.softness].map(|of| of.expect("both are known"));
             for i in 0..LANES {
                 let at = |of: &Lanes2| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i]));
-                assert_eq!(found.reads(i), 1.0);
+                assert_eq!(found.tap_count(i), 1.0);
                 match Twin::new(at(&across), at(&down), TapStage::Area).kernel {
                     Kernel::Area(exact) => {
                         areas += 1;

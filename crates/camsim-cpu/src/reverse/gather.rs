@@ -1,46 +1,46 @@
-//! What a pixel collects over its exposure: twin of shaders/reverse/gather.
+//! Gather over the exposure: twin of shaders/reverse/gather.
 
 use camsim_plan::PathStage;
 
 use super::{
-    Reads,
-    footprint::{Footprint, Spline},
-    ideal::Halves,
-    source::{Nodes, Pose, Source},
+    Stages,
+    footprint::{BlockSpline, Footprint},
+    ideal_texels::HalfSums,
+    source::{BlockSources, LinePose, Nodes},
 };
-use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, each, whether};
+use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, indicator, per_lane};
 use crate::simd::vectors::Vectors;
 
-/// What pixels collect.
-pub(super) struct Gathered {
-    /// R G B A, the mean over the exposure.
+/// Result of the gather for a block.
+pub(super) struct BlockGather {
+    /// R G B A, mean over the exposure.
     pub color: [[f32; 4]; LANES],
-    /// Whether all nodes are inside: 1, else 0.
+    /// 1 if all nodes are inside the ideal frame, else 0.
     pub inside: Lanes,
-    /// Where they look at the phase of the exposure that is asked for, ideal pixels.
+    /// Sources at the exposure phase that is reported, ideal pixels.
     pub at_phase_px: Lanes2,
 }
 
-/// A polynomial of time through up to five nodes, by Newton's forward differences.
-struct Curve {
+/// Polynomial of time through up to five nodes, by Newton's forward differences.
+struct BlockCurve {
     path: PathStage,
     begin_px: Lanes2,
     differences: [Lanes2; 4],
     length_px: Lanes,
     inside: Lanes,
-    end: Source,
+    end: BlockSources,
 }
 
-impl Curve {
-    /// From a node on, so many steps after the first.
+impl BlockCurve {
+    /// Polynomial from a node, `step` steps after the first.
     #[inline(always)]
     fn new(
         path: PathStage,
         nodes: &mut Nodes<'_>,
-        begin: &Source,
+        begin: &BlockSources,
         step: usize,
         stride: usize,
-        poses: &[Pose],
+        poses: &[LinePose],
     ) -> Self {
         let mut differences = [Lanes2::ZERO; 4];
         let mut length_px = ZERO;
@@ -50,26 +50,26 @@ impl Curve {
         for (k, difference) in differences.iter_mut().enumerate().take(steps) {
             let node = stride * (step + k + 1);
             let next = nodes.next(node, &poses[node]);
-            *difference = next.at_px.minus(&end.at_px);
+            *difference = next.position_px.minus(&end.position_px);
             let length = difference.length();
-            length_px = each(|i| length_px[i] + length[i]);
-            inside = each(|i| inside[i] * next.inside[i]);
+            length_px = per_lane(|i| length_px[i] + length[i]);
+            inside = per_lane(|i| inside[i] * next.inside[i]);
             end = next;
         }
-        // First differences of neighbours, then those of them, and so on.
+        // First differences of neighbours, then higher ones.
         for order in 1..steps {
             for k in (order..steps).rev() {
                 differences[k] = differences[k].minus(&differences[k - 1]);
             }
         }
-        Self { path, begin_px: begin.at_px, differences, length_px, inside, end }
+        Self { path, begin_px: begin.position_px, differences, length_px, inside, end }
     }
 
-    /// A place that stays.
-    fn point(source: Source) -> Self {
+    /// A constant position.
+    fn point(source: BlockSources) -> Self {
         Self {
             path: PathStage::Straight,
-            begin_px: source.at_px,
+            begin_px: source.position_px,
             differences: [Lanes2::ZERO; 4],
             length_px: ZERO,
             inside: source.inside,
@@ -77,7 +77,7 @@ impl Curve {
         }
     }
 
-    /// Places after so many steps.
+    /// Positions after a number of steps.
     #[inline(always)]
     fn along(&self, steps: &Lanes) -> Lanes2 {
         let (begin, [d1, d2, d3, d4]) = (&self.begin_px, &self.differences);
@@ -88,15 +88,15 @@ impl Curve {
     }
 }
 
-/// One axis of a polynomial by its differences.
+/// One axis of the polynomial.
 #[inline(always)]
 fn along(path: PathStage, steps: &Lanes, begin: &Lanes, [d1, d2, d3, d4]: [&Lanes; 4]) -> Lanes {
     match path {
-        PathStage::Straight => each(|i| steps[i].mul_add(d1[i], begin[i])),
+        PathStage::Straight => per_lane(|i| steps[i].mul_add(d1[i], begin[i])),
         PathStage::Parabola => {
-            each(|i| steps[i].mul_add((0.5 * (steps[i] - 1.0)).mul_add(d2[i], d1[i]), begin[i]))
+            per_lane(|i| steps[i].mul_add((0.5 * (steps[i] - 1.0)).mul_add(d2[i], d1[i]), begin[i]))
         }
-        PathStage::Quartic => each(|i| {
+        PathStage::Quartic => per_lane(|i| {
             let third = (0.25 * (steps[i] - 3.0)).mul_add(d4[i], d3[i]);
             let second = ((steps[i] - 2.0) * (1.0 / 3.0)).mul_add(third, d2[i]);
             steps[i].mul_add((0.5 * (steps[i] - 1.0)).mul_add(second, d1[i]), begin[i])
@@ -104,137 +104,151 @@ fn along(path: PathStage, steps: &Lanes, begin: &Lanes, [d1, d2, d3, d4]: [&Lane
     }
 }
 
-impl Reads<'_> {
-    /// Gathers pixels of a line with these poses: at the nodes, then at mid-exposure. Colours only of those
-    /// that are `wanted` (1, else 0).
+impl Stages<'_> {
+    /// Gathers pixels of a line. `poses` are at the nodes, then at mid-exposure. Colours are gathered only
+    /// for pixels with `is_wanted` 1 (else 0).
     #[inline(always)]
     pub(super) fn gather(
         &self,
         vectors: impl Vectors,
         uv: &Lanes2,
-        area: &Footprint<'_>,
-        poses: &[Pose],
-        mid: &Pose,
-        wanted: &Lanes,
-    ) -> Gathered {
+        footprint: &Footprint<'_>,
+        poses: &[LinePose],
+        mid: &LinePose,
+        is_wanted: &Lanes,
+    ) -> BlockGather {
         let mut sum = [[0.0; 4]; LANES];
         let Some(blur) = self.blur else {
-            let curve = Curve::point(self.solve(uv, mid));
-            let count = each(|i| area.reads(i) * wanted[i] * curve.inside[i]);
-            self.add_mean(vectors, &curve, &count, area, &ZERO, &mut sum);
-            return Gathered { color: sum, inside: curve.inside, at_phase_px: curve.begin_px };
+            let curve = BlockCurve::point(self.solve(uv, mid));
+            let count = per_lane(|i| footprint.tap_count(i) * is_wanted[i] * curve.inside[i]);
+            self.add_mean(vectors, &curve, &count, footprint, &ZERO, &mut sum);
+            return BlockGather { color: sum, inside: curve.inside, at_phase_px: curve.begin_px };
         };
-        let stretches = blur.stretches();
-        let per_stretch = 1.0 / stretches as f32;
-        let at_least = each(|i| (area.reads(i) * per_stretch).ceil());
+        let segments = blur.stretches();
+        let per_segment = 1.0 / segments as f32;
+        let min_samples = per_lane(|i| (footprint.tap_count(i) * per_segment).ceil());
         let mut nodes = Nodes::new(self, uv, poses, blur.depths);
         let mut source = nodes.next(0, &poses[0]);
         let mut inside = source.inside;
-        let mut taken = ZERO;
+        let mut samples_taken = ZERO;
         let mut at_phase_px = Lanes2::ZERO;
-        let gone = (self.frame.coords_phase + 0.5).clamp(0.0, 1.0) * stretches as f32;
-        for stretch in 0..stretches {
+        let segment_position = (self.frame.coords_phase + 0.5).clamp(0.0, 1.0) * segments as f32;
+        for segment in 0..segments {
             let steps = blur.path.steps() as usize;
-            let curve = Curve::new(
+            let curve = BlockCurve::new(
                 blur.path,
                 &mut nodes,
                 &source,
-                stretch as usize * steps,
+                segment as usize * steps,
                 blur.stride as usize,
                 poses,
             );
-            inside = each(|i| inside[i] * curve.inside[i]);
-            let samples = self.samples(&curve.length_px, &at_least);
-            let count = each(|i| samples[i] * inside[i] * wanted[i]);
-            self.add_mean(vectors, &curve, &count, area, &taken, &mut sum);
-            taken = each(|i| taken[i] + samples[i]);
+            inside = per_lane(|i| inside[i] * curve.inside[i]);
+            let samples = self.samples(&curve.length_px, &min_samples);
+            let count = per_lane(|i| samples[i] * inside[i] * is_wanted[i]);
+            self.add_mean(vectors, &curve, &count, footprint, &samples_taken, &mut sum);
+            samples_taken = per_lane(|i| samples_taken[i] + samples[i]);
             source = curve.end;
-            if self.frame_of_truth.is_some() && stretch == (gone as u32).min(stretches - 1) {
-                at_phase_px = curve.along(&[(gone - stretch as f32) * steps as f32; LANES]);
+            if self.truth_frame.is_some() && segment == (segment_position as u32).min(segments - 1) {
+                at_phase_px = curve.along(&[(segment_position - segment as f32) * steps as f32; LANES]);
             }
         }
-        if self.frame_of_truth.is_some() && self.frame.coords_phase == 0.0 {
-            at_phase_px = self.solve(uv, mid).at_px;
+        if self.truth_frame.is_some() && self.frame.coords_phase == 0.0 {
+            at_phase_px = self.solve(uv, mid).position_px;
         }
         for part in sum.as_flattened_mut() {
-            *part *= per_stretch;
+            *part *= per_segment;
         }
-        Gathered { color: sum, inside, at_phase_px }
+        BlockGather { color: sum, inside, at_phase_px }
     }
 
-    /// Samples for a path of this length.
+    /// Number of samples for a path of this length.
     #[inline(always)]
-    fn samples(&self, length_px: &Lanes, at_least: &Lanes) -> Lanes {
-        let (per_px, most) = (self.frame.samples_per_px, self.frame.max_samples as f32);
-        each(|i| {
-            let wanted = (per_px * length_px[i]).min(length_px[i] + 16.0).ceil();
-            let capped = if wanted < most { wanted } else { most };
-            if capped > at_least[i] { capped } else { at_least[i] }
+    fn samples(&self, length_px: &Lanes, min_samples: &Lanes) -> Lanes {
+        let (samples_per_px, max_count) = (self.frame.samples_per_px, self.frame.max_samples as f32);
+        per_lane(|i| {
+            let requested = (samples_per_px * length_px[i]).min(length_px[i] + 16.0).ceil();
+            let capped = if requested < max_count { requested } else { max_count };
+            if capped > min_samples[i] { capped } else { min_samples[i] }
         })
     }
 
-    /// Adds the mean of `count` samples along a curve; `taken` were taken before.
+    /// Adds the mean of `count` samples along a curve; `samples_taken` samples precede them.
     #[inline(always)]
     fn add_mean(
         &self,
         vectors: impl Vectors,
-        curve: &Curve,
+        curve: &BlockCurve,
         count: &Lanes,
-        area: &Footprint<'_>,
-        taken: &Lanes,
+        footprint: &Footprint<'_>,
+        samples_taken: &Lanes,
         sum: &mut [[f32; 4]; LANES],
     ) {
         let steps = curve.path.steps() as f32;
-        let share = each(|i| 1.0 / count[i].max(1.0));
-        let most = count.iter().fold(0.0, |most: f32, &count| most.max(count));
-        let mut of_curve = [[0.0; 8]; LANES];
+        let share = per_lane(|i| 1.0 / count[i].max(1.0));
+        let max_count = count.iter().fold(0.0, |max_count: f32, &count| max_count.max(count));
+        let mut curve_sum = [[0.0; 8]; LANES];
         let mut sample = 0.0;
-        while sample < most {
-            let step = each(|i| steps * share[i] * (sample + 0.5));
-            let tap = each(|i| taken[i] + sample);
-            self.add_sample(vectors, &curve.along(&step), area, &tap, |i| count[i] > sample, &mut of_curve);
+        while sample < max_count {
+            let step = per_lane(|i| steps * share[i] * (sample + 0.5));
+            let tap = per_lane(|i| samples_taken[i] + sample);
+            self.add_sample(
+                vectors,
+                &curve.along(&step),
+                footprint,
+                &tap,
+                |i| count[i] > sample,
+                &mut curve_sum,
+            );
             sample += 1.0;
         }
         for i in 0..LANES {
             for k in 0..4 {
-                sum[i][k] += (of_curve[i][k] + of_curve[i][k + 4]) * share[i];
+                sum[i][k] += (curve_sum[i][k] + curve_sum[i][k + 4]) * share[i];
             }
         }
     }
 
-    /// Adds a sample for each pixel that takes one: a read of its grid, its area, or the spline.
+    /// Adds one sample for each pixel that takes one: a tap of its grid, its area, or the spline.
     #[inline(always)]
     fn add_sample(
         &self,
         vectors: impl Vectors,
-        at_px: &Lanes2,
-        area: &Footprint<'_>,
+        position_px: &Lanes2,
+        footprint: &Footprint<'_>,
         tap: &Lanes,
         is_taken: impl Fn(usize) -> bool,
-        sum: &mut [Halves; LANES],
+        sum: &mut [HalfSums; LANES],
     ) {
-        let Some(softness) = &area.softness else {
+        let Some(softness) = &footprint.softness else {
             return self.ideal.add_color(
                 vectors,
                 self.frame,
-                &area.moved(at_px, tap),
+                &footprint.tap_position_px(position_px, tap),
                 is_taken,
                 |_| 1.0,
                 sum,
             );
         };
-        let wide = whether(|i| area.is_wide(i));
+        let wide = indicator(|i| footprint.is_wide(i));
         if wide.contains(&1.0) {
             let is_taken = |i: usize| is_taken(i) && wide[i] > 0.0;
-            match &area.area {
-                Some(sides_px) => self.ideal.add_area(vectors, self.frame, at_px, sides_px, is_taken, sum),
-                None => {
-                    self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum)
+            match &footprint.area {
+                Some(sides_px) => {
+                    self.ideal.add_area(vectors, self.frame, position_px, sides_px, is_taken, sum)
                 }
+                None => self.ideal.add_color(
+                    vectors,
+                    self.frame,
+                    &footprint.tap_position_px(position_px, tap),
+                    is_taken,
+                    |_| 1.0,
+                    sum,
+                ),
             }
         }
         if wide.contains(&0.0) {
-            let spline = Spline::around(at_px, softness);
+            let spline = BlockSpline::texel_neighbourhoods(position_px, softness);
             self.ideal.add_spline(vectors, self.frame, &spline, |i| is_taken(i) && wide[i] == 0.0, sum);
         }
     }

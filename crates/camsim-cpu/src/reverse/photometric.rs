@@ -1,15 +1,15 @@
-//! Vignette, light, noise and saturation: twin of shaders/reverse/photometric.wgsl and
+//! Vignette, brightness, noise and saturation: twin of shaders/reverse/photometric.wgsl and
 //! shaders/common/noise.wgsl.
 
 use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
 
-use crate::simd::lanes::{LANES, Lanes, ZERO, each, within};
+use crate::simd::lanes::{LANES, Lanes, ZERO, clamp_to, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
 
-/// Weights of the luminance.
+/// Luminance weights (Rec. 709).
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Gives pixels of a row, from `x` on, what the sensor makes of their colours.
+/// Photometric stage of pixels of a row, from `x` on.
 #[inline(always)]
 pub(super) fn photometric(
     frame: &FrameUniforms,
@@ -18,12 +18,12 @@ pub(super) fn photometric(
     colors: &[[f32; 4]; LANES],
     weight: &Lanes,
 ) -> [Lanes; 3] {
-    // One by one, here and below: what `map` calls may be compiled without the vectors that this is.
-    let mut values = [each(|i| colors[i][0]), each(|i| colors[i][1]), each(|i| colors[i][2])];
+    // No `map` here and below: its closure may be compiled without the enabled vector instructions.
+    let mut values = [per_lane(|i| colors[i][0]), per_lane(|i| colors[i][1]), per_lane(|i| colors[i][2])];
     let is_mono = frame.mono == 1;
     if is_mono {
         let [r, g, b] = &values;
-        values = [each(|i| r[i] * LUMINANCE[0] + g[i] * LUMINANCE[1] + b[i] * LUMINANCE[2]); 3];
+        values = [per_lane(|i| r[i] * LUMINANCE[0] + g[i] * LUMINANCE[1] + b[i] * LUMINANCE[2]); 3];
     }
     let mut noise = [ZERO; 3];
     if frame.noise_sigma > 0.0 {
@@ -31,12 +31,13 @@ pub(super) fn photometric(
         noise = if is_mono { [normals[0]; 3] } else { normals };
     }
     for (value, noise) in values.iter_mut().zip(&noise) {
-        *value = each(|i| within(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
+        *value =
+            per_lane(|i| clamp_to(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
     }
     values
 }
 
-/// Independent standard normals, for each pixel of a row from `x` on: the first `channels` of three.
+/// Independent standard normals for pixels of a row from `x` on, for the first `channels` of three channels.
 #[inline(always)]
 fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channels: usize) -> [Lanes; 3] {
     let mut bits = [[0_u32; LANES]; 3];
@@ -54,15 +55,15 @@ fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channel
     }
     let mut normals = [ZERO; 3];
     for (normals, bits) in normals.iter_mut().zip(&bits).take(channels) {
-        *normals = of_bits(bits, segments);
+        *normals = normals_from_bits(bits, segments);
     }
     normals
 }
 
-/// As `camsim_core::noise::normal_from_bits`; the octave is the exponent of the bits as a number, the place
-/// in it the fraction.
+/// As `camsim_core::noise::normal_from_bits`. With the tail probability as a float, the octave is its
+/// exponent and the segment part of its mantissa.
 #[inline(always)]
-fn of_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
+fn normals_from_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
     let mut place = [0_u32; LANES];
     let mut t = ZERO;
     for i in 0..LANES {
@@ -77,7 +78,7 @@ fn of_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
     for i in 0..LANES {
         [begin[i], adds[i]] = segments[place[i] as usize];
     }
-    each(|i| {
+    per_lane(|i| {
         let value = begin[i] + t[i] * adds[i];
         f32::from_bits(value.to_bits() ^ (bits[i] & 0x8000_0000))
     })

@@ -1,28 +1,28 @@
-//! Ideal rays of pixels and how they change from pixel to pixel: twin of shaders/reverse/ray.
+//! Ideal rays of output pixels and their derivatives: twin of shaders/reverse/ray.
 
 use camsim_core::camera::{CameraModel, INVALID_UV};
 
 use super::footprint::scaled;
-use crate::large_pages::Large;
-use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, each};
+use crate::large_pages::LargeArray;
+use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
 
-/// Above this a lens map says "no pre-image".
+/// Larger values in a lens map mean that the pixel has no ideal ray.
 const INVALID_ABOVE: f32 = 0.1 * INVALID_UV;
 
 /// A lens map: ideal (u, v) of pixels, row by row.
 #[derive(Debug)]
 pub struct LensMap {
-    /// Ideal rays, or [`INVALID_UV`] twice.
-    pub(crate) uv: Large<[f32; 2]>,
+    /// Ideal (u, v) of each pixel, or [`INVALID_UV`] twice.
+    pub(crate) uv: LargeArray<[f32; 2]>,
 }
 
 impl LensMap {
-    /// Of a camera, by its lens's inverse in f64.
+    /// Lens map of a camera, by its f64 lens inverse.
     #[must_use]
     pub fn new(camera: &CameraModel) -> Self {
         let rays = camera.lens_inverse();
-        let mut uv = Large::zeros(rays.len());
+        let mut uv = LargeArray::zeros(rays.len());
         uv.copy_from_slice(&rays);
         Self { uv }
     }
@@ -33,16 +33,16 @@ impl LensMap {
     }
 }
 
-/// Rays of some pixels.
-pub(super) struct Rays {
+/// Rays of a block of pixels.
+pub(super) struct BlockRays {
     pub uv: Lanes2,
-    /// Whether there are any: 1, else 0.
+    /// 1 for pixels with a ray, else 0.
     pub valid: Lanes,
 }
 
-/// Of a row from `x` on; places beyond its end have none.
+/// Rays of a row from `x` on; lanes beyond the end have none.
 #[inline(always)]
-pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> Rays {
+pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> BlockRays {
     let width = frame.size_px[0];
     let (mut uv, mut valid) = (Lanes2::ZERO, ZERO);
     match map {
@@ -54,7 +54,7 @@ pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32)
                 uv.y[i] = if is_valid { v } else { 0.0 };
                 valid[i] = if is_valid { 1.0 } else { 0.0 };
             };
-            // Most blocks are whole: a loop of a known length is one of vectors.
+            // Most blocks are whole: a loop of known length is vectorised.
             match row.first_chunk::<LANES>() {
                 Some(row) => {
                     for i in 0..LANES {
@@ -66,14 +66,17 @@ pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32)
         }
         None => {
             let ([cx, cy], [fx, fy]) = (frame.principal_px, frame.focal_px);
-            uv = Lanes2 { x: each(|i| ((x + i as u32) as f32 - cx) / fx), y: each(|_| (y as f32 - cy) / fy) };
-            valid = each(|i| if x + (i as u32) < width { 1.0 } else { 0.0 });
+            uv = Lanes2 {
+                x: per_lane(|i| ((x + i as u32) as f32 - cx) / fx),
+                y: per_lane(|_| (y as f32 - cy) / fy),
+            };
+            valid = per_lane(|i| if x + (i as u32) < width { 1.0 } else { 0.0 });
         }
     }
-    Rays { uv, valid }
+    BlockRays { uv, valid }
 }
 
-/// Sides of the pixels in the ideal frame.
+/// Sides of the output pixels in the ideal frame, ideal pixels.
 #[inline(always)]
 pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> [Lanes2; 2] {
     let Some(map) = map else {
@@ -92,8 +95,8 @@ pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32
     [scaled(&sides[0], frame.ideal_focal_px), scaled(&sides[1], frame.ideal_focal_px)]
 }
 
-/// Central differences of a whole block; false where one of its pixels, or of those around them, has no ray
-/// or is beyond the map.
+/// Central differences of a whole block. Returns false if one of its pixels or of their neighbours has no ray
+/// or is outside of the map.
 #[inline(always)]
 fn central_differences(size_px: [u32; 2], map: &LensMap, [x, y]: [u32; 2], sides: &mut [Lanes2; 2]) -> bool {
     let [width, height] = size_px.map(|side| side as usize);
@@ -146,25 +149,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_blocks_have_the_differences_of_their_pixels() {
+    fn block_differences_equal_pixel_differences() {
         let size_px: [u32; 2] = [4 * LANES as u32 + 5, 40];
-        let mut map = LensMap { uv: Large::zeros((size_px[0] * size_px[1]) as usize) };
+        let mut map = LensMap { uv: LargeArray::zeros((size_px[0] * size_px[1]) as usize) };
         for (uv, i) in map.uv.iter_mut().zip(0..) {
             let [x, y] = [i % size_px[0], i / size_px[0]].map(|n| n as f32);
             *uv = [0.01 * x + 1e-4 * x * y, 0.01 * y - 2e-5 * x * x];
         }
-        // Without a ray: within a block, beside one, and in corners of the picture.
+        // Pixels without a ray: within a block, beside one, and in corners of the image.
         for [x, y] in [[40, 20], [95, 30], [31, 10], [0, 0], [132, 39]] {
             map.uv[(y * size_px[0] + x) as usize] = [INVALID_UV; 2];
         }
-        let mut whole = 0;
+        let mut whole_blocks = 0;
         for y in 0..size_px[1] {
             for x in (0..size_px[0]).step_by(LANES) {
                 let mut sides = [Lanes2::ZERO; 2];
                 if !central_differences(size_px, &map, [x, y], &mut sides) {
                     continue;
                 }
-                whole += 1;
+                whole_blocks += 1;
                 for i in 0..LANES {
                     for (axis, side) in sides.iter().enumerate() {
                         let exact = difference(size_px, &map, [x + i as u32, y], axis);
@@ -173,8 +176,8 @@ mod tests {
                 }
             }
         }
-        // Of three blocks within the picture in each of 38 rows, all but those with a ray missing above,
-        // below or within, or beside.
-        assert_eq!(whole, 3 * 38 - 3 - (3 + 1) - 1);
+        // Of three blocks within the image in each of 38 rows, all but those with a ray missing above, below,
+        // within, or beside.
+        assert_eq!(whole_blocks, 3 * 38 - 3 - (3 + 1) - 1);
     }
 }

@@ -1,31 +1,31 @@
-//! Pixels side by side: plain loops of fixed length, which compilers turn into vector instructions.
+//! Arrays over a block of pixels: plain loops of fixed length, which the compiler vectorises.
 
-/// Pixels of a line that are worked out together: enough for wide vectors and few enough for the first cache.
+/// Pixels of a row per block: enough for wide vectors, and few enough for the L1 cache.
 pub(crate) const LANES: usize = 32;
 
-/// A number of each.
+/// One number per pixel of a block.
 pub(crate) type Lanes = [f32; LANES];
 
-/// Zero of each.
+/// Zero for all pixels.
 pub(crate) const ZERO: Lanes = [0.0; LANES];
 
-/// A number of each, by its place.
+/// One number per pixel, from the pixel's index.
 #[inline(always)]
-pub(crate) fn each(number: impl Fn(usize) -> f32) -> Lanes {
+pub(crate) fn per_lane(value: impl Fn(usize) -> f32) -> Lanes {
     let mut lanes = ZERO;
     for i in 0..LANES {
-        lanes[i] = number(i);
+        lanes[i] = value(i);
     }
     lanes
 }
 
-/// Whether it holds for each, as 0 or 1.
+/// 1 where the condition holds, else 0.
 #[inline(always)]
-pub(crate) fn whether(holds: impl Fn(usize) -> bool) -> Lanes {
-    each(|i| if holds(i) { 1.0 } else { 0.0 })
+pub(crate) fn indicator(holds: impl Fn(usize) -> bool) -> Lanes {
+    per_lane(|i| if holds(i) { 1.0 } else { 0.0 })
 }
 
-/// A place on a plane of each.
+/// One 2D vector per pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lanes2 {
     pub x: Lanes,
@@ -37,16 +37,16 @@ impl Lanes2 {
 
     #[inline(always)]
     pub fn minus(&self, other: &Self) -> Self {
-        Self { x: each(|i| self.x[i] - other.x[i]), y: each(|i| self.y[i] - other.y[i]) }
+        Self { x: per_lane(|i| self.x[i] - other.x[i]), y: per_lane(|i| self.y[i] - other.y[i]) }
     }
 
     #[inline(always)]
     pub fn length(&self) -> Lanes {
-        each(|i| self.x[i].mul_add(self.x[i], self.y[i] * self.y[i]).sqrt())
+        per_lane(|i| self.x[i].mul_add(self.x[i], self.y[i] * self.y[i]).sqrt())
     }
 }
 
-/// A direction of each.
+/// One 3D vector per pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lanes3 {
     pub x: Lanes,
@@ -54,27 +54,27 @@ pub(crate) struct Lanes3 {
     pub z: Lanes,
 }
 
-/// Into `0..=last`; NaN becomes 0. One instruction a bound, which `f32::clamp` is not.
+/// Clamps to `0..=last`; NaN becomes 0. One instruction per bound, unlike `f32::clamp`.
 #[inline(always)]
-pub(crate) fn within(value: f32, last: f32) -> f32 {
-    lower(higher(value, 0.0), last)
+pub(crate) fn clamp_to(value: f32, last: f32) -> f32 {
+    fast_min(fast_max(value, 0.0), last)
 }
 
-/// A whole number in `0..2^23`, from its bits: conversions that saturate take several instructions.
+/// Converts a whole number in `0..2^23` by its bits: saturating conversions take several instructions.
 #[inline(always)]
-pub(crate) fn whole(value: f32) -> u32 {
+pub(crate) fn to_index(value: f32) -> u32 {
     const FIRST_WITHOUT_FRACTION: f32 = (1_u32 << 23) as f32;
     (value + FIRST_WITHOUT_FRACTION).to_bits() & 0x007f_ffff
 }
 
-/// One instruction, which `f32::min` is not.
+/// Minimum in one instruction, unlike `f32::min`; `b` if either is NaN.
 #[inline(always)]
-pub(crate) fn lower(a: f32, b: f32) -> f32 {
+pub(crate) fn fast_min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// One instruction, which `f32::max` is not.
+/// Maximum in one instruction, unlike `f32::max`; `b` if either is NaN.
 #[inline(always)]
-pub(crate) fn higher(a: f32, b: f32) -> f32 {
+pub(crate) fn fast_max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }

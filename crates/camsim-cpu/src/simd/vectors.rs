@@ -1,8 +1,8 @@
-//! What processors have beyond what all of them have. The only place that takes their word for it.
+//! Instructions beyond the baseline of the target, selected at run time.
 
-/// Does work by the widest vectors that the processor has, and returns what that gives. Only what is inlined
-/// into it is compiled for these: functions are marked so, and loops are written out, since closures that
-/// arrays' `map` or iterators call mostly stay calls.
+/// Runs `work` with the widest vectors of the processor, and returns its result. Only code inlined into it is
+/// compiled for them: hence `#[inline(always)]`, and loops instead of iterator adapters or `array::map`,
+/// whose closures often remain calls.
 macro_rules! widest {
     ($vectors:ident => $work:expr) => {{
         #[cfg(target_arch = "x86_64")]
@@ -12,109 +12,119 @@ macro_rules! widest {
                 |$vectors| $work,
             );
         }
-        let $vectors = $crate::simd::vectors::Any;
+        let $vectors = $crate::simd::vectors::Baseline;
         $work
     }};
 }
 pub(crate) use widest;
 
-/// Numbers that are looked at together.
-pub(crate) const SIDE_BY_SIDE: usize = 8;
+/// Lanes of a vector.
+pub(crate) const VECTOR_LANES: usize = 8;
 
-/// Whole numbers side by side, and others.
-pub(crate) type Wholes = [i32; SIDE_BY_SIDE];
-pub(crate) type Numbers = [f32; SIDE_BY_SIDE];
+/// A vector of integers.
+pub(crate) type IntVector = [i32; VECTOR_LANES];
+pub(crate) type FloatVector = [f32; VECTOR_LANES];
 
-/// What is not left to the compiler: half floats, and what it makes a condition for each number of where it
-/// is one for all.
+/// Operations that are not left to auto-vectorisation: half floats, and tests of a whole vector that the
+/// compiler would split into lanes.
 pub(crate) trait Vectors: Copy + Sync {
-    /// Finite half floats as floats.
-    fn numbers(self, halves: [u16; 8]) -> Numbers;
-    /// Floats as half floats, rounded to the nearest.
-    fn halves(self, numbers: Numbers) -> [u16; 8];
-    /// Sums of two products for each, those of whole numbers modulo 2^32.
-    fn mixed(self, factors: [i32; 2], of: [&Wholes; 2]) -> Wholes;
-    fn mixed_numbers(self, factors: [f32; 2], of: [&Numbers; 2]) -> Numbers;
-    /// Whether it is at any of the places.
-    fn is_any_inside(self, what: &Inside<'_>) -> bool;
-    /// Shows what is nearer than what is there, where it is.
-    fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]);
+    /// Converts finite half floats to floats.
+    fn floats_from_halves(self, halves: [u16; 8]) -> FloatVector;
+    /// Converts floats to half floats, rounded to nearest.
+    fn halves_from_floats(self, floats: FloatVector) -> [u16; 8];
+    /// Weighted sum of two vectors; integers wrap around.
+    fn weighted_int_sum(self, factors: [i32; 2], of: [&IntVector; 2]) -> IntVector;
+    fn weighted_sum(self, factors: [f32; 2], of: [&FloatVector; 2]) -> FloatVector;
+    /// Whether any lane is inside.
+    fn is_any_covered(self, triangle: &Coverage<'_>) -> bool;
+    /// Depth-tests a triangle and stores its depth and id in the lanes that are inside and nearer.
+    fn depth_test(
+        self,
+        triangle: &VectorTriangle<'_>,
+        depth: &mut FloatVector,
+        ids: &mut [u32; VECTOR_LANES],
+    );
 }
 
-/// Where something is, of places side by side.
+/// Coverage of a triangle over consecutive pixels.
 #[derive(Clone, Copy)]
-pub(crate) struct Inside<'a> {
-    /// It is where all of these are at least 0: each the sum of one number for all places and one for each.
-    /// They wrap around.
-    pub sides: [(i32, &'a Wholes); 3],
-    /// Places after the first one that are asked.
+pub(crate) struct Coverage<'a> {
+    /// Three edge functions, each as a sum of a value common to all lanes and one per lane. A lane is inside
+    /// where all are at least 0. The sums wrap around.
+    pub edges: [(i32, &'a IntVector); 3],
+    /// Index of the last valid lane.
     pub last: i32,
 }
 
-/// Something that some of the places side by side may show.
-pub(crate) struct Shown<'a> {
-    /// Its number.
-    pub name: u32,
-    pub inside: Inside<'a>,
-    /// How near it is, such a sum too: the more the nearer.
-    pub near: (f32, &'a Numbers),
+/// A triangle to be depth-tested over consecutive pixels.
+pub(crate) struct VectorTriangle<'a> {
+    /// Id of the triangle.
+    pub id: u32,
+    pub coverage: Coverage<'a>,
+    /// near / z, as a sum of a value common to all lanes and one per lane.
+    pub depth_sum: (f32, &'a FloatVector),
 }
 
-/// Any processor.
+/// Fallback for any processor.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Any;
+pub(crate) struct Baseline;
 
-/// Numbers of places side by side.
-const PLACES: Wholes = [0, 1, 2, 3, 4, 5, 6, 7];
+/// Lane indices.
+const LANE_INDICES: IntVector = [0, 1, 2, 3, 4, 5, 6, 7];
 
-impl Inside<'_> {
+impl Coverage<'_> {
     #[inline(always)]
-    fn is_at(&self, i: usize) -> bool {
-        // Less than 0 is what is less than 0 anywhere.
-        let sides = self.sides.iter().fold(0, |bits, (all, each)| bits | all.wrapping_add(each[i]));
-        (sides | (self.last - PLACES[i])) >= 0
+    fn covers_lane(&self, i: usize) -> bool {
+        // The sign bit of the OR is set if any of the values is negative.
+        let edges = self.edges.iter().fold(0, |bits, (all, per_lane)| bits | all.wrapping_add(per_lane[i]));
+        (edges | (self.last - LANE_INDICES[i])) >= 0
     }
 }
 
-impl Vectors for Any {
-    /// Moved to where a float has exponent and fraction, and set right by a factor.
+impl Vectors for Baseline {
+    /// Shifts exponent and mantissa to their places in a float and corrects the exponent bias by a factor.
     #[inline(always)]
-    fn numbers(self, halves: [u16; 8]) -> Numbers {
+    fn floats_from_halves(self, halves: [u16; 8]) -> FloatVector {
         const FACTOR: f32 = f32::from_bits((127 + 112) << 23);
-        let mut numbers = [0.0; 8];
+        let mut floats = [0.0; 8];
         for k in 0..8 {
             let moved = i32::from(halves[k] as i16) << 13;
-            numbers[k] = f32::from_bits(moved as u32 & 0x8fff_ffff) * FACTOR;
+            floats[k] = f32::from_bits(moved as u32 & 0x8fff_ffff) * FACTOR;
         }
-        numbers
+        floats
     }
 
     #[inline(always)]
-    fn halves(self, numbers: Numbers) -> [u16; 8] {
-        numbers.map(|number| half::f16::from_f32(number).to_bits())
+    fn halves_from_floats(self, floats: FloatVector) -> [u16; 8] {
+        floats.map(|number| half::f16::from_f32(number).to_bits())
     }
 
     #[inline(always)]
-    fn mixed(self, [a, b]: [i32; 2], [of_a, of_b]: [&Wholes; 2]) -> Wholes {
+    fn weighted_int_sum(self, [a, b]: [i32; 2], [of_a, of_b]: [&IntVector; 2]) -> IntVector {
         std::array::from_fn(|i| a.wrapping_mul(of_a[i]).wrapping_add(b.wrapping_mul(of_b[i])))
     }
 
     #[inline(always)]
-    fn mixed_numbers(self, [a, b]: [f32; 2], [of_a, of_b]: [&Numbers; 2]) -> Numbers {
+    fn weighted_sum(self, [a, b]: [f32; 2], [of_a, of_b]: [&FloatVector; 2]) -> FloatVector {
         std::array::from_fn(|i| a * of_a[i] + b * of_b[i])
     }
 
     #[inline(always)]
-    fn is_any_inside(self, what: &Inside<'_>) -> bool {
-        (0..SIDE_BY_SIDE).any(|i| what.is_at(i))
+    fn is_any_covered(self, triangle: &Coverage<'_>) -> bool {
+        (0..VECTOR_LANES).any(|i| triangle.covers_lane(i))
     }
 
     #[inline(always)]
-    fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]) {
-        for i in 0..SIDE_BY_SIDE {
-            let near = what.near.0 + what.near.1[i];
-            if what.inside.is_at(i) && near > depth[i] {
-                (depth[i], shown[i]) = (near, what.name);
+    fn depth_test(
+        self,
+        triangle: &VectorTriangle<'_>,
+        depth: &mut FloatVector,
+        ids: &mut [u32; VECTOR_LANES],
+    ) {
+        for i in 0..VECTOR_LANES {
+            let depth_sum = triangle.depth_sum.0 + triangle.depth_sum.1[i];
+            if triangle.coverage.covers_lane(i) && depth_sum > depth[i] {
+                (depth[i], ids[i]) = (depth_sum, triangle.id);
             }
         }
     }
@@ -136,9 +146,10 @@ mod x86 {
         },
     };
 
-    use super::{Inside, Numbers, PLACES, SIDE_BY_SIDE, Shown, Vectors, Wholes};
+    use super::{Coverage, FloatVector, IntVector, LANE_INDICES, VECTOR_LANES, VectorTriangle, Vectors};
 
-    /// x86-64 with AVX2, FMA and F16C, which nearly all have: there is one only where they were found.
+    /// x86-64 with AVX2, FMA and F16C, which nearly all processors have. A value exists only if they were
+    /// detected.
     #[derive(Clone, Copy, Debug)]
     pub struct Avx2(());
 
@@ -150,7 +161,7 @@ mod x86 {
             .then_some(Self(()))
         }
 
-        /// Runs what is compiled for it.
+        /// Runs `work`, compiled for these instructions.
         pub fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
             #[target_feature(enable = "avx2,fma,f16c")]
             fn compiled<R>(avx2: Avx2, work: impl FnOnce(Avx2) -> R) -> R {
@@ -162,19 +173,19 @@ mod x86 {
     }
 
     impl Avx2 {
-        /// Its first bits tell where it is not.
+        /// The sign bit of each lane is set where it is not inside.
         #[inline(always)]
-        fn beyond(self, what: &Inside<'_>) -> __m256 {
-            let [(a, of_a), (b, of_b), (c, of_c)] = what.sides;
+        fn outside_mask(self, triangle: &Coverage<'_>) -> __m256 {
+            let [(a, of_a), (b, of_b), (c, of_c)] = triangle.edges;
             let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
-            let places: __m256i = bytemuck::cast(PLACES);
+            let places: __m256i = bytemuck::cast(LANE_INDICES);
             // SAFETY: `self` tells that this processor has it.
             unsafe {
-                let sum = |all: i32, each: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), each);
+                let sum = |all: i32, per_lane: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), per_lane);
                 let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
                 _mm256_castsi256_ps(_mm256_or_si256(
                     beside,
-                    _mm256_sub_epi32(_mm256_set1_epi32(what.last), places),
+                    _mm256_sub_epi32(_mm256_set1_epi32(triangle.last), places),
                 ))
             }
         }
@@ -182,21 +193,21 @@ mod x86 {
 
     impl Vectors for Avx2 {
         #[inline(always)]
-        fn numbers(self, halves: [u16; 8]) -> Numbers {
+        fn floats_from_halves(self, halves: [u16; 8]) -> FloatVector {
             let halves: __m128i = bytemuck::cast(halves);
             // SAFETY: `self` tells that this processor has it.
             bytemuck::cast(unsafe { _mm256_cvtph_ps(halves) })
         }
 
         #[inline(always)]
-        fn halves(self, numbers: Numbers) -> [u16; 8] {
-            let numbers = bytemuck::cast(numbers);
+        fn halves_from_floats(self, floats: FloatVector) -> [u16; 8] {
+            let floats = bytemuck::cast(floats);
             // SAFETY: `self` tells that this processor has it.
-            bytemuck::cast(unsafe { _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(numbers) })
+            bytemuck::cast(unsafe { _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(floats) })
         }
 
         #[inline(always)]
-        fn mixed(self, [a, b]: [i32; 2], of: [&Wholes; 2]) -> Wholes {
+        fn weighted_int_sum(self, [a, b]: [i32; 2], of: [&IntVector; 2]) -> IntVector {
             let [of_a, of_b]: [__m256i; 2] = of.map(|of| bytemuck::cast(*of));
             // SAFETY: `self` tells that this processor has it.
             bytemuck::cast(unsafe {
@@ -208,7 +219,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn mixed_numbers(self, [a, b]: [f32; 2], of: [&Numbers; 2]) -> Numbers {
+        fn weighted_sum(self, [a, b]: [f32; 2], of: [&FloatVector; 2]) -> FloatVector {
             let [of_a, of_b]: [__m256; 2] = of.map(|of| bytemuck::cast(*of));
             // SAFETY: `self` tells that this processor has it.
             bytemuck::cast(unsafe {
@@ -217,24 +228,31 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn is_any_inside(self, what: &Inside<'_>) -> bool {
+        fn is_any_covered(self, triangle: &Coverage<'_>) -> bool {
             // SAFETY: `self` tells that this processor has it.
-            unsafe { _mm256_movemask_ps(self.beyond(what)) != 0xff }
+            unsafe { _mm256_movemask_ps(self.outside_mask(triangle)) != 0xff }
         }
 
         #[inline(always)]
-        fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]) {
-            let (near, before): (__m256, __m256) = (bytemuck::cast(*what.near.1), bytemuck::cast(*depth));
-            let beyond = self.beyond(&what.inside);
+        fn depth_test(
+            self,
+            triangle: &VectorTriangle<'_>,
+            depth: &mut FloatVector,
+            ids: &mut [u32; VECTOR_LANES],
+        ) {
+            let (depth_sum, old_depth): (__m256, __m256) =
+                (bytemuck::cast(*triangle.depth_sum.1), bytemuck::cast(*depth));
+            let outside_mask = self.outside_mask(&triangle.coverage);
             // SAFETY: `self` tells that this processor has it.
             unsafe {
-                let near = _mm256_add_ps(_mm256_set1_ps(what.near.0), near);
-                // The first bit of each number decides.
-                let is_shown = _mm256_andnot_ps(beyond, _mm256_cmp_ps::<_CMP_GT_OQ>(near, before));
-                if _mm256_movemask_ps(is_shown) != 0 {
-                    *depth = bytemuck::cast(_mm256_blendv_ps(before, near, is_shown));
-                    let name = _mm256_castsi256_ps(_mm256_set1_epi32(what.name.cast_signed()));
-                    *shown = bytemuck::cast(_mm256_blendv_ps(bytemuck::cast(*shown), name, is_shown));
+                let depth_sum = _mm256_add_ps(_mm256_set1_ps(triangle.depth_sum.0), depth_sum);
+                // The sign bit of each lane selects.
+                let is_visible =
+                    _mm256_andnot_ps(outside_mask, _mm256_cmp_ps::<_CMP_GT_OQ>(depth_sum, old_depth));
+                if _mm256_movemask_ps(is_visible) != 0 {
+                    *depth = bytemuck::cast(_mm256_blendv_ps(old_depth, depth_sum, is_visible));
+                    let id = _mm256_castsi256_ps(_mm256_set1_epi32(triangle.id.cast_signed()));
+                    *ids = bytemuck::cast(_mm256_blendv_ps(bytemuck::cast(*ids), id, is_visible));
                 }
             }
         }
@@ -247,59 +265,63 @@ mod tests {
 
     use super::*;
 
-    /// Numbers of all kinds: any bits, so NaN and infinite ones too, or near each other.
-    fn numbers(seed: u32, are_near: bool) -> Numbers {
+    /// Test values: arbitrary bits, including NaN and infinity, or values close to each other.
+    fn random_floats(seed: u32, are_near: bool) -> FloatVector {
         std::array::from_fn(|i| {
             let [bits, ..] = pcg4d([seed, i as u32, 3, 4]);
             if are_near { (bits % 5) as f32 } else { f32::from_bits(bits) }
         })
     }
 
-    fn wholes(seed: u32, most: u32) -> Wholes {
+    fn random_ints(seed: u32, most: u32) -> IntVector {
         std::array::from_fn(|i| (pcg4d([seed, i as u32, 1, 2])[0] % (2 * most)) as i32 - most as i32)
     }
 
     #[test]
-    fn the_widest_vectors_show_what_any_processor_shows() {
+    fn avx2_equals_the_fallback() {
         let Some(avx2) = Avx2::find() else { return eprintln!("skipped: this processor has no AVX2") };
         let mut counts = [0; 9];
         for seed in 0..20_000 {
             let k = 16 * seed;
-            let inside = [wholes(k, 50), wholes(k + 1, 50), wholes(k + 2, 50)];
-            // One sum of a few wraps around.
+            let coverage = [random_ints(k, 50), random_ints(k + 1, 50), random_ints(k + 2, 50)];
+            // In some cases one sum wraps around.
             let all = if seed % 7 == 0 { [i32::MAX, 40, 60] } else { [30, 40, 60] };
-            let near = numbers(k + 3, seed % 3 != 0);
-            let what = Shown {
-                name: seed,
-                inside: Inside {
-                    sides: [(all[0], &inside[0]), (all[1], &inside[1]), (all[2], &inside[2])],
+            let depth_sum = random_floats(k + 3, seed % 3 != 0);
+            let triangle = VectorTriangle {
+                id: seed,
+                coverage: Coverage {
+                    edges: [(all[0], &coverage[0]), (all[1], &coverage[1]), (all[2], &coverage[2])],
                     last: (seed % 11) as i32,
                 },
-                near: ((seed % 4) as f32, &near),
+                depth_sum: ((seed % 4) as f32, &depth_sum),
             };
-            let before = (numbers(k + 4, seed % 2 == 0), [7; SIDE_BY_SIDE]);
-            let (mut by_any, mut by_avx2) = (before, before);
-            Any.show(&what, &mut by_any.0, &mut by_any.1);
-            avx2.run(|avx2| avx2.show(&what, &mut by_avx2.0, &mut by_avx2.1));
+            let old_depth = (random_floats(k + 4, seed % 2 == 0), [7; VECTOR_LANES]);
+            let (mut by_any, mut by_avx2) = (old_depth, old_depth);
+            Baseline.depth_test(&triangle, &mut by_any.0, &mut by_any.1);
+            avx2.run(|avx2| avx2.depth_test(&triangle, &mut by_avx2.0, &mut by_avx2.1));
             assert_eq!(
                 (by_any.0.map(f32::to_bits), by_any.1),
                 (by_avx2.0.map(f32::to_bits), by_avx2.1),
                 "{seed}"
             );
             assert_eq!(
-                Any.is_any_inside(&what.inside),
-                avx2.run(|avx2| avx2.is_any_inside(&what.inside)),
+                Baseline.is_any_covered(&triangle.coverage),
+                avx2.run(|avx2| avx2.is_any_covered(&triangle.coverage)),
                 "{seed}"
             );
-            counts[by_any.1.iter().filter(|&&shown| shown != 7).count()] += 1;
+            counts[by_any.1.iter().filter(|&&ids| ids != 7).count()] += 1;
 
-            let (a, b) = (wholes(k + 5, 1 << 20), wholes(k + 6, 1 << 20));
-            let factors = [wholes(k + 7, 1 << 20)[0], wholes(k + 8, 300)[0]];
-            assert_eq!(Any.mixed(factors, [&a, &b]), avx2.run(|avx2| avx2.mixed(factors, [&a, &b])));
-            let (a, b, [c, d, ..]) = (numbers(k + 9, true), numbers(k + 10, true), numbers(k + 11, true));
+            let (a, b) = (random_ints(k + 5, 1 << 20), random_ints(k + 6, 1 << 20));
+            let factors = [random_ints(k + 7, 1 << 20)[0], random_ints(k + 8, 300)[0]];
             assert_eq!(
-                Any.mixed_numbers([c, d], [&a, &b]),
-                avx2.run(|avx2| avx2.mixed_numbers([c, d], [&a, &b]))
+                Baseline.weighted_int_sum(factors, [&a, &b]),
+                avx2.run(|avx2| avx2.weighted_int_sum(factors, [&a, &b]))
+            );
+            let (a, b, [c, d, ..]) =
+                (random_floats(k + 9, true), random_floats(k + 10, true), random_floats(k + 11, true));
+            assert_eq!(
+                Baseline.weighted_sum([c, d], [&a, &b]),
+                avx2.run(|avx2| avx2.weighted_sum([c, d], [&a, &b]))
             );
         }
         assert!(counts[..8].iter().all(|&count| count > 100), "not all kinds were there: {counts:?}");

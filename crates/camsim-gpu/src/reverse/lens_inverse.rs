@@ -1,8 +1,8 @@
-//! lens_inverse: pixel -> ideal ray, as a **lens map** that is computed once per lens and zoom value.
+//! The lens map: ideal ray of every pixel, computed once per lens and zoom value.
 //!
-//! Reads intrinsics, coefficients and the f64 fold curve and start table of [`Lens`]; writes one `rg32float`
-//! texel per pixel: ideal `(u, v)` of the pixel's centre, or [`INVALID_UV`] twice. CPU twin:
-//! [`CameraModel::lens_inverse`].
+//! Inputs are intrinsics, coefficients, and the f64 fold curve and table of initial values of [`Lens`].
+//! Output is one `rg32float` texel per pixel: ideal `(u, v)` of the pixel's centre, or [`INVALID_UV`] twice.
+//! f64 twin: [`CameraModel::lens_inverse`].
 
 use bytemuck::{Pod, Zeroable};
 use camsim_core::camera::CameraModel;
@@ -10,25 +10,25 @@ pub use camsim_core::camera::INVALID_UV;
 use camsim_core::lens::{FOLD_RAYS, Lens, LensModel, RADIAL_TABLE_LEN};
 use glam::DVec2;
 
-use crate::{ideal::whole, recorder::Recorder};
+use crate::{ideal::full_view, recorder::Recorder};
 
 /// Texel format of a lens map. Half precision would cost 0.3 px.
 pub const LENS_MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
 
-/// Edge of the square workgroups.
+/// Side of the square workgroups, pixels.
 const WORKGROUP_PX: u32 = 8;
 
-/// Where the inverse starts.
+/// Initial value of the inverse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Start {
-    /// From the lens's own table.
+    /// The lens's own table.
     Cold,
-    /// From the lens map of a nearby zoom value.
+    /// The lens map of a nearby zoom value.
     Warm,
 }
 
-/// Every variant of the stage, in the order of [`LensInversePass`]'s pipelines. A pinhole has nothing to
-/// start from.
+/// All variants of the stage, in the order of the pipelines of [`LensInversePass`]. A pinhole needs no
+/// initial value.
 pub const VARIANTS: [(LensModel, Start); 5] = [
     (LensModel::Pinhole, Start::Cold),
     (LensModel::BrownConrady, Start::Cold),
@@ -59,12 +59,12 @@ impl LensUniform {
     fn new(camera: &CameraModel) -> Self {
         // Clamped so that the integer difference to a pixel cannot overflow; so far out every pixel is
         // invalid or meaningless anyway.
-        let whole = camera.principal_point_px.round().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
+        let full_view = camera.principal_point_px.round().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
         let mut uniform = Self {
             size_px: camera.size_px,
             focal_px: camera.focal_px.as_vec2().to_array(),
-            principal_point_whole_px: whole.as_ivec2().to_array(),
-            principal_point_fraction_px: (camera.principal_point_px - whole).as_vec2().to_array(),
+            principal_point_whole_px: full_view.as_ivec2().to_array(),
+            principal_point_fraction_px: (camera.principal_point_px - full_view).as_vec2().to_array(),
             radial: [0.0; 4],
             rational: [0.0; 4],
             tangential: [0.0; 2],
@@ -97,12 +97,12 @@ impl LensUniform {
     }
 }
 
-/// Nearest f32 that a shader may compute with.
+/// Nearest finite f32.
 fn finite_f32(value: f64) -> f32 {
     value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
-/// Fold radii, then start ratios; empty for a pinhole.
+/// Fold radii, then ratios for initial values; empty for a pinhole.
 fn lens_table(lens: &Lens) -> Vec<f32> {
     let fold = lens.fold_curve().map_or(&[][..], |fold| fold.radii());
     let ratios = lens.radial_table().map_or(&[][..], |table| table.ratios());
@@ -131,20 +131,20 @@ pub fn shader_source(model: LensModel, start: Start) -> String {
     [common, table, formula, start, main].concat()
 }
 
-/// A lens map, and how this stage has come to it so far.
+/// A lens map and its bind groups.
 #[derive(Debug)]
 pub struct LensMap {
-    /// [`LENS_MAP_FORMAT`], the camera's size: written by this stage, then sampled, copied, or given as
-    /// `warm`.
+    /// Texture in [`LENS_MAP_FORMAT`], of the camera's size: written by this stage, then sampled, copied, or
+    /// used as `warm`.
     pub texture: wgpu::Texture,
-    /// All of it.
+    /// View of the texture.
     pub view: wgpu::TextureView,
-    /// Bind groups by the number of the variant and the map that it started from.
+    /// Bind groups by index of the variant and view of the initial map.
     groups: Vec<(usize, Option<wgpu::TextureView>, wgpu::BindGroup)>,
 }
 
 impl LensMap {
-    /// An empty map.
+    /// Creates an empty map.
     #[must_use]
     pub fn new(device: &wgpu::Device, size_px: [u32; 2]) -> Self {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -159,11 +159,11 @@ impl LensMap {
                 | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        Self { view: whole(&texture), texture, groups: Vec::new() }
+        Self { view: full_view(&texture), texture, groups: Vec::new() }
     }
 }
 
-/// The pipelines of all variants, and what a lens is written to.
+/// Pipelines of all variants, and the buffers of a lens.
 #[derive(Debug)]
 pub struct LensInversePass {
     pipelines: [wgpu::ComputePipeline; VARIANTS.len()],
@@ -209,8 +209,9 @@ impl LensInversePass {
     }
 
     /// Records the pass that writes the lens map of `camera` to `target`, a map of the camera's size. `warm`,
-    /// the map of a camera of the same size and nearby zoom, only shortens the way to the same solution: keep
-    /// it a pure function of scenario and frame (a zoom table entry's map, never the previous frame's).
+    /// the map of a camera of the same size and nearby zoom, only shortens the iteration to the same
+    /// solution: it must be a pure function of scenario and frame (the map of a zoom table entry, never that
+    /// of the previous frame).
     pub fn encode(
         &self,
         device: &wgpu::Device,
@@ -231,8 +232,8 @@ impl LensInversePass {
         let pipeline = &self.pipelines[variant];
         recorder.write(&self.uniform, 0, bytemuck::bytes_of(&LensUniform::new(camera)));
         recorder.write(&self.table, 0, bytemuck::cast_slice(&lens_table(&camera.lens)));
-        let known = target.groups.iter().position(|(of, from, _)| *of == variant && from.as_ref() == warm);
-        let group = known.unwrap_or_else(|| {
+        let cached = target.groups.iter().position(|(of, from, _)| *of == variant && from.as_ref() == warm);
+        let group = cached.unwrap_or_else(|| {
             let group = self.bind(device, pipeline, model, &target.view, warm);
             target.groups.push((variant, warm.cloned(), group));
             target.groups.len() - 1
@@ -269,7 +270,8 @@ impl LensInversePass {
     }
 }
 
-/// Explicit, because float32 textures are not filterable and a derived layout would ask for a filterable one.
+/// Explicit layout, because float32 textures are not filterable and a derived layout would require a
+/// filterable one.
 fn pipeline_layout(device: &wgpu::Device, model: LensModel, start: Start) -> wgpu::PipelineLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
@@ -328,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn every_variant_is_valid_without_any_capability() {
+    fn all_variants_are_valid_without_optional_capabilities() {
         for (model, start) in VARIANTS {
             let module = parsed(model, start);
             let mut validator = naga::valid::Validator::new(
@@ -340,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn the_uniform_is_laid_out_as_in_the_shader() {
+    fn uniform_layout_equals_that_of_the_shader() {
         let module = parsed(LensModel::BrownConrady, Start::Cold);
         let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("LensUniform")).unwrap();
         let naga::TypeInner::Struct { members, span } = &ty.inner else {
@@ -366,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shaders_constants_are_those_of_the_core() {
+    fn shader_constants_equal_those_of_camsim_core() {
         let source = shader_source(LensModel::BrownConrady, Start::Cold);
         assert!(source.contains(&format!("const FOLD_RAYS: u32 = {}u;", camsim_core::lens::FOLD_RAYS)));
         assert!(

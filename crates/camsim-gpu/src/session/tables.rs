@@ -1,4 +1,4 @@
-//! Tables that frames read and that do not change with them.
+//! Constant tables that all frames read.
 
 use camsim_core::{
     noise::{SEGMENTS, tail_segments},
@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 
 use crate::context::GpuContext;
 
-/// Numbers that never change, by places: one or two a texel.
+/// A constant table as a texture, one or two floats per texel.
 fn table(
     gpu: &GpuContext,
     label: &str,
@@ -32,14 +32,14 @@ fn table(
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// What the segments of the normal quantiles begin with and add, a row an octave.
+/// Normal quantiles: value at the start of each segment and increment over it, one row per octave.
 pub(super) fn noise_table(gpu: &GpuContext) -> wgpu::TextureView {
     let segments = tail_segments();
     let size = [SEGMENTS as u32, (segments.len() / SEGMENTS) as u32];
     table(gpu, "camsim.noise_table", size, wgpu::TextureFormat::Rg32Float, segments.as_flattened())
 }
 
-/// The same for the device.
+/// Vignette weights.
 pub(super) fn vignette(gpu: &GpuContext, sequence: &Sequence) -> wgpu::TextureView {
     let (size, weights) = sequence.vignette_weights();
     table(gpu, "camsim.vignette", size, wgpu::TextureFormat::R32Float, &weights)

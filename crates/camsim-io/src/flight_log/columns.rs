@@ -1,4 +1,4 @@
-//! What columns a flight can have: axes, units, sources of numbers.
+//! The columns that a flight is read from: axes, units, and the fields of each number.
 
 use camsim_core::scenario::LogFormat;
 
@@ -15,43 +15,50 @@ pub(super) enum Frame {
     EastNorthUp,
 }
 
-/// Where a number comes from.
+/// The field that a number is read from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Source {
+pub(super) struct FieldSource {
+    /// Index of the column, from 0.
     pub(super) column: usize,
-    /// Which of two numbers in one field.
+    /// Index of the number where one field holds two, as `47.0 8.0`.
     pub(super) part: Option<usize>,
-    /// To degrees or metres; `None` where the header names no unit.
+    /// Factor that converts to degrees or metres; `None` where the header names no unit.
     pub(super) factor: Option<f64>,
 }
 
-impl Source {
+impl FieldSource {
     pub(super) fn whole(column: usize, factor: Option<f64>) -> Self {
         Self { column, part: None, factor }
     }
 }
 
+/// The columns of the attitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum AttitudeColumns {
+    /// The log has no attitude, or it is not read.
     None,
     /// Roll, pitch, yaw.
-    Euler([Source; 3]),
-    /// x, y, z, w.
+    Euler([FieldSource; 3]),
+    /// Quaternion x, y, z, w.
     Quaternion([usize; 4]),
 }
 
+/// The columns of the time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TimeColumns {
+    /// Index of the column, from 0.
     pub(super) column: usize,
-    /// Nanoseconds of the unit, where the header names one.
+    /// Nanoseconds per unit, where the header names the unit.
     pub(super) unit_ns: Option<f64>,
-    /// Where the format says it: whole numbers are nanoseconds.
-    pub(super) whole_are_ns: bool,
+    /// Whether whole numbers are nanoseconds, as in EuRoC files.
+    pub(super) integers_are_ns: bool,
+    /// Column of dates that belong to clock times.
     pub(super) date: Option<usize>,
-    /// Nanoseconds beside whole seconds.
+    /// Column of nanoseconds that are added to whole seconds.
     pub(super) nanoseconds: Option<usize>,
 }
-/// As written in a scenario.
+
+/// The format as `flight.format` names it.
 pub(super) fn format_name(format: LogFormat) -> &'static str {
     match format {
         LogFormat::Auto => "auto",

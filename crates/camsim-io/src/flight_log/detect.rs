@@ -1,4 +1,4 @@
-//! What a file without a header is, by its values.
+//! Detection of the format of a table without a header, from its values.
 
 use std::path::Path;
 
@@ -7,25 +7,32 @@ use glam::DVec3;
 
 use super::{
     FlightLogError,
-    resolve::unit_of_key,
-    text::{Line, Separator, Table},
-    time,
+    text_table::{Line, Separator, Table},
+    time_fields,
+    time_unit::unit_of_key,
 };
 
-/// Rows looked at.
+/// Rows that are sampled.
 const SAMPLE_ROWS: usize = 500;
-/// A "time" at or above this is nanoseconds: in seconds it would be 3 million years.
-const NANOSECONDS_FROM: f64 = 1e14;
+/// Times at or above this number are nanoseconds: as seconds they would be 3 million years.
+const MIN_NANOSECONDS: f64 = 1e14;
 
-/// The format of a file without a header, if only one fits.
-pub(super) fn format(path: &Path, table: &Table<'_>, spec: &FlightSpec) -> Result<LogFormat, FlightLogError> {
+/// The format of a table without a header.
+///
+/// # Errors
+/// No format fits, or several do.
+pub(super) fn detect_format(
+    path: &Path,
+    table: &Table<'_>,
+    spec: &FlightSpec,
+) -> Result<LogFormat, FlightLogError> {
     let ambiguous = |candidates| FlightLogError::Ambiguous { path: path.to_owned(), candidates };
     let time_factor = unit_of_key(spec.time_unit).map_or(1.0, |unit| unit.factor * 1e-9);
     let value = |index: usize, field: &str| match table.number(field) {
         Some(value) if index == 0 => value * time_factor,
         Some(value) => value,
-        None => time::date_time_ns(field)
-            .or_else(|| time::clock_ns(field))
+        None => time_fields::date_time_ns(field)
+            .or_else(|| time_fields::clock_ns(field))
             .map_or(f64::NAN, |ns| ns as f64 * 1e-9),
     };
     let sample: Vec<Vec<f64>> = table
@@ -35,9 +42,9 @@ pub(super) fn format(path: &Path, table: &Table<'_>, spec: &FlightSpec) -> Resul
     if table.columns >= 8 && has_quaternions(&sample) {
         let first_time =
             table.rows.first().and_then(|row| table.number(table.fields(row).first().copied().unwrap_or("")));
-        // TUM writes seconds between blanks, EuRoC nanoseconds between commas; whoever mixes them may have
-        // mixed the order too.
-        return match (first_time.is_some_and(|time| time >= NANOSECONDS_FROM), table.separator) {
+        // TUM files have seconds and blanks, EuRoC files nanoseconds and commas. With any other combination
+        // the order of the quaternion is unknown.
+        return match (first_time.is_some_and(|time| time >= MIN_NANOSECONDS), table.separator) {
             (true, Separator::Comma) => Ok(LogFormat::Euroc),
             (false, Separator::Space) => Ok(LogFormat::Tum),
             _ => Err(ambiguous("tum (qx qy qz qw) and euroc (qw qx qy qz)")),
@@ -53,33 +60,34 @@ pub(super) fn format(path: &Path, table: &Table<'_>, spec: &FlightSpec) -> Resul
     }
 }
 
-/// Whether columns 4 to 7 are quaternions: of length 1, or, while they change, all of another one.
+/// Whether columns 4 to 7 (from 0) are quaternions: nine rows in ten have norm 1, or they change and have one
+/// common norm.
 fn has_quaternions(sample: &[Vec<f64>]) -> bool {
-    let lengths: Vec<f64> = sample
+    let norms: Vec<f64> = sample
         .iter()
         .filter(|row| row.len() >= 8)
         .map(|row| row[4..8].iter().map(|q| q * q).sum::<f64>().sqrt())
         .collect();
-    let share_near = |length: f64, within: f64| {
-        lengths.iter().filter(|other| (*other / length - 1.0).abs() < within).count() * 10 >= sample.len() * 9
+    let most_near = |norm: f64, tolerance: f64| {
+        norms.iter().filter(|other| (*other / norm - 1.0).abs() < tolerance).count() * 10 >= sample.len() * 9
     };
     let changes = || sample.iter().filter(|row| row.len() >= 8).any(|row| row[4..8] != sample[0][4..8]);
-    share_near(1.0, 0.01)
-        || lengths.first().is_some_and(|&first| first > 0.0 && share_near(first, 1e-4) && changes())
+    most_near(1.0, 0.01)
+        || norms.first().is_some_and(|&first| first > 0.0 && most_near(first, 1e-4) && changes())
 }
 
 fn can_be_geodetic(sample: &[Vec<f64>]) -> bool {
-    // Written so that missing values pass.
+    // Comparisons with NaN are false, so missing values pass.
     sample.iter().all(|row| {
         row.len() < 4 || !(row[1].abs() > 90.0 || row[2].abs() > 360.0 || row[3] < -1000.0 || row[3] > 1e5)
     })
 }
 
-/// Whether the columns can be latitude and longitude and cannot be metres, judged by the upper quartile of
-/// their change per second.
+/// Whether the columns can be latitude and longitude and cannot be metres, by the upper quartile of their
+/// change per second.
 ///
-/// A flight of 0.05 to 333 m/s changes its degrees by 4.5e-7 to 3e-3 a second. Read as metres that would be
-/// at most 3 mm/s, which is no flight. A log that moves faster or not at all is not decided.
+/// At 0.05 to 333 m/s latitude and longitude change by 4.5e-7 to 3e-3 degrees per second. Read as metres that
+/// is at most 3 mm/s, slower than any flight. A log that moves faster, or not at all, stays undecided.
 fn only_geodetic_fits(sample: &[Vec<f64>]) -> bool {
     let mut rates: Vec<f64> = sample
         .windows(2)
@@ -100,7 +108,7 @@ fn metric_candidates(sample: &[Vec<f64>]) -> &'static str {
     }
 }
 
-/// KITTI writes twelve columns whose left 3x3 block is a rotation.
+/// Refuses KITTI poses: twelve columns, whose left 3x3 block is a rotation matrix.
 pub(super) fn refuse_pose_matrices(path: &Path, table: &Table<'_>) -> Result<(), FlightLogError> {
     let is_matrix = |row: &Line<'_>| {
         let values: Option<Vec<f64>> = table.fields(row).iter().map(|field| table.number(field)).collect();

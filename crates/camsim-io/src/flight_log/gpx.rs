@@ -2,7 +2,7 @@
 //!
 //! | tag | |
 //! |---|---|
-//! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks and segments are one log |
+//! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks are one log |
 //! | `trkpt` without `time`, or without `ele` where others have one | left out, counted |
 //! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
 
@@ -15,11 +15,14 @@ use camsim_core::{
 };
 use roxmltree::{Document, Node};
 
-use super::{FlightLogError, RawLog, columns::format_name, sniff, time};
+use super::{FlightLogError, RawLog, columns::format_name, foreign_formats, time_fields};
 
-/// Reads the rows of XML text, if it is GPX.
+/// Reads the track points of a GPX file.
+///
+/// # Errors
+/// The text is no XML, no GPX, or has no usable track points.
 pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let other = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
+    let foreign = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
         path: path.to_owned(),
         what,
         advice,
@@ -28,8 +31,8 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
     match document.root_element().tag_name().name() {
         "gpx" => {}
-        "kml" => return Err(other(sniff::KML)),
-        _ => return Err(other(sniff::OTHER_XML)),
+        "kml" => return Err(foreign(foreign_formats::KML)),
+        _ => return Err(foreign(foreign_formats::OTHER_XML)),
     }
     if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
         return Err(problem(format!(
@@ -38,20 +41,13 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         )));
     }
     let points: Vec<Node<'_, '_>> =
-        document.descendants().filter(|node| node.has_tag_name_of("trkpt")).collect();
+        document.descendants().filter(|node| node.has_local_name("trkpt")).collect();
     if points.is_empty() {
         return Err(problem(
             "the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown"
                 .to_owned(),
         ));
     }
-    let child = |point: &Node<'_, '_>, name: &str| {
-        point
-            .children()
-            .find(|node| node.has_tag_name_of(name))
-            .and_then(|node| node.text())
-            .map(|text| text.trim().to_owned())
-    };
     for (name, advice) in [("time", "record the track with times"), ("ele", "add heights (ele)")] {
         if points.iter().all(|point| child(point, name).is_none()) {
             return Err(problem(format!(
@@ -59,46 +55,55 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
             )));
         }
     }
-    let mut rows = Vec::with_capacity(points.len());
-    for point in &points {
-        let line = document.text_pos_at(point.range().start).row as usize;
-        let not_a_number = |name: &str, text: &str| FlightLogError::Header {
-            path: path.to_owned(),
-            line,
-            problem: format!("`{text}` of {name} is not a number"),
-        };
-        let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
-            None | Some("") => Ok(f64::NAN),
-            Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
-        };
-        let (latitude, longitude) =
-            (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
-        if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
-            return Err(problem(format!(
-                "line {line}: latitude {latitude}, longitude {longitude} is no place"
-            )));
-        }
-        let height_m = number("ele", child(point, "ele").as_deref())?;
-        let t_ns = match child(point, "time") {
-            None => None,
-            Some(text) => Some(time::date_time_ns(&text).ok_or_else(|| {
-                problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
-            })?),
-        };
-        rows.push(RawRow {
-            line,
-            t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
-            position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
-            attitude: RawAttitude::None,
-        });
-    }
+    let line = |point: &Node<'_, '_>| document.text_pos_at(point.range().start).row as usize;
+    let rows = points.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
     Ok(RawLog { rows, notes: notes(&document, &points, spec) })
 }
 
+/// Text of the child element `name` of a track point.
+fn child(point: &Node<'_, '_>, name: &str) -> Option<String> {
+    let element = point.children().find(|node| node.has_local_name(name))?;
+    element.text().map(|text| text.trim().to_owned())
+}
+
+/// Parses one track point.
+fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, FlightLogError> {
+    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
+    let not_a_number = |name: &str, text: &str| FlightLogError::Header {
+        path: path.to_owned(),
+        line,
+        problem: format!("`{text}` of {name} is not a number"),
+    };
+    let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
+        None | Some("") => Ok(f64::NAN),
+        Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
+    };
+    let (latitude, longitude) =
+        (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
+    if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
+        return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
+    }
+    let height_m = number("ele", child(point, "ele").as_deref())?;
+    let t_ns = match child(point, "time") {
+        None => None,
+        Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
+            problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
+        })?),
+    };
+    Ok(RawRow {
+        line,
+        t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
+        position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
+        attitude: RawAttitude::None,
+    })
+}
+
+/// Notes on keys and tags that are not used.
 fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
     let mut notes = Vec::new();
     if spec.height == HeightReference::Ellipsoid {
-        let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set flight.height = \"msl\" unless you know better";
+        let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
+            flight.height = \"msl\" unless you know better";
         notes.push(Note { is_warning: true, text: text.to_owned() });
     }
     if spec.time_unit != TimeUnit::Auto {
@@ -109,18 +114,18 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
     }
     let used = ["ele", "time", "trkpt", "trk", "trkseg", "gpx"];
     let in_points = points.iter().flat_map(|point| point.descendants());
-    let beside = document
+    let waypoints = document
         .root_element()
         .children()
-        .filter(|node| node.has_tag_name_of("wpt") || node.has_tag_name_of("rte"));
+        .filter(|node| node.has_local_name("wpt") || node.has_local_name("rte"));
     let not_used: BTreeSet<&str> = in_points
-        .chain(beside)
+        .chain(waypoints)
         .filter(|node| node.is_element())
         .map(|node| node.tag_name().name())
         .filter(|name| !used.contains(name) && *name != "extensions")
         .collect();
     if !not_used.is_empty() {
-        // These would have changed the picture in a log of another format.
+        // Attitude tags change the picture in other formats, so leaving them out is worth a warning.
         const ATTITUDE: [&str; 6] = ["heading", "yaw", "roll", "pitch", "course", "geoidheight"];
         let is_warning = not_used.iter().any(|name| ATTITUDE.contains(name));
         let list: Vec<&str> = not_used.into_iter().collect();
@@ -133,12 +138,12 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
 }
 
 trait LocalName {
-    /// Of this name in any namespace: GPX 1.0, 1.1, or none.
-    fn has_tag_name_of(&self, name: &str) -> bool;
+    /// Whether this is an element of the given name in any namespace: GPX 1.0, 1.1, or none.
+    fn has_local_name(&self, name: &str) -> bool;
 }
 
 impl LocalName for Node<'_, '_> {
-    fn has_tag_name_of(&self, name: &str) -> bool {
+    fn has_local_name(&self, name: &str) -> bool {
         self.is_element() && self.tag_name().name() == name
     }
 }

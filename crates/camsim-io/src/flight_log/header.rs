@@ -1,61 +1,62 @@
-//! A header line: what each name means, in which unit, and which column stands for a quantity where several
-//! do.
+//! Header lines: the meaning and unit of each name, and lookup of columns by meaning.
 
 use super::{
-    names::{self, Meaning},
-    units::{self, Datum, Dimension, Unit, Word},
+    column_meaning::ColumnMeaning,
+    column_names,
+    units::{Dimension, Qualifier, Unit, VerticalDatum, parse_qualifier},
 };
 
 /// A column of a header.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Column {
-    /// As written.
+pub(super) struct HeaderColumn {
+    /// Name as the file has it.
     pub(super) name: String,
-    /// `None` where the name says nothing to us.
-    pub(super) means: Option<Means>,
+    /// Meaning of the name; `None` where it is not known.
+    pub(super) parsed: Option<ParsedName>,
 }
 
-/// What a known name says.
+/// Meaning and unit of a known name.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Means {
-    pub(super) meaning: Meaning,
-    /// The part of the name that has the meaning, in normal form.
+pub(super) struct ParsedName {
+    /// What the column holds.
+    pub(super) meaning: ColumnMeaning,
+    /// The known part of the name, without units and the like, in normal form.
     pub(super) stem: String,
+    /// Unit that the header states.
     pub(super) unit: Option<&'static Unit>,
-    /// The name is nothing but a unit: it may be a part of a time in several columns.
+    /// Whether the name is only a unit (`ms`), which may be one part of a time in several columns.
     pub(super) is_bare_unit: bool,
-    /// Words beside the name that nobody knows, or that contradict each other: an error if the column is
-    /// used.
+    /// Error message for unknown or contradictory qualifiers, reported if the column is used.
     problem: Option<String>,
 }
 
 /// The columns of a header.
 #[derive(Clone, Debug)]
-pub(super) struct Header(pub(super) Vec<Column>);
+pub(super) struct HeaderColumns(pub(super) Vec<HeaderColumn>);
 
-impl Header {
+impl HeaderColumns {
     pub(super) fn parse(names: &[&str]) -> Self {
         Self(
             names
                 .iter()
-                .map(|name| Column { name: (*name).to_owned(), means: parse_name(name, None) })
+                .map(|name| HeaderColumn { name: (*name).to_owned(), parsed: parse_name(name, None) })
                 .collect(),
         )
     }
 
-    /// The same with a line of units below the names; `None` if that line says anything else.
-    pub(super) fn parse_with_units(names: &[&str], words: &[&str]) -> Option<Self> {
-        if names.len() != words.len()
-            || !words.iter().all(|text| units::word(text.trim_matches(['[', ']', '(', ')'])).is_some())
+    /// Parses names with a line of units below them; `None` if that line holds anything else.
+    pub(super) fn parse_with_units(names: &[&str], units: &[&str]) -> Option<Self> {
+        if names.len() != units.len()
+            || !units.iter().all(|text| parse_qualifier(text.trim_matches(['[', ']', '(', ')'])).is_some())
         {
             return None;
         }
-        let columns = names.iter().zip(words);
+        let columns = names.iter().zip(units);
         Some(Self(
             columns
-                .map(|(name, words)| Column {
+                .map(|(name, unit)| HeaderColumn {
                     name: (*name).to_owned(),
-                    means: parse_name(name, Some(words)),
+                    parsed: parse_name(name, Some(unit)),
                 })
                 .collect(),
         ))
@@ -65,73 +66,85 @@ impl Header {
         self.0.get(column).map_or("", |column| &column.name)
     }
 
-    pub(super) fn means(&self, column: usize) -> Option<&Means> {
-        self.0.get(column).and_then(|column| column.means.as_ref())
+    pub(super) fn parsed(&self, column: usize) -> Option<&ParsedName> {
+        self.0.get(column).and_then(|column| column.parsed.as_ref())
     }
 
-    pub(super) fn all(&self, is: impl Fn(Meaning) -> bool) -> Vec<usize> {
-        let is_it = |column: &Column| column.means.as_ref().is_some_and(|means| is(means.meaning));
-        self.0.iter().enumerate().filter(|(_, column)| is_it(column)).map(|(index, _)| index).collect()
+    /// The known part of a column's name, in normal form; empty where the name is not known.
+    pub(super) fn stem(&self, column: usize) -> &str {
+        self.parsed(column).map_or("", |parsed| &parsed.stem)
+    }
+
+    /// Indices of the columns whose meaning fulfils a condition.
+    pub(super) fn columns_where(&self, condition: impl Fn(ColumnMeaning) -> bool) -> Vec<usize> {
+        let fulfils =
+            |column: &HeaderColumn| column.parsed.as_ref().is_some_and(|parsed| condition(parsed.meaning));
+        self.0.iter().enumerate().filter(|(_, column)| fulfils(column)).map(|(index, _)| index).collect()
     }
 
     /// The column of this meaning, if there is one.
     ///
     /// # Errors
-    /// There are several, or its unit makes no sense: what to say.
-    pub(super) fn one(&self, meaning: Meaning) -> Result<Option<usize>, String> {
-        let all = self.all(|other| other == meaning);
+    /// There are several, or its unit makes no sense: the error message.
+    pub(super) fn unique(&self, meaning: ColumnMeaning) -> Result<Option<usize>, String> {
+        let all = self.columns_where(|other| other == meaning);
         match all[..] {
             [] => Ok(None),
-            [column] => self.check(column).map(|()| Some(column)),
-            _ => Err(self.two(&all)),
+            [column] => self.check_usable(column).map(|()| Some(column)),
+            _ => Err(self.ambiguity_message(&all)),
         }
     }
 
-    /// All of these, or `None` if one is missing.
-    pub(super) fn all_of<const N: usize>(
+    /// The column of each meaning, or `None` if one is missing.
+    ///
+    /// # Errors
+    /// As [`Self::unique`].
+    pub(super) fn unique_each<const N: usize>(
         &self,
-        meanings: [Meaning; N],
+        meanings: [ColumnMeaning; N],
     ) -> Result<Option<[usize; N]>, String> {
-        if meanings.iter().any(|&meaning| self.all(|other| other == meaning).is_empty()) {
+        if meanings.iter().any(|&meaning| self.columns_where(|other| other == meaning).is_empty()) {
             return Ok(None);
         }
         let mut columns = [0; N];
         for (column, meaning) in columns.iter_mut().zip(meanings) {
-            *column = self.one(meaning)?.unwrap_or_default();
+            *column = self.unique(meaning)?.unwrap_or_default();
         }
         Ok(Some(columns))
     }
 
-    pub(super) fn check(&self, column: usize) -> Result<(), String> {
-        match self.means(column).and_then(|means| means.problem.as_ref()) {
+    /// Reports the problem of a column's name, if it has one.
+    pub(super) fn check_usable(&self, column: usize) -> Result<(), String> {
+        match self.parsed(column).and_then(|parsed| parsed.problem.as_ref()) {
             Some(problem) => Err(format!("column {} (`{}`): {problem}", column + 1, self.name(column))),
             None => Ok(()),
         }
     }
 
-    /// Of one quantity several columns.
-    pub(super) fn two(&self, columns: &[usize]) -> String {
+    /// Message for several columns of one quantity.
+    pub(super) fn ambiguity_message(&self, columns: &[usize]) -> String {
         format!(
             "the columns {} are of one quantity: remove or rename all but the right one",
-            self.list(columns)
+            self.describe(columns)
         )
     }
 
-    pub(super) fn list(&self, columns: &[usize]) -> String {
+    /// Numbers and names of columns, for messages: ``1 (`t`) and 2 (`time`)``.
+    pub(super) fn describe(&self, columns: &[usize]) -> String {
         let named: Vec<String> =
             columns.iter().map(|&column| format!("{} (`{}`)", column + 1, self.name(column))).collect();
         named.join(" and ")
     }
 
-    /// Factor of a column's unit, if it names one.
+    /// Factor of a column's unit, if the header states one.
     pub(super) fn factor(&self, column: usize) -> Option<f64> {
-        self.means(column).and_then(|means| means.unit).map(|unit| unit.factor)
+        self.parsed(column).and_then(|parsed| parsed.unit).map(|unit| unit.factor)
     }
 }
 
-/// The dimension that a column of this meaning has; `None` where it has none.
-fn dimension(meaning: Meaning) -> Option<Dimension> {
-    use Meaning::*;
+/// The physical dimension of a column; `None` where it has no unit.
+fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
+    use ColumnMeaning::*;
     match meaning {
         Time | NanosecondsPart => Some(Dimension::Time),
         Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
@@ -144,65 +157,67 @@ fn dimension(meaning: Meaning) -> Option<Dimension> {
     }
 }
 
-/// `timestamp [ns]`, `lat_deg`, `p_RS_R_x [m]`, `Yaw(rad)`, `lat, deg`, `latE7`, `TimeUS`; `below` is what a
-/// line of units says.
-fn parse_name(name: &str, below: Option<&str>) -> Option<Means> {
+/// Parses a name such as `timestamp [ns]`, `lat_deg`, `p_RS_R_x [m]`, `Yaw(rad)`, `lat, deg`, `latE7` or
+/// `TimeUS`; `unit_line` is the cell of a line of units below it.
+// Long because the rules for qualifiers share the meaning, unit and problem found so far.
+fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
-    let (bare, mut beside) = without_brackets(name);
+    let (bare, mut qualifier_texts) = split_brackets(name);
     let (bare, after_comma) = bare.split_once(',').map_or((bare.as_str(), ""), |(bare, rest)| (bare, rest));
-    beside
-        .extend([after_comma.to_owned(), below.unwrap_or("").trim_matches(['[', ']', '(', ')']).to_owned()]);
+    let unit_line = unit_line.unwrap_or("").trim_matches(['[', ']', '(', ')']);
+    qualifier_texts.extend([after_comma.to_owned(), unit_line.to_owned()]);
 
     let normal = normal_form(bare);
-    let (known, stem, mut words) = known_and_suffixes(&normal)?;
+    let (known, stem, mut qualifiers) = split_suffixes(&normal)?;
     let mut problem = None;
-    for text in beside.iter().map(|text| text.trim()).filter(|text| !text.is_empty()) {
-        match words_of(text) {
-            Some(found) => words.extend(found),
+    for text in qualifier_texts.iter().map(|text| text.trim()).filter(|text| !text.is_empty()) {
+        match parse_qualifiers(text) {
+            Some(parsed) => qualifiers.extend(parsed),
             None => {
                 problem = Some(format!(
-                    "`{text}` is no unit known; docs/inputs/LOGS.md lists them, and a column that needs none should name none"
+                    "`{text}` is no unit known; docs/inputs/LOGS.md lists them, and a column that needs none \
+                        should name none"
                 ))
             }
         }
     }
     let mut meaning = known.meaning;
     let mut unit = known.unit;
-    for word in words {
-        match word {
-            Word::Unit(other) if dimension(meaning) != Some(other.dimension) => {
+    for qualifier in qualifiers {
+        match qualifier {
+            Qualifier::Unit(other) if dimension(meaning) != Some(other.dimension) => {
                 problem = Some(match dimension(meaning) {
                     Some(dimension) => format!("{} is no unit of {}", other.name, dimension.name()),
                     None => format!("it has no unit, but {} is named", other.name),
                 });
             }
-            Word::Unit(other) if unit.is_some_and(|unit| unit != other) => {
+            Qualifier::Unit(other) if unit.is_some_and(|unit| unit != other) => {
                 problem = Some(format!(
                     "it names two units, {} and {}",
                     unit.map_or("", |unit| unit.name),
                     other.name
                 ));
             }
-            Word::Unit(other) => unit = Some(other),
-            Word::Datum(datum) => match meaning {
-                Meaning::Height(None) => meaning = Meaning::Height(Some(datum)),
-                Meaning::Height(Some(other)) if other != datum => {
+            Qualifier::Unit(other) => unit = Some(other),
+            Qualifier::Datum(datum) => match meaning {
+                ColumnMeaning::Height(None) => meaning = ColumnMeaning::Height(Some(datum)),
+                ColumnMeaning::Height(Some(other)) if other != datum => {
                     problem = Some("it names two vertical datums".to_owned())
                 }
-                Meaning::PressureHeight if datum == Datum::Ellipsoid => {
-                    problem = Some("air pressure knows no ellipsoid".to_owned())
+                ColumnMeaning::PressureHeight if datum == VerticalDatum::Ellipsoid => {
+                    problem = Some("a height by air pressure is not above the ellipsoid".to_owned())
                 }
                 _ => {}
             },
-            Word::Magnetic if meaning == Meaning::Yaw => meaning = Meaning::MagneticYaw,
-            Word::Magnetic | Word::Noise => {}
+            Qualifier::Magnetic if meaning == ColumnMeaning::Yaw => meaning = ColumnMeaning::MagneticYaw,
+            Qualifier::Magnetic | Qualifier::Ignored => {}
         }
     }
-    Some(Means { meaning, stem, unit, is_bare_unit: known.unit.is_some(), problem })
+    Some(ParsedName { meaning, stem, unit, is_bare_unit: known.unit.is_some(), problem })
 }
 
-/// The name without what stands in brackets, and that.
-fn without_brackets(name: &str) -> (String, Vec<String>) {
+/// Splits a name into the text outside of brackets and the texts inside.
+fn split_brackets(name: &str) -> (String, Vec<String>) {
     let (mut bare, mut inside) = (String::new(), Vec::new());
     let mut rest = name;
     while let Some(open) = rest.find(['[', '(']) {
@@ -216,7 +231,7 @@ fn without_brackets(name: &str) -> (String, Vec<String>) {
     (bare, inside)
 }
 
-/// Lower case, words joined by single underscores; `TimeUS` is two words.
+/// The normal form of a name: lower case, words joined by single underscores. `TimeUS` is two words.
 fn normal_form(name: &str) -> String {
     let mut normal = String::with_capacity(name.len() + 4);
     let mut before = ' ';
@@ -236,34 +251,37 @@ fn normal_form(name: &str) -> String {
     normal.trim_matches('_').to_owned()
 }
 
-/// Splits units and the like off the end of a name until the rest is known.
-fn known_and_suffixes(normal: &str) -> Option<(&'static names::Known, String, Vec<Word>)> {
+/// Splits qualifiers off the end of a name until the rest is a known name.
+fn split_suffixes(normal: &str) -> Option<(&'static column_names::KnownName, String, Vec<Qualifier>)> {
     let mut stem = normal;
-    let mut words = Vec::new();
+    let mut qualifiers = Vec::new();
     loop {
-        if let Some(known) = names::find(stem) {
-            // `alt_min` is no height in minutes but the lowest one: a name of another kind.
-            let fits = |word: &Word| !matches!(word, Word::Unit(unit) if dimension(known.meaning) != Some(unit.dimension));
-            return words.iter().all(fits).then(|| (known, stem.to_owned(), words));
+        if let Some(known) = column_names::find(stem) {
+            // `alt_min` is the minimum of a height, not a height in minutes: another, unknown name.
+            let fits = |qualifier: &Qualifier| match qualifier {
+                Qualifier::Unit(unit) => dimension(known.meaning) == Some(unit.dimension),
+                _ => true,
+            };
+            return qualifiers.iter().all(fits).then(|| (known, stem.to_owned(), qualifiers));
         }
-        let starts: Vec<usize> = stem.match_indices('_').map(|(at, _)| at).collect();
-        // The longest first: `us_survey_ft` ends in a `ft` too.
-        let split = starts.iter().rev().take(3).rev().find_map(|&at| {
-            let text = &stem[at + 1..];
-            let is_word = text.chars().any(char::is_alphabetic);
-            units::word(text).filter(|_| is_word).map(|word| (at, word))
+        let separators: Vec<usize> = stem.match_indices('_').map(|(index, _)| index).collect();
+        // The longest suffix first: `us_survey_ft` also ends in `ft`.
+        let split = separators.iter().rev().take(3).rev().find_map(|&separator| {
+            let text = &stem[separator + 1..];
+            let has_letter = text.chars().any(char::is_alphabetic);
+            parse_qualifier(text).filter(|_| has_letter).map(|qualifier| (separator, qualifier))
         });
-        let (at, word) = split?;
-        words.push(word);
-        stem = stem[..at].trim_end_matches("_in");
+        let (separator, qualifier) = split?;
+        qualifiers.push(qualifier);
+        stem = stem[..separator].trim_end_matches("_in");
     }
 }
 
-/// Words of one pair of brackets; `None` if one is unknown.
-fn words_of(text: &str) -> Option<Vec<Word>> {
-    match units::word(text) {
-        Some(word) => Some(vec![word]),
-        None => text.split([',', ';', ' ']).filter(|part| !part.is_empty()).map(units::word).collect(),
+/// Parses the qualifiers in one pair of brackets; `None` if one is unknown.
+fn parse_qualifiers(text: &str) -> Option<Vec<Qualifier>> {
+    match parse_qualifier(text) {
+        Some(qualifier) => Some(vec![qualifier]),
+        None => text.split([',', ';', ' ']).filter(|part| !part.is_empty()).map(parse_qualifier).collect(),
     }
 }
 
@@ -274,9 +292,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_give_meaning_unit_and_datum() {
-        use Meaning::*;
-        let mean_sea_level = Height(Some(Datum::MeanSeaLevel));
+    fn names_are_parsed_into_meaning_unit_and_datum() {
+        use ColumnMeaning::*;
+        let mean_sea_level = Height(Some(VerticalDatum::MeanSeaLevel));
         for (name, meaning, unit) in [
             ("time(millisecond)", Time, "ms"),
             ("TimeUS", Time, "us"),
@@ -300,16 +318,16 @@ mod tests {
             ("h_mm", Height(None), "mm"),
             ("gnss_alt_m", Height(None), "m"),
             ("altitude in feet", Height(None), "ft"),
-            ("HAE (m)", Height(Some(Datum::Ellipsoid)), "m"),
+            ("HAE (m)", Height(Some(VerticalDatum::Ellipsoid)), "m"),
             ("Yaw(rad)", Yaw, "rad"),
             ("yaw_cdeg", Yaw, "cdeg"),
             ("heading (deg, magnetic)", MagneticYaw, "deg"),
             ("p_RS_R_x [m]", X, "m"),
             ("north_km", North, "km"),
         ] {
-            let means = parse_name(name, None).unwrap_or_else(|| panic!("{name}"));
+            let parsed = parse_name(name, None).unwrap_or_else(|| panic!("{name}"));
             assert_eq!(
-                (means.meaning, means.unit.unwrap().name, means.problem),
+                (parsed.meaning, parsed.unit.unwrap().name, parsed.problem),
                 (meaning, unit, None),
                 "{name}"
             );
@@ -317,11 +335,11 @@ mod tests {
         for (name, meaning) in [
             ("timestamp(s)", Time),
             ("q_RS_w []", Qw),
-            ("alt_ellipsoid", Height(Some(Datum::Ellipsoid))),
+            ("alt_ellipsoid", Height(Some(VerticalDatum::Ellipsoid))),
             ("datetime(utc)", DateTime),
         ] {
-            let means = parse_name(name, None).unwrap();
-            assert_eq!((means.meaning, means.problem), (meaning, None), "{name}");
+            let parsed = parse_name(name, None).unwrap();
+            assert_eq!((parsed.meaning, parsed.problem), (meaning, None), "{name}");
         }
         for name in [
             "delta_alt",

@@ -1,5 +1,5 @@
-//! Logs as nobody should write them: each gives the right flight or is refused with words that help; none is
-//! silently another flight.
+//! Malformed and unusual logs: each is read as the right flight, or refused with a message that helps. None
+//! is silently read as another flight.
 
 #![allow(clippy::unwrap_used)]
 
@@ -15,16 +15,17 @@ thread_local! {
     static FAULTS: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
 }
 
-/// Says all faults of a test at its end, not only the first one.
-struct AllFaults;
+/// Fails the test when dropped, with all faults that were collected, not only the first one.
+struct FaultReport;
 
-impl Drop for AllFaults {
+impl Drop for FaultReport {
     fn drop(&mut self) {
         let faults = FAULTS.take();
         assert!(std::thread::panicking() || faults.is_empty(), "{}", faults.join("\n"));
     }
 }
 
+/// Adds a fault to the report of the running test.
 fn fault(text: String) {
     FAULTS.with_borrow_mut(|faults| faults.push(text));
 }
@@ -36,13 +37,13 @@ fn read_with(content: &[u8], spec: &FlightSpec) -> Result<FlightLog, String> {
     read_flight_log(&path, spec, HeightConversion::None).map_err(|error| error.to_string())
 }
 
-/// A header and 21 rows of 20 s, 200 m north, 20 m up, by a pattern: `T` seconds, `LAT`, `LON`, `N` metres
-/// north, `H` metres up.
+/// A log with a header and 21 rows over 20 s, 200 m north and 20 m up. In the pattern of a row, `T` stands
+/// for seconds, `LAT` and `LON` for degrees, `N` for metres north, `H` for the height in metres.
 fn log(header: &str, pattern: &str) -> String {
     scaled(header, pattern, 1.0)
 }
 
-/// The same with times of other units.
+/// As [`log`], with times of another unit, of which there are `per_second` in a second.
 fn scaled(header: &str, pattern: &str, per_second: f64) -> String {
     let mut text = if header.is_empty() { String::new() } else { format!("{header}\n") };
     for i in 0..21 {
@@ -59,7 +60,8 @@ fn scaled(header: &str, pattern: &str, per_second: f64) -> String {
     text
 }
 
-/// 20 s, 200 m north, 20 m up; warnings have this part, or there are none.
+/// Checks that a log lasts 20 s and moves 200 m north and 20 m up, and that a warning contains `warning`;
+/// there is no warning if that is empty.
 fn assert_flies(what: &str, content: &str, spec: &FlightSpec, warning: &str) {
     let log = match read_with(content.as_bytes(), spec) {
         Ok(log) => log,
@@ -81,6 +83,7 @@ fn assert_flies(what: &str, content: &str, spec: &FlightSpec, warning: &str) {
     }
 }
 
+/// Checks that a log is refused with a message that contains all `words`.
 fn assert_refused(what: &str, content: &[u8], spec: &FlightSpec, words: &[&str]) {
     match read_with(content, spec) {
         Ok(log) => {
@@ -103,7 +106,7 @@ fn auto() -> FlightSpec {
 }
 
 #[test]
-fn the_reference_is_the_code() {
+fn logs_md_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/LOGS.md");
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();

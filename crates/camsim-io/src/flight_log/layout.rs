@@ -1,4 +1,4 @@
-//! Which column is what: from the header, or from `flight.format`, or from the values.
+//! The meaning of each column of a table: from its header, else from `flight.format`, else from the values.
 
 use std::path::Path;
 
@@ -9,50 +9,53 @@ use camsim_core::{
 
 use super::{
     FlightLogError,
-    choose::{
-        attitude_columns, names_a_flight, position_columns, say_what_is_not_used, stem, time_columns,
-        what_is_missing,
+    column_meaning::ColumnMeaning,
+    column_selection::{
+        attitude_columns, has_time_and_position, missing_columns_message, note_unused_columns,
+        position_columns, time_columns,
     },
-    columns::{AttitudeColumns, Frame, Source, TimeColumns},
+    columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,
-    header::Header,
-    names::Meaning,
-    text::{HeaderLine, Table},
+    header::HeaderColumns,
+    text_table::{HeaderLine, Table},
 };
 
-/// Columns of a file and what they mean.
+/// The meaning of the columns of a table.
 #[derive(Clone, Debug)]
-pub(super) struct Layout {
+pub(super) struct TableLayout {
     pub(super) format: LogFormat,
     pub(super) time: TimeColumns,
     pub(super) frame: Frame,
-    pub(super) position: [Source; 3],
+    pub(super) position: [FieldSource; 3],
     pub(super) attitude: AttitudeColumns,
-    /// As a header writes them, or by what they mean.
+    /// Names of the columns: those of the header, or of the quantities.
     pub(super) names: Vec<String>,
     pub(super) has_header: bool,
-    /// Says whose row it is.
+    /// Column that identifies the vehicle of a row.
     pub(super) vehicle: Option<usize>,
 }
 
-impl Layout {
-    pub(super) fn find(
+impl TableLayout {
+    pub(super) fn detect(
         path: &Path,
         table: &Table<'_>,
         spec: &FlightSpec,
         notes: &mut Vec<Note>,
     ) -> Result<Self, FlightLogError> {
         detect::refuse_pose_matrices(path, table)?;
-        // The header nearest to the data counts; prose in comments names no columns.
+        // The last header before the data counts. Comments that name no columns are skipped.
         for (index, line) in table.headers.iter().enumerate().rev() {
             let above = index.checked_sub(1).and_then(|above| table.headers.get(above));
-            let Some(header) = header_of(path, table, line, above)? else { continue };
+            let Some(header) = parse_header(path, table, line, above)? else { continue };
             return Self::from_header(&header, table, spec, notes).map_err(|problem| {
                 FlightLogError::Header { path: path.to_owned(), line: line.number, problem }
             });
         }
-        let format =
-            if spec.format == LogFormat::Auto { detect::format(path, table, spec)? } else { spec.format };
+        let format = if spec.format == LogFormat::Auto {
+            detect::detect_format(path, table, spec)?
+        } else {
+            spec.format
+        };
         Ok(Self::without_header(table, format))
     }
 
@@ -69,7 +72,7 @@ impl Layout {
             LogFormat::Tum => (AttitudeColumns::Quaternion([4, 5, 6, 7]), &["qx", "qy", "qz", "qw"][..]),
             LogFormat::Euroc => (AttitudeColumns::Quaternion([5, 6, 7, 4]), &["qw", "qx", "qy", "qz"][..]),
             _ if table.columns >= 7 => (
-                AttitudeColumns::Euler([4, 5, 6].map(|column| Source::whole(column, None))),
+                AttitudeColumns::Euler([4, 5, 6].map(|column| FieldSource::whole(column, None))),
                 &["roll", "pitch", "yaw"][..],
             ),
             _ => (AttitudeColumns::None, &[][..]),
@@ -79,12 +82,12 @@ impl Layout {
             time: TimeColumns {
                 column: 0,
                 unit_ns: None,
-                whole_are_ns: format == LogFormat::Euroc,
+                integers_are_ns: format == LogFormat::Euroc,
                 date: None,
                 nanoseconds: None,
             },
             frame,
-            position: [1, 2, 3].map(|column| Source::whole(column, None)),
+            position: [1, 2, 3].map(|column| FieldSource::whole(column, None)),
             attitude,
             names: ["time"]
                 .iter()
@@ -98,7 +101,7 @@ impl Layout {
     }
 
     fn from_header(
-        header: &Header,
+        header: &HeaderColumns,
         table: &Table<'_>,
         spec: &FlightSpec,
         notes: &mut Vec<Note>,
@@ -111,7 +114,7 @@ impl Layout {
         };
         let (frame, position) = position_columns(header, table, spec, time.column, notes)?;
         let is_euroc =
-            spec.format == LogFormat::Euroc || stem(header, position[0].column).starts_with("p_rs_r");
+            spec.format == LogFormat::Euroc || header.stem(position[0].column).starts_with("p_rs_r");
         let format = match frame {
             Frame::Geodetic => LogFormat::CsvLla,
             Frame::NorthEastUp => LogFormat::CsvXya,
@@ -119,15 +122,15 @@ impl Layout {
             Frame::EastNorthUp if is_euroc => LogFormat::Euroc,
             Frame::EastNorthUp => LogFormat::Tum,
         };
-        let time = TimeColumns { whole_are_ns: format == LogFormat::Euroc, ..time };
-        say_what_is_not_used(header, frame, attitude, notes);
+        let time = TimeColumns { integers_are_ns: format == LogFormat::Euroc, ..time };
+        note_unused_columns(header, frame, attitude, notes);
         let names = header.0.iter().map(|column| column.name.clone()).collect();
-        let vehicle = header.all(|meaning| meaning == Meaning::Vehicle).first().copied();
+        let vehicle = header.columns_where(|meaning| meaning == ColumnMeaning::Vehicle).first().copied();
         Ok(Self { format, time, frame, position, attitude, names, has_header: true, vehicle })
     }
 
-    /// Columns that a row must have.
-    pub(super) fn columns_needed(&self) -> usize {
+    /// Number of columns that a row must have.
+    pub(super) fn required_columns(&self) -> usize {
         let attitude = match self.attitude {
             AttitudeColumns::None => 0,
             AttitudeColumns::Euler(sources) => sources.iter().map(|source| source.column).max().unwrap_or(0),
@@ -137,43 +140,46 @@ impl Layout {
         1 + self.position.iter().map(|source| source.column).fold(attitude.max(time), usize::max)
     }
 
-    /// ` (`name`)`, for messages about a column.
-    pub(super) fn named(&self, column: usize) -> String {
+    /// Name of a column in brackets, with a blank before it, for messages: ` (`name`)`.
+    pub(super) fn bracketed_name(&self, column: usize) -> String {
         self.names.get(column).map_or(String::new(), |name| {
             if self.has_header { format!(" (`{name}`)") } else { format!(" ({name})") }
         })
     }
 }
-/// The header that a line is, with its line of units; `None` if it is prose.
-fn header_of(
+
+/// Parses a line as a header, or as the line of units below the header `above`; `None` if it is a comment
+/// that names no columns.
+fn parse_header(
     path: &Path,
     table: &Table<'_>,
     line: &HeaderLine<'_>,
     above: Option<&HeaderLine<'_>>,
-) -> Result<Option<Header>, FlightLogError> {
+) -> Result<Option<HeaderColumns>, FlightLogError> {
     let names = table.names(line.text);
-    let units = |above: &HeaderLine<'_>| {
-        Header::parse_with_units(&table.names(above.text), &names).filter(names_a_flight)
+    let with_units = |above: &HeaderLine<'_>| {
+        HeaderColumns::parse_with_units(&table.names(above.text), &names).filter(has_time_and_position)
     };
-    if let Some(header) = above.and_then(units) {
+    if let Some(header) = above.and_then(with_units) {
         return Ok(Some(header));
     }
     let problem =
         |problem: String| FlightLogError::Header { path: path.to_owned(), line: line.number, problem };
-    let mut header = Header::parse(&names);
-    let is_whole = table.fits(names.len()) && names_a_flight(&header);
+    let mut header = HeaderColumns::parse(&names);
+    let is_complete = table.fits(names.len()) && has_time_and_position(&header);
     if line.is_comment
-        && !is_whole
-        && let Some(without_prose) = without_prose(table, line.text)
+        && !is_complete
+        && let Some(names_only) = header_after_prose(table, line.text)
     {
-        header = without_prose;
+        header = names_only;
     }
-    if !names_a_flight(&header) {
-        return if line.is_comment { Ok(None) } else { Err(problem(what_is_missing(&header))) };
+    if !has_time_and_position(&header) {
+        return if line.is_comment { Ok(None) } else { Err(problem(missing_columns_message(&header))) };
     }
     if !table.fits(header.0.len()) {
         return Err(problem(format!(
-            "it names {} columns, but the rows have {}: give every column one name (a comma within a name needs quotes, decimal commas need semicolons between the columns)",
+            "it names {} columns, but the rows have {}: give every column one name (a comma within a name \
+                needs quotes, decimal commas need semicolons between the columns)",
             header.0.len(),
             table.columns
         )));
@@ -181,19 +187,19 @@ fn header_of(
     Ok(Some(header))
 }
 
-/// `# format: timestamp tx ty ...`, `# columns are t x y ...`: the names behind a colon, or the last ones, as
-/// many as there are columns.
-fn without_prose(table: &Table<'_>, text: &str) -> Option<Header> {
-    let behind = text.match_indices([':', '=']).map(|(at, _)| &text[at + 1..]);
-    let mut headers = behind.map(|text| Header::parse(&table.names(text.trim())));
-    let fits = |header: &Header| table.fits(header.0.len()) && names_a_flight(header);
+/// The header at the end of a comment, as in `# format: timestamp tx ty ...` and `# columns are t x y ...`:
+/// the names after a colon or an equals sign, else as many of the last words as the table has columns.
+fn header_after_prose(table: &Table<'_>, text: &str) -> Option<HeaderColumns> {
+    let after_mark = text.match_indices([':', '=']).map(|(mark, _)| &text[mark + 1..]);
+    let mut headers = after_mark.map(|text| HeaderColumns::parse(&table.names(text.trim())));
+    let fits = |header: &HeaderColumns| table.fits(header.0.len()) && has_time_and_position(header);
     headers.find(fits).or_else(|| {
         let names = table.names(text);
-        let prose = names.len().checked_sub(table.columns)?;
+        let prose_words = names.len().checked_sub(table.columns)?;
         let is_prose = names
-            .get(..prose)?
+            .get(..prose_words)?
             .iter()
-            .all(|word| Header::parse(&[word]).0.iter().all(|column| column.means.is_none()));
-        is_prose.then(|| Header::parse(&names[prose..])).filter(fits)
+            .all(|word| HeaderColumns::parse(&[word]).0.iter().all(|column| column.parsed.is_none()));
+        is_prose.then(|| HeaderColumns::parse(&names[prose_words..])).filter(fits)
     })
 }

@@ -1,42 +1,43 @@
-//! Lengths of quaternions.
+//! Normalisation of quaternions.
 
 use camsim_core::flight_log::Note;
 
-use super::rows::Row;
+use super::rows::ParsedRow;
 
-/// Rounded to two decimals, quaternions are off by less.
-const NEAR: f64 = 0.01;
+/// Relative tolerance of the norm: the error of components that are rounded to two decimals is smaller.
+const NORM_TOLERANCE: f64 = 0.01;
 
-/// Gives quaternions that are all of one other length the length 1.
+/// Divides the quaternions by their common norm, if that is not 1.
 ///
 /// # Errors
-/// Their lengths vary: they are no quaternions.
-pub(super) fn normalise(rows: &mut [Row], notes: &mut Vec<Note>) -> Result<(), String> {
-    let length = |row: &Row| row.attitude.iter().map(|q| q * q).sum::<f64>().sqrt();
-    let mut lengths: Vec<f64> =
-        rows.iter().map(length).filter(|length| length.is_finite() && *length > 0.0).collect();
-    if lengths.is_empty() {
+/// Their norms vary, so they are no quaternions.
+pub(super) fn normalise(rows: &mut [ParsedRow], notes: &mut Vec<Note>) -> Result<(), String> {
+    let norm = |row: &ParsedRow| row.attitude.iter().map(|q| q * q).sum::<f64>().sqrt();
+    let mut norms: Vec<f64> = rows.iter().map(norm).filter(|norm| norm.is_finite() && *norm > 0.0).collect();
+    if norms.is_empty() {
         return Ok(());
     }
-    lengths.sort_by(f64::total_cmp);
-    let (least, usual, most) = (lengths[0], lengths[lengths.len() / 2], lengths[lengths.len() - 1]);
-    let share_near = |of: f64| {
-        lengths.iter().filter(|&&length| (length / of - 1.0).abs() <= NEAR).count() * 10 >= lengths.len() * 9
+    norms.sort_by(f64::total_cmp);
+    let (smallest, median, largest) = (norms[0], norms[norms.len() / 2], norms[norms.len() - 1]);
+    let most_near = |reference: f64| {
+        norms.iter().filter(|&&norm| (norm / reference - 1.0).abs() <= NORM_TOLERANCE).count() * 10
+            >= norms.len() * 9
     };
-    if share_near(1.0) {
+    if most_near(1.0) {
         return Ok(());
     }
-    if !share_near(usual) {
+    if !most_near(median) {
         return Err(format!(
-            "the columns of the quaternion have lengths from {least:.3} to {most:.3}, not 1: they are no quaternions, or in another order"
+            "the columns of the quaternion have lengths from {smallest:.3} to {largest:.3}, not 1: they are \
+                no quaternions, or in another order"
         ));
     }
     for row in rows.iter_mut() {
-        row.attitude = row.attitude.map(|q| q / usual);
+        row.attitude = row.attitude.map(|q| q / median);
     }
     notes.push(Note {
         is_warning: true,
-        text: format!("the quaternions have the length {usual:.3}, not 1: they are brought to 1"),
+        text: format!("the quaternions have the length {median:.3}, not 1: they are brought to 1"),
     });
     Ok(())
 }

@@ -1,14 +1,14 @@
-//! The documentation of what the reader knows, made from its own tables.
+//! Generates docs/inputs/LOGS.md from the reader's tables.
 
 use std::fmt::Write;
 
 use super::{
-    names::{KNOWN, PREFIXES},
-    sniff::{KML, OTHER_XML, OTHERS, SUBTITLES},
+    column_names::{KNOWN_NAMES, PREFIXES},
+    foreign_formats::{FOREIGN_FORMATS, KML, OTHER_XML, SUBTITLES},
     units::{Dimension, UNITS},
 };
 
-/// Formats without a header: name, columns, what the numbers are.
+/// Formats of files without a header: name, columns, units and axes.
 const FORMATS: &[(&str, &str, &str)] = &[
     (
         "csv-lla",
@@ -22,74 +22,95 @@ const FORMATS: &[(&str, &str, &str)] = &[
     ("gpx", "`trkpt` with lat, lon, `ele`, `time`", "no attitude: flight.attitude = \"track\""),
 ];
 
-/// Keys of `[flight]` that decide how a log is read.
+/// Keys of `[flight]` that control the reading, with what each decides.
 const KEYS: &[(&str, &str)] = &[
     ("format", "the layout, where a file has no header or its names do not say where the axes point"),
     (
         "time_unit",
-        "unit of a time column that names none: s, ms, us, ns, min, h. `auto`: seconds without a question where rows and speed are those of a flight; another unit, with a warning, where only that one is possible; else refused",
+        "unit of a time column that names none: s, ms, us, ns, min, h. `auto`: seconds without a question \
+            where rows and speed are those of a flight; another unit, with a warning, where only that one is \
+            possible; else refused",
     ),
     (
         "angle_unit",
-        "unit of roll, pitch and yaw that name none: deg, rad. `auto`: degrees; radians, with a warning, where yaw jumps by a turn of radians; refused where all stay within pi",
+        "unit of roll, pitch and yaw that name none: deg, rad. `auto`: degrees; radians, with a warning, \
+            where yaw jumps by a turn of radians; refused where all stay within pi",
     ),
     ("angles", "whether angles wrap or count turns"),
     ("attitude", "`track`: columns of the attitude are not read at all"),
     (
         "height",
-        "what heights are above; decides between several height columns, and warns where the column says otherwise",
+        "what heights are above; decides between several height columns, and warns where the column says \
+            otherwise",
     ),
 ];
 
-/// What else is done, or not.
+/// Further rules: subject and rule.
 const RULES: &[(&str, &str)] = &[
     (
         "Units in a header",
-        "in brackets `[]` or `()`, behind a comma (`\"lat, deg\"`), as the end of the name (`alt_ft`, `TimeUS`, `latE7`), or as a line of units below the names. An unknown unit of a column that is used is refused",
+        "in brackets `[]` or `()`, behind a comma (`\"lat, deg\"`), as the end of the name (`alt_ft`, \
+            `TimeUS`, `latE7`), or as a line of units below the names. An unknown unit of a column that is \
+            used is refused",
     ),
     (
         "Several columns for one quantity",
-        "refused, with both names. Stated choices: the time that names its unit; the height of the datum of flight.height; a height over one by air pressure; the quaternion over angles (with a warning); latitude and longitude over local coordinates, unless flight.format says local",
+        "refused, with both names. Stated choices: the time that names its unit; the height of the datum of \
+            flight.height; a height over one by air pressure; the quaternion over angles (with a warning); \
+            latitude and longitude over local coordinates, unless flight.format says local",
     ),
     (
         "x, y, z",
-        "z is up, and quaternions are of a forward-left-up body, where the names are TUM's (tx ty tz) or EuRoC's (p_RS_R_x), or x y z qx qy qz qw stand in TUM's order between blanks; else flight.format decides",
+        "z is up, and quaternions are of a forward-left-up body, where the names are TUM's (tx ty tz) or \
+            EuRoC's (p_RS_R_x), or x y z qx qy qz qw stand in TUM's order between blanks; else flight.format \
+            decides",
     ),
     (
         "Number of columns",
-        "a header names as many as the rows have, and no row has more. The end of a comment counts where prose stands before the names (`# format: timestamp tx ty ...`)",
+        "a header names as many as the rows have, and no row has more. The end of a comment counts where \
+            prose stands before the names (`# format: timestamp tx ty ...`)",
     ),
     (
         "Times",
-        "numbers; `h:m:s`, also with AM or PM, with a date column if there is one; ISO 8601 with `T` or a blank, `Z` or an offset. Dates are year-month-day. A clock that begins again (midnight, GPS week, 32 bit counters of us and ms) goes on, with a warning",
+        "numbers; `h:m:s`, also with AM or PM, with a date column if there is one; ISO 8601 with `T` or a \
+            blank, `Z` or an offset. Dates are year-month-day. A clock that begins again (midnight, GPS \
+            week, 32 bit counters of us and ms) goes on, with a warning",
     ),
     (
         "Missing values",
-        "empty, NA, N/A, NaN, null, none, nil, `-`. A row without a time or position is left out and counted; an attitude is interpolated",
+        "empty, NA, N/A, NaN, null, none, nil, `-`. A row without a time or position is left out and \
+            counted; an attitude is interpolated",
     ),
     (
         "Rows of zeros",
-        "a latitude or longitude of exactly 0, or a height of exactly 0, that no aircraft reaches from the rows beside it is left out and counted",
+        "a latitude or longitude of exactly 0, or a height of exactly 0, that no aircraft reaches from the \
+            rows beside it is left out and counted",
     ),
     (
         "Sparse tables",
-        "where no row states everything, each quantity is interpolated between the rows that state it: positions linearly at the rows of the attitude, attitudes as rotations at the rows of the position; no row is lost",
+        "where no row states everything, each quantity is interpolated between the rows that state it: \
+            positions linearly at the rows of the attitude, attitudes as rotations at the rows of the \
+            position; no row is lost",
     ),
     (
         "Numbers",
-        "with a decimal point; with a decimal comma throughout where semicolons, tabs or blanks separate. Only columns that are used must be numbers",
+        "with a decimal point; with a decimal comma throughout where semicolons, tabs or blanks separate. \
+            Only columns that are used must be numbers",
     ),
     (
         "Quaternions",
-        "of length 1 within 1 %; of another length throughout: brought to 1, with a warning; of varying lengths: refused",
+        "of length 1 within 1 %; of another length throughout: brought to 1, with a warning; of varying \
+            lengths: refused",
     ),
     (
         "GPX",
-        "all tracks and segments are one log; `ele` is taken as flight.height says, with a warning unless that is \"msl\"; other tags are named",
+        "all tracks and segments are one log; `ele` is taken as flight.height says, with a warning unless \
+            that is \"msl\"; other tags are named",
     ),
     (
         "Jumps",
-        "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with the place",
+        "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with \
+            the place",
     ),
 ];
 
@@ -97,17 +118,20 @@ const RULES: &[(&str, &str)] = &[
 #[must_use]
 pub fn reference() -> String {
     let mut text = String::from(
-        "# Flight logs: what is read\n\nMade from the reader's own tables (`crates/camsim-io/src/flight_log`).\n\n## Columns\n\nNames count without regard to case; blanks, dots, hyphens and underscores are alike. These may stand before a name: ",
+        "# Flight logs: what is read\n\nMade from the reader's own tables \
+            (`crates/camsim-io/src/flight_log`).\n\n## Columns\n\nNames count without regard to case; \
+            blanks, dots, hyphens and underscores are alike. These may stand before a name: ",
     );
     let prefixes: Vec<String> = PREFIXES.iter().map(|prefix| format!("`{prefix}`")).collect();
     text += &prefixes.join(", ");
     text += ". Other columns are not read.\n\n| quantity | names | what is done |\n|---|---|---|\n";
-    for known in KNOWN {
+    for known in KNOWN_NAMES {
         let names: Vec<String> = known.names.iter().map(|name| format!("`{name}`")).collect();
-        // Writing to a text cannot fail.
-        let _ = writeln!(text, "| {} | {} | {} |", known.what, names.join(", "), known.use_of_it);
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "| {} | {} | {} |", known.quantity, names.join(", "), known.treatment);
     }
-    text += "\n## Units\n\nAll are applied. Spellings count without blanks, underscores, dots, hyphens and signs of multiplication.\n\n| of | unit | is | spellings |\n|---|---|---|---|\n";
+    text += "\n## Units\n\nAll are applied. Spellings count without blanks, underscores, dots, hyphens and \
+        signs of multiplication.\n\n| of | unit | is | spellings |\n|---|---|---|---|\n";
     for unit in UNITS {
         let (base, scale) = match unit.dimension {
             Dimension::Time => ("s", 1e9),
@@ -125,8 +149,10 @@ pub fn reference() -> String {
             spellings.join(", ")
         );
     }
-    text += "\nBeside a height, msl, amsl, asl, orthometric, geoid, egm96 say that it is above mean sea level; ellipsoid, ellipsoidal, hae, wgs84 that it is above the ellipsoid.\n";
-    text += "\n## Formats\n\nBy flight.format, or detected where only one fits.\n\n| format | columns | numbers |\n|---|---|---|\n";
+    text += "\nBeside a height, msl, amsl, asl, orthometric, geoid, egm96 say that it is above mean sea \
+        level; ellipsoid, ellipsoidal, hae, wgs84 that it is above the ellipsoid.\n";
+    text += "\n## Formats\n\nBy flight.format, or detected where only one fits.\n\n| format | columns | \
+        numbers |\n|---|---|---|\n";
     for (format, columns, numbers) in FORMATS {
         let _ = writeln!(text, "| {format} | {columns} | {numbers} |");
     }
@@ -135,13 +161,13 @@ pub fn reference() -> String {
         let _ = writeln!(text, "| {key} | {decides} |");
     }
     text += "\n## Rules\n\n| of | rule |\n|---|---|\n";
-    for (of, rule) in RULES {
-        let _ = writeln!(text, "| {of} | {rule} |");
+    for (subject, rule) in RULES {
+        let _ = writeln!(text, "| {subject} | {rule} |");
     }
     text += "\n## Refused with advice\n\n| file | what to do |\n|---|---|\n";
-    let by_content = OTHERS.iter().map(|other| (other.what, other.advice));
-    for (what, advice) in by_content.chain([SUBTITLES, KML, OTHER_XML]) {
-        let _ = writeln!(text, "| {what} | {advice} |");
+    let by_signature = FOREIGN_FORMATS.iter().map(|format| (format.name, format.advice));
+    for (name, advice) in by_signature.chain([SUBTITLES, KML, OTHER_XML]) {
+        let _ = writeln!(text, "| {name} | {advice} |");
     }
     text
 }

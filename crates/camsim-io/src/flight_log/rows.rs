@@ -1,98 +1,116 @@
-//! The numbers of the rows, as the file states them but for named units.
+//! Parsing of rows: numbers in the units that the header names, else as the file has them.
 
 use std::path::Path;
 
 use super::{
     FlightLogError,
-    columns::{AttitudeColumns, Frame, Source, format_name},
-    layout::Layout,
-    text::{self, Line, Table},
-    time::{self, Kind},
+    columns::{AttitudeColumns, FieldSource, Frame, format_name},
+    layout::TableLayout,
+    text_table::{self, Line, Table},
+    time_fields::{self, TimeFormat},
 };
 
-/// Numbers of a row; NaN where it has none.
+/// The numbers of a row; NaN where a value is missing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
+pub(super) struct ParsedRow {
+    /// Line in the file, from 1.
     pub(super) line: usize,
-    /// Nanoseconds, or 1e-12 units of a number; `None` where there is none.
+    /// Nanoseconds of clock times and dates, else the number in 1e-12 of its unit; `None` where it is
+    /// missing.
     pub(super) time: Option<i128>,
-    /// Degrees and metres, unless a header names no unit.
+    /// Position, in degrees and metres unless the header names no unit.
     pub(super) position: [f64; 3],
-    /// Roll, pitch, yaw and nothing, or a quaternion x, y, z, w.
+    /// Roll, pitch, yaw and NaN, or a quaternion x, y, z, w.
     pub(super) attitude: [f64; 4],
 }
 
-impl Row {
+impl ParsedRow {
     pub(super) fn has_position(&self) -> bool {
         self.position.iter().all(|value| value.is_finite())
     }
 
-    pub(super) fn states_attitude(&self) -> bool {
+    pub(super) fn has_attitude(&self) -> bool {
         self.attitude[..3].iter().any(|value| !value.is_nan())
     }
 }
 
-/// All of them.
+/// All rows of a table.
 #[derive(Debug)]
-pub(super) struct Rows {
-    pub(super) kind: Kind,
-    /// Clock times come with dates.
+pub(super) struct ParsedRows {
+    /// Format of the times.
+    pub(super) time_format: TimeFormat,
+    /// Whether dates have been added to clock times.
     pub(super) has_dates: bool,
-    pub(super) rows: Vec<Row>,
+    /// Rows in the order of the file.
+    pub(super) rows: Vec<ParsedRow>,
 }
 
-pub(super) fn read(path: &Path, table: &Table<'_>, layout: &Layout) -> Result<Rows, FlightLogError> {
+/// Parses all rows.
+///
+/// # Errors
+/// A field is no number, a row is too short or too long, a position is out of range, or there are several
+/// vehicles.
+pub(super) fn read(
+    path: &Path,
+    table: &Table<'_>,
+    layout: &TableLayout,
+) -> Result<ParsedRows, FlightLogError> {
     let mut fields = Vec::new();
-    let mut kind = None;
+    let mut time_format = None;
     for line in &table.rows {
         table.separator.split(line.text, &mut fields);
-        kind = fields.get(layout.time.column).and_then(|field| Kind::of(field));
-        if kind.is_some() {
+        time_format = fields.get(layout.time.column).and_then(|field| TimeFormat::detect(field));
+        if time_format.is_some() {
             break;
         }
     }
-    one_vehicle(path, table, layout)?;
-    let is_clock = kind == Some(Kind::Clock);
-    let date = layout.time.date.filter(|&date| is_clock && !is_same_text(table, date));
-    let reader = Reader {
+    check_single_vehicle(path, table, layout)?;
+    let is_clock = time_format == Some(TimeFormat::Clock);
+    let date = layout.time.date.filter(|&date| is_clock && !is_constant_text(table, date));
+    let reader = RowReader {
         date,
         path,
         table,
         layout,
-        kind: kind.unwrap_or(Kind::Number),
-        most: if layout.has_header { layout.names.len() } else { table.columns },
+        time_format: time_format.unwrap_or(TimeFormat::Number),
+        max_columns: if layout.has_header { layout.names.len() } else { table.columns },
     };
     let rows = table.rows.iter().map(|line| reader.row(line, &mut fields)).collect::<Result<_, _>>()?;
-    Ok(Rows { kind: reader.kind, has_dates: reader.date.is_some(), rows })
+    Ok(ParsedRows { time_format: reader.time_format, has_dates: reader.date.is_some(), rows })
 }
 
-struct Reader<'a> {
+/// Parses the rows of a table.
+struct RowReader<'a> {
     path: &'a Path,
     table: &'a Table<'a>,
-    layout: &'a Layout,
-    kind: Kind,
-    /// The column of dates, where they differ or can be read.
+    layout: &'a TableLayout,
+    time_format: TimeFormat,
+    /// The column of dates, unless it has one constant, unreadable text.
     date: Option<usize>,
-    most: usize,
+    /// Number of columns that a row may have.
+    max_columns: usize,
 }
 
-/// Rows of several vehicles are no flight.
-fn one_vehicle(path: &Path, table: &Table<'_>, layout: &Layout) -> Result<(), FlightLogError> {
+/// Refuses rows of several vehicles.
+fn check_single_vehicle(path: &Path, table: &Table<'_>, layout: &TableLayout) -> Result<(), FlightLogError> {
     let Some(column) = layout.vehicle else { return Ok(()) };
     let mut fields = Vec::new();
     let mut first: Option<&str> = None;
     for line in &table.rows {
         table.separator.split(line.text, &mut fields);
-        let Some(name) = fields.get(column).copied().filter(|name| !text::is_missing(name)) else { continue };
+        let Some(name) = fields.get(column).copied().filter(|name| !text_table::is_missing(name)) else {
+            continue;
+        };
         match first {
             Some(first) if first != name => {
                 return Err(FlightLogError::Values {
                     path: path.to_owned(),
                     problem: format!(
-                        "line {}: `{name}` in column {}{}, but `{first}` before: keep the rows of one vehicle, or remove the column if they are all of one",
+                        "line {}: `{name}` in column {}{}, but `{first}` before: keep the rows of one \
+                            vehicle, or remove the column if they are all of one",
                         line.number,
                         column + 1,
-                        layout.named(column)
+                        layout.bracketed_name(column)
                     ),
                 });
             }
@@ -102,36 +120,36 @@ fn one_vehicle(path: &Path, table: &Table<'_>, layout: &Layout) -> Result<(), Fl
     Ok(())
 }
 
-/// A date that never changes and cannot be read doesn't matter.
-fn is_same_text(table: &Table<'_>, column: usize) -> bool {
+/// Whether a column holds one text throughout that is no date. Such dates are ignored.
+fn is_constant_text(table: &Table<'_>, column: usize) -> bool {
     let mut fields = Vec::new();
     let mut first = None;
     table.rows.iter().all(|line| {
         table.separator.split(line.text, &mut fields);
         let field = fields.get(column).copied().unwrap_or("");
-        time::date_ns(field).is_none() && *first.get_or_insert(field) == field
+        time_fields::date_ns(field).is_none() && *first.get_or_insert(field) == field
     })
 }
 
-impl<'a> Reader<'a> {
-    fn row(&self, line: &Line<'a>, fields: &mut Vec<&'a str>) -> Result<Row, FlightLogError> {
+impl<'a> RowReader<'a> {
+    fn row(&self, line: &Line<'a>, fields: &mut Vec<&'a str>) -> Result<ParsedRow, FlightLogError> {
         self.table.separator.split(line.text, fields);
-        if fields.iter().skip(self.most).any(|field| !field.is_empty()) {
+        if fields.iter().skip(self.max_columns).any(|field| !field.is_empty()) {
             return Err(FlightLogError::SurplusColumns {
                 path: self.path.to_owned(),
                 line: line.number,
                 found: fields.len(),
-                known: self.most,
+                known: self.max_columns,
             });
         }
-        let row = Fields { reader: self, line: line.number, fields };
+        let row = RowFields { reader: self, line: line.number, fields };
         let time = row.time()?;
         let mut position = [f64::NAN; 3];
         for (value, source) in position.iter_mut().zip(self.layout.position) {
             *value = row.number(source)?;
         }
         if self.layout.frame == Frame::Geodetic {
-            row.check_place(position)?;
+            row.check_geodetic_range(position)?;
         }
         let mut attitude = [f64::NAN; 4];
         match self.layout.attitude {
@@ -143,28 +161,29 @@ impl<'a> Reader<'a> {
             }
             AttitudeColumns::Quaternion(columns) => {
                 for (value, column) in attitude.iter_mut().zip(columns) {
-                    *value = row.number(Source { column, part: None, factor: None })?;
+                    *value = row.number(FieldSource { column, part: None, factor: None })?;
                 }
             }
         }
-        Ok(Row { line: line.number, time, position, attitude })
+        Ok(ParsedRow { line: line.number, time, position, attitude })
     }
 }
 
-struct Fields<'a, 'b> {
-    reader: &'b Reader<'a>,
+/// The fields of one row.
+struct RowFields<'a, 'b> {
+    reader: &'b RowReader<'a>,
     line: usize,
     fields: &'b [&'a str],
 }
 
-impl<'a> Fields<'a, '_> {
+impl<'a> RowFields<'a, '_> {
     fn field(&self, column: usize) -> Result<&'a str, FlightLogError> {
         let layout = self.reader.layout;
         self.fields.get(column).copied().ok_or_else(|| FlightLogError::MissingColumns {
             path: self.reader.path.to_owned(),
             line: self.line,
             found: self.fields.len(),
-            needed: layout.columns_needed(),
+            needed: layout.required_columns(),
             format: format_name(layout.format),
         })
     }
@@ -174,22 +193,22 @@ impl<'a> Fields<'a, '_> {
             path: self.reader.path.to_owned(),
             line: self.line,
             column: column + 1,
-            name: self.reader.layout.named(column),
+            name: self.reader.layout.bracketed_name(column),
             text: text.to_owned(),
             hint: hint(text),
         }
     }
 
-    fn number(&self, source: Source) -> Result<f64, FlightLogError> {
+    fn number(&self, source: FieldSource) -> Result<f64, FlightLogError> {
         let field = self.field(source.column)?;
         let bad = || self.not_a_number(source.column, field);
         let value = match source.part {
             None => self.reader.table.number(field).ok_or_else(bad)?,
-            Some(_) if text::is_missing(field) => f64::NAN,
+            Some(_) if text_table::is_missing(field) => f64::NAN,
             Some(part) => {
                 let parts: Vec<&str> =
                     field.split([' ', ',', ';', '/']).filter(|part| !part.is_empty()).collect();
-                let number = |text: &str| text::number(text, false);
+                let number = |text: &str| text_table::number(text, false);
                 if parts.len() == 2 { number(parts[part]).ok_or_else(bad)? } else { return Err(bad()) }
             }
         };
@@ -199,42 +218,46 @@ impl<'a> Fields<'a, '_> {
     fn time(&self) -> Result<Option<i128>, FlightLogError> {
         let columns = self.reader.layout.time;
         let field = self.field(columns.column)?;
-        if text::is_missing(field) {
+        if text_table::is_missing(field) {
             return Ok(None);
         }
         let bad = |column: usize, text: &str| self.not_a_number(column, text);
-        match self.reader.kind {
-            Kind::DateTime => time::date_time_ns(field).map(Some).ok_or_else(|| bad(columns.column, field)),
-            Kind::Clock => {
-                let clock = time::clock_ns(field).ok_or_else(|| bad(columns.column, field))?;
+        match self.reader.time_format {
+            TimeFormat::DateTime => {
+                time_fields::date_time_ns(field).map(Some).ok_or_else(|| bad(columns.column, field))
+            }
+            TimeFormat::Clock => {
+                let clock = time_fields::clock_ns(field).ok_or_else(|| bad(columns.column, field))?;
                 let Some(column) = self.reader.date else { return Ok(Some(clock)) };
                 let date = self.field(column)?;
-                if text::is_missing(date) {
+                if text_table::is_missing(date) {
                     return Ok(None);
                 }
-                time::date_ns(date).map(|day| Some(day + clock)).ok_or_else(|| bad(column, date))
+                time_fields::date_ns(date).map(|day| Some(day + clock)).ok_or_else(|| bad(column, date))
             }
-            Kind::Number => {
+            TimeFormat::Number => {
                 let decimal_commas = self.reader.table.has_decimal_commas;
-                let whole = time::number(field, decimal_commas).ok_or_else(|| bad(columns.column, field))?;
-                let Some(column) = columns.nanoseconds else { return Ok(whole) };
+                let seconds = time_fields::fixed_point(field, decimal_commas)
+                    .ok_or_else(|| bad(columns.column, field))?;
+                let Some(column) = columns.nanoseconds else { return Ok(seconds) };
                 let field = self.field(column)?;
-                let part = time::number(field, decimal_commas).ok_or_else(|| bad(column, field))?;
-                // 1e-12 s and 1e-12 ns.
-                Ok(whole.zip(part).map(|(whole, part)| whole + part / 1_000_000_000))
+                let part =
+                    time_fields::fixed_point(field, decimal_commas).ok_or_else(|| bad(column, field))?;
+                // Seconds in steps of 1e-12 s, nanoseconds in steps of 1e-12 ns.
+                Ok(seconds.zip(part).map(|(seconds, part)| seconds + part / 1_000_000_000))
             }
         }
     }
 
-    /// Latitude, longitude and height can be ones.
-    fn check_place(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), FlightLogError> {
+    /// Refuses latitudes, longitudes and heights that are out of range.
+    fn check_geodetic_range(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), FlightLogError> {
         let sources = self.reader.layout.position;
-        let fail = |source: Source, what: &'static str, value: f64, advice: &'static str| {
+        let fail = |source: FieldSource, what: &'static str, value: f64, advice: &'static str| {
             Err(FlightLogError::OutOfRange {
                 path: self.reader.path.to_owned(),
                 line: self.line,
                 column: source.column + 1,
-                name: self.reader.layout.named(source.column),
+                name: self.reader.layout.bracketed_name(source.column),
                 what,
                 value,
                 advice,
@@ -253,17 +276,18 @@ impl<'a> Fields<'a, '_> {
             }
         }
         if height_m.is_finite() && !(-1000.0..=1e5).contains(&height_m) {
-            let advice = "leave the field empty where the height is missing, or name the unit in the header (alt_mm, alt_cm, alt_ft)";
+            let advice = "leave the field empty where the height is missing, or name the unit in the header \
+                (alt_mm, alt_cm, alt_ft)";
             return fail(sources[2], "height in metres", height_m, advice);
         }
         Ok(())
     }
 }
 
-/// What a field that is no number looks like, and what to do.
+/// Advice for a field that is no number, by its appearance.
 fn hint(text: &str) -> &'static str {
     let digits = text.bytes().filter(u8::is_ascii_digit).count();
-    if time::clock_ns(text).is_some() || time::date_time_ns(text).is_some() {
+    if time_fields::clock_ns(text).is_some() || time_fields::date_time_ns(text).is_some() {
         "; it is a time, but other rows have numbers there"
     } else if digits >= 6 && text.contains(['/', '-', '.']) && text.split(['/', '-', '.']).count() >= 3 {
         "; dates are year-month-day, times 2023-05-01T10:00:00Z"

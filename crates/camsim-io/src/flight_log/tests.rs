@@ -37,14 +37,14 @@ fn raw_bytes(content: &[u8], format: LogFormat) -> Result<Vec<RawRow>, FlightLog
 fn ned(row: &RawRow) -> DVec3 {
     match row.position {
         RawPosition::Ned(ned) => ned,
-        RawPosition::Geodetic(at) => panic!("{at:?} is geodetic"),
+        RawPosition::Geodetic(position) => panic!("{position:?} is geodetic"),
     }
 }
 
 const LLA: &str = "0.000,47.0,8.0,500,1,2,3\n0.5,47.0001,8.0,501,1,2,3\n1.0,47.0002,8.0,502,1,2,3\n";
 
 #[test]
-fn separators_bom_crlf_and_comments_make_no_difference() {
+fn separators_bom_crlf_and_comments_do_not_change_the_rows() {
     let plain = raw(LLA, LogFormat::Auto).unwrap();
     assert_eq!(plain.len(), 3);
     assert_eq!(plain[1].t_ns, Some(500_000_000));
@@ -63,14 +63,16 @@ fn separators_bom_crlf_and_comments_make_no_difference() {
 }
 
 #[test]
-fn headers_name_columns_in_any_order() {
+fn headers_allow_columns_in_any_order() {
     let rows = raw(
-        "yaw_rad,Latitude,lon [deg],note,alt_m,pitch,roll,timestamp [us]\n1.5707963267948966,47,8,hello,500,2,1,1500000\n",
+        "yaw_rad,Latitude,lon [deg],note,alt_m,pitch,roll,timestamp \
+            [us]\n1.5707963267948966,47,8,hello,500,2,1,1500000\n",
         LogFormat::Auto,
     )
     .unwrap();
     assert_eq!(rows[0].t_ns, Some(1_500_000_000));
-    assert!(matches!(rows[0].position, RawPosition::Geodetic(at) if (at.lon_deg() - 8.0).abs() < 1e-12));
+    let RawPosition::Geodetic(position) = rows[0].position else { panic!("{:?}", rows[0]) };
+    assert!((position.lon_deg() - 8.0).abs() < 1e-12);
     assert_eq!(rows[0].attitude, RawAttitude::EulerDeg([1.0, 2.0, 90.0]));
     let down = raw("t,east,north,down,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", LogFormat::Auto).unwrap();
     assert_eq!(ned(&down[0]), DVec3::new(2.0, 1.0, 3.0));
@@ -89,7 +91,7 @@ fn headers_name_columns_in_any_order() {
 }
 
 #[test]
-fn auto_refuses_what_fits_two_layouts() {
+fn auto_format_refuses_tables_that_fit_two_layouts() {
     let metres = "0,-299.1,-54.3,-3346.5,9.7,1.7,94.0\n1,-323.7,-87.0,-3303.1,11.6,0.9,106.6\n";
     let slow = "0,1,2,3,0,0,0\n1,1.5,2,3,0,0,0\n";
     let one_row = "0,47,8,500,0,0,0\n";
@@ -108,12 +110,15 @@ fn auto_refuses_what_fits_two_layouts() {
 }
 
 #[test]
-fn tum_and_euroc_become_ned_and_frd() {
+fn tum_and_euroc_poses_are_converted_to_ned_and_frd() {
     // 1 m east, 2 m north, 3 m up; a forward-left-up body turned 90 degrees to the left of east looks north.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let tum = raw(&format!("1520531829.301144123 1 2 3 0 0 {half} {half}\n"), LogFormat::Auto).unwrap();
     let euroc = raw(
-        &format!("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v [m s^-1]\n1520531829301144123,1,2,3,{half},0,0,{half},9\n"),
+        &format!(
+            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y \
+            [],q_RS_z [],v [m s^-1]\n1520531829301144123,1,2,3,{half},0,0,{half},9\n"
+        ),
         LogFormat::Euroc,
     )
     .unwrap();
@@ -133,7 +138,7 @@ fn tum_and_euroc_become_ned_and_frd() {
 }
 
 #[test]
-fn bad_files_get_one_clear_error() {
+fn malformed_files_are_refused_with_line_and_column() {
     let text = |result: Result<Vec<RawRow>, FlightLogError>| result.unwrap_err().to_string();
     assert!(matches!(raw("", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
     assert!(matches!(raw("# only words\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
@@ -154,7 +159,7 @@ fn bad_files_get_one_clear_error() {
 }
 
 #[test]
-fn missing_values_are_left_to_cleaning() {
+fn missing_values_are_kept_as_nan_or_none() {
     let rows =
         raw("0,47,8,500,1,2,3\n,47,8,500,1,2,3\n1,nan,8,500,1,,3\n1e30,47,8,inf,1,2,3\n", LogFormat::CsvLla)
             .unwrap();
@@ -164,9 +169,10 @@ fn missing_values_are_left_to_cleaning() {
 }
 
 #[test]
-fn times_are_exact_decimals() {
+fn times_are_parsed_exactly() {
     let time_ns = |field: &str, unit: &units::Unit| {
-        time::number(field, false).map(|value| value.and_then(|value| time::to_ns(value, unit.factor)))
+        time_fields::fixed_point(field, false)
+            .map(|value| value.and_then(|value| time_fields::to_ns(value, unit.factor)))
     };
     let [s, ms, ns, min] = [&units::SECOND, &units::MILLISECOND, &units::NANOSECOND, &units::MINUTE];
     assert_eq!(time_ns("-1.5", s), Some(Some(-1_500_000_000)));
@@ -180,11 +186,11 @@ fn times_are_exact_decimals() {
     assert_eq!(time_ns("0.05", min), Some(Some(3_000_000_000)));
     assert_eq!(time_ns("nan", s), Some(None));
     assert_eq!(time_ns("1:30", s), None);
-    assert_eq!(time::clock_ns("15:41:00.980"), Some(56_460_980_000_000));
-    assert_eq!(time::clock_ns("3:41:00.98 PM"), Some(56_460_980_000_000));
-    assert_eq!(time::clock_ns("12:00:01 am"), Some(1_000_000_000));
+    assert_eq!(time_fields::clock_ns("15:41:00.980"), Some(56_460_980_000_000));
+    assert_eq!(time_fields::clock_ns("3:41:00.98 PM"), Some(56_460_980_000_000));
+    assert_eq!(time_fields::clock_ns("12:00:01 am"), Some(1_000_000_000));
     for bad in ["12:34", "24:00:00", "1:60:00", "1:2:3:4", "a:b:c", ""] {
-        assert_eq!(time::clock_ns(bad), None, "{bad}");
+        assert_eq!(time_fields::clock_ns(bad), None, "{bad}");
     }
     // `date -u -d 2024-02-29T23:59:59Z +%s`
     for same in [
@@ -194,15 +200,15 @@ fn times_are_exact_decimals() {
         "2024-03-01T01:29:59+01:30",
         "2024-02-29T18:59:59-0500",
     ] {
-        assert_eq!(time::date_time_ns(same), Some(1_709_251_199_000_000_000), "{same}");
+        assert_eq!(time_fields::date_time_ns(same), Some(1_709_251_199_000_000_000), "{same}");
     }
-    assert_eq!(time::date_ns("1970-01-01"), Some(0));
-    assert_eq!(time::date_ns("01/02/2024"), None);
+    assert_eq!(time_fields::date_ns("1970-01-01"), Some(0));
+    assert_eq!(time_fields::date_ns("01/02/2024"), None);
 }
 
-/// The collected real flights: what each gives, and that only the faults that are there are found.
+/// Reads the real flights in CAMSIM_DATA and compares the number of rows and of repairs with the known ones.
 #[test]
-fn real_flights() {
+fn published_flights_have_the_known_rows_and_repairs() {
     let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
         eprintln!("CAMSIM_DATA is not set: skipped");
         return;
@@ -233,8 +239,7 @@ fn real_flights() {
     let start = std::time::Instant::now();
     let lawnmower = log("camsim/path_lawnmower.csv");
     assert!(start.elapsed().as_secs_f64() < 0.5, "reading took {:?}", start.elapsed());
-    // NUMERICS.md names 44849 for the last one; the file's odd row is the one before: -170.4 between 179.8
-    // and -180.0.
+    // The last row, 44848, has -170.4 between 179.8 and -180.0.
     assert_eq!(lawnmower.report.attitude_glitches.lines, [7190, 22762, 23060, 37732, 44551, 44848]);
     assert_eq!(lawnmower.report.position_spikes.count, 0);
     assert_eq!(lawnmower.report.rows_read, 51_753);

@@ -1,13 +1,13 @@
-//! Units as headers write them.
+//! Units and other qualifiers of column names.
 
-/// What a unit measures.
+/// Physical dimension of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Dimension {
-    /// Factors are nanoseconds.
+    /// Time; factors convert to nanoseconds.
     Time,
-    /// Factors are metres.
+    /// Length; factors convert to metres.
     Length,
-    /// Factors are degrees.
+    /// Angle; factors convert to degrees.
     Angle,
 }
 
@@ -21,13 +21,16 @@ impl Dimension {
     }
 }
 
-/// A unit that headers name.
+/// A unit of time, length or angle.
 #[derive(Debug, PartialEq)]
 pub(super) struct Unit {
+    /// Name in messages.
     pub(super) name: &'static str,
-    /// Spellings, in lower case, without blanks, underscores, dots, hyphens and signs of multiplication.
+    /// Spellings, in lower case, without blanks, underscores, dots, hyphens and multiplication signs.
     pub(super) spellings: &'static [&'static str],
+    /// What it measures.
     pub(super) dimension: Dimension,
+    /// Factor that converts to nanoseconds, metres or degrees.
     pub(super) factor: f64,
 }
 
@@ -142,7 +145,7 @@ static GON: Unit = unit("gon", Dimension::Angle, 0.9, &["gon", "gons"]);
 static SEMICIRCLE: Unit =
     unit("semicircles", Dimension::Angle, 180.0 / 2_147_483_648.0, &["semicircle", "semicircles"]);
 
-/// Every unit known.
+/// All known units.
 pub(super) static UNITS: &[&Unit] = &[
     &SECOND,
     &MILLISECOND,
@@ -174,41 +177,47 @@ pub(super) static UNITS: &[&Unit] = &[
     &SEMICIRCLE,
 ];
 
-/// What heights are above.
+/// Reference surface of heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Datum {
+pub(super) enum VerticalDatum {
     MeanSeaLevel,
     Ellipsoid,
 }
 
-/// A word beside a column's name.
+/// A word that qualifies a column's name: a suffix, or in brackets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Word {
+pub(super) enum Qualifier {
+    /// Unit of the numbers.
     Unit(&'static Unit),
-    Datum(Datum),
-    /// Of magnetic north.
+    /// Reference surface of a height.
+    Datum(VerticalDatum),
+    /// Angles from magnetic north.
     Magnetic,
-    /// Says nothing that changes numbers.
-    Noise,
+    /// A known word that does not change the numbers.
+    Ignored,
 }
 
-/// Words of a header's brackets and suffixes; `None` for those that say nothing known.
-pub(super) fn word(text: &str) -> Option<Word> {
+/// Parses a suffix of a name, or a word in its brackets; `None` if it is not known.
+pub(super) fn parse_qualifier(text: &str) -> Option<Qualifier> {
     let key: String = text
         .to_lowercase()
         .chars()
         .filter(|c| !matches!(c, ' ' | '_' | '.' | '-' | '+' | '±' | '*' | '·' | '×'))
         .collect();
     if let Some(unit) = UNITS.iter().find(|unit| unit.spellings.contains(&key.as_str())) {
-        return Some(Word::Unit(unit));
+        return Some(Qualifier::Unit(unit));
     }
     Some(match key.as_str() {
         "msl" | "amsl" | "asl" | "sealevel" | "abovesealevel" | "abovemeansealevel" | "orthometric"
-        | "geoid" | "egm96" => Word::Datum(Datum::MeanSeaLevel),
-        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "aboveellipsoid" => Word::Datum(Datum::Ellipsoid),
-        "magnetic" | "mag" => Word::Magnetic,
+        | "geoid" | "egm96" => Qualifier::Datum(VerticalDatum::MeanSeaLevel),
+        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "aboveellipsoid" => {
+            Qualifier::Datum(VerticalDatum::Ellipsoid)
+        }
+        "magnetic" | "mag" => Qualifier::Magnetic,
         "" | "utc" | "gmt" | "local" | "gps" | "unix" | "epoch" | "true" | "1" | "unitless" | "0360"
-        | "360" | "180" | "180180" | "180to180" | "0to360" | "frd" | "body" | "decimal" | "dd" => Word::Noise,
+        | "360" | "180" | "180180" | "180to180" | "0to360" | "frd" | "body" | "decimal" | "dd" => {
+            Qualifier::Ignored
+        }
         _ => return None,
     })
 }
@@ -218,11 +227,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spellings_are_unique_and_normal() {
+    fn spellings_are_unique_and_in_normal_form() {
         let all: Vec<&str> = UNITS.iter().flat_map(|unit| unit.spellings.iter().copied()).collect();
-        for (at, spelling) in all.iter().enumerate() {
-            assert!(!all[..at].contains(spelling), "{spelling}");
-            assert!(matches!(word(spelling), Some(Word::Unit(_))), "{spelling}");
+        for (index, spelling) in all.iter().enumerate() {
+            assert!(!all[..index].contains(spelling), "{spelling}");
+            assert!(matches!(parse_qualifier(spelling), Some(Qualifier::Unit(_))), "{spelling}");
         }
     }
 }

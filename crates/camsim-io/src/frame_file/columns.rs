@@ -1,28 +1,28 @@
-//! Columns of tables by name, with the unit that the name states.
+//! Names of table columns and the units that they state.
 
-/// A time or a length by its name: `t_s`, `t_ms`, `timestamp [ns]`, `x`, `x_mm`.
+/// Unit of a time or a length, as in `t_s`, `t_ms`, `timestamp [ns]`, `x`, `x_mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Unit {
-    /// Seconds or metres of one of them.
+pub(crate) struct UnitFactor {
+    /// Factor that converts to seconds or metres.
     pub factor: f64,
 }
 
-/// What a column is.
+/// Meaning of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Column {
-    /// Seconds are the numbers times this; `None` if the name has no unit.
-    Time(Option<Unit>),
-    /// x, y, z of the position; metres are the numbers times this.
-    Position(usize, Unit),
-    /// w, x, y, z of the quaternion.
-    Turn(usize),
-    /// A known quantity in a unit that is not.
+pub(crate) enum TableColumn {
+    /// Time; `None` if the name has no unit.
+    Time(Option<UnitFactor>),
+    /// Component of the position: 0, 1, 2 for x, y, z.
+    Position(usize, UnitFactor),
+    /// Component of the quaternion: 0, 1, 2, 3 for w, x, y, z.
+    Quaternion(usize),
+    /// A known quantity in an unknown unit.
     WrongUnit,
     /// Anything else.
     Other,
 }
 
-/// Names of time units and what they are in seconds.
+/// Units of time, in seconds.
 const TIMES: &[(&str, f64)] = &[
     ("s", 1.0),
     ("sec", 1.0),
@@ -36,24 +36,25 @@ const TIMES: &[(&str, f64)] = &[
     ("nanoseconds", 1e-9),
     ("min", 60.0),
 ];
-/// Names of units of length and what they are in metres.
+/// Units of length, in metres.
 const LENGTHS: &[(&str, f64)] =
     &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km", 1e3), ("ft", 0.3048), ("in", 0.0254)];
 
+/// Names of time columns.
 const TIME_NAMES: &[&str] = &["t", "time", "timestamp", "stamp"];
 
-/// What a header's cell names.
-pub(crate) fn column(cell: &str) -> Column {
+/// Parses the name of a column.
+pub(crate) fn parse_column(cell: &str) -> TableColumn {
     let cell = cell.trim_start_matches('\u{feff}').trim().trim_matches('"').trim().to_lowercase();
-    let (name, unit) = split(&cell);
+    let (name, unit) = split_unit(&cell);
     let factor = |units: &[(&str, f64)]| {
-        units.iter().find(|(known, _)| Some(*known) == unit).map(|(_, factor)| Unit { factor: *factor })
+        units.iter().find(|(known, _)| Some(*known) == unit).map(|(_, factor)| UnitFactor { factor: *factor })
     };
     if TIME_NAMES.contains(&name) {
         return match (unit, factor(TIMES)) {
-            (None, _) => Column::Time(None),
-            (_, Some(unit)) => Column::Time(Some(unit)),
-            (Some(_), None) => Column::WrongUnit,
+            (None, _) => TableColumn::Time(None),
+            (_, Some(unit)) => TableColumn::Time(Some(unit)),
+            (Some(_), None) => TableColumn::WrongUnit,
         };
     }
     let axis = |names: &[&str]| names.iter().position(|known| *known == name);
@@ -61,19 +62,19 @@ pub(crate) fn column(cell: &str) -> Column {
         axis(&["x", "y", "z"]).or_else(|| axis(&["tx", "ty", "tz"])).or_else(|| axis(&["px", "py", "pz"]))
     {
         return match (unit, factor(LENGTHS)) {
-            (None, _) => Column::Position(axis, Unit { factor: 1.0 }),
-            (_, Some(unit)) => Column::Position(axis, unit),
-            (Some(_), None) => Column::WrongUnit,
+            (None, _) => TableColumn::Position(axis, UnitFactor { factor: 1.0 }),
+            (_, Some(unit)) => TableColumn::Position(axis, unit),
+            (Some(_), None) => TableColumn::WrongUnit,
         };
     }
     match axis(&["qw", "qx", "qy", "qz"]) {
-        Some(part) if unit.is_none() => Column::Turn(part),
-        _ => Column::Other,
+        Some(part) if unit.is_none() => TableColumn::Quaternion(part),
+        _ => TableColumn::Other,
     }
 }
 
-/// A name and its unit: `x_mm`, `x [mm]`, `x (mm)`, `q_w` being a name of its own.
-fn split(cell: &str) -> (&str, Option<&str>) {
+/// Splits `x_mm`, `x [mm]` or `x (mm)` into name and unit. The `w` of `q_w` is no unit.
+fn split_unit(cell: &str) -> (&str, Option<&str>) {
     match cell {
         "q_w" => return ("qw", None),
         "q_x" => return ("qx", None),
@@ -86,7 +87,7 @@ fn split(cell: &str) -> (&str, Option<&str>) {
             return (name.trim_end_matches(['_', ' ']), Some(unit.trim()));
         }
     }
-    // `time_stamp` is no unit of time called stamp.
+    // The `stamp` of `time_stamp` is no unit.
     if cell == "time_stamp" {
         return ("timestamp", None);
     }
@@ -98,26 +99,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_say_what_and_in_which_unit() {
-        let unit = |factor| Unit { factor };
+    fn names_are_parsed_into_meaning_and_unit() {
+        let unit = |factor| UnitFactor { factor };
         for (cell, expected) in [
-            ("t_s", Column::Time(Some(unit(1.0)))),
-            ("\u{feff}T_ms", Column::Time(Some(unit(1e-3)))),
-            ("timestamp [ns]", Column::Time(Some(unit(1e-9)))),
-            ("time (us)", Column::Time(Some(unit(1e-6)))),
-            ("t_min", Column::Time(Some(unit(60.0)))),
-            ("timestamp", Column::Time(None)),
-            ("t_ticks", Column::WrongUnit),
-            ("x", Column::Position(0, unit(1.0))),
-            ("TY_MM", Column::Position(1, unit(1e-3))),
-            ("pz [ft]", Column::Position(2, unit(0.3048))),
-            ("x_px", Column::WrongUnit),
-            ("qw", Column::Turn(0)),
-            ("q_z", Column::Turn(3)),
-            ("yaw", Column::Other),
-            ("qw_deg", Column::Other),
+            ("t_s", TableColumn::Time(Some(unit(1.0)))),
+            ("\u{feff}T_ms", TableColumn::Time(Some(unit(1e-3)))),
+            ("timestamp [ns]", TableColumn::Time(Some(unit(1e-9)))),
+            ("time (us)", TableColumn::Time(Some(unit(1e-6)))),
+            ("t_min", TableColumn::Time(Some(unit(60.0)))),
+            ("timestamp", TableColumn::Time(None)),
+            ("t_ticks", TableColumn::WrongUnit),
+            ("x", TableColumn::Position(0, unit(1.0))),
+            ("TY_MM", TableColumn::Position(1, unit(1e-3))),
+            ("pz [ft]", TableColumn::Position(2, unit(0.3048))),
+            ("x_px", TableColumn::WrongUnit),
+            ("qw", TableColumn::Quaternion(0)),
+            ("q_z", TableColumn::Quaternion(3)),
+            ("yaw", TableColumn::Other),
+            ("qw_deg", TableColumn::Other),
         ] {
-            assert_eq!(column(cell), expected, "{cell}");
+            assert_eq!(parse_column(cell), expected, "{cell}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Depth pictures as inverse planar depth.
+//! Reads depth pictures as inverse planar depth.
 
 use std::path::Path;
 
@@ -9,34 +9,34 @@ use image::{DynamicImage, ImageFormat};
 use super::{
     DepthEncoding, DepthKind, FrameFileError, FrameSpec,
     exr_planes::read_exr,
-    floats::{self, Stored, Unit},
+    floats::{self, DepthUnit, StoredDepth},
     images::{failure, is_exr, open},
     npy,
     packed::{self, Packing},
     png_chunks::PngChunks,
 };
 
-/// Stored values of one metre that 16 bits make sense of: steps from a kilometre to a micrometre.
+/// Allowed values of `depth_per_metre`: steps of 16-bit integers from a kilometre to a micrometre.
 const PER_METRE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
-/// No camera sees anything nearer, metres. Its inverse and the slant of any ray fit an f32.
+/// Depths up to this are no measurement, metres. Its inverse, times the slant of any ray, fits an f32.
 const NEAREST_M: f64 = 1e-6;
 
-/// What is at least as far is no depth, metres, unless `depth_max_m` says less: no scene is as large, and
-/// Blender's background is 1e10.
+/// Depths from this on are no depth, metres, unless `depth_max_m` is smaller. No scene is as large; Blender
+/// writes 1e10 for the background.
 const FARTHEST_M: f64 = 1e9;
 
-/// Numbers of a camera that looks farther than this are no metres where all of them are whole.
-const WHOLE_ABOVE: f64 = 100.0;
+/// If all depths are integers above this, they are probably not metres.
+const INTEGER_DEPTH_MIN: f64 = 100.0;
 
 /// A depth picture.
 pub(super) struct Depth {
     /// 1/z in 1/m, 0 where there is no depth.
     pub(super) inverse: Vec<f32>,
-    /// What there is to say about it.
+    /// Notes about the picture.
     pub(super) notes: Vec<String>,
 }
 
-/// Reads a depth picture.
+/// Reads a depth picture and converts it to inverse planar depth.
 pub(super) fn read_depth(
     path: &Path,
     spec: &FrameSpec,
@@ -44,9 +44,9 @@ pub(super) fn read_depth(
     color_origin_px: Option<[i32; 2]>,
     frame_path: &Path,
 ) -> Result<Depth, FrameFileError> {
-    let stored = stored(path, spec, color_origin_px, frame_path)?;
+    let stored = read_stored(path, spec, color_origin_px, frame_path)?;
     let per_metre = per_metre(spec, &stored, frame_path)?;
-    let Stored { size_px, values, notes, .. } = stored;
+    let StoredDepth { size_px, values, notes, .. } = stored;
     if size_px != geometry.size_px {
         let [w, h] = geometry.size_px;
         return Err(failure(
@@ -60,8 +60,8 @@ pub(super) fn read_depth(
     let in_metres = |value: f64| {
         if spec.depth_kind == DepthKind::Inverse { per_metre / value } else { value / per_metre }
     };
-    refuse_without_any(&values, in_metres, path)?;
-    let most_m = spec.depth_max_m.unwrap_or(FARTHEST_M).min(FARTHEST_M);
+    refuse_impossible_depths(&values, in_metres, path)?;
+    let max_m = spec.depth_max_m.unwrap_or(FARTHEST_M).min(FARTHEST_M);
     let planar = |(i, value): (usize, f64)| {
         let depth_m = in_metres(value);
         let pixel = DVec2::new((i as u32 % size_px[0]).into(), (i as u32 / size_px[0]).into());
@@ -70,18 +70,18 @@ pub(super) fn read_depth(
             DepthKind::Range => ((pixel - geometry.principal_px) / geometry.focal_px).extend(1.0).length(),
         };
         let inverse = slant / depth_m;
-        if usable(depth_m) && depth_m < most_m { inverse as f32 } else { 0.0 }
+        if is_measurement(depth_m) && depth_m < max_m { inverse as f32 } else { 0.0 }
     };
     Ok(Depth { inverse: values.into_iter().enumerate().map(planar).collect(), notes })
 }
 
-/// The numbers of a depth picture, in whatever kind of file.
-fn stored(
+/// Reads the stored numbers of a depth picture of any format.
+fn read_stored(
     path: &Path,
     spec: &FrameSpec,
     color_origin_px: Option<[i32; 2]>,
     frame_path: &Path,
-) -> Result<Stored, FrameFileError> {
+) -> Result<StoredDepth, FrameFileError> {
     let fail = |key, message: &str| FrameFileError::Key {
         path: frame_path.into(),
         key,
@@ -101,12 +101,12 @@ fn stored(
     } else {
         floats::read(path, spec, frame_path)?
     };
-    let found = match floats {
+    let array = match floats {
         None if !exr => read_npy(path)?,
         floats => floats,
     };
-    if let Some(found) = found {
-        let Some(packing) = packing else { return Ok(found) };
+    if let Some(array) = array {
+        let Some(packing) = packing else { return Ok(array) };
         let message = format!(
             "\"{}\" is of 8-bit RGB pictures, and depth is an EXR, PFM, TIFF or .npy; leave it out",
             packing.word()
@@ -121,25 +121,25 @@ fn stored(
     };
     let size_px = [picture.width(), picture.height()];
     let (values, unit) = match packing {
-        Some(packing) => (packed::metres(&picture, format, packing, path)?, Unit::Packed),
-        None => (whole_numbers(&picture, path)?, Unit::Whole),
+        Some(packing) => (packed::metres(&picture, format, packing, path)?, DepthUnit::Packed),
+        None => (integers(&picture, path)?, DepthUnit::Integers),
     };
     let notes = note.map(|note| format!("{}: {note}", path.display())).into_iter().collect();
-    Ok(Stored { size_px, values, unit, notes })
+    Ok(StoredDepth { size_px, values, unit, notes })
 }
 
-fn read_npy(path: &Path) -> Result<Option<Stored>, FrameFileError> {
+fn read_npy(path: &Path) -> Result<Option<StoredDepth>, FrameFileError> {
     let Some(array) = npy::read(path)? else { return Ok(None) };
     let size_px = array.plane().map_err(|message| failure(path, message))?;
-    let unit = if array.whole { Unit::Whole } else { Unit::Floats };
-    Ok(Some(Stored { size_px, values: array.values, unit, notes: Vec::new() }))
+    let unit = if array.is_integer { DepthUnit::Integers } else { DepthUnit::Floats };
+    Ok(Some(StoredDepth { size_px, values: array.values, unit, notes: Vec::new() }))
 }
 
 fn read_exr_depth(
     path: &Path,
     spec: &FrameSpec,
     color_origin_px: Option<[i32; 2]>,
-) -> Result<Stored, FrameFileError> {
+) -> Result<StoredDepth, FrameFileError> {
     let picture = read_exr(path)?;
     let plane = picture
         .depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref())
@@ -151,8 +151,7 @@ fn read_exr_depth(
         );
         return Err(failure(path, message));
     }
-    // What is far from near becomes near from far: a file that names its channel so must not be read as
-    // metres.
+    // Inverse depth read as depth would swap near and far, so a channel with such a name is refused.
     let lower = plane.name.to_lowercase();
     if let Some(word) = ["disp", "inv"]
         .into_iter()
@@ -166,65 +165,76 @@ fn read_exr_depth(
             format!("{}: is a disparity or an inverse depth by its name (`{word}`): {fix}", plane.name),
         ));
     }
-    Ok(Stored {
+    Ok(StoredDepth {
         size_px: plane.size_px,
         values: plane.values.iter().map(|&z| f64::from(z)).collect(),
-        unit: Unit::Floats,
+        unit: DepthUnit::Floats,
         notes: picture.notes(spec.focal_px),
     })
 }
 
-/// Stored value of one metre; of inverse depth, of one inverse metre.
-fn per_metre(spec: &FrameSpec, stored: &Stored, frame_path: &Path) -> Result<f64, FrameFileError> {
+/// Stored value of one metre, or of one inverse metre for inverse depth.
+///
+/// # Errors
+/// `depth_per_metre` is missing, not allowed, or out of range.
+fn per_metre(spec: &FrameSpec, stored: &StoredDepth, frame_path: &Path) -> Result<f64, FrameFileError> {
     let (given, inverse) = (spec.depth_per_metre, spec.depth_kind == DepthKind::Inverse);
     let message = match (given, stored.unit) {
-        // Where depth_per_metre is given as well, they agree.
-        (_, Unit::Stated) => return Ok(1.0),
-        (Some(_), Unit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in metres: leave it out".to_owned(),
+        // The scale of the file, which agrees with depth_per_metre if that is given, has been applied.
+        (_, DepthUnit::Stated) => return Ok(1.0),
+        (Some(_), DepthUnit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in \
+            metres: leave it out"
+            .to_owned(),
         (Some(per_metre), _) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
-        (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned(),
-        (None, Unit::Whole | Unit::Floats) if inverse => {
-            "is missing: with depth_kind = \"inverse\" give the stored value of 1/m; of disparities in pixels that is focal length in pixels times \
+        (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for \
+            millimetres or 5000 for TUM"
+            .to_owned(),
+        (None, DepthUnit::Integers | DepthUnit::Floats) if inverse => {
+            "is missing: with depth_kind = \"inverse\" give the stored value of 1/m; of disparities in \
+                pixels that is focal length in pixels times \
              baseline in metres"
                 .to_owned()
         }
-        (None, Unit::Whole) => {
-            "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned()
+        (None, DepthUnit::Integers) => {
+            "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres \
+                or 5000 for TUM"
+                .to_owned()
         }
-        (None, Unit::Floats) => match whole_numbers_between(&stored.values) {
-            Some([least, most]) => format!(
-                "is missing: depth is of floats, which are metres, but all of them are whole numbers from {least} to {most}, as millimetres are: give \
+        (None, DepthUnit::Floats) => match integer_range(&stored.values) {
+            Some([min, max]) => format!(
+                "is missing: depth is of floats, which are metres, but all of them are whole numbers from \
+                    {min} to {max}, as millimetres are: give \
                  1000 for millimetres, 1 for metres"
             ),
             None => return Ok(1.0),
         },
-        (None, Unit::Packed) => return Ok(1.0),
+        (None, DepthUnit::Packed) => return Ok(1.0),
     };
     Err(FrameFileError::Key { path: frame_path.into(), key: "depth_per_metre", message })
 }
 
-/// The least and the largest depth where all are whole and more than any camera that stores metres would
-/// round so: it may be millimetres.
-fn whole_numbers_between(values: &[f64]) -> Option<[f64; 2]> {
-    let known = || values.iter().copied().filter(|&z| usable(z) && z < FARTHEST_M);
-    let whole = known().all(|z| z.fract() == 0.0 && z > WHOLE_ABOVE);
-    let [least, most] = known().fold([f64::INFINITY, 0.0], |[least, most], z| [z.min(least), z.max(most)]);
-    (whole && most > 0.0).then_some([least, most])
+/// The smallest and the largest depth, if all are integers above [`INTEGER_DEPTH_MIN`]: they may be
+/// millimetres.
+fn integer_range(values: &[f64]) -> Option<[f64; 2]> {
+    let known = || values.iter().copied().filter(|&z| is_measurement(z) && z < FARTHEST_M);
+    let all_integers = known().all(|z| z.fract() == 0.0 && z > INTEGER_DEPTH_MIN);
+    let [min, max] = known().fold([f64::INFINITY, 0.0], |[min, max], z| [z.min(min), z.max(max)]);
+    (all_integers && max > 0.0).then_some([min, max])
 }
 
-/// Nothing is nearer than [`NEAREST_M`]; what claims to be is no measurement either.
-fn usable(depth_m: f64) -> bool {
+/// Whether a depth is finite and above [`NEAREST_M`].
+fn is_measurement(depth_m: f64) -> bool {
     depth_m.is_finite() && depth_m > NEAREST_M
 }
 
-/// Gives each pixel without depth that of the nearest one with, counted in steps to the four neighbours; of
-/// several at one distance the farthest surface, since what hides from a depth camera is behind what it sees.
-/// Without any depth nothing changes.
+/// Gives each pixel without depth that of the nearest pixel with depth, by breadth-first search over the four
+/// neighbours. Of several at equal distance the farthest surface counts: what a depth camera cannot see is
+/// hidden by the nearer one. Without any depth nothing changes.
 pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
     let (width, height) = (width as usize, height as usize);
     let mut front: Vec<usize> = (0..inverse_depth.len()).filter(|&i| inverse_depth[i] > 0.0).collect();
     while !front.is_empty() {
-        let mut found: Vec<(usize, f32)> = Vec::new();
+        let mut filled: Vec<(usize, f32)> = Vec::new();
         for &i in &front {
             let (x, y) = (i % width, i / width);
             let neighbours = [
@@ -233,30 +243,30 @@ pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
                 (y > 0).then(|| i - width),
                 (y + 1 < height).then_some(i + width),
             ];
-            found.extend(
+            filled.extend(
                 neighbours
                     .into_iter()
                     .flatten()
-                    .filter(|&at| inverse_depth[at] == 0.0)
-                    .map(|at| (at, inverse_depth[i])),
+                    .filter(|&pixel| inverse_depth[pixel] == 0.0)
+                    .map(|pixel| (pixel, inverse_depth[i])),
             );
         }
-        // Of a pixel that is found several times the smallest inverse depth stays.
-        found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        found.dedup_by_key(|(at, _)| *at);
-        found.iter().for_each(|&(at, inverse)| inverse_depth[at] = inverse);
-        front = found.into_iter().map(|(at, _)| at).collect();
+        // A pixel with several filled neighbours gets the smallest inverse depth.
+        filled.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        filled.dedup_by_key(|(pixel, _)| *pixel);
+        filled.iter().for_each(|&(pixel, inverse)| inverse_depth[pixel] = inverse);
+        front = filled.into_iter().map(|(pixel, _)| pixel).collect();
     }
 }
 
-/// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is
-/// in another sign or unit.
-fn refuse_without_any(
+/// Refuses a picture without any possible depth, unless it has zeros and infinities only, which may be sky.
+/// Other values show that its sign or unit is wrong.
+fn refuse_impossible_depths(
     values: &[f64],
     in_metres: impl Fn(f64) -> f64,
     path: &Path,
 ) -> Result<(), FrameFileError> {
-    if values.iter().any(|value| usable(in_metres(*value))) {
+    if values.iter().any(|value| is_measurement(in_metres(*value))) {
         return Ok(());
     }
     let count = |what: &dyn Fn(f64) -> bool| values.iter().filter(|value| what(**value)).count();
@@ -269,26 +279,30 @@ fn refuse_without_any(
     Err(failure(
         path,
         format!(
-            "has no depth: of {all} pixels {negative} are negative, {nan} not a number, {near} nearer than a micrometre; depth is in metres and \
+            "has no depth: of {all} pixels {negative} are negative, {nan} not a number, {near} nearer than a \
+                micrometre; depth is in metres and \
              positive forward (OpenGL's z is the negative of it), 0 where it is unknown"
         ),
     ))
 }
 
-fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
+/// The values of a 16-bit grey picture.
+fn integers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
     let kinds = "16-bit PNG, PGM or TIFF, or EXR, PFM, TIFF or .npy of floats";
     match picture {
         DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
         DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
             let message = format!(
-                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or give it as {kinds}",
+                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or \
+                    give it as {kinds}",
                 packed::FORMULAS
             );
             Err(failure(path, message))
         }
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
             let message = format!(
-                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are no distances: give depth as {kinds}"
+                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are \
+                    no distances: give depth as {kinds}"
             );
             Err(failure(path, message))
         }
@@ -301,7 +315,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holes_take_the_nearest_and_of_two_the_farther() {
+    fn holes_are_filled_from_the_nearest_pixel_and_the_farther_surface() {
         let mut depth = [1.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0];
         fill_holes(&mut depth, [5, 2]);
         assert_eq!(depth, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 1.0, 0.25, 0.25, 0.25]);

@@ -1,8 +1,8 @@
-//! Planes of EXR files by name, of every layer and part.
+//! Planes of EXR files by name, from all layers and parts.
 //!
-//! A plane's whole name is `layer.channel`, as Blender's multilayer files have it (`ViewLayer.Depth.Z`); in a
-//! file of several parts the part's name comes before, unless the channel has it already. A name is found
-//! whole, or by its end where only one ends so.
+//! The full name of a plane is `layer.channel`, as in Blender's multilayer files (`ViewLayer.Depth.Z`). In
+//! files of several parts the name of the part comes first, unless the channel already has it. A plane is
+//! found by its full name, or by the end of it if that is unique.
 
 use std::path::{Path, PathBuf};
 
@@ -10,40 +10,43 @@ use exr::prelude::read_all_flat_layers_from_file;
 
 use super::{FrameFileError, images::failure};
 
-/// One channel of one part.
-pub(super) struct Plane {
+/// One channel of one part of a file.
+pub(super) struct ExrPlane {
+    /// Full name.
     pub(super) name: String,
+    /// Width, height.
     pub(super) size_px: [u32; 2],
-    /// Where the part's first pixel is in the file's own pixels.
+    /// Position of the first pixel of the data window in the pixels of the file.
     pub(super) origin_px: [i32; 2],
+    /// Samples, row by row.
     pub(super) values: Vec<f32>,
 }
 
-impl Plane {
-    /// `a.b.Z` is channel `Z` of layer `a.b`.
+impl ExrPlane {
+    /// Splits the name: `a.b.Z` is channel `Z` of layer `a.b`.
     fn layer_and_channel(&self) -> (&str, &str) {
         self.name.rsplit_once('.').unwrap_or(("", &self.name))
     }
 }
 
-/// Layers of Blender's whose Z is not in metres.
+/// Layers of Blender whose channel Z is not a depth in metres.
 const NO_DEPTH: [&str; 2] = ["Mist", "Denoising Depth"];
 
 /// All planes of a file.
-pub(super) struct Planes {
-    pub(super) planes: Vec<Plane>,
-    /// Middle of the display window, in the file's own pixels: where the optical axis is, whatever part of
-    /// the picture the file holds.
+pub(super) struct ExrPlanes {
+    /// Planes in the order of the file.
+    pub(super) planes: Vec<ExrPlane>,
+    /// Centre of the display window in the pixels of the file: the optical axis, also of a cropped picture.
     pub(super) display_centre_px: [f64; 2],
-    /// Width of a pixel over its height.
+    /// Width of a pixel divided by its height.
     pixel_aspect: f64,
-    /// Whether red, green, blue and white are others than those of sRGB.
+    /// Whether the chromaticities differ from those of sRGB.
     other_primaries: bool,
     path: PathBuf,
 }
 
-/// Reads every part.
-pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
+/// Reads all parts of a file.
+pub(super) fn read_exr(path: &Path) -> Result<ExrPlanes, FrameFileError> {
     let image = read_all_flat_layers_from_file(path).map_err(|error| {
         let fix = match &error {
             exr::error::Error::NotSupported(_) => "write it with ZIP compression, and not deep",
@@ -52,7 +55,7 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
         };
         failure(path, format!("cannot be read as EXR: {error}; {fix}"))
     })?;
-    let several = image.layer_data.len() > 1;
+    let has_several_parts = image.layer_data.len() > 1;
     let display = image.attributes.display_window;
     let middle = |from: i32, length: usize| f64::from(from) + 0.5 * (length as f64 - 1.0);
     let display_centre_px =
@@ -63,15 +66,15 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
             .attributes
             .layer_name
             .as_ref()
-            .filter(|_| several)
+            .filter(|_| has_several_parts)
             .map(ToString::to_string)
             .unwrap_or_default();
         for channel in &part.channel_data.list {
             let name = channel.name.to_string();
-            let whole = part_name.is_empty()
+            let is_full_name = part_name.is_empty()
                 || name.strip_prefix(&part_name).is_some_and(|rest| rest.starts_with('.'));
-            planes.push(Plane {
-                name: if whole { name } else { format!("{part_name}.{name}") },
+            planes.push(ExrPlane {
+                name: if is_full_name { name } else { format!("{part_name}.{name}") },
                 size_px: [part.size.0 as u32, part.size.1 as u32],
                 origin_px: [part.attributes.layer_position.0, part.attributes.layer_position.1],
                 values: channel.sample_data.values_as_f32().collect(),
@@ -79,81 +82,86 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
         }
     }
     let pixel_aspect = f64::from(image.attributes.pixel_aspect);
-    let other_primaries = image.attributes.chromaticities.is_some_and(|found| {
-        let of = [found.red, found.green, found.blue, found.white];
-        of.iter().zip(REC709).any(|(at, [x, y])| (at.x() - x).abs() > 2e-3 || (at.y() - y).abs() > 2e-3)
+    let other_primaries = image.attributes.chromaticities.is_some_and(|stated| {
+        let stated = [stated.red, stated.green, stated.blue, stated.white];
+        stated.iter().zip(REC709).any(|(xy, [x, y])| (xy.x() - x).abs() > 2e-3 || (xy.y() - y).abs() > 2e-3)
     });
-    Ok(Planes { planes, display_centre_px, pixel_aspect, other_primaries, path: path.into() })
+    Ok(ExrPlanes { planes, display_centre_px, pixel_aspect, other_primaries, path: path.into() })
 }
 
-/// Red, green, blue and white of sRGB.
+/// Chromaticities of sRGB: red, green, blue, white.
 const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
-impl Planes {
-    /// What the header says that the keys do not go with, or that is left out.
+impl ExrPlanes {
+    /// Notes on attributes of the header that are not applied.
     pub(super) fn notes(&self, [fx, fy]: [f64; 2]) -> Vec<String> {
         let mut notes = Vec::new();
-        // Pixels that are wide have a focal length that is short in them.
-        let implied = fy / fx;
-        // 1 is what writers leave there without a thought.
-        if self.pixel_aspect != 1.0 && (implied / self.pixel_aspect - 1.0).abs() > 0.01 {
+        // In wide pixels the horizontal focal length is shorter.
+        let implied_aspect = fy / fx;
+        // An aspect of 1 is the default of writers, and no statement.
+        if self.pixel_aspect != 1.0 && (implied_aspect / self.pixel_aspect - 1.0).abs() > 0.01 {
             let (path, aspect) = (self.path.display(), self.pixel_aspect);
             notes.push(format!(
-                "{path}: its header says that a pixel is {aspect} times as wide as high (pixelAspectRatio), focal_px = [{fx}, {fy}] that it is {implied:.4} times: \
+                "{path}: its header says that a pixel is {aspect} times as wide as high (pixelAspectRatio), \
+                    focal_px = [{fx}, {fy}] that it is {implied_aspect:.4} times: \
                  focal_px counts"
             ));
         }
         if self.other_primaries {
             let path = self.path.display();
             notes.push(format!(
-                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; convert the picture if they matter"
+                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; \
+                    convert the picture if they matter"
             ));
         }
         notes
     }
 
-    /// The only two planes of a file.
-    pub(super) fn pair(&self) -> Result<[&Plane; 2], String> {
+    /// The two planes of a flow (right, down), if the file has no others.
+    pub(super) fn pair(&self) -> Result<[&ExrPlane; 2], String> {
         match &self.planes[..] {
-            // Channels are sorted by name: X before Y, U before V, but R after G.
-            [a, b] if a.name.ends_with('G') && b.name.ends_with('R') => Ok([whole(b)?, whole(a)?]),
-            [a, b] => Ok([whole(a)?, whole(b)?]),
+            // Channels are sorted by name: X before Y and U before V, but G before R.
+            [a, b] if a.name.ends_with('G') && b.name.ends_with('R') => Ok([complete(b)?, complete(a)?]),
+            [a, b] => Ok([complete(a)?, complete(b)?]),
             _ => Err(format!(
                 "has the channels {}: say with motion.flow_channels which two are the flow right and down",
-                self.list()
+                self.all_names()
             )),
         }
     }
 
     /// All names, for messages.
-    fn list(&self) -> String {
+    fn all_names(&self) -> String {
         self.planes.iter().map(|plane| plane.name.as_str()).collect::<Vec<_>>().join(" ")
     }
 
-    /// The plane of that name, or the only one whose name ends with it.
-    pub(super) fn named(&self, wanted: &str) -> Result<&Plane, String> {
+    /// The plane of this full name, or the only one whose name ends with it.
+    pub(super) fn plane(&self, wanted: &str) -> Result<&ExrPlane, String> {
         if let Some(plane) = self.planes.iter().find(|plane| plane.name == wanted) {
-            return whole(plane);
+            return complete(plane);
         }
-        let ends = |plane: &&Plane| plane.name.strip_suffix(wanted).is_some_and(|rest| rest.ends_with('.'));
-        let found: Vec<&Plane> = self.planes.iter().filter(ends).collect();
-        match found[..] {
-            [plane] => whole(plane),
-            [] => Err(format!("has no channel {wanted}, but {}", self.list())),
-            _ => Err(format!("has several channels {wanted}: {}; give the whole name", names(&found))),
+        let has_ending =
+            |plane: &&ExrPlane| plane.name.strip_suffix(wanted).is_some_and(|rest| rest.ends_with('.'));
+        let matching: Vec<&ExrPlane> = self.planes.iter().filter(has_ending).collect();
+        match matching[..] {
+            [plane] => complete(plane),
+            [] => Err(format!("has no channel {wanted}, but {}", self.all_names())),
+            _ => Err(format!("has several channels {wanted}: {}; give the whole name", names(&matching))),
         }
     }
 
-    /// Red, green and blue: those asked for (one is grey), or the only ones there are.
+    /// Planes of red, green and blue: the given channels (one for grey), else the only ones of the file.
     pub(super) fn colors(
         &self,
         channels: Option<&[String]>,
         layer: Option<&str>,
-    ) -> Result<[&Plane; 3], String> {
-        let full = |name: &str| layer.map_or_else(|| name.to_owned(), |layer| format!("{layer}.{name}"));
+    ) -> Result<[&ExrPlane; 3], String> {
+        let full_name = |name: &str| layer.map_or_else(|| name.to_owned(), |layer| format!("{layer}.{name}"));
         let colors = match channels {
-            Some([gray]) => [self.named(&full(gray))?; 3],
-            Some([r, g, b]) => [self.named(&full(r))?, self.named(&full(g))?, self.named(&full(b))?],
+            Some([gray]) => [self.plane(&full_name(gray))?; 3],
+            Some([r, g, b]) => {
+                [self.plane(&full_name(r))?, self.plane(&full_name(g))?, self.plane(&full_name(b))?]
+            }
             Some(_) => {
                 return Err(
                     "takes one channel (grey) or three (red, green, blue) in color_channels".to_owned()
@@ -164,16 +172,16 @@ impl Planes {
                     Some(layer) => layer.to_owned(),
                     None => self.color_layer()?,
                 };
-                let of_layer = |channel: &str| {
-                    self.named(&if layer.is_empty() {
+                let in_layer = |channel: &str| {
+                    self.plane(&if layer.is_empty() {
                         channel.to_owned()
                     } else {
                         format!("{layer}.{channel}")
                     })
                 };
-                match of_layer("R") {
-                    Ok(r) => [r, of_layer("G")?, of_layer("B")?],
-                    Err(error) => of_layer("Y").map(|gray| [gray; 3]).map_err(|_| error)?,
+                match in_layer("R") {
+                    Ok(r) => [r, in_layer("G")?, in_layer("B")?],
+                    Err(error) => in_layer("Y").map(|gray| [gray; 3]).map_err(|_| error)?,
                 }
             }
         };
@@ -184,8 +192,7 @@ impl Planes {
         Ok(colors)
     }
 
-    /// The layer with R G B (or Y alone), where one can be told from the others: without a name, or Blender's
-    /// `Combined`.
+    /// The layer with R, G, B (or Y alone). Of several, the one without a name or Blender's `Combined`.
     fn color_layer(&self) -> Result<String, String> {
         let has = |layer: &str, channel: &str| {
             self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, channel))
@@ -193,85 +200,97 @@ impl Planes {
         let mut layers: Vec<&str> = self.planes.iter().map(|plane| plane.layer_and_channel().0).collect();
         layers.sort_unstable();
         layers.dedup();
-        let rgb = |layer: &&str| ["R", "G", "B"].iter().all(|channel| has(layer, channel));
-        // A Y beside an X is a coordinate, beside RY a luminance without its chroma.
-        let gray = |layer: &&str| has(layer, "Y") && !has(layer, "X") && !has(layer, "RY");
-        let mut found: Vec<&str> = layers.iter().copied().filter(rgb).collect();
-        if found.is_empty() {
-            found = layers.into_iter().filter(gray).collect();
+        let has_rgb = |layer: &&str| ["R", "G", "B"].iter().all(|channel| has(layer, channel));
+        // Y together with X is a coordinate; together with RY it is the luminance of a luminance-chroma
+        // picture.
+        let has_gray = |layer: &&str| has(layer, "Y") && !has(layer, "X") && !has(layer, "RY");
+        let mut candidates: Vec<&str> = layers.iter().copied().filter(has_rgb).collect();
+        if candidates.is_empty() {
+            candidates = layers.into_iter().filter(has_gray).collect();
         }
-        if found.is_empty() {
+        if candidates.is_empty() {
             return Err(format!(
                 "has no channels R G B or Y, but {}; name them with color_channels",
-                self.list()
+                self.all_names()
             ));
         }
-        only(&found, |layer| layer.is_empty(), |layer| last(layer) == "Combined")
+        preferred(&candidates, |layer| layer.is_empty(), |layer| last_component(layer) == "Combined")
             .map(|layer| (*layer).to_owned())
             .ok_or_else(|| {
-                format!("has several layers with colour: {}; choose one with color_layer", found.join(", "))
+                format!(
+                    "has several layers with colour: {}; choose one with color_layer",
+                    candidates.join(", ")
+                )
             })
     }
 
-    /// Depth: the channel asked for, or the only one that can be it.
-    pub(super) fn depth(&self, channel: Option<&str>, layer: Option<&str>) -> Result<&Plane, String> {
+    /// The plane of depth: the given channel, else the only one that can be depth.
+    pub(super) fn depth(&self, channel: Option<&str>, layer: Option<&str>) -> Result<&ExrPlane, String> {
         match (channel, layer) {
-            (Some(channel), Some(layer)) => return self.named(&format!("{layer}.{channel}")),
-            (Some(channel), None) => return self.named(channel),
+            (Some(channel), Some(layer)) => return self.plane(&format!("{layer}.{channel}")),
+            (Some(channel), None) => return self.plane(channel),
             (None, Some(layer)) => {
-                return self.named(&format!("{layer}.Z")).or_else(|_| self.named(&format!("{layer}.V")));
+                return self.plane(&format!("{layer}.Z")).or_else(|_| self.plane(&format!("{layer}.V")));
             }
             (None, None) => {}
         }
         if let [plane] = &self.planes[..] {
-            return whole(plane);
+            return complete(plane);
         }
-        let beside = |plane: &Plane, other: &str| {
+        let layer_has = |plane: &ExrPlane, other: &str| {
             let layer = plane.layer_and_channel().0;
             self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, other))
         };
-        // A Z beside an X is a coordinate. Blender's depth pass is called `Depth.V` when it has a file of its
-        // own; its mist is a Z too, and no depth.
-        let is = |plane: &&Plane, channel: &str, not_beside: &str| {
+        // Z together with X is a coordinate. Blender's depth pass is `Depth.V` in a file of its own. Its mist
+        // pass has a Z that is no depth.
+        let is_depth = |plane: &&ExrPlane, channel: &str, excluded: &str| {
             let (layer, name) = plane.layer_and_channel();
-            name == channel && !beside(plane, not_beside) && !NO_DEPTH.contains(&last(layer))
+            name == channel && !layer_has(plane, excluded) && !NO_DEPTH.contains(&last_component(layer))
         };
-        let mut found: Vec<&Plane> = self.planes.iter().filter(|plane| is(plane, "Z", "X")).collect();
-        if found.is_empty() {
-            found = self.planes.iter().filter(|plane| is(plane, "V", "U")).collect();
+        let mut candidates: Vec<&ExrPlane> =
+            self.planes.iter().filter(|plane| is_depth(plane, "Z", "X")).collect();
+        if candidates.is_empty() {
+            candidates = self.planes.iter().filter(|plane| is_depth(plane, "V", "U")).collect();
         }
-        if found.is_empty() {
-            return Err(format!("has no channel Z, but {}; name it with depth_channel", self.list()));
+        if candidates.is_empty() {
+            return Err(format!("has no channel Z, but {}; name it with depth_channel", self.all_names()));
         }
-        let layer = |plane: &&Plane| plane.layer_and_channel().0.to_owned();
-        match only(&found, |plane| layer(plane).is_empty(), |plane| last(&layer(plane)) == "Depth") {
-            Some(plane) => whole(plane),
+        let layer = |plane: &&ExrPlane| plane.layer_and_channel().0.to_owned();
+        match preferred(
+            &candidates,
+            |plane| layer(plane).is_empty(),
+            |plane| last_component(&layer(plane)) == "Depth",
+        ) {
+            Some(plane) => complete(plane),
             None => Err(format!(
                 "has several channels that may be depth: {}; choose one with depth_channel",
-                names(&found)
+                names(&candidates)
             )),
         }
     }
 }
 
-/// The only one there is, or the only one that is preferred by the first rule, or by the second.
-fn only<T>(found: &[T], first: impl Fn(&T) -> bool, second: impl Fn(&T) -> bool) -> Option<&T> {
-    let alone = |rule: &dyn Fn(&T) -> bool| {
-        let mut by_rule = found.iter().filter(|item| rule(item));
+/// The only item, else the only one that fulfils the first rule, else the only one that fulfils the second.
+fn preferred<T>(items: &[T], first: impl Fn(&T) -> bool, second: impl Fn(&T) -> bool) -> Option<&T> {
+    let only = |rule: &dyn Fn(&T) -> bool| {
+        let mut by_rule = items.iter().filter(|item| rule(item));
         by_rule.next().filter(|_| by_rule.next().is_none())
     };
-    alone(&|_| true).or_else(|| alone(&first)).or_else(|| alone(&second))
+    only(&|_| true).or_else(|| only(&first)).or_else(|| only(&second))
 }
 
-fn last(layer: &str) -> &str {
+/// The last component of a dotted layer name.
+fn last_component(layer: &str) -> &str {
     layer.rsplit('.').next().unwrap_or_default()
 }
 
-fn names(planes: &[&Plane]) -> String {
+/// Names of planes, for messages.
+fn names(planes: &[&ExrPlane]) -> String {
     planes.iter().map(|plane| plane.name.as_str()).collect::<Vec<_>>().join(" ")
 }
 
-fn whole(plane: &Plane) -> Result<&Plane, String> {
+/// Refuses subsampled and empty planes.
+fn complete(plane: &ExrPlane) -> Result<&ExrPlane, String> {
     let [width, height] = plane.size_px;
     if width == 0 || height == 0 || plane.values.len() != width as usize * height as usize {
         return Err(format!("has a channel {} that is subsampled, or has no pixel", plane.name));

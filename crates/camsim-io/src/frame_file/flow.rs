@@ -1,4 +1,4 @@
-//! Optical flow: Middlebury `.flo`, two channels of an EXR, or a `.npy` of two numbers a pixel.
+//! Reads optical flow: Middlebury `.flo`, two channels of an EXR, or a `.npy` with two numbers per pixel.
 
 use std::path::Path;
 
@@ -11,15 +11,17 @@ use super::{
     npy,
 };
 
-/// Flow of each pixel, row by row, and of an EXR where its first pixel is in the file's own pixels.
-type Values = ([u32; 2], Vec<[f32; 2]>, Option<[i32; 2]>);
+/// Size in pixels; flow of each pixel, row by row; and for an EXR the position of the first pixel in the
+/// pixels of the file.
+type FlowValues = ([u32; 2], Vec<[f32; 2]>, Option<[i32; 2]>);
 
-/// The first four bytes of a `.flo` file are this number, little-endian.
+/// Signature of a `.flo` file: this number, little-endian.
 const FLO_TAG: f32 = 202_021.25;
-/// Middlebury's: what is larger is not known.
+/// Larger values mark unknown flow, by the definition of `.flo`.
 const UNKNOWN_PX: f32 = 1e9;
 
-/// Reads `motion.flow`, whose keys have been checked; with the place of an EXR's first pixel.
+/// Reads `motion.flow`, whose keys have been checked. Returns the flow, and for an EXR the position of its
+/// first pixel in the pixels of the file.
 pub(super) fn read_flow(
     path: &Path,
     motion: &MotionSpec,
@@ -37,12 +39,13 @@ pub(super) fn read_flow(
     let scaled = |uv: [f32; 2]| [0, 1].map(|k: usize| (f64::from(uv[k]) * scale[k]) as f32);
     let px: Vec<[f32; 2]> =
         values.into_iter().map(|uv| if known(uv) { scaled(uv) } else { [f32::NAN; 2] }).collect();
-    // An infinity may stand for what is not known; a number that becomes one may not.
+    // Unknown flow has become NaN above, so other values beyond the limit come from the scale.
     if px.iter().any(|uv| !uv[0].is_nan() && !known(*uv)) {
         return Err(failure(
             path,
             format!(
-                "times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what the file holds"
+                "times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what \
+                    the file holds"
             ),
         ));
     }
@@ -55,18 +58,20 @@ pub(super) fn read_flow(
     Ok((FlowField { size_px, px, interval_s: 1e-3 * motion.flow_interval_ms.unwrap_or_default() }, origin_px))
 }
 
-fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<Values, FrameFileError> {
+/// Reads two channels of an EXR.
+fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<FlowValues, FrameFileError> {
     let picture = read_exr(path)?;
-    let wrong = |message: String| failure(path, message);
+    let error = |message: String| failure(path, message);
     let [u, v] = match motion.flow_channels.as_deref() {
-        Some([u, v]) => [picture.named(u).map_err(wrong)?, picture.named(v).map_err(wrong)?],
-        _ => picture.pair().map_err(wrong)?,
+        Some([u, v]) => [picture.plane(u).map_err(error)?, picture.plane(v).map_err(error)?],
+        _ => picture.pair().map_err(error)?,
     };
     if u.name == v.name {
         return Err(failure(
             path,
             format!(
-                "has one channel {} for both names of motion.flow_channels: give that to the right, and that down",
+                "has one channel {} for both names of motion.flow_channels: give that to the right, and that \
+                    down",
                 u.name
             ),
         ));
@@ -80,7 +85,8 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<Values, FrameFileEr
     Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect(), Some(u.origin_px)))
 }
 
-fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
+/// Reads a Middlebury `.flo` file.
+fn read_flo(path: &Path) -> Result<FlowValues, FrameFileError> {
     let bytes = std::fs::read(path).map_err(|error| {
         failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
     })?;
@@ -88,7 +94,8 @@ fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
     if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
         return Err(failure(
             path,
-            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is one of these",
+            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is \
+                one of these",
         ));
     }
     let side = |word: Option<[u8; 4]>| word.map_or(0, u32::from_le_bytes);

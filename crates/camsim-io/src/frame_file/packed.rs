@@ -1,4 +1,4 @@
-//! Depth packed into the three bytes of a colour picture, as two programs do it.
+//! Decodes depth that is packed into the three bytes of a colour picture.
 
 use std::path::Path;
 
@@ -6,27 +6,29 @@ use image::{DynamicImage, ImageFormat};
 
 use super::{FrameFileError, images::failure};
 
-/// How.
+/// Encoding of packed depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Packing {
-    /// The reference program's.
+    /// That of the reference program: metres are (65025 R + 255 G + B) / 255.
     Packed24,
-    /// CARLA's.
+    /// That of CARLA: metres are 1000 (R + 256 G + 65536 B) / 16777215.
     Carla,
 }
 
-/// Depth of the reference program's cleared buffer, metres: all three bytes full.
+/// Depth of `packed24` that stands for the sky, metres: all bytes 255.
 const PACKED24_SKY_M: f64 = 65_281.0;
-/// CARLA's far plane, metres: all three bytes full.
+/// Far plane of CARLA, metres: all bytes 255.
 const CARLA_FAR_M: f64 = 1000.0;
-/// The largest number of three bytes.
+/// Largest integer of three bytes.
 const THREE_BYTES: f64 = 16_777_215.0;
 
-/// What each encoding makes of bytes, for messages: a picture does not tell which of them it is of.
-pub(super) const FORMULAS: &str = "depth_encoding = \"carla\" where metres are 1000 (R + 256 G + 65536 B) / 16777215, or \"packed24\" where they are \
+/// Formulas of the encodings, for messages. The picture itself does not state its encoding.
+pub(super) const FORMULAS: &str = "depth_encoding = \"carla\" where metres are 1000 (R + 256 G + 65536 B) / \
+    16777215, or \"packed24\" where they are \
                                    (65025 R + 255 G + B) / 255";
 
-/// Metres, 0 where nothing is in reach. Decoded texel by texel: packed bytes must never be filtered.
+/// Decodes a picture to metres, 0 for the sky. Packed bytes must not be filtered, so each pixel is decoded
+/// alone.
 pub(super) fn metres(
     picture: &DynamicImage,
     format: ImageFormat,
@@ -34,18 +36,20 @@ pub(super) fn metres(
     path: &Path,
 ) -> Result<Vec<f64>, FrameFileError> {
     if !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
-        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
+        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, \
+            BMP or PPM";
         return Err(failure(path, message));
     }
     if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
-        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
+        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; \
+            leave that key out for 16-bit grey";
         return Err(failure(path, message));
     }
     Ok(picture.to_rgb8().pixels().map(|pixel| packing.metres(pixel.0.map(f64::from))).collect())
 }
 
 impl Packing {
-    /// As in FRAME.toml.
+    /// Value of `depth_encoding`.
     pub(super) fn word(self) -> &'static str {
         match self {
             Self::Packed24 => "packed24",
@@ -67,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_become_metres_by_their_formulas() {
+    fn packed_bytes_are_decoded_by_formula() {
         assert!((Packing::Packed24.metres([12.0, 34.0, 51.0]) - 3094.2).abs() < 1e-9);
         assert_eq!(Packing::Packed24.metres([255.0; 3]), 0.0);
         // 167 772 of 16 777 215 parts of a kilometre.

@@ -1,52 +1,52 @@
-//! What a PNG says of its values beside its pixels.
+//! Metadata chunks of PNG files about the meaning of their values.
 
 use std::path::Path;
 
-/// What sRGB's curve comes nearest to, as PNG files say it.
+/// Value of `gAMA` for sRGB.
 const SRGB_GAMMA: f64 = 0.454_55;
-/// White, red, green and blue of sRGB: x and y each, in hundred thousandths.
+/// Value of `cHRM` for sRGB: x and y of white, red, green and blue, times 100000.
 const SRGB_CHROMATICITIES: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
-/// How far they may be off, as writers round them.
+/// Tolerance of [`SRGB_CHROMATICITIES`], for rounding by writers.
 const CHROMATICITY_SLACK: u32 = 500;
-/// Primaries, transfer, matrix and range of sRGB, in `cICP`.
+/// Value of `cICP` for sRGB: primaries, transfer function, matrix, range.
 const SRGB_CICP: [u8; 4] = [1, 13, 0, 1];
 
-/// The chunks ahead of the pixels.
+/// Metadata chunks before the pixels.
 #[derive(Default)]
 pub(super) struct PngChunks {
     is_srgb: bool,
     gamma: Option<f64>,
     chromaticities: Option<[u32; 8]>,
     cicp: Option<[u8; 4]>,
-    /// `sBIT`, `pCAL`, `sCAL`: what its numbers stand for.
+    /// Names of the chunks `sBIT`, `pCAL` and `sCAL` that are present.
     calibration: Vec<&'static str>,
 }
 
 impl PngChunks {
-    /// Reads them; of what is damaged the decoder tells.
+    /// Reads the chunks of a file. Errors are left to the decoder of the pixels.
     pub(super) fn read(path: &Path) -> Self {
-        let mut found = Self::default();
+        let mut chunks = Self::default();
         if let Ok(bytes) = std::fs::read(path) {
-            found.walk(&bytes);
+            chunks.parse(&bytes);
         }
-        found
+        chunks
     }
 
-    fn walk(&mut self, bytes: &[u8]) -> Option<()> {
-        let word = |at: usize| {
-            bytes.get(at..at.checked_add(4)?).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]))
+    fn parse(&mut self, bytes: &[u8]) -> Option<()> {
+        let unsigned = |offset: usize| {
+            bytes.get(offset..offset.checked_add(4)?).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]))
         };
-        let mut at = 8_usize;
+        let mut offset = 8_usize;
         loop {
-            let length = word(at)? as usize;
-            match bytes.get(at + 4..at + 8)? {
+            let length = unsigned(offset)? as usize;
+            match bytes.get(offset + 4..offset + 8)? {
                 b"sRGB" => self.is_srgb = true,
-                b"gAMA" => self.gamma = word(at + 8).map(|value| f64::from(value) / 1e5),
-                b"cICP" => self.cicp = bytes.get(at + 8..at + 12).and_then(|b| b.try_into().ok()),
+                b"gAMA" => self.gamma = unsigned(offset + 8).map(|value| f64::from(value) / 1e5),
+                b"cICP" => self.cicp = bytes.get(offset + 8..offset + 12).and_then(|b| b.try_into().ok()),
                 b"cHRM" if length == 32 => {
                     let mut all = [0; 8];
                     for (k, value) in all.iter_mut().enumerate() {
-                        *value = word(at + 8 + 4 * k)?;
+                        *value = unsigned(offset + 8 + 4 * k)?;
                     }
                     self.chromaticities = Some(all);
                 }
@@ -56,12 +56,12 @@ impl PngChunks {
                 b"IDAT" | b"IEND" => return Some(()),
                 _ => {}
             }
-            at = at.checked_add(length.checked_add(12)?)?;
+            offset = offset.checked_add(length.checked_add(12)?)?;
         }
     }
 
-    /// What it says of its curve, where that is not sRGB's.
-    pub(super) fn other_curve(&self) -> Option<String> {
+    /// Description of the transfer function, if it is not that of sRGB.
+    pub(super) fn foreign_transfer(&self) -> Option<String> {
         if let Some(cicp @ [_, transfer, ..]) = self.cicp {
             let differs = cicp[1..] != SRGB_CICP[1..];
             return differs.then(|| {
@@ -72,25 +72,29 @@ impl PngChunks {
         Some(format!("that its values are light to the power of {gamma} (gAMA), as sRGB is not"))
     }
 
-    /// What of its colours is not applied.
+    /// Note about primaries that are not applied.
     pub(super) fn color_note(&self) -> Option<String> {
         if let Some(cicp) = self.cicp {
-            let of = || {
+            let note = || {
                 format!(
-                    "its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as color_space says"
+                    "its cICP {cicp:?} is not applied: primaries are taken for those of sRGB, the curve as \
+                        color_space says"
                 )
             };
-            return (cicp != SRGB_CICP).then(of);
+            return (cicp != SRGB_CICP).then(note);
         }
         let other = |all: &[u32; 8]| {
             all.iter().zip(&SRGB_CHROMATICITIES).any(|(a, b)| a.abs_diff(*b) > CHROMATICITY_SLACK)
         };
         self.chromaticities.filter(|all| !self.is_srgb && other(all)).map(|all| {
-            format!("its primaries (cHRM {all:?}) are not those of sRGB, and are not applied: its colours are taken for those of sRGB")
+            format!(
+                "its primaries (cHRM {all:?}) are not those of sRGB, and are not applied: its colours \
+                are taken for those of sRGB"
+            )
         })
     }
 
-    /// What of its numbers is not applied.
+    /// Note about calibration chunks that are not applied.
     pub(super) fn depth_note(&self) -> Option<String> {
         let names = self.calibration.join(", ");
         (!names.is_empty()).then(|| {

@@ -1,7 +1,8 @@
-//! Every key of a FRAME.toml, with what it takes.
+//! The schema of FRAME.toml: every key and the values it takes.
 
-use crate::scenario_file::schema::{Kind::*, Schema};
+use crate::scenario_file::schema::{Schema, ValueKind::*};
 
+/// Schema of FRAME.toml.
 pub(super) const FRAME: Schema = Schema {
     keys: &[
         ("frames", Path),
@@ -36,7 +37,7 @@ pub(super) const FRAME: Schema = Schema {
         ("fog.end_m", Number),
         ("fog.color", Numbers(3)),
     ],
-    later_words: &[],
+    unsupported_words: &[],
     required: &[("focal_px", ""), ("fog.end_m", "fog"), ("fog.color", "fog")],
     listing: "`camsim apply --help` lists all keys",
 };

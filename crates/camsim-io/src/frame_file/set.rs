@@ -1,4 +1,4 @@
-//! The frames of a FRAME.toml, one or many, and the motion of each.
+//! The frames of a FRAME.toml, one or several, and the motion of each.
 
 use std::path::{Path, PathBuf};
 
@@ -12,33 +12,32 @@ use super::{
     FrameFile, FrameFileError, FrameSpec,
     flow::read_flow,
     images::{failure, is_exr},
-    list::{Entry, frames},
+    list::{FrameEntry, frames},
     poses::read_poses,
     read_pictures, read_spec,
 };
 
-/// Frames that are read one by one.
+/// The frames of a FRAME.toml. Their pictures are read one frame at a time.
 #[derive(Clone, Debug)]
 pub struct FrameSet {
     path: PathBuf,
     spec: FrameSpec,
-    entries: Vec<Entry>,
+    entries: Vec<FrameEntry>,
     left_out: usize,
     several: bool,
-    moves: Moves,
+    motion_source: MotionSource,
     notes: Vec<String>,
 }
 
+/// What determines the motion of the frames.
 #[derive(Clone, Debug)]
-enum Moves {
+enum MotionSource {
+    /// A constant twist.
     Twist(Twist),
+    /// A file of optical flow.
     Flow(PathBuf),
-    /// Rows with times from `base_s`.
-    Poses {
-        table: PathBuf,
-        rows: Vec<PoseRow>,
-        base_s: f64,
-    },
+    /// Poses of a table, with times relative to `base_s`.
+    Poses { table: PathBuf, rows: Vec<PoseRow>, base_s: f64 },
 }
 
 /// Reads a frame file and the tables that it names; its pictures are read by [`FrameSet::read`].
@@ -49,67 +48,67 @@ pub fn read_frame_set(path: &Path) -> Result<FrameSet, FrameFileError> {
     let spec = read_spec(path)?;
     let listed = frames(&spec, path)?;
     let mut notes = listed.notes;
-    let moves = read_moves(&spec, &listed.entries, listed.several, path, &mut notes)?;
+    let motion_source = read_motion_source(&spec, &listed.entries, listed.several, path, &mut notes)?;
     Ok(FrameSet {
         path: path.into(),
         entries: listed.entries,
         left_out: listed.left_out,
         several: listed.several,
         spec,
-        moves,
+        motion_source,
         notes,
     })
 }
 
 impl FrameSet {
-    /// The frames in order; there is at least one.
+    /// The frames in order, at least one.
     #[must_use]
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[FrameEntry] {
         &self.entries
     }
 
-    /// Colour pictures without depth of about the same time, which are none of the frames.
+    /// Number of colour pictures left out because no depth is near in time.
     #[must_use]
     pub fn left_out(&self) -> usize {
         self.left_out
     }
 
-    /// What of the tables is not read.
+    /// Notes about columns that are not read.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// When the pictures were taken, seconds from their stamps.
+    /// Instant at which the pictures were taken, seconds from their stamps.
     #[must_use]
     pub fn instant_s(&self) -> f64 {
         1e-3 * self.spec.instant_ms
     }
 
-    /// The table of poses or the flow that says how the camera moves, if one does.
+    /// The file of poses or of optical flow, if there is one.
     #[must_use]
     pub fn motion_file(&self) -> Option<&Path> {
-        match &self.moves {
-            Moves::Twist(_) => None,
-            Moves::Flow(path) | Moves::Poses { table: path, .. } => Some(path),
+        match &self.motion_source {
+            MotionSource::Twist(_) => None,
+            MotionSource::Flow(path) | MotionSource::Poses { table: path, .. } => Some(path),
         }
     }
 
-    /// Whether the file names a folder or a table of frames, which may hold a single one.
+    /// Whether the file names a pattern, list or table of frames (which may hold a single frame).
     #[must_use]
     pub fn is_several(&self) -> bool {
         self.several
     }
 
-    /// How the camera moves about the stamp of frame `index`.
+    /// Motion of the camera relative to the stamp of frame `index`.
     ///
     /// # Errors
-    /// No such frame, or a table of poses that cannot be used.
+    /// The flow cannot be read, or the poses make no trajectory.
     pub fn motion(&self, index: usize) -> Result<Motion, FrameFileError> {
-        match &self.moves {
-            Moves::Twist(twist) => Ok(Motion::Twist(*twist)),
-            Moves::Flow(flow) => Ok(Motion::Flow(read_flow(flow, &self.spec.motion)?.0)),
-            Moves::Poses { table, rows, base_s } => {
+        match &self.motion_source {
+            MotionSource::Twist(twist) => Ok(Motion::Twist(*twist)),
+            MotionSource::Flow(flow) => Ok(Motion::Flow(read_flow(flow, &self.spec.motion)?.0)),
+            MotionSource::Poses { table, rows, base_s } => {
                 let stamp_s = self.stamp_s(index).unwrap_or(*base_s);
                 let track = PoseTrack::new(rows.clone(), stamp_s - base_s);
                 Ok(Motion::Poses(
@@ -122,14 +121,14 @@ impl FrameSet {
     /// Reads the pictures of frame `index`.
     ///
     /// # Errors
-    /// As [`read_frame_set`], of the pictures; or no such frame.
+    /// A picture cannot be used, or there is no such frame.
     pub fn read(&self, index: usize) -> Result<FrameFile, FrameFileError> {
         let Some(entry) = self.entries.get(index) else {
             let message = format!("has {} frames; there is none of number {index}", self.entries.len());
             return Err(FrameFileError::Key { path: self.path.clone(), key: "frames", message });
         };
-        let (motion, flow_origin_px) = match &self.moves {
-            Moves::Flow(flow) => {
+        let (motion, flow_origin_px) = match &self.motion_source {
+            MotionSource::Flow(flow) => {
                 let (flow, origin_px) = read_flow(flow, &self.spec.motion)?;
                 (Motion::Flow(flow), origin_px)
             }
@@ -137,13 +136,14 @@ impl FrameSet {
         };
         let (file, color_origin_px) =
             read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), motion, &self.path)?;
-        if let (Moves::Flow(path), Motion::Flow(flow)) = (&self.moves, &file.motion) {
+        if let (MotionSource::Flow(path), Motion::Flow(flow)) = (&self.motion_source, &file.motion) {
             let [[w, h], [width, height]] = [flow.size_px, file.frame.geometry.size_px];
             if [w, h] != [width, height] {
                 return Err(failure(
                     path,
                     format!(
-                        "is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"
+                        "is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have \
+                            one size"
                     ),
                 ));
             }
@@ -151,7 +151,8 @@ impl FrameSet {
                 && flow_px != color_px
             {
                 let message = format!(
-                    "begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels"
+                    "begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover \
+                        the same pixels"
                 );
                 return Err(failure(path, message));
             }
@@ -165,32 +166,36 @@ impl FrameSet {
     }
 }
 
-/// Whole seconds apart, so that a stamp in Unix time keeps its nanoseconds as far as an f64 does.
+/// Converts nanoseconds to seconds. Whole seconds are converted apart, which loses the least of Unix times.
 fn seconds(stamp_ns: i64) -> f64 {
     stamp_ns.div_euclid(1_000_000_000) as f64 + stamp_ns.rem_euclid(1_000_000_000) as f64 * 1e-9
 }
 
-/// A twist (nothing given is no motion) or a table of poses, not both.
-fn read_moves(
+/// Reads the motion: a flow, a table of poses, or a twist (zero by default).
+///
+/// # Errors
+/// Several of them are given, or a value is missing or not finite.
+// Long because it is one sequence of checks of keys.
+fn read_motion_source(
     spec: &FrameSpec,
-    entries: &[Entry],
+    entries: &[FrameEntry],
     several: bool,
     path: &Path,
     notes: &mut Vec<String>,
-) -> Result<Moves, FrameFileError> {
+) -> Result<MotionSource, FrameFileError> {
     let motion = &spec.motion;
     let fail =
         |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
     if let Some(flow) = &motion.flow {
         check_flow(spec, several, path)?;
-        return Ok(Moves::Flow(flow.clone()));
+        return Ok(MotionSource::Flow(flow.clone()));
     }
-    let of_flow = [
+    let flow_keys = [
         ("motion.flow_channels", motion.flow_channels.is_some()),
         ("motion.flow_scale", motion.flow_scale.is_some()),
         ("motion.flow_interval_ms", motion.flow_interval_ms.is_some()),
     ];
-    if let Some((key, _)) = of_flow.into_iter().find(|(_, given)| *given) {
+    if let Some((key, _)) = flow_keys.into_iter().find(|(_, given)| *given) {
         return fail(key, "is for motion.flow, which is missing; add it, or leave this out");
     }
     let Some(trajectory) = &motion.trajectory else {
@@ -207,7 +212,7 @@ fn read_moves(
                 return fail(key, "must be three finite numbers, in camera axes: x right, y down, z forward");
             }
         }
-        return Ok(Moves::Twist(Twist { velocity_m_s: velocity, rate_rad_s: rate }));
+        return Ok(MotionSource::Twist(Twist { velocity_m_s: velocity, rate_rad_s: rate }));
     };
     if motion.velocity_m_s.is_some() || motion.angular_rate_rad_s.is_some() {
         return fail("motion", "has both a twist and a trajectory; give one of them");
@@ -223,7 +228,8 @@ fn read_moves(
         (true, _) => match entries.first().and_then(|entry| entry.stamp_ns) {
             Some(stamp_ns) => seconds(stamp_ns),
             None => {
-                let fix = "is there, but the frames have no times: say what their names count with name_unit (\"s\", \"ms\", \"us\" or \"ns\"), \
+                let fix = "is there, but the frames have no times: say what their names count with name_unit \
+                    (\"s\", \"ms\", \"us\" or \"ns\"), \
                            or give fps, with motion.stamp_s for the first";
                 return fail("motion.trajectory", fix);
             }
@@ -235,13 +241,12 @@ fn read_moves(
             "must be a finite number of seconds on the clock of motion.trajectory",
         );
     }
-    let (rows, of_table) = read_poses(trajectory, motion.trajectory_format, base_s)?;
-    notes.extend(of_table);
-    let moves = Moves::Poses { table: trajectory.clone(), rows, base_s };
-    Ok(moves)
+    let (rows, table_notes) = read_poses(trajectory, motion.trajectory_format, base_s)?;
+    notes.extend(table_notes);
+    Ok(MotionSource::Poses { table: trajectory.clone(), rows, base_s })
 }
 
-/// A flow goes with nothing else that moves, over a time that is not 0.
+/// Checks the keys of `motion.flow`, which excludes other motion.
 fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameFileError> {
     let motion = &spec.motion;
     let fail =
@@ -270,11 +275,13 @@ fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameF
         Some(ms) if ms.is_finite() && ms != 0.0 => Ok(()),
         Some(_) => fail(
             "motion.flow_interval_ms",
-            "must be a finite number of milliseconds that is not 0: the time between the two instants that the flow joins",
+            "must be a finite number of milliseconds that is not 0: the time between the two instants that \
+                the flow joins",
         ),
         None => fail(
             "motion.flow_interval_ms",
-            "is missing: give the time between the two instants that the flow joins, 1000 / fps for successive frames",
+            "is missing: give the time between the two instants that the flow joins, 1000 / fps for \
+                successive frames",
         ),
     }
 }

@@ -41,7 +41,7 @@ fn read(text: &str) -> Result<FrameFile, FrameFileError> {
 }
 
 #[test]
-fn a_frame_is_read_with_its_defaults() {
+fn frames_are_read_with_default_keys() {
     let file = read(GOOD).unwrap();
     assert_eq!(file.frame.geometry.principal_px, DVec2::new(1.0, 0.5));
     assert_eq!(file.frame.inverse_depth, [1.0, 0.5, 0.0, 0.25, 2.0, (1.0_f64 / 65.535) as f32]);
@@ -53,9 +53,11 @@ fn a_frame_is_read_with_its_defaults() {
 }
 
 #[test]
-fn every_key_is_taken() {
-    let text = "color_space = \"linear\"\ndepth_kind = \"range\"\nprincipal_point_px = [0, 0]\ninstant_ms = -20\n\
-                [motion]\nvelocity_m_s = [1, 2, 3]\nangular_rate_rad_s = [0.1, 0.2, 0.3]\n[fog]\nend_m = 9\ncolor = [0.5, 0.6, 0.7]\n";
+fn all_keys_are_applied() {
+    let text = "color_space = \"linear\"\ndepth_kind = \"range\"\nprincipal_point_px = [0, 0]\ninstant_ms = \
+        -20\n\
+                [motion]\nvelocity_m_s = [1, 2, 3]\nangular_rate_rad_s = [0.1, 0.2, 0.3]\n[fog]\nend_m = \
+                9\ncolor = [0.5, 0.6, 0.7]\n";
     let file = read(&format!("{GOOD}{text}")).unwrap();
     assert_eq!(file.frame.color_rgba[4], 10.0 / 255.0);
     // Pixel (1, 1) lies at (0.5, 0.5): its range is longer than its depth by sqrt(1.5).
@@ -96,7 +98,7 @@ fn depth_is_read_from_exr_and_packed_bytes() {
         depth_m: Some(depth_m),
         ..RenderedFrame::default()
     };
-    // What `apply` writes is what it reads: linear values beyond 1 and all.
+    // The output of `apply` can be read again, with linear values above 1.
     write_picture(&folder.path().join("out.exr"), &frame, OutputEncoding::Srgb8).unwrap();
     let file = read_frame(&path).unwrap();
     assert_eq!(file.frame.inverse_depth, [1.0, 0.0, 0.25, 0.0, 0.0, 0.0]);
@@ -122,7 +124,7 @@ fn depth_is_read_from_exr_and_packed_bytes() {
 }
 
 #[test]
-fn depth_that_means_nothing_is_refused_and_sky_is_not() {
+fn impossible_depth_is_refused_and_sky_is_not() {
     let (folder, path) = folder("color = \"c.png\"\ndepth = \"z.exr\"\nfocal_px = [2, 2]\n");
     let read_depth = |depth_m: [f32; 6]| {
         let frame = RenderedFrame {
@@ -180,7 +182,7 @@ fn depth_that_means_nothing_is_refused_and_sky_is_not() {
 }
 
 #[test]
-fn bad_frames_are_named_by_key_and_file() {
+fn errors_name_key_and_file() {
     for (text, expected) in [
         ("color = \"c.png\"\n", "focal_px: is missing"),
         (
@@ -225,7 +227,7 @@ fn bad_frames_are_named_by_key_and_file() {
 }
 
 #[test]
-fn marked_holes_are_those_of_the_depth_picture() {
+fn marked_holes_are_the_pixels_without_depth() {
     let file = read(&format!("{GOOD}holes = \"mark\"\n")).unwrap();
     assert_eq!(file.frame.holes, [false, false, true, false, false, false]);
     assert!(read(GOOD).unwrap().frame.holes.is_empty() && (file.without_depth - 1.0 / 6.0).abs() < 1e-12);
@@ -247,7 +249,7 @@ fn packed_depth_must_be_lossless() {
     packed.save(folder.path().join("p.jpg")).unwrap();
     let error = read_frame(&path).unwrap_err().to_string();
     assert!(error.contains("p.jpg: is not lossless"), "{error}");
-    // The name does not decide: a JPEG called PNG is one.
+    // The format is detected by content: a JPEG with the extension .png is refused too.
     fs::rename(folder.path().join("p.jpg"), folder.path().join("p.png")).unwrap();
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("p.jpg", "p.png")).unwrap();
     assert!(read_frame(&path).unwrap_err().to_string().contains("is not lossless"));
@@ -256,7 +258,7 @@ fn packed_depth_must_be_lossless() {
     assert!((f64::from(read_frame(&path).unwrap().frame.inverse_depth[0]) * 2.2 - 1.0).abs() < 1e-6);
 }
 
-/// A .flo file of 3x2 pixels: 1 to the right, and down by the pixel's number; the last is not known.
+/// A .flo file of 3x2 pixels: flow 1 right, and down by the number of the pixel; unknown for the last.
 fn flo() -> Vec<u8> {
     let numbers = (0..6).flat_map(|k| if k == 5 { [1.6e9_f32, 1.6e9] } else { [1.0, k as f32] });
     let head = [202_021.25_f32.to_le_bytes(), 3_u32.to_le_bytes(), 2_u32.to_le_bytes()].concat();
@@ -290,23 +292,23 @@ fn read_with_flow(text: &str, flow: &[u8]) -> Result<FrameFile, FrameFileError> 
 }
 
 #[test]
-fn flows_are_read_from_flo_and_exr() {
+fn flow_is_read_from_flo_and_exr() {
     let flow = |text: &str| match read_with_flow(text, &flo()).unwrap().motion {
         Motion::Flow(flow) => flow,
         other => panic!("{other:?}"),
     };
-    let found = flow("flow = \"f.flo\"\nflow_interval_ms = 40");
-    assert_eq!((found.size_px, found.interval_s), ([3, 2], 0.04));
-    assert_eq!(found.px[..5], [[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0], [1.0, 4.0]]);
-    assert!(found.px[5][0].is_nan() && found.px[5][1].is_nan());
-    let found = flow("flow = \"two.exr\"\nflow_interval_ms = -40\nflow_scale = [2, -1]");
-    assert_eq!((found.px[1], found.px[5], found.interval_s), ([2.0, -11.0], [10.0, -15.0], -0.04));
-    let found = flow("flow = \"four.exr\"\nflow_channels = [\"Z\", \"Vector.W\"]\nflow_interval_ms = 40");
-    assert_eq!(found.px[2], [22.0, 32.0]);
+    let field = flow("flow = \"f.flo\"\nflow_interval_ms = 40");
+    assert_eq!((field.size_px, field.interval_s), ([3, 2], 0.04));
+    assert_eq!(field.px[..5], [[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0], [1.0, 4.0]]);
+    assert!(field.px[5][0].is_nan() && field.px[5][1].is_nan());
+    let field = flow("flow = \"two.exr\"\nflow_interval_ms = -40\nflow_scale = [2, -1]");
+    assert_eq!((field.px[1], field.px[5], field.interval_s), ([2.0, -11.0], [10.0, -15.0], -0.04));
+    let field = flow("flow = \"four.exr\"\nflow_channels = [\"Z\", \"Vector.W\"]\nflow_interval_ms = 40");
+    assert_eq!(field.px[2], [22.0, 32.0]);
 }
 
 #[test]
-fn flows_that_cannot_be_used_are_named() {
+fn unusable_flow_is_refused() {
     for (text, bytes, wanted) in [
         ("flow = \"f.flo\"", flo(), "motion.flow_interval_ms: is missing"),
         ("flow = \"f.flo\"\nflow_interval_ms = 0", flo(), "not 0"),

@@ -1,14 +1,14 @@
-//! What becomes of each key of a FRAME.toml, and of what its files say of themselves: the tables of
-//! `docs/inputs/APPLY.md`.
+//! Tables of `docs/inputs/APPLY.md`: the keys of FRAME.toml, and the treatment of metadata in its files.
 
-/// A key, what it takes, and what it does.
-type Row = (&'static str, &'static str);
+/// A key, and the values that it takes.
+type KeyTreatment = (&'static str, &'static str);
 
 /// Keys of FRAME.toml.
-const KEYS: &[Row] = &[
+const KEYS: &[KeyTreatment] = &[
     (
         "frames",
-        "a table of `time color` or `time color time depth`, or a .csv of color, depth and t_s (t_ms, t_us, t_ns, stamp_ns)",
+        "a table of `time color` or `time color time depth`, or a .csv of color, depth and t_s (t_ms, t_us, \
+            t_ns, stamp_ns)",
     ),
     ("name_unit", "`s`, `ms`, `us`, `ns`: what stands for the * in names is a time"),
     ("fps", "times for frames that have none"),
@@ -18,30 +18,37 @@ const KEYS: &[Row] = &[
     ("color_layer", "of an EXR"),
     (
         "color_space",
-        "`srgb` or `linear`; left out linear for EXR, sRGB for others; asked for where a TIFF is of floats or a PNG states another gamma",
+        "`srgb` or `linear`; left out linear for EXR, sRGB for others; asked for where a TIFF is of floats \
+            or a PNG states another gamma",
     ),
     ("depth", "EXR, PFM, TIFF, .npy, 16-bit PNG or PGM; packed: PNG, BMP, PPM; a pattern, or a list"),
     ("depth_channel", "of an EXR"),
     ("depth_layer", "of an EXR"),
     (
         "depth_encoding",
-        "`plain`; `packed24`: metres are (65025 R + 255 G + B) / 255; `carla`: 1000 (R + 256 G + 65536 B) / 16777215. An RGB picture without it is refused",
+        "`plain`; `packed24`: metres are (65025 R + 255 G + B) / 255; `carla`: 1000 (R + 256 G + 65536 B) / \
+            16777215. An RGB picture without it is refused",
     ),
     (
         "depth_per_metre",
-        "the stored value of one metre: depth is the number stored over it. Needed for whole numbers; of floats 1 if left out, but asked for where all of them are whole numbers above 100, as millimetres are. With `inverse`: the stored value of 1/m, always needed",
+        "the stored value of one metre: depth is the number stored over it. Needed for whole numbers; of \
+            floats 1 if left out, but asked for where all of them are whole numbers above 100, as \
+            millimetres are. With `inverse`: the stored value of 1/m, always needed",
     ),
     ("depth_rows", "of a PFM: `bottom-up`, as the format says, or `top-down`; asked for"),
     ("depth_max_m", "what is as far, or farther, is no depth"),
     (
         "depth_kind",
-        "`planar`: along the optical axis; `range`: along the ray; `inverse`: depth_per_metre over the number stored, planar. Of disparities depth_per_metre is focal length in pixels times baseline in metres",
+        "`planar`: along the optical axis; `range`: along the ray; `inverse`: depth_per_metre over the \
+            number stored, planar. Of disparities depth_per_metre is focal length in pixels times baseline \
+            in metres",
     ),
     ("holes", "`far`, `nearest`, `mark`: what is taken where there is no depth"),
     ("focal_px", "of the ideal frame"),
     (
         "principal_point_px",
-        "from the first pixel's centre; left out the middle of the picture, of an EXR that of its display window",
+        "from the first pixel's centre; left out the middle of the picture, of an EXR that of its display \
+            window",
     ),
     ("instant_ms", "when it was taken, from its stamp"),
     ("motion.velocity_m_s", "in camera axes"),
@@ -57,19 +64,21 @@ const KEYS: &[Row] = &[
     ("fog.color", "with --preset paper"),
 ];
 
-/// What files say of themselves.
+/// Metadata in files: what, treatment, remark.
 const FILES: &[(&str, &str, &str)] = &[
     (
         "PFM: scale",
         "applied",
-        "its sign is the byte order; its magnitude is a factor of every number, and a warning tells of it where it is not 1",
+        "its sign is the byte order; its magnitude is a factor of every number, and a warning tells of it \
+            where it is not 1",
     ),
     ("PFM of three channels (`PF`)", "refused", "depth is of one"),
     ("TIFF: GDAL_NODATA", "applied", "what is that number is no depth"),
     (
         "TIFF: SCALE, OFFSET, UNITTYPE (GDAL_METADATA, `.aux.xml`)",
         "applied",
-        "`scale x stored + offset` in that unit, metres where none is stated; a warning tells of them. Refused where depth_per_metre says another, or the unit is not known",
+        "`scale x stored + offset` in that unit, metres where none is stated; a warning tells of them. \
+            Refused where depth_per_metre says another, or the unit is not known",
     ),
     ("TIFF: mask of its own, `.msk`", "applied", "what they leave out is no depth"),
     ("PNG of depth: sBIT, pCAL, sCAL", "named", ""),
@@ -101,7 +110,8 @@ const FILES: &[(&str, &str, &str)] = &[
     (
         "PNG: cICP",
         "refused",
-        "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, 0, 1",
+        "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, \
+            0, 1",
     ),
     ("PNG: cHRM", "named", "where it is not that of sRGB"),
     (
@@ -113,7 +123,8 @@ const FILES: &[(&str, &str, &str)] = &[
     (
         "poses: header",
         "applied",
-        "t, time, timestamp or stamp with _s, _ms, _us, _ns, _min; x, tx or px with _m, _mm, _cm, _km, _ft, _in; qw to qz in any order. `[ms]` and `(ms)` do as well as `_ms`",
+        "t, time, timestamp or stamp with _s, _ms, _us, _ns, _min; x, tx or px with _m, _mm, _cm, _km, _ft, \
+            _in; qw to qz in any order. `[ms]` and `(ms)` do as well as `_ms`",
     ),
     ("poses: time without a unit, two columns of one quantity, an unknown unit", "refused", ""),
     ("poses: other columns", "named", ""),
@@ -135,15 +146,18 @@ mod tests {
             FILES.iter().map(|(what, how, note)| format!("| {what} | {how} | {note} |\n")).collect();
         format!(
             "# What `camsim apply` takes, and what becomes of it\n\n\
-             Made from `crates/camsim-io/src/frame_file/treatments.rs`; [APPLY.md](../APPLY.md) tells how it is used.\n\n\
-             ## Keys of FRAME.toml\n\nAll are applied; a key that is not here is refused, with the nearest that is.\n\n| key | what it takes |\n|---|---|\n{keys}\n\
-             ## What files say of themselves\n\n*Applied*: it does what it says. *Refused*: an error that names it and what to do. *Named*: a warning.\n\n\
+             Made from `crates/camsim-io/src/frame_file/treatments.rs`; [APPLY.md](../APPLY.md) tells how it \
+             is used.\n\n\
+             ## Keys of FRAME.toml\n\nAll are applied; a key that is not here is refused, with the nearest \
+             that is.\n\n| key | what it takes |\n|---|---|\n{keys}\n\
+             ## What files say of themselves\n\n*Applied*: it does what it says. *Refused*: an error that \
+             names it and what to do. *Named*: a warning.\n\n\
              | what | treatment | |\n|---|---|---|\n{files}"
         )
     }
 
     #[test]
-    fn the_page_of_apply_is_made_from_the_tables_and_has_every_key() {
+    fn apply_md_is_up_to_date_and_has_every_key() {
         let keys = KEYS.iter().map(|(key, _)| *key);
         assert!(keys.eq(FRAME.keys.iter().map(|(key, _)| *key)), "a key is in one table alone");
         crate::inputs_page::check("APPLY.md", &page());

@@ -1,5 +1,4 @@
-//! What is between the world and the sensor's numbers: zoom tracks and vignettes, and what there is to say
-//! about them.
+//! Reads zoom tracks, and checks zoom tracks and vignettes.
 
 use camsim_core::{
     flight_log::FlightLog,
@@ -8,14 +7,15 @@ use camsim_core::{
 };
 
 use super::LoadError;
-use crate::frame_file::columns::{Column, column};
+use crate::frame_file::columns::{TableColumn, parse_column};
 
-/// A vignette whose brightest value is below this may be of fewer bits than it is stored in.
-const DIM: f32 = 0.5;
-/// Sides of a vignette and a picture that are in the same relation to this have one shape.
-const SAME_SHAPE: f64 = 0.01;
+/// A vignette whose largest value is below this may have fewer bits than it is stored in.
+const DIM_VIGNETTE: f32 = 0.5;
+/// Relative tolerance within which vignette and picture have the same aspect ratio.
+const ASPECT_TOLERANCE: f64 = 0.01;
 
-/// `t_s,zoom` on the log's clock, brought to path time.
+/// Reads the zoom track, a table `t_s,zoom` on the log's clock. Returns path times in seconds and zoom
+/// values.
 pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64)>, LoadError> {
     let camera = &scenario.camera;
     let Some(path) = &camera.zoom_track else {
@@ -35,15 +35,17 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
         .from_path(path)
         .map_err(|error| fail(None, error.to_string()))?;
     let header = reader.headers().map_err(|error| fail(None, error.to_string()))?.clone();
-    let (second_s, is_zoom) = match (header.get(0).map(column), header.get(1), header.len()) {
-        (Some(Column::Time(Some(unit))), Some(zoom), 2) => (unit.factor, zoom.eq_ignore_ascii_case("zoom")),
+    let (unit_s, has_columns) = match (header.get(0).map(parse_column), header.get(1), header.len()) {
+        (Some(TableColumn::Time(Some(unit))), Some(zoom), 2) => {
+            (unit.factor, zoom.eq_ignore_ascii_case("zoom"))
+        }
         _ => (1.0, false),
     };
-    if !is_zoom {
-        let found = header.iter().collect::<Vec<_>>().join(",");
+    if !has_columns {
+        let columns = header.iter().collect::<Vec<_>>().join(",");
         return Err(fail(
             Some(1),
-            format!("the header is `{found}` and not `t_s,zoom` (or t_ms, t_us, t_ns)"),
+            format!("the header is `{columns}` and not `t_s,zoom` (or t_ms, t_us, t_ns)"),
         ));
     }
     let epoch_s = log.epoch_ns as f64 * 1e-9;
@@ -52,32 +54,32 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
         let record =
             record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
         let line = record.position().map(csv::Position::line);
-        let number = |at: usize| {
-            let text = record.get(at).unwrap_or_default();
+        let number = |column: usize| {
+            let text = record.get(column).unwrap_or_default();
             text.parse::<f64>().map_err(|_| fail(line, format!("`{text}` is no number")))
         };
-        let (t_s, zoom) = (second_s * number(0)?, number(1)?);
-        let at = ((t_s - epoch_s) / scenario.flight.speed, zoom);
-        if !at.0.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= at.0) {
+        let (t_s, zoom) = (unit_s * number(0)?, number(1)?);
+        let path_s = (t_s - epoch_s) / scenario.flight.speed;
+        if !path_s.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= path_s) {
             return Err(fail(
                 line,
                 format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before"),
             ));
         }
-        rows.push(at);
+        rows.push((path_s, zoom));
     }
     if rows.is_empty() { Err(fail(None, "there are no rows".into())) } else { Ok(rows) }
 }
 
-/// What there is to say about a sequence's zoom track and vignette.
+/// Warnings about the zoom track and the vignette of a sequence.
 pub(super) fn optics_warnings(sequence: &Sequence) -> Vec<String> {
     let camera = &sequence.scenario.camera;
     let vignette = sequence.vignette.as_deref().map(|map| vignette_warnings(camera, map)).unwrap_or_default();
     zoom_warnings(sequence).into_iter().chain(vignette).collect()
 }
 
-/// Of rows that end before the flight does, and of values that nothing was calibrated for, the nearest is
-/// taken.
+/// Warns if the zoom track covers less than the frames, or exceeds the calibrated zoom values. The nearest
+/// row or calibration is used then.
 fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
     let camera = &sequence.scenario.camera;
     let (Some(path), Some(first), Some(last)) =
@@ -89,25 +91,27 @@ fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
     let mut warnings = Vec::new();
     let end_s = sequence.start_s + (sequence.frames.saturating_sub(1)) as f64 / camera.fps;
     let (before_s, after_s) = (first.0 - sequence.start_s, end_s - last.0);
-    // A frame is no gap.
+    // A difference of one frame is allowed.
     let frame_s = 1.0 / camera.fps + 1e-9;
     if before_s > frame_s || after_s > frame_s {
         warnings.push(format!(
-            "{path}: camera.zoom_track covers {:.3} s to {:.3} s after the log's first row, the frames {:.3} s to {end_s:.3} s: beyond it the first or last zoom \
+            "{path}: camera.zoom_track covers {:.3} s to {:.3} s after the log's first row, the frames {:.3} \
+                s to {end_s:.3} s: beyond it the first or last zoom \
              is held; check that both have one clock",
             first.0, last.0, sequence.start_s
         ));
     }
-    let known = camera.zoom.iter().map(|entry| entry.at);
-    let [least, most] =
-        known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| [at.min(least), at.max(most)]);
+    let min_max = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], zoom| [zoom.min(min), zoom.max(max)])
+    };
+    let [min, max] = min_max(&mut camera.zoom.iter().map(|entry| entry.at));
     let values = || sequence.zoom_track.iter().map(|row| row.1);
-    let beyond = values().filter(|zoom| *zoom < least || *zoom > most).count();
+    let beyond = values().filter(|zoom| *zoom < min || *zoom > max).count();
     if beyond > 0 {
-        let [low, high] = values()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], zoom| [zoom.min(low), zoom.max(high)]);
+        let [low, high] = min_max(&mut values());
         warnings.push(format!(
-            "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, {low} to {high} where {least} to {most} are known: the \
+            "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, \
+                {low} to {high} where {min} to {max} are known: the \
              nearest is taken",
             sequence.zoom_track.len()
         ));
@@ -115,21 +119,22 @@ fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
     warnings
 }
 
-/// What a vignette looks as if it were not.
+/// Warns of a vignette that seems to have the wrong bit depth or aspect ratio.
 #[must_use]
 pub fn vignette_warnings(camera: &CameraSpec, map: &GrayImage) -> Vec<String> {
     let Some(path) = &camera.photometric.vignette else { return Vec::new() };
     let path = path.display();
     let mut warnings = Vec::new();
     let brightest = map.values.iter().copied().fold(0.0, f32::max);
-    if brightest < DIM {
+    if brightest < DIM_VIGNETTE {
         warnings.push(format!(
-            "{path}: the brightest value of the vignette is {:.1} % of what it can be: if it is of fewer bits than it is stored in, scale it up",
+            "{path}: the brightest value of the vignette is {:.1} % of what it can be: if it is of fewer \
+                bits than it is stored in, scale it up",
             100.0 * brightest
         ));
     }
-    let shape = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);
-    if (shape(map.size_px) / shape(camera.size_px) - 1.0).abs() > SAME_SHAPE {
+    let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);
+    if (aspect(map.size_px) / aspect(camera.size_px) - 1.0).abs() > ASPECT_TOLERANCE {
         let ([w, h], [width, height]) = (map.size_px, camera.size_px);
         warnings.push(format!(
             "{path}: the vignette is of {w}x{h} pixels and is stretched to the picture's {width}x{height}"

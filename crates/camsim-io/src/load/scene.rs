@@ -1,4 +1,4 @@
-//! The scene of a scenario, in the local frame of its log.
+//! Loads the scene of a scenario into the local frame of its log.
 
 use std::{cell::RefCell, collections::HashSet, sync::Arc};
 
@@ -14,7 +14,7 @@ use camsim_core::{
 use glam::DVec3;
 
 use super::{
-    LoadError, height_plan,
+    LoadError, height_conversions,
     placements::{Placement, read_placements},
 };
 use crate::{
@@ -24,7 +24,7 @@ use crate::{
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
 };
 
-/// Reads what `[scene]` names.
+/// Reads all files that `[scene]` names. Returns the scene, the summary of the terrain, and notes.
 pub(super) fn load_scene(
     scenario: &Scenario,
     log: &FlightLog,
@@ -45,53 +45,63 @@ pub(super) fn load_scene(
         let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
         let ned =
             |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
-        let (_, shift_terrain) = height_plan(scenario);
-        let shift = if shift_terrain { Some(&undulation as HeightShift<'_>) } else { None };
+        let (_, shift_terrain) = height_conversions(scenario);
+        let shift = if shift_terrain { Some(&undulation_m as HeightShift<'_>) } else { None };
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
         summary = Some(loaded.summary);
         notes.extend(loaded.notes);
     }
     if let Some(pattern) = &spec.pattern {
-        let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
-        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(of_pattern)?;
+        let picture_error = |source| LoadError::Picture { key: "scene.pattern.image", source };
+        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(picture_error)?;
         scene.meshes.push(Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m));
     }
     if let Some(spec) = &spec.board {
-        scene
-            .meshes
-            .push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
+        scene.meshes.push(
+            read_board(spec)?
+                .mesh(board_position_ned_m(scenario, spec, log)?, ned_from_board(spec.angles_deg)),
+        );
     }
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
-        notes.push("scene.light changes nothing: it falls on terrain and models, of which the scene has none; patterns and boards keep their colours".to_owned());
+        notes.push(
+            "scene.light changes nothing: it falls on terrain and models, of which the scene has \
+            none; patterns and boards keep their colours"
+                .to_owned(),
+        );
     }
     for spec in &spec.gltf {
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
     }
-    notes.extend(too_many_to_order(&scene));
-    let left = split_intersecting_blended(&mut scene.meshes).remaining;
-    notes.extend((left > 0).then(|| {
-        format!("scene.gltf: {left} places where blended triangles pass through each other are not cut, and may be mixed in the wrong order there")
+    notes.extend(blended_triangles_note(&scene));
+    let remaining = split_intersecting_blended(&mut scene.meshes).remaining;
+    notes.extend((remaining > 0).then(|| {
+        format!(
+            "scene.gltf: {remaining} places where blended triangles pass through each other are not cut, and \
+            may be mixed in the wrong order there"
+        )
     }));
-    // Models of one file say the same.
-    let mut said = HashSet::new();
-    notes.retain(|note| said.insert(note.clone()));
+    // Several models of one file give equal notes.
+    let mut known = HashSet::new();
+    notes.retain(|note| known.insert(note.clone()));
     Ok((scene, summary, notes))
 }
 
-/// What there is to say where more is blended than an order is found for.
-fn too_many_to_order(scene: &Scene) -> Option<String> {
+/// A note if the scene has more blended triangles than can be sorted by depth.
+fn blended_triangles_note(scene: &Scene) -> Option<String> {
     let blended = scene.meshes.iter().filter(|mesh| mesh.material.blends);
     let triangles: usize = blended.map(|mesh| mesh.shape.indices.len() / 3).sum();
     (triangles > MAX_TRIANGLES).then(|| {
         format!(
-            "scene.gltf: {triangles} triangles are blended; frames with more than {MAX_TRIANGLES} of them in view draw them mesh by mesh by distance, and may \
-             mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode MASK does without"
+            "scene.gltf: {triangles} triangles are blended; frames with more than {MAX_TRIANGLES} of them in \
+                view draw them mesh by mesh by distance, and may \
+             mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode \
+             MASK does without"
         )
     })
 }
 
-/// A model wherever it is to stand; gives what there is to say about it.
+/// Adds a model at all its placements. Returns notes about it.
 fn add_model(
     scenario: &Scenario,
     log: &FlightLog,
@@ -106,36 +116,39 @@ fn add_model(
         normals: scenario.scene.light.is_some(),
     };
     let model = read_gltf(&spec.file, options)?;
-    let places = match &spec.placements {
-        None => vec![Placement { place: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
+    let placements = match &spec.placements {
+        None => vec![Placement { position: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
         Some(path) => read_placements(path, spec.on_ground)?,
     };
-    let (all, mut without_ground) = (places.len(), 0);
-    for Placement { place: (at, geodetic), heading_deg, scale } in places {
-        let mut at_ned_m = place(scenario, log, at, geodetic, "a place of scene.gltf")?;
+    let (all, mut without_ground) = (placements.len(), 0);
+    for Placement { position: (local, geodetic), heading_deg, scale } in placements {
+        let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a place of scene.gltf")?;
         if spec.on_ground {
-            let ground = scene.terrain.as_ref().and_then(|terrain| terrain.down_at(at_ned_m.x, at_ned_m.y));
-            // Where thousands are scattered some may fall beside the terrain; one that is put there is a
-            // mistake, and so are all.
+            let ground = scene
+                .terrain
+                .as_ref()
+                .and_then(|terrain| terrain.down_at(position_ned_m.x, position_ned_m.y));
+            // Some of many scattered copies may lie off the terrain and are left out. If all do, that is a
+            // mistake.
             let Some(ground_down_m) = ground else {
                 without_ground += 1;
                 if without_ground == all {
                     return Err(LoadError::NoGround {
                         file: spec.file.clone(),
-                        north_m: at_ned_m.x,
-                        east_m: at_ned_m.y,
+                        north_m: position_ned_m.x,
+                        east_m: position_ned_m.y,
                     });
                 }
                 continue;
             };
-            at_ned_m.z = ground_down_m;
+            position_ned_m.z = ground_down_m;
         }
-        let reach_m = at_ned_m.length() + model.radius_m * spec.scale * scale;
+        let reach_m = position_ned_m.length() + model.radius_m * spec.scale * scale;
         if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
             return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
         scene.meshes.extend(model.place(
-            at_ned_m,
+            position_ned_m,
             (spec.heading_deg + heading_deg).to_radians(),
             spec.scale * scale,
         ));
@@ -151,15 +164,20 @@ fn add_model(
         .collect())
 }
 
-/// Where the middle of a board is.
+/// Position of the centre of a board, local north-east-down, metres.
 ///
 /// # Errors
-/// It has a place on Earth, and the log has none.
-pub fn board_place(scenario: &Scenario, board: &BoardSpec, log: &FlightLog) -> Result<DVec3, LoadError> {
-    place(scenario, log, board.at, board.geodetic, "scene.board.geodetic")
+/// The board is georeferenced, and the log has local coordinates.
+pub fn board_position_ned_m(
+    scenario: &Scenario,
+    board: &BoardSpec,
+    log: &FlightLog,
+) -> Result<DVec3, LoadError> {
+    position_ned_m(scenario, log, board.at, board.geodetic, "scene.board.geodetic")
 }
 
-fn place(
+/// Local position of an object that is placed locally or geodetically. `key` names it in the error.
+fn position_ned_m(
     scenario: &Scenario,
     log: &FlightLog,
     at: PatternCentre,
@@ -168,12 +186,12 @@ fn place(
 ) -> Result<DVec3, LoadError> {
     let Some([lat_deg, lon_deg, height_m]) = geodetic else { return Ok(local(at)) };
     let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, key))?;
-    let mut at = Geodetic::from_deg(lat_deg, lon_deg, height_m);
-    // As the log's own heights.
-    if height_plan(scenario).0 == HeightConversion::MslToEllipsoid {
-        at.height_m += undulation(at.lat_rad, at.lon_rad);
+    let mut position = Geodetic::from_deg(lat_deg, lon_deg, height_m);
+    // Heights have the datum of the log's.
+    if height_conversions(scenario).0 == HeightConversion::MslToEllipsoid {
+        position.height_m += undulation_m(position.lat_rad, position.lon_rad);
     }
-    Ok(frame.ned_from_geodetic(at))
+    Ok(frame.ned_from_geodetic(position))
 }
 
 fn local(at: PatternCentre) -> DVec3 {
@@ -187,9 +205,9 @@ fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
     LoadError::NoOrigin { log: scenario.flight.log.clone(), key }
 }
 
-/// Height of the geoid above the ellipsoid. One sum of harmonics a vertex would take minutes; the caches
-/// interpolate a lattice, one for each thread that reads terrain.
-fn undulation(lat_rad: f64, lon_rad: f64) -> f64 {
+/// Height of the geoid above the ellipsoid, metres. A sum of harmonics per vertex would take minutes, so each
+/// thread that reads terrain interpolates in a cached grid.
+fn undulation_m(lat_rad: f64, lon_rad: f64) -> f64 {
     thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
     GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
 }
@@ -201,11 +219,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_too_much_to_order_is_said() {
+    fn too_many_blended_triangles_are_noted() {
         let texture = Arc::new(Texture::uniform([255, 255, 255, 99], Encoding::Linear));
         let mut pane = Mesh::level_picture(texture, DVec3::ZERO, 1.0);
         let note = |mesh: &Mesh, count: usize| {
-            too_many_to_order(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() })
+            blended_triangles_note(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() })
         };
         assert_eq!(note(&pane, MAX_TRIANGLES), None);
         pane.material.blends = true;

@@ -1,56 +1,61 @@
-//! Keys and types against the schema, and paths resolved on the way.
+//! Checks keys and types against the schema, and resolves paths.
 
 use toml::{Table, Value};
 
 use super::{
-    schema::{self, Kind, Schema},
+    schema::{self, Schema, ValueKind},
     tree::{Tree, join},
 };
 
-/// Checks `tree` below `prefix` (`""` for a scenario, `"camera"` for a camera file) and resolves its paths;
-/// gives one line a problem.
+/// Checks `tree` below `prefix` (`""` for a scenario, `"camera"` for a camera file) and resolves its paths.
+/// Returns one line of text per problem.
 pub(crate) fn check(tree: &mut Tree, schema: &Schema, prefix: &str) -> Vec<String> {
     let mut problems = Vec::new();
     let mut root = std::mem::take(&mut tree.root);
     check_table(tree, schema, &mut root, prefix, prefix, &mut problems);
     tree.root = root;
-    // In a camera file of its own the keys stand at the root.
-    let inner = if prefix.is_empty() { String::new() } else { format!("{prefix}.") };
-    let line = |(at, message): &(String, String)| {
-        let message = message.replace(&format!("`{inner}"), "`").replace(&format!("[[{inner}"), "[[");
-        format!("{}: {}: {message}", tree.place(at), at.strip_prefix(&inner).unwrap_or(at))
+    // The keys of a camera file stand at its root, so messages leave out the prefix.
+    let hidden = if prefix.is_empty() { String::new() } else { format!("{prefix}.") };
+    let line = |(indexed_key, message): &(String, String)| {
+        let message = message.replace(&format!("`{hidden}"), "`").replace(&format!("[[{hidden}"), "[[");
+        format!(
+            "{}: {}: {message}",
+            tree.location(indexed_key),
+            indexed_key.strip_prefix(&hidden).unwrap_or(indexed_key)
+        )
     };
     problems.iter().map(line).collect()
 }
 
-/// `at` is the key with indices (its place), `key` the one without (the schema's). Problems are pairs of
-/// place and message.
+/// Checks one table. `indexed_key` has the indices of array elements and `key`, the schema's, has not.
+/// Problems are pairs of indexed key and message.
 fn check_table(
     tree: &Tree,
     schema: &Schema,
     table: &mut Table,
-    at: &str,
+    indexed_key: &str,
     key: &str,
     problems: &mut Vec<(String, String)>,
 ) {
     for (name, value) in table.iter_mut() {
-        let (at, key) = (join(at, name), join(key, name));
-        let wrong = match (schema.kind_of(&key), value) {
-            (Some(Kind::Tables), Value::Array(array)) if array.iter().all(Value::is_table) => {
+        let (indexed_key, key) = (join(indexed_key, name), join(key, name));
+        let problem = match (schema.kind(&key), value) {
+            (Some(ValueKind::Tables), Value::Array(array)) if array.iter().all(Value::is_table) => {
                 for (index, element) in array.iter_mut().enumerate() {
                     if let Value::Table(table) = element {
-                        check_table(tree, schema, table, &join(&at, &index.to_string()), &key, problems);
+                        let element_key = join(&indexed_key, &index.to_string());
+                        check_table(tree, schema, table, &element_key, &key, problems);
                     }
                 }
                 None
             }
-            (Some(Kind::Path), Value::String(path)) => {
-                *path = tree.resolve(&at, path).to_string_lossy().into_owned();
+            (Some(ValueKind::Path), Value::String(path)) => {
+                *path = tree.resolve(&indexed_key, path).to_string_lossy().into_owned();
                 None
             }
-            (Some(kind), value) => expected(schema, &key, kind, value),
+            (Some(kind), value) => type_problem(schema, &key, kind, value),
             (None, Value::Table(table)) if schema.is_table(&key) => {
-                check_table(tree, schema, table, &at, &key, problems);
+                check_table(tree, schema, table, &indexed_key, &key, problems);
                 None
             }
             (None, value) if schema.is_table(&key) => {
@@ -61,17 +66,17 @@ fn check_table(
                 None => format!("unknown key; {}", schema.listing),
             }),
         };
-        problems.extend(wrong.map(|message| (at, message)));
+        problems.extend(problem.map(|message| (indexed_key, message)));
     }
-    for (required, within) in schema.required {
-        let missing = *within == key;
-        let path = required.strip_prefix(within).unwrap_or(required).trim_start_matches('.');
-        if missing && !has(table, path) {
-            problems.push((join(at, path), "is missing, and has no default; add it".into()));
+    for (required, parent) in schema.required {
+        let path = required.strip_prefix(parent).unwrap_or(required).trim_start_matches('.');
+        if *parent == key && !has(table, path) {
+            problems.push((join(indexed_key, path), "is missing, and has no default; add it".into()));
         }
     }
 }
 
+/// Whether a table has a value at a dotted path.
 fn has(table: &Table, path: &str) -> bool {
     match path.split_once('.') {
         Some((first, rest)) => {
@@ -81,7 +86,9 @@ fn has(table: &Table, path: &str) -> bool {
     }
 }
 
-fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<String> {
+/// The message for a value of the wrong type; `None` if it is right.
+// Long because it is one table of kinds.
+fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> Option<String> {
     let number = |value: &Value| value.is_float() || value.is_integer();
     let whole = |value: &Value| value.as_integer().is_some_and(|value| value >= 0);
     let count = |value: &Value| value.as_integer().is_some_and(|value| u32::try_from(value).is_ok());
@@ -92,40 +99,40 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
     };
     let among = |value: &Value, words: &[&str]| value.as_str().is_some_and(|word| words.contains(&word));
     let (ok, text) = match kind {
-        Kind::Number => (number(value), "a number".to_owned()),
-        Kind::NumberOr(words) => {
+        ValueKind::Number => (number(value), "a number".to_owned()),
+        ValueKind::NumberOr(words) => {
             (number(value) || among(value, words), format!("a number or {}", list(words)))
         }
-        Kind::Whole => (whole(value), "a whole number, 0 or more".to_owned()),
-        Kind::Within(least, most) => {
-            let range = i64::from(least)..=i64::from(most);
+        ValueKind::Whole => (whole(value), "a whole number, 0 or more".to_owned()),
+        ValueKind::Within(min, max) => {
+            let range = i64::from(min)..=i64::from(max);
             (
                 value.as_integer().is_some_and(|v| range.contains(&v)),
-                format!("a whole number, {least} to {most}"),
+                format!("a whole number, {min} to {max}"),
             )
         }
-        Kind::CountOr(most, words) => {
-            (count(value) || among(value, words), format!("a whole number up to {most} or {}", list(words)))
+        ValueKind::CountOr(max, words) => {
+            (count(value) || among(value, words), format!("a whole number up to {max} or {}", list(words)))
         }
-        Kind::Numbers(n) => (all(value, Some(n), &number), format!("a list of {n} numbers")),
-        Kind::Flag => (value.is_bool(), "true or false".to_owned()),
-        Kind::NumbersOr(n, word) => (
+        ValueKind::Numbers(n) => (all(value, Some(n), &number), format!("a list of {n} numbers")),
+        ValueKind::Flag => (value.is_bool(), "true or false".to_owned()),
+        ValueKind::NumbersOr(n, word) => (
             all(value, Some(n), &number) || among(value, &[word]),
             format!("a list of {n} numbers or \"{word}\""),
         ),
-        Kind::Counts(n, most) => {
-            (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {most}"))
+        ValueKind::Counts(n, max) => {
+            (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {max}"))
         }
-        Kind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
-        Kind::Path => (false, "a path in quotes".to_owned()),
-        Kind::Text => (value.is_str(), "a text in quotes".to_owned()),
-        Kind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),
-        Kind::Tables => (false, format!("a list of tables; write [[{key}]]")),
-        Kind::Word(words) => (among(value, words), format!("one of {}", list(words))),
-        Kind::Words(words) => {
+        ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
+        ValueKind::Path => (false, "a path in quotes".to_owned()),
+        ValueKind::Text => (value.is_str(), "a text in quotes".to_owned()),
+        ValueKind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),
+        ValueKind::Tables => (false, format!("a list of tables; write [[{key}]]")),
+        ValueKind::Word(words) => (among(value, words), format!("one of {}", list(words))),
+        ValueKind::Words(words) => {
             (all(value, None, &|value| among(value, words)), format!("a list of any of {}", list(words)))
         }
-        Kind::Later => return Some("is not supported by this version; leave it out".into()),
+        ValueKind::Unsupported => return Some("is not supported by this version; leave it out".into()),
     };
     if ok {
         return None;
@@ -136,12 +143,15 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         .chain(value.as_array().into_iter().flatten().filter_map(Value::as_str))
         .collect();
     if let Some((_, word)) =
-        schema.later_words.iter().find(|(its_key, word)| *its_key == key && written.contains(word))
+        schema.unsupported_words.iter().find(|(its_key, word)| *its_key == key && written.contains(word))
     {
         return Some(format!("\"{word}\" is not supported by this version; expected {text}"));
     }
     let hint = match kind {
-        Kind::Word(words) | Kind::Words(words) | Kind::NumberOr(words) | Kind::CountOr(_, words) => written
+        ValueKind::Word(words)
+        | ValueKind::Words(words)
+        | ValueKind::NumberOr(words)
+        | ValueKind::CountOr(_, words) => written
             .iter()
             .find(|word| !words.contains(word))
             .and_then(|word| schema::nearest_word(word, words)),
@@ -151,11 +161,12 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
     Some(format!("expected {text}, found {}{hint}", show(value)))
 }
 
+/// Quoted words, separated by commas.
 fn list(words: &[&str]) -> String {
     words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
 }
 
-/// A value for a message, shortened.
+/// A value as text for a message, cut at 60 characters.
 fn show(value: &Value) -> String {
     let text = match value {
         Value::Table(_) => return "a table".into(),

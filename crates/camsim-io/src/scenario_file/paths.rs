@@ -1,29 +1,29 @@
-//! The paths of a scenario, whichever keys hold them.
+//! Visits all paths of a scenario.
 
 use serde_json::Value;
 
 use super::{
-    schema::{Kind, SCENARIO},
+    schema::{SCENARIO, ValueKind},
     tree::join,
 };
 
-/// Shows every path of a scenario, as a tree of JSON, with its key (elements of arrays by index), in order of
-/// keys.
-pub(crate) fn for_each_path(scenario: &mut Value, with: &mut dyn FnMut(&str, &mut String)) {
-    visit(scenario, "", "", with);
+/// Calls `visitor` for every path of a scenario, a tree of JSON, in the order of keys. Array elements have
+/// their index in the key.
+pub(crate) fn for_each_path(scenario: &mut Value, visitor: &mut dyn FnMut(&str, &mut String)) {
+    visit(scenario, "", "", visitor);
 }
 
-/// `at` is the key with indices, `key` the one without, which the schema knows.
-fn visit(value: &mut Value, at: &str, key: &str, with: &mut dyn FnMut(&str, &mut String)) {
+/// Visits one value. `indexed_key` has the indices of array elements, `key`, the schema's, has not.
+fn visit(value: &mut Value, indexed_key: &str, key: &str, visitor: &mut dyn FnMut(&str, &mut String)) {
     match value {
-        Value::Object(map) => {
-            map.iter_mut().for_each(|(name, value)| visit(value, &join(at, name), &join(key, name), with))
-        }
+        Value::Object(map) => map
+            .iter_mut()
+            .for_each(|(name, value)| visit(value, &join(indexed_key, name), &join(key, name), visitor)),
         Value::Array(list) => list
             .iter_mut()
             .enumerate()
-            .for_each(|(i, value)| visit(value, &join(at, &i.to_string()), key, with)),
-        Value::String(text) if SCENARIO.kind_of(key) == Some(Kind::Path) => with(at, text),
+            .for_each(|(i, value)| visit(value, &join(indexed_key, &i.to_string()), key, visitor)),
+        Value::String(text) if SCENARIO.kind(key) == Some(ValueKind::Path) => visitor(indexed_key, text),
         _ => {}
     }
 }

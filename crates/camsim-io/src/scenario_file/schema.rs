@@ -1,5 +1,5 @@
-//! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml
-//! has a table of its own.
+//! The schema of scenario files: every key and the values it takes. A test compares it with the structs.
+//! `frame_file` has the schema of FRAME.toml.
 
 use camsim_core::{
     scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
@@ -7,30 +7,30 @@ use camsim_core::{
 };
 use camsim_plan::MAX_KEYS;
 
-/// A table of keys with what belongs to it.
+/// Keys of a file format, with what error messages say about them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schema {
-    /// Dotted keys; elements of an array of tables stand without their index.
-    pub(crate) keys: &'static [(&'static str, Kind)],
-    /// Words that the format knows and this version does not.
-    pub(crate) later_words: &'static [(&'static str, &'static str)],
-    /// Keys without which there is nothing to run, under the table that makes them necessary.
+    /// Dotted keys, without indices of array elements.
+    pub(crate) keys: &'static [(&'static str, ValueKind)],
+    /// Words of the format that this version does not support, with their keys.
+    pub(crate) unsupported_words: &'static [(&'static str, &'static str)],
+    /// Required keys, each with the table within which it is required (`""` for the root).
     pub(crate) required: &'static [(&'static str, &'static str)],
-    /// Where a user finds all keys.
+    /// Hint in messages: where a user finds all keys.
     pub(crate) listing: &'static str,
 }
 
-/// Scenarios, and camera files below `camera`.
+/// Schema of scenarios, and of camera files below `camera`.
 pub(crate) const SCENARIO: Schema = Schema {
     keys: KEYS,
-    later_words: LATER_WORDS,
+    unsupported_words: UNSUPPORTED_WORDS,
     required: REQUIRED,
     listing: "`camsim render --print-default` lists all keys",
 };
 
-/// What a key takes.
+/// The values that a key takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum ValueKind {
     /// A number.
     Number,
     /// A number, or one of these words.
@@ -39,18 +39,19 @@ pub enum Kind {
     Whole,
     /// A whole number from the first to the last.
     Within(u32, u32),
-    /// A whole number of at most 32 bits, or one of these words. The message names the most that makes sense;
-    /// ranges are checked later.
+    /// A whole number of at most 32 bits, or one of these words. The number here is the largest useful value,
+    /// for the message; ranges are checked later.
     CountOr(u32, &'static [&'static str]),
-    /// That many numbers.
+    /// A list of this many numbers.
     Numbers(usize),
     /// `true` or `false`.
     Flag,
-    /// That many numbers, or this word.
+    /// A list of this many numbers, or this word.
     NumbersOr(usize, &'static str),
-    /// That many whole numbers of at most 32 bits; with the most that makes sense, as above.
+    /// A list of this many whole numbers of at most 32 bits. The second number is the largest useful value,
+    /// for the message; ranges are checked later.
     Counts(usize, u32),
-    /// Any number of numbers.
+    /// A list of any number of numbers.
     NumberList,
     /// A path, resolved against the folder of the file that names it.
     Path,
@@ -62,19 +63,19 @@ pub enum Kind {
     Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
-    /// An array of tables, whose keys stand under the same dotted name.
+    /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
-    /// Planned, but not in this version.
-    Later,
+    /// Reserved; not supported by this version.
+    Unsupported,
 }
 
-use Kind::*;
+use ValueKind::*;
 
 const AUTO: &[&str] = &["auto"];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
-/// Of a scenario.
-pub(super) const KEYS: &[(&str, Kind)] = &[
+/// Keys of a scenario.
+pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("seed", Whole),
     ("flight.log", Path),
     ("flight.format", Word(&["auto", "csv-lla", "csv-xya", "csv-ned", "tum", "euroc", "gpx"])),
@@ -125,7 +126,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("camera.photometric.light", Number),
     ("camera.photometric.noise_sigma", Number),
     ("camera.photometric.output", Word(&["linear-f32", "linear-f16", "srgb8", "linear8", "luma8", "luma16"])),
-    ("camera.sensor", Later),
+    ("camera.sensor", Unsupported),
     ("scene.terrain.dem", Path),
     ("scene.terrain.ortho", Path),
     ("scene.terrain.height", Word(HEIGHT)),
@@ -189,10 +190,11 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
 ];
 
-/// Words that the format knows and this version does not.
-pub(super) const LATER_WORDS: &[(&str, &str)] = &[("flight.format", "ulog"), ("output.channels", "flow")];
+/// Words that this version does not support.
+pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] =
+    &[("flight.format", "ulog"), ("output.channels", "flow")];
 
-/// Keys without which there is nothing to run, under the table that makes them necessary.
+/// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("flight.log", ""),
     ("scene", ""),
@@ -207,7 +209,8 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
 ];
 
 impl Schema {
-    pub(crate) fn kind_of(&self, key: &str) -> Option<Kind> {
+    /// The values that `key` takes; `None` if it is unknown.
+    pub(crate) fn kind(&self, key: &str) -> Option<ValueKind> {
         self.keys.iter().find(|(name, _)| *name == key).map(|(_, kind)| *kind)
     }
 
@@ -220,35 +223,44 @@ impl Schema {
                 .any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
     }
 
-    /// The known key that is most like `key`: a sibling first, else anywhere (a key in the wrong table).
+    /// The known key most similar to `key`, for "did you mean". Siblings are preferred, but a key of another
+    /// table may win.
     pub(crate) fn nearest(&self, key: &str) -> Option<String> {
         let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
         let mut names: Vec<&str> = Vec::new();
         for (name, _) in self.keys {
-            names.extend(name.match_indices('.').map(|(at, _)| &name[..at]));
+            names.extend(name.match_indices('.').map(|(end, _)| &name[..end]));
             names.push(name);
         }
         let score = |name: &&str| {
             let (its_parent, its_leaf) = name.rsplit_once('.').unwrap_or(("", name));
-            let alike = alikeness(leaf, its_leaf);
-            if its_parent == parent { alike + 0.15 } else { alike }
+            let similarity = similarity(leaf, its_leaf);
+            if its_parent == parent { similarity + 0.15 } else { similarity }
         };
         let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-        (score(&best) > NEAR).then(|| best.to_owned())
+        (score(&best) > MIN_KEY_SIMILARITY).then(|| best.to_owned())
     }
 }
 
-/// Likeness of a key that is worth naming: `fsp` beside `fps` has 0.82, words of four or five letters that
-/// share one have up to 0.79.
-const NEAR: f64 = 0.8;
+/// Similarity above which a key is suggested: `fsp` and `fps` have 0.82, words of four or five letters with
+/// one letter in common up to 0.79.
+const MIN_KEY_SIMILARITY: f64 = 0.8;
 
-/// The word of `words` that is most like `word`.
+/// Similarity above which a word is suggested.
+const MIN_WORD_SIMILARITY: f64 = 0.65;
+
+/// The word of `words` most similar to `word`, if it is similar enough to suggest.
 pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
-    let score = |candidate: &&str| alikeness(word, candidate);
-    words.iter().copied().max_by(|a, b| score(a).total_cmp(&score(b))).filter(|best| score(best) > 0.65)
+    let score = |candidate: &&str| similarity(word, candidate);
+    words
+        .iter()
+        .copied()
+        .max_by(|a, b| score(a).total_cmp(&score(b)))
+        .filter(|best| score(best) > MIN_WORD_SIMILARITY)
 }
 
-/// 0..=1. Jaro-Winkler likes common beginnings, Damerau-Levenshtein sees swapped letters in short words.
-fn alikeness(a: &str, b: &str) -> f64 {
+/// Similarity of two words, 0..=1: the larger of Jaro-Winkler, which favours common prefixes, and
+/// Damerau-Levenshtein, which finds swapped letters in short words.
+fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
 }

@@ -19,7 +19,7 @@ fn with(sets: &[(&str, &str)]) -> Result<Scenario, ScenarioError> {
 }
 
 #[test]
-fn the_printed_default_holds_the_defaults() {
+fn printed_default_has_the_default_values() {
     let scenario = parse(&print_default()).unwrap();
     assert_eq!(scenario.seed, 0);
     assert_eq!(scenario.flight.speed, 1.0);
@@ -29,10 +29,8 @@ fn the_printed_default_holds_the_defaults() {
     assert_eq!(scenario.output, OutputSpec::default());
 }
 
-/// Schema and structs cannot drift apart: every key in the printed default or in its comments, every word
-/// deserialises.
 #[test]
-fn every_word_of_the_schema_is_known_to_the_structs() {
+fn every_word_of_the_schema_deserialises() {
     for (key, kind) in KEYS {
         if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."]
             .iter()
@@ -41,11 +39,11 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
             continue;
         }
         let values: Vec<String> = match kind {
-            schema::Kind::Word(words) | schema::Kind::NumberOr(words) | schema::Kind::CountOr(_, words) => {
-                words.iter().map(|w| (*w).into()).collect()
-            }
-            schema::Kind::Words(words) => words.iter().map(|w| format!("[\"{w}\"]")).collect(),
-            schema::Kind::NumbersOr(_, word) => vec![(*word).into(), "[1.0, 2.0, 3.0]".into()],
+            schema::ValueKind::Word(words)
+            | schema::ValueKind::NumberOr(words)
+            | schema::ValueKind::CountOr(_, words) => words.iter().map(|w| (*w).into()).collect(),
+            schema::ValueKind::Words(words) => words.iter().map(|w| format!("[\"{w}\"]")).collect(),
+            schema::ValueKind::NumbersOr(_, word) => vec![(*word).into(), "[1.0, 2.0, 3.0]".into()],
             _ => continue,
         };
         for value in values {
@@ -110,13 +108,13 @@ fn every_key_of_the_structs_is_in_the_schema() {
     (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
     (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
     let saved = toml::to_string(&scenario).unwrap();
-    let mut seen = Vec::new();
-    collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
+    let mut visited = Vec::new();
+    collect(&toml::from_str(&saved).unwrap(), "", &mut visited);
     for (key, kind) in KEYS {
-        let later = matches!(kind, schema::Kind::Later);
+        let is_unsupported = matches!(kind, schema::ValueKind::Unsupported);
         assert_eq!(
-            seen.iter().any(|s| s == key),
-            !later,
+            visited.iter().any(|s| s == key),
+            !is_unsupported,
             "{key} stands in the schema but not in the struct, or the other way round"
         );
     }
@@ -134,7 +132,7 @@ fn board(columns: u32, rows: u32, size_m: f64) -> BoardSpec {
 }
 
 #[test]
-fn boards_are_read_by_their_keys() {
+fn keys_of_boards_are_checked_by_kind() {
     let text = |keys: &str| format!("[flight]\nlog = \"a.csv\"\n[scene.board]\n{keys}\n");
     for kind in ["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"] {
         parse(&text(&format!("kind = \"{kind}\"\ncolumns = 5\nrows = 4\nsize_m = 0.1"))).unwrap();
@@ -159,22 +157,22 @@ fn boards_are_read_by_their_keys() {
     }
 }
 
-fn collect(value: &toml::Table, prefix: &str, seen: &mut Vec<String>) {
+fn collect(value: &toml::Table, prefix: &str, visited: &mut Vec<String>) {
     for (name, value) in value {
         let key = tree::join(prefix, name);
         match value {
-            toml::Value::Table(table) => collect(table, &key, seen),
+            toml::Value::Table(table) => collect(table, &key, visited),
             toml::Value::Array(array) => {
-                array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, seen))
+                array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, visited))
             }
             _ => {}
         }
-        seen.push(key);
+        visited.push(key);
     }
 }
 
 #[test]
-fn bad_scenarios_are_named_by_file_line_and_key() {
+fn errors_name_file_line_and_key() {
     let cases: &[(&str, &str)] = &[
         ("[camera]\nfsp = 30", "dir/s.toml:7: camera.fsp: unknown key; did you mean `camera.fps`?"),
         (
@@ -199,7 +197,8 @@ fn bad_scenarios_are_named_by_file_line_and_key() {
         ),
         (
             "[quality]\nblur_samples = 4294967296",
-            "dir/s.toml:7: quality.blur_samples: expected a whole number up to 4096 or \"auto\", found 4294967296",
+            "dir/s.toml:7: quality.blur_samples: expected a whole number up to 4096 or \"auto\", found \
+                4294967296",
         ),
         (
             "[quality]\niterations = 4294967296",
@@ -256,7 +255,7 @@ fn bad_scenarios_are_named_by_file_line_and_key() {
 }
 
 #[test]
-fn set_changes_the_tree_before_it_is_read() {
+fn set_changes_keys_before_they_are_checked() {
     let scenario = with(&[
         ("camera.shutter.readout_ms", "10"),
         ("camera.shutter.readout", "left-to-right"),
@@ -289,7 +288,7 @@ fn set_changes_the_tree_before_it_is_read() {
 }
 
 #[test]
-fn a_camera_file_is_read_with_its_own_paths_and_lines() {
+fn camera_files_have_their_own_paths_and_lines() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::create_dir(dir.path().join("cams")).unwrap();
     let camera = dir.path().join("cams/c.toml");
@@ -309,7 +308,7 @@ fn a_camera_file_is_read_with_its_own_paths_and_lines() {
         error.contains("c.toml:2: camera.focal: unknown key; did you mean `camera.focal_px`?"),
         "{error}"
     );
-    // By itself its keys have no table around them.
+    // Errors of a camera file alone name keys without `camera.`.
     let error = read_camera(&camera).unwrap_err().to_string();
     assert!(error.ends_with("c.toml:2: focal: unknown key; did you mean `focal_px`?"), "{error}");
     for (text, expected) in [

@@ -1,4 +1,4 @@
-//! The TOML tree of a scenario with the place of every key, and `--set` on it.
+//! The TOML tree of a scenario with the location of every key, changed by `--set`.
 
 use std::{
     collections::HashMap,
@@ -11,21 +11,21 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::{ScenarioError, mistaken::mistaken, schema::KEYS};
+use super::{ScenarioError, schema::KEYS, wrong_file_kind::wrong_kind_message};
 
-/// Where a key was written.
+/// Where a key is written.
 #[derive(Clone, Debug)]
-pub(crate) enum Place {
-    /// File and line from 1.
+pub(crate) enum KeyLocation {
+    /// File, and line from 1.
     File(PathBuf, usize),
     /// `--set key=value`.
     Set(String),
-    /// A run.json; whether its paths are relative to it, or to the working directory as those of early
-    /// versions.
+    /// A run.json, and whether its paths are relative to its folder. Those of early versions are relative to
+    /// the working directory.
     Run(PathBuf, bool),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for KeyLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(file, line) => write!(f, "{}:{line}", file.display()),
@@ -35,15 +35,18 @@ impl fmt::Display for Place {
     }
 }
 
-/// Values by nesting, places by dotted key with indices.
+/// A parsed file: nested values, and the location of each key.
 pub(crate) struct Tree {
+    /// The file that was read.
     pub(crate) file: PathBuf,
+    /// Values.
     pub(crate) root: Table,
-    pub(crate) places: HashMap<String, Place>,
+    /// Locations by dotted key, with indices of array elements.
+    pub(crate) locations: HashMap<String, KeyLocation>,
 }
 
 impl Tree {
-    /// Reads `path`; keys are placed under `prefix`.
+    /// Reads `path`. Locations are stored with `prefix` before their key.
     pub(crate) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
         let bytes =
             std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
@@ -58,10 +61,10 @@ impl Tree {
     /// Reads a scenario, or the one that a `run.json` holds.
     pub(crate) fn read_scenario(path: &Path) -> Result<Self, ScenarioError> {
         let bytes = std::fs::read(path).unwrap_or_default();
-        if let Some(what) = mistaken(path, &bytes) {
-            return Err(ScenarioError::Problems(vec![what]));
+        if let Some(message) = wrong_kind_message(path, &bytes) {
+            return Err(ScenarioError::Problems(vec![message]));
         }
-        // No TOML file begins so.
+        // No TOML file begins with a brace.
         if bytes.trim_ascii_start().first() == Some(&b'{') {
             Self::read_run(path)
         } else {
@@ -70,28 +73,33 @@ impl Tree {
     }
 
     fn read_run(path: &Path) -> Result<Self, ScenarioError> {
-        let wrong = |message: String| ScenarioError::Problems(vec![format!("{}: {message}", path.display())]);
+        let problem =
+            |message: String| ScenarioError::Problems(vec![format!("{}: {message}", path.display())]);
         let bytes =
             std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
         let run: serde_json::Value = serde_json::from_slice(&bytes)
-            .map_err(|error| wrong(format!("neither TOML nor JSON: {error}")))?;
+            .map_err(|error| problem(format!("neither TOML nor JSON: {error}")))?;
         let Some(Value::Table(root)) = run.get("scenario").and_then(from_json) else {
-            return Err(wrong(
-                "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds a scenario".into(),
+            return Err(problem(
+                "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds \
+                    a \
+                 scenario"
+                    .into(),
             ));
         };
         let is_portable =
             run.get("paths").and_then(serde_json::Value::as_str) == Some(crate::manifest::PATHS);
-        let places = root.keys().map(|key| (key.clone(), Place::Run(path.into(), is_portable))).collect();
-        Ok(Self { file: path.into(), root, places })
+        let locations =
+            root.keys().map(|key| (key.clone(), KeyLocation::Run(path.into(), is_portable))).collect();
+        Ok(Self { file: path.into(), root, locations })
     }
 
-    /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its
-    /// header, is refused as a whole.
+    /// Reads a camera file, with `camera.` before the keys of locations. A scenario, or `[camera]` copied
+    /// with its header, is refused.
     pub(crate) fn read_camera(path: &Path) -> Result<Self, ScenarioError> {
         let tree = Self::read(path, "camera")?;
-        let mut of_scenario = KEYS.iter().filter_map(|(key, _)| key.split('.').next());
-        match of_scenario.find(|name| tree.root.contains_key(*name)) {
+        let mut scenario_keys = KEYS.iter().filter_map(|(key, _)| key.split('.').next());
+        match scenario_keys.find(|name| tree.root.contains_key(*name)) {
             None => Ok(tree),
             Some(name) => {
                 let fix = if name == "camera" {
@@ -99,17 +107,19 @@ impl Tree {
                 } else {
                     "the rest belongs into a scenario"
                 };
-                let place = tree.place(&join("camera", name));
+                let location = tree.location(&join("camera", name));
                 Err(ScenarioError::Problems(vec![format!(
-                    "{place}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}"
+                    "{location}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}"
                 )]))
             }
         }
     }
 
+    /// Parses the text of the file `path`. Locations are stored with `prefix` before their key.
     pub(crate) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
-        let line_of =
-            |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
+        let line_of = |offset: usize| {
+            text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1
+        };
         let syntax = |error: toml::de::Error| ScenarioError::Syntax {
             path: path.into(),
             line: error.span().map_or(1, |span| line_of(span.start)),
@@ -117,29 +127,29 @@ impl Tree {
         };
         let spanned = DeTable::parse(text).map_err(syntax)?;
         let root: Table = toml::from_str(text).map_err(syntax)?;
-        let mut places = HashMap::new();
-        let mut place = |key: &str, at: usize| {
-            places.insert(key.to_owned(), Place::File(path.into(), line_of(at)));
+        let mut locations = HashMap::new();
+        let mut record = |key: &str, offset: usize| {
+            locations.insert(key.to_owned(), KeyLocation::File(path.into(), line_of(offset)));
         };
-        place_table(spanned.get_ref(), prefix, &mut place);
-        Ok(Self { file: path.into(), root, places })
+        locate_table(spanned.get_ref(), prefix, &mut record);
+        Ok(Self { file: path.into(), root, locations })
     }
 
-    /// The place of `key`, or of the nearest table around it.
-    pub(crate) fn place(&self, key: &str) -> Place {
+    /// The location of `key`, or of the nearest table that contains it.
+    pub(crate) fn location(&self, key: &str) -> KeyLocation {
         let mut key = key;
         loop {
-            if let Some(place) = self.places.get(key) {
-                return place.clone();
+            if let Some(location) = self.locations.get(key) {
+                return location.clone();
             }
             match key.rsplit_once('.') {
                 Some((parent, _)) => key = parent,
-                None => return Place::File(self.file.clone(), 1),
+                None => return KeyLocation::File(self.file.clone(), 1),
             }
         }
     }
 
-    /// Replaces `camera = "file.toml"` by the contents of that file.
+    /// Replaces `camera = "file.toml"` by the content of that file.
     pub(super) fn resolve_camera(&mut self) -> Result<(), ScenarioError> {
         let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
         let path = self.resolve("camera", name);
@@ -150,19 +160,19 @@ impl Tree {
             other => other,
         })?;
         self.root.insert("camera".into(), Value::Table(camera.root));
-        self.places.insert("camera".into(), Place::File(path, 1));
-        self.places.extend(camera.places);
+        self.locations.insert("camera".into(), KeyLocation::File(path, 1));
+        self.locations.extend(camera.locations);
         Ok(())
     }
 
-    /// A path written at `key`, against the folder of its file; a path of `--set` stays relative to the
+    /// Resolves a path written at `key` against the folder of its file. Paths of `--set` stay relative to the
     /// working directory.
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
-        match self.place(key) {
-            Place::File(file, _) | Place::Run(file, true) => {
+        match self.location(key) {
+            KeyLocation::File(file, _) | KeyLocation::Run(file, true) => {
                 file.parent().unwrap_or(Path::new("")).join(path)
             }
-            Place::Set(_) | Place::Run(_, false) => path.into(),
+            KeyLocation::Set(_) | KeyLocation::Run(_, false) => path.into(),
         }
     }
 
@@ -194,16 +204,16 @@ impl Tree {
         }
         table.insert(leaf.into(), value(text));
         let below = format!("{key}.");
-        self.places.retain(|place, _| !place.starts_with(&below));
+        self.locations.retain(|key, _| !key.starts_with(&below));
         for (end, _) in key.match_indices('.') {
-            self.places.entry(key[..end].into()).or_insert_with(|| Place::Set(shown.clone()));
+            self.locations.entry(key[..end].into()).or_insert_with(|| KeyLocation::Set(shown.clone()));
         }
-        self.places.insert(key.into(), Place::Set(shown));
+        self.locations.insert(key.into(), KeyLocation::Set(shown));
         if key == "camera" { self.resolve_camera() } else { Ok(()) }
     }
 }
 
-/// JSON as TOML, in which null is nothing.
+/// Converts JSON to TOML; `None` for null, which TOML lacks.
 fn from_json(json: &serde_json::Value) -> Option<Value> {
     use serde_json::Value as Json;
     Some(match json {
@@ -220,32 +230,35 @@ fn from_json(json: &serde_json::Value) -> Option<Value> {
     })
 }
 
-/// A TOML value; what is none is a string, so that words need no quotes.
+/// Parses a TOML value; any other text becomes a string, so that words need no quotes.
 fn value(text: &str) -> Value {
     let parsed = toml::from_str::<Table>(&format!("v = {text}")).ok().filter(|table| table.len() == 1);
     parsed.and_then(|mut table| table.remove("v")).unwrap_or_else(|| Value::String(text.into()))
 }
 
+/// The dotted key of `key` within the table `prefix`.
 pub(super) fn join(prefix: &str, key: &str) -> String {
     if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") }
 }
 
-fn place_table(table: &DeTable<'_>, prefix: &str, place: &mut dyn FnMut(&str, usize)) {
+/// Records the byte offset of every key of a table.
+fn locate_table(table: &DeTable<'_>, prefix: &str, record: &mut dyn FnMut(&str, usize)) {
     for (key, value) in table {
         let name = join(prefix, key.get_ref());
-        place(&name, key.span().start);
-        place_value(value, &name, place);
+        record(&name, key.span().start);
+        locate_value(value, &name, record);
     }
 }
 
-fn place_value(value: &Spanned<DeValue<'_>>, name: &str, place: &mut dyn FnMut(&str, usize)) {
+/// Records the byte offset of every key within a value, and of array elements.
+fn locate_value(value: &Spanned<DeValue<'_>>, name: &str, record: &mut dyn FnMut(&str, usize)) {
     match value.get_ref() {
-        DeValue::Table(table) => place_table(table, name, place),
+        DeValue::Table(table) => locate_table(table, name, record),
         DeValue::Array(array) => {
             for (index, element) in array.iter().enumerate() {
                 let name = join(name, &index.to_string());
-                place(&name, element.span().start);
-                place_value(element, &name, place);
+                record(&name, element.span().start);
+                locate_value(element, &name, record);
             }
         }
         _ => {}

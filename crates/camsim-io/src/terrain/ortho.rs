@@ -18,7 +18,7 @@ use super::{
     stated_crs::StatedCrs,
     tiff_file::gdal_translate,
 };
-use crate::pictures::{PictureError, Stored, read_stored};
+use crate::pictures::{PictureError, StoredPicture, read_stored};
 
 /// An ortho-image.
 pub(super) struct Ortho {
@@ -210,7 +210,7 @@ fn read_image(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<
             "scene.terrain.ortho_white is for TIFF files: leave it out",
         )));
     }
-    let Stored { texture, orientation, largest_of_16_bits } =
+    let StoredPicture { texture, orientation, largest_of_16_bits } =
         read_stored(path, Encoding::Srgb).map_err(ortho_error)?;
     let mut geo = GeoTags { orientation, ..GeoTags::default() };
     sidecar::read_sidecar_tags(path, &mut geo)?;

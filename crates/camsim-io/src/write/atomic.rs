@@ -1,4 +1,4 @@
-//! A file is written whole or not at all.
+//! Atomic writing of files.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -10,11 +10,11 @@ use std::{
 
 use super::WriteError;
 
-/// Writes `bytes` under a temporary name in the same folder (made if need be) and renames; nothing is left
-/// behind on failure.
+/// Writes `bytes` under a temporary name in the same folder, which is created if missing, and renames the
+/// file. The temporary file is removed on failure.
 ///
 /// # Errors
-/// With the path, the system's reason and what to do.
+/// [`WriteError`] with the path, the error of the system and what to do.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
     let name = path
@@ -28,15 +28,15 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
     let temporary = folder.join(format!(".{}.{}-{unique}.tmp", name.to_string_lossy(), std::process::id()));
     fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|source| {
-        // The first error is the one to tell; a temporary file that cannot be removed either is only litter.
+        // The first error is reported; failure to remove the temporary file does no harm.
         let _ = fs::remove_file(&temporary);
         fail(source)
     })
 }
 
-/// Removes what killed runs left of these files: temporary names that nobody will rename. Whoever else writes
-/// below the folder writes other files.
-pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
+/// Removes the temporary files that killed runs left for these paths. Other processes that write to the same
+/// folder are expected to write other paths.
+pub(super) fn remove_temporaries(paths: impl Iterator<Item = PathBuf>) {
     let mut by_folder: HashMap<PathBuf, HashSet<OsString>> = HashMap::new();
     for path in paths {
         if let (Some(folder), Some(name)) = (path.parent(), path.file_name()) {
@@ -44,9 +44,13 @@ pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
         }
     }
     for (folder, names) in by_folder {
-        // A folder that is not there has nothing to sweep; litter that cannot be removed stays litter.
+        // A missing folder has no temporary files; one that cannot be removed does no harm.
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            if entry.file_name().to_str().and_then(meant).is_some_and(|name| names.contains(OsStr::new(name)))
+            if entry
+                .file_name()
+                .to_str()
+                .and_then(final_name)
+                .is_some_and(|name| names.contains(OsStr::new(name)))
             {
                 let _ = fs::remove_file(entry.path());
             }
@@ -54,8 +58,8 @@ pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
     }
 }
 
-/// The name that a temporary one stands for.
-fn meant(temporary: &str) -> Option<&str> {
+/// The final name of a temporary file; `None` for other files.
+fn final_name(temporary: &str) -> Option<&str> {
     let (name, unique) = temporary.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
     let (process, count) = unique.split_once('-')?;
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -69,10 +73,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_leftovers_of_these_files_go() {
+    fn only_temporaries_of_the_given_paths_are_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        let stay = [
+        let path = |name: &str| folder.path().join(name);
+        let kept = [
             "a.exr",
             ".b.exr.12-0.tmp",
             ".a.exr.tmp",
@@ -81,9 +85,11 @@ mod tests {
             "a.exr.12-0.tmp",
             ".a.exr.12-0",
         ];
-        let go = [".a.exr.12-0.tmp", ".a.exr.4711-38.tmp"];
-        stay.iter().chain(&go).for_each(|name| fs::write(at(name), "x").unwrap());
-        sweep([at("a.exr"), at("none/c.exr")].into_iter());
-        assert!(stay.iter().all(|name| at(name).is_file()) && go.iter().all(|name| !at(name).exists()));
+        let removed = [".a.exr.12-0.tmp", ".a.exr.4711-38.tmp"];
+        kept.iter().chain(&removed).for_each(|name| fs::write(path(name), "x").unwrap());
+        remove_temporaries([path("a.exr"), path("none/c.exr")].into_iter());
+        assert!(
+            kept.iter().all(|name| path(name).is_file()) && removed.iter().all(|name| !path(name).exists())
+        );
     }
 }

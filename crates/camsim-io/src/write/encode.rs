@@ -1,4 +1,4 @@
-//! Linear values to code values.
+//! Conversion of linear values to code values.
 
 use std::sync::LazyLock;
 
@@ -16,19 +16,21 @@ fn linear_from_srgb(encoded: f64) -> f64 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Nearest 8-bit code; NaN is 0.
+/// Nearest 8-bit code; NaN gives 0.
 pub(super) fn code8(value: f32) -> u8 {
     (value * 255.0).round() as u8
 }
 
-/// Nearest 16-bit code; NaN is 0.
+/// Nearest 16-bit code; NaN gives 0.
 pub(super) fn code16(value: f32) -> u16 {
     (value * 65535.0).round() as u16
 }
 
+/// Number of cells of the table's index.
 const CELLS: usize = 4096;
 
-/// `steps[c]` is the smallest linear value whose code is above c; `first[i]` the code at the start of cell i.
+/// Table of the sRGB transfer function. `steps[c]` is the smallest linear value whose code is above c,
+/// `first[i]` the code at the start of cell i.
 struct SrgbTable {
     steps: [f32; 256],
     first: [u8; CELLS + 1],
@@ -44,7 +46,7 @@ static SRGB: LazyLock<SrgbTable> = LazyLock::new(|| {
     SrgbTable { steps, first }
 });
 
-/// Nearest 8-bit sRGB code of a linear value, by table instead of a power per sample; NaN is 0.
+/// Nearest 8-bit sRGB code of a linear value, by table; NaN gives 0.
 pub fn srgb8(linear: f32) -> u8 {
     if linear.is_nan() {
         return 0;
@@ -63,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_gives_the_nearest_srgb_code() {
+    fn table_gives_the_nearest_srgb_code() {
         for i in 0..=200_000 {
             let linear = i as f32 / 200_000.0;
             let exact = srgb_from_linear(f64::from(linear)) * 255.0;

@@ -1,4 +1,4 @@
-//! OpenEXR scanline files with named channels.
+//! Encodes OpenEXR scanline files with named channels.
 
 use std::{io::Cursor, path::Path};
 
@@ -11,7 +11,7 @@ use half::f16;
 
 use super::WriteError;
 
-/// Encodes interleaved samples as one channel a name. `path` is for messages only.
+/// Encodes interleaved samples as one channel per name. `path` is for messages only.
 pub(super) fn encode(
     path: &Path,
     size_px: [u32; 2],
@@ -24,8 +24,7 @@ pub(super) fn encode(
     for (channel, name) in names.iter().enumerate() {
         let plane = samples.iter().skip(channel).step_by(names.len());
         let plane = match pixel {
-            // Beyond the range of half a value would become an infinity, which no reader expects of a
-            // picture.
+            // Values beyond the range of half are clamped, as infinities would break readers.
             ExrPixel::Half => {
                 FlatSamples::F16(plane.map(|&v| f16::from_f32(v.clamp(-65504.0, 65504.0))).collect())
             }
@@ -47,7 +46,7 @@ pub(super) fn encode(
     let size = Vec2(size_px[0] as usize, size_px[1] as usize);
     let image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(list));
     let mut bytes = Cursor::new(Vec::with_capacity(samples.len() * 2));
-    // One thread a file: the frames are what runs in parallel.
+    // One thread per file, as frames are written in parallel.
     let result = image.write().non_parallel().to_buffered(&mut bytes);
     result.map_err(|error| WriteError::Encode { path: path.into(), message: error.to_string() })?;
     Ok(bytes.into_inner())

@@ -1,4 +1,4 @@
-//! `frames.csv`: a row for each frame whose files are there, whoever wrote them.
+//! `frames.csv`: one row for each frame that has files in the folder, also those of earlier runs.
 
 use std::{
     collections::BTreeMap,
@@ -14,44 +14,46 @@ use super::{
     write_atomic,
 };
 
-/// What each row begins with, before a column of paths for each file of a frame. The first pose is the
-/// camera's at the stamp; columns that begin with `ideal_` say what the source coordinates x, y of `coords`
-/// are in: a pinhole camera's frame, and where that camera is at which instant. Both q are ned_from_camera.
-pub const FRAMES_COLUMNS: &str = "frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
-                                  ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,ideal_qw,ideal_qx,ideal_qy,ideal_qz";
+/// Columns before those of the paths of a frame's files. The first pose is that of the camera at the stamp.
+/// Columns `ideal_*` describe the pinhole camera whose pixels the source coordinates x, y of `coords` are:
+/// size, focal length, principal point, instant and pose. Both q are ned_from_camera.
+pub const FRAMES_COLUMNS: &str = "\
+    frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
+                                  ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,\
+                                  ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
-/// One row.
+/// One row of `frames.csv`.
 #[derive(Clone, Debug)]
 pub struct FrameRecord {
     /// Frame number.
     pub frame: u64,
     /// Stamp, nanoseconds.
     pub stamp_ns: i64,
-    /// Of the camera at the stamp.
+    /// Pose of the camera at the stamp.
     pub pose: CameraPose,
-    /// What source coordinates are in.
+    /// Camera of the source coordinates.
     pub source: SourceFrame,
-    /// Column name and path below the output folder.
+    /// Column name and path, relative to the output folder, of each file.
     pub files: Vec<(String, String)>,
 }
 
-/// The pinhole camera that source coordinates of a frame are in.
+/// The pinhole camera whose pixels the source coordinates of a frame are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SourceFrame {
-    /// Width, height.
+    /// Width, height, pixels.
     pub size_px: [u32; 2],
-    /// fx, fy.
+    /// Focal lengths fx, fy, pixels.
     pub focal_px: [f64; 2],
-    /// Principal point.
+    /// Principal point, pixels.
     pub principal_px: [f64; 2],
     /// Instant, nanoseconds on the clock of stamps.
     pub t_ns: i64,
-    /// Its pose then.
+    /// Pose at that instant.
     pub pose: CameraPose,
 }
 
 impl SourceFrame {
-    /// Of a plan; `epoch_ns` is the stamp at path time 0.
+    /// The camera of a plan's ideal frame; `epoch_ns` is the stamp at path time 0.
     #[must_use]
     pub fn new(plan: &FramePlan, epoch_ns: i64) -> Self {
         Self {
@@ -64,17 +66,17 @@ impl SourceFrame {
     }
 }
 
-/// The table: rows by frame number.
+/// The table `frames.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameTable {
-    /// Names of the columns of files.
+    /// Names of the columns of paths.
     columns: Vec<String>,
-    /// What stands before the files, and the path of each, empty where there is none.
+    /// By frame number: the text before the paths, and the path of each column, empty where there is none.
     rows: BTreeMap<u64, (String, Vec<String>)>,
 }
 
 impl FrameTable {
-    /// What is in `path`: nothing, if there is no such table, or one with other columns.
+    /// Reads a table; empty if the file does not exist or has other columns.
     #[must_use]
     pub fn read(path: &Path) -> Self {
         std::fs::read_to_string(path).ok().and_then(|text| Self::parse(&text)).unwrap_or_default()
@@ -84,20 +86,20 @@ impl FrameTable {
         let mut lines = text.lines();
         let files = lines.next()?.strip_prefix(FRAMES_COLUMNS)?;
         let columns: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
-        let own = FRAMES_COLUMNS.split(',').count();
+        let value_columns = FRAMES_COLUMNS.split(',').count();
         let row = |line: &str| {
-            let (at, _) = line.match_indices(',').chain([(line.len(), "")]).nth(own - 1)?;
-            let (values, files) = line.split_at(at);
+            let (end, _) = line.match_indices(',').chain([(line.len(), "")]).nth(value_columns - 1)?;
+            let (values, files) = line.split_at(end);
             let mut files: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
             files.resize(columns.len(), String::new());
             Some((values.split(',').next()?.parse().ok()?, (values.to_owned(), files)))
         };
-        // A line that cannot be read is of a frame that will be found without a row.
+        // A malformed line is dropped, so that its frame counts as missing.
         let rows = lines.filter_map(row).collect();
         Some(Self { columns, rows })
     }
 
-    /// Takes in a row, in place of the one that its frame had. Files of other columns stay with it.
+    /// Inserts or replaces the row of a frame. Paths in columns that `record` does not have are kept.
     pub fn insert(&mut self, record: &FrameRecord) {
         for (column, _) in &record.files {
             if !self.columns.contains(column) {
@@ -118,14 +120,15 @@ impl FrameTable {
         row.0 = values;
         row.1.resize(self.columns.len(), String::new());
         for (column, file) in &record.files {
-            if let Some(at) = self.columns.iter().position(|known| known == column) {
-                row.1[at].clone_from(file);
+            if let Some(index) = self.columns.iter().position(|known| known == column) {
+                row.1[index].clone_from(file);
             }
         }
     }
 
-    /// Keeps what is there: files below `folder`, and frames with any of them, or that `also` names.
-    pub fn keep_what_is_in(&mut self, folder: &Path, also: &dyn Fn(u64) -> bool) {
+    /// Removes the paths of files that do not exist below `folder`, rows without any path unless `also`
+    /// selects their frame, and empty columns.
+    pub fn retain_existing(&mut self, folder: &Path, also: &dyn Fn(u64) -> bool) {
         let columns = self.columns.len();
         self.rows.retain(|frame, (_, files)| {
             files.resize(columns, String::new());
@@ -134,11 +137,11 @@ impl FrameTable {
         });
         let is_used = |column: usize| self.rows.values().any(|(_, files)| !files[column].is_empty());
         let used: Vec<bool> = (0..columns).map(is_used).collect();
-        let kept = |list: &[String]| {
+        let retained = |list: &[String]| {
             list.iter().zip(&used).filter(|(_, used)| **used).map(|(item, _)| item.clone()).collect()
         };
-        self.columns = kept(&self.columns);
-        self.rows.values_mut().for_each(|(_, files)| *files = kept(files));
+        self.columns = retained(&self.columns);
+        self.rows.values_mut().for_each(|(_, files)| *files = retained(files));
     }
 
     /// Whether frame `index` has a row.
@@ -150,14 +153,14 @@ impl FrameTable {
     /// Whether frame `index` has a row with all of these files.
     #[must_use]
     pub fn has_files(&self, index: u64, files: &[(String, String)]) -> bool {
-        let Some((_, there)) = self.rows.get(&index) else { return false };
+        let Some((_, paths)) = self.rows.get(&index) else { return false };
         let has = |column: &String, file: &String| {
-            self.columns.iter().zip(there).any(|(known, at)| known == column && at == file)
+            self.columns.iter().zip(paths).any(|(known, path)| known == column && path == file)
         };
         files.iter().all(|(column, file)| has(column, file))
     }
 
-    /// As CSV.
+    /// The table as CSV.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let mut text = FRAMES_COLUMNS.to_owned();
@@ -176,7 +179,7 @@ impl FrameTable {
         text
     }
 
-    /// Writes it whole.
+    /// Writes the table.
     ///
     /// # Errors
     /// As [`write_atomic`].
@@ -185,7 +188,7 @@ impl FrameTable {
     }
 }
 
-/// Where the table of a folder is.
+/// Path of `frames.csv` in an output folder.
 #[must_use]
 pub fn frames_path(folder: &Path) -> PathBuf {
     folder.join("frames.csv")
@@ -215,19 +218,20 @@ mod tests {
     }
 
     #[test]
-    fn rows_have_what_coordinates_need_and_read_back() {
+    fn rows_have_the_source_camera_and_read_back() {
         let mut table = FrameTable::default();
         table.insert(&record(4, &["color_exr"]));
         let text = table.to_csv();
         assert_eq!(
             text,
             format!(
-                "{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,0,0,color_exr/4\n"
+                "{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,\
+                 0,0,color_exr/4\n"
             )
         );
         assert_eq!(FrameTable::parse(&text).unwrap(), table);
         assert_eq!(FrameTable::default().to_csv(), format!("{FRAMES_COLUMNS}\n"));
-        // Of another version.
+        // A table of another version.
         assert_eq!(
             FrameTable::parse("frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,a\n"),
             None
@@ -235,27 +239,27 @@ mod tests {
     }
 
     #[test]
-    fn parts_make_the_table_of_the_whole() {
+    fn partial_runs_are_merged_into_one_table() {
         let folder = tempfile::tempdir().unwrap();
         let path = frames_path(folder.path());
-        let whole = |frames: &[u64]| {
+        let table_of = |frames: &[u64]| {
             let mut table = FrameTable::default();
             frames.iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
             table
         };
-        whole(&[0, 2, 4]).write(&path).unwrap();
+        table_of(&[0, 2, 4]).write(&path).unwrap();
         let mut table = FrameTable::read(&path);
         [1, 3, 4].iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
-        assert_eq!(table.to_csv(), whole(&[0, 1, 2, 3, 4]).to_csv());
+        assert_eq!(table.to_csv(), table_of(&[0, 1, 2, 3, 4]).to_csv());
         // Another channel of the same frames.
         table.insert(&record(3, &["depth"]));
         let text = table.to_csv();
         let last: Vec<&str> = text.lines().map(|line| line.rsplit(',').next().unwrap()).collect();
         assert_eq!(last, ["depth", "", "", "", "depth/3", ""]);
-        // Only what is there counts.
+        // Files that do not exist are dropped.
         std::fs::create_dir(folder.path().join("depth")).unwrap();
         std::fs::write(folder.path().join("depth/3"), "").unwrap();
-        table.keep_what_is_in(folder.path(), &|frame| frame == 1);
+        table.retain_existing(folder.path(), &|frame| frame == 1);
         let lines: Vec<String> = table.to_csv().lines().map(str::to_owned).collect();
         assert!(lines.len() == 3 && lines[0].ends_with("ideal_qz,depth"), "{lines:?}");
         assert!(

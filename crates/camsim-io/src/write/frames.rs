@@ -1,4 +1,4 @@
-//! Frames to files, on threads of their own: the renderer waits only when the queue is full.
+//! Writes frames to files on worker threads. The renderer waits only when the queue is full.
 
 use std::{
     path::{Path, PathBuf},
@@ -17,7 +17,7 @@ use camsim_core::{
 
 use super::{WriteError, atomic, exr_file, png_file, tables, write_atomic};
 
-/// Which files a frame has, and where.
+/// Names and paths of the files of frames.
 #[derive(Clone, Debug)]
 pub struct FrameFiles {
     folder: PathBuf,
@@ -25,9 +25,9 @@ pub struct FrameFiles {
     encoding: OutputEncoding,
 }
 
-/// One file of a frame.
+/// One of the files of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Piece {
+enum OutputFile {
     Color(ImageFormat),
     Depth,
     Valid,
@@ -36,24 +36,24 @@ enum Piece {
 }
 
 impl FrameFiles {
-    /// Files below `folder` for what `output` asks; `encoding` is `camera.photometric.output`.
+    /// Files below `folder` for the channels and formats of `output`; `encoding` is
+    /// `camera.photometric.output`.
     pub fn new(folder: &Path, output: &OutputSpec, encoding: OutputEncoding) -> Self {
         Self { folder: folder.into(), output: output.clone(), encoding }
     }
 
-    /// `(column, path below the folder)` of every file of frame `index`, for `frames.csv`.
+    /// Column of `frames.csv` and path below the folder of each file of frame `index`.
     pub fn names(&self, index: u64) -> Vec<(String, String)> {
-        self.pieces().into_iter().map(|piece| (column(piece).to_owned(), name(piece, index))).collect()
+        self.files().into_iter().map(|file| (column_name(file).to_owned(), file_name(file, index))).collect()
     }
 
-    /// Whether every file of frame `index` is there, which `--resume` takes for done: files are never there
-    /// in part.
+    /// Whether all files of frame `index` exist. `--resume` skips such frames, as files are never incomplete.
     pub fn exist(&self, index: u64) -> bool {
         let names = self.names(index);
         !names.is_empty() && names.iter().all(|(_, name)| self.folder.join(name).is_file())
     }
 
-    /// Removes the files of these frames, so that none of an earlier run is taken for one of the next.
+    /// Removes the files of these frames, so that files of an earlier run are not mistaken for new ones.
     ///
     /// # Errors
     /// A file that cannot be removed.
@@ -70,15 +70,14 @@ impl FrameFiles {
         Ok(())
     }
 
-    /// Files of frames in the folder, of any channel, that are not among those of `frames`: paths below the
-    /// folder, in order.
-    pub fn others(&self, frames: &[u64]) -> Vec<String> {
-        let own: std::collections::HashSet<String> =
+    /// Sorted paths, below the folder, of the files of frames of any channel that do not belong to `frames`.
+    pub fn unlisted_frame_files(&self, frames: &[u64]) -> Vec<String> {
+        let listed: std::collections::HashSet<String> =
             frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
-        let mut others = Vec::new();
-        // A folder that cannot be read has nothing that could be mixed up.
+        let mut unlisted = Vec::new();
+        // Folders that cannot be read count as empty.
         for channel in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
-            let of_channel = channel.file_name().to_string_lossy().into_owned();
+            let channel_name = channel.file_name().to_string_lossy().into_owned();
             for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
                 let name = file.file_name().to_string_lossy().into_owned();
                 let number = name
@@ -88,66 +87,70 @@ impl FrameFiles {
                 let is_frame = number.is_some_and(|number| {
                     !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
                 });
-                let path = format!("{of_channel}/{name}");
-                if is_frame && !own.contains(&path) {
-                    others.push(path);
+                let path = format!("{channel_name}/{name}");
+                if is_frame && !listed.contains(&path) {
+                    unlisted.push(path);
                 }
             }
         }
-        others.sort();
-        others
+        unlisted.sort();
+        unlisted
     }
 
-    /// Removes what a killed run left half written of these frames' files.
-    pub fn sweep(&self, frames: &[u64]) {
+    /// Removes the temporary files that a killed run left for these frames.
+    pub fn remove_temporaries(&self, frames: &[u64]) {
         let names = frames.iter().flat_map(|&index| self.names(index));
-        atomic::sweep(names.map(|(_, name)| self.folder.join(name)));
+        atomic::remove_temporaries(names.map(|(_, name)| self.folder.join(name)));
     }
 
-    fn pieces(&self) -> Vec<Piece> {
-        let mut pieces = Vec::new();
+    fn files(&self) -> Vec<OutputFile> {
+        let mut files = Vec::new();
         if self.output.format.is_empty() {
-            return pieces;
+            return files;
         }
         for channel in &self.output.channels {
-            let of_channel = match channel {
-                Channel::Color => self.output.format.iter().map(|&format| Piece::Color(format)).collect(),
-                Channel::Depth => vec![Piece::Depth],
-                Channel::Valid => vec![Piece::Valid],
-                Channel::Coords => vec![Piece::Coords],
-                Channel::Rows => vec![Piece::Rows],
+            let channel_files = match channel {
+                Channel::Color => {
+                    self.output.format.iter().map(|&format| OutputFile::Color(format)).collect()
+                }
+                Channel::Depth => vec![OutputFile::Depth],
+                Channel::Valid => vec![OutputFile::Valid],
+                Channel::Coords => vec![OutputFile::Coords],
+                Channel::Rows => vec![OutputFile::Rows],
             };
-            // A channel or format that is named twice is still one file.
-            of_channel.into_iter().for_each(|piece| {
-                if !pieces.contains(&piece) {
-                    pieces.push(piece)
+            // A channel or format that is listed twice gives one file.
+            channel_files.into_iter().for_each(|file| {
+                if !files.contains(&file) {
+                    files.push(file)
                 }
             });
         }
-        pieces
+        files
     }
 
     fn write(&self, frame: &RenderedFrame) -> Result<u64, WriteError> {
-        let pieces = self.pieces();
-        check(frame, &pieces)?;
+        let files = self.files();
+        check_sizes(frame, &files)?;
         let mut written = 0;
-        for piece in pieces {
-            let path = self.folder.join(name(piece, frame.index));
+        for file in files {
+            let path = self.folder.join(file_name(file, frame.index));
             let exr = |names: &[&str], samples: &[f32], pixel| {
                 exr_file::encode(&path, frame.size_px, names, samples, pixel, self.output.exr_compression)
             };
-            let bytes = match piece {
-                Piece::Color(ImageFormat::Exr) => {
+            let bytes = match file {
+                OutputFile::Color(ImageFormat::Exr) => {
                     exr(&["R", "G", "B", "A"], &frame.color_rgba, self.output.exr_pixel)?
                 }
-                Piece::Color(ImageFormat::Png) => png_file::encode_color(&path, frame, self.encoding)?,
-                Piece::Depth => exr(&["Z"], frame.depth_m.as_deref().unwrap_or_default(), ExrPixel::Float)?,
-                Piece::Valid => png_file::encode_valid(&path, frame)?,
-                Piece::Coords => {
+                OutputFile::Color(ImageFormat::Png) => png_file::encode_color(&path, frame, self.encoding)?,
+                OutputFile::Depth => {
+                    exr(&["Z"], frame.depth_m.as_deref().unwrap_or_default(), ExrPixel::Float)?
+                }
+                OutputFile::Valid => png_file::encode_valid(&path, frame)?,
+                OutputFile::Coords => {
                     let samples = frame.coords.as_deref().unwrap_or_default().as_flattened();
                     exr(&["u", "v", "x", "y", "dt", "n", "e", "d"], samples, ExrPixel::Float)?
                 }
-                Piece::Rows => tables::rows_csv(&frame.rows).into_bytes(),
+                OutputFile::Rows => tables::rows_csv(&frame.rows).into_bytes(),
             };
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
@@ -156,44 +159,46 @@ impl FrameFiles {
     }
 }
 
-fn column(piece: Piece) -> &'static str {
-    match piece {
-        Piece::Color(ImageFormat::Exr) => "color_exr",
-        Piece::Color(ImageFormat::Png) => "color_png",
-        Piece::Depth => "depth",
-        Piece::Valid => "valid",
-        Piece::Coords => "coords",
-        Piece::Rows => "rows",
+/// Column of `frames.csv`.
+fn column_name(file: OutputFile) -> &'static str {
+    match file {
+        OutputFile::Color(ImageFormat::Exr) => "color_exr",
+        OutputFile::Color(ImageFormat::Png) => "color_png",
+        OutputFile::Depth => "depth",
+        OutputFile::Valid => "valid",
+        OutputFile::Coords => "coords",
+        OutputFile::Rows => "rows",
     }
 }
 
-fn name(piece: Piece, index: u64) -> String {
-    let (folder, ending) = match piece {
-        Piece::Color(ImageFormat::Exr) => ("color", "exr"),
-        Piece::Color(ImageFormat::Png) => ("color", "png"),
-        Piece::Depth => ("depth", "exr"),
-        Piece::Valid => ("valid", "png"),
-        Piece::Coords => ("coords", "exr"),
-        Piece::Rows => ("rows", "csv"),
+/// Path below the output folder.
+fn file_name(file: OutputFile, index: u64) -> String {
+    let (folder, ending) = match file {
+        OutputFile::Color(ImageFormat::Exr) => ("color", "exr"),
+        OutputFile::Color(ImageFormat::Png) => ("color", "png"),
+        OutputFile::Depth => ("depth", "exr"),
+        OutputFile::Valid => ("valid", "png"),
+        OutputFile::Coords => ("coords", "exr"),
+        OutputFile::Rows => ("rows", "csv"),
     };
     format!("{folder}/frame_{index:06}.{ending}")
 }
 
-/// Encoders take planes on trust, so what does not fill the frame stops here.
-fn check(frame: &RenderedFrame, pieces: &[Piece]) -> Result<(), WriteError> {
+/// Checks that all planes have the size of the frame, which the encoders assume.
+fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteError> {
     let pixels = frame.size_px[0] as usize * frame.size_px[1] as usize;
-    let needs = |piece: Piece| match piece {
-        Piece::Color(_) | Piece::Valid => ("color", frame.color_rgba.len(), pixels * 4),
-        Piece::Depth => ("depth", frame.depth_m.as_ref().map_or(0, Vec::len), pixels),
-        Piece::Coords => {
+    let sizes = |file: OutputFile| match file {
+        OutputFile::Color(_) | OutputFile::Valid => ("color", frame.color_rgba.len(), pixels * 4),
+        OutputFile::Depth => ("depth", frame.depth_m.as_ref().map_or(0, Vec::len), pixels),
+        OutputFile::Coords => {
             ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS)
         }
-        Piece::Rows => ("rows", frame.rows.len().min(1), 1),
+        OutputFile::Rows => ("rows", frame.rows.len().min(1), 1),
     };
-    for (what, found, needed) in pieces.iter().map(|&piece| needs(piece)) {
-        if found != needed || pixels == 0 {
+    for (channel, size, needed) in files.iter().map(|&file| sizes(file)) {
+        if size != needed || pixels == 0 {
             let message = format!(
-                "{what} has {found} values where {needed} are needed ({}x{})",
+                "{channel} has {size} values where {needed} are needed ({}x{})",
                 frame.size_px[0], frame.size_px[1]
             );
             return Err(WriteError::Frame { frame: frame.index, message });
@@ -202,44 +207,44 @@ fn check(frame: &RenderedFrame, pieces: &[Piece]) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// What a writer did.
+/// Totals of a writer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WriteSummary {
-    /// Frames taken.
+    /// Number of frames written.
     pub frames: u64,
-    /// Bytes of their files.
+    /// Bytes of their files in total.
     pub bytes: u64,
 }
 
-/// Encodes and writes frames on worker threads behind a bounded queue, so memory does not grow with the
-/// sequence.
+/// Encodes and writes frames on worker threads behind a bounded queue, which limits the memory.
 #[derive(Debug)]
 pub struct FrameWriter {
     queue: Option<SyncSender<RenderedFrame>>,
     workers: Vec<JoinHandle<()>>,
-    shared: Arc<Shared>,
+    shared: Arc<WriterState>,
 }
 
+/// State shared by the worker threads.
 #[derive(Debug, Default)]
-struct Shared {
+struct WriterState {
     failure: Mutex<Option<WriteError>>,
     frames: AtomicU64,
     bytes: AtomicU64,
 }
 
-impl Shared {
+impl WriterState {
     fn take_failure(&self) -> Option<WriteError> {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
 impl FrameWriter {
-    /// Starts `threads` (at least one) workers; at most as many frames again wait in the queue.
+    /// Starts `threads` workers, at least one. The queue holds as many frames.
     pub fn new(files: FrameFiles, threads: usize) -> Self {
         let threads = threads.max(1);
         let (queue, frames) = sync_channel(threads);
         let frames = Arc::new(Mutex::new(frames));
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(WriterState::default());
         let files = Arc::new(files);
         let workers = (0..threads)
             .map(|_| {
@@ -250,7 +255,7 @@ impl FrameWriter {
         Self { queue: Some(queue), workers, shared }
     }
 
-    /// Hands over a frame; waits while the queue is full.
+    /// Queues a frame; waits while the queue is full.
     ///
     /// # Errors
     /// The first failure of an earlier frame; rendering should stop then.
@@ -263,15 +268,15 @@ impl FrameWriter {
         }
     }
 
-    /// Waits until everything is on disk.
+    /// Waits until all frames are written.
     ///
     /// # Errors
-    /// The first failure that no `write` has told yet.
+    /// The first failure that `write` has not reported yet.
     pub fn finish(mut self) -> Result<WriteSummary, WriteError> {
-        let whole = self.join();
+        let is_complete = self.join();
         match self.shared.take_failure() {
             Some(failure) => Err(failure),
-            None if whole => Ok(WriteSummary {
+            None if is_complete => Ok(WriteSummary {
                 frames: self.shared.frames.load(Ordering::Relaxed),
                 bytes: self.shared.bytes.load(Ordering::Relaxed),
             }),
@@ -279,10 +284,10 @@ impl FrameWriter {
         }
     }
 
+    /// Waits for the workers; false if one panicked.
     fn join(&mut self) -> bool {
         self.queue = None;
-        // Counted rather than `all`, which would stop at the first failure and leave the other threads
-        // running.
+        // `all` would stop at the first failure, and leave the other threads running.
         self.workers.drain(..).filter_map(|worker| worker.join().err()).count() == 0
     }
 }
@@ -293,9 +298,10 @@ impl Drop for FrameWriter {
     }
 }
 
-fn work(files: &FrameFiles, frames: &Mutex<Receiver<RenderedFrame>>, shared: &Shared) {
+/// Loop of a worker thread.
+fn work(files: &FrameFiles, frames: &Mutex<Receiver<RenderedFrame>>, shared: &WriterState) {
     loop {
-        // The lock is held while waiting: the next frame goes to whoever waits, the others wait for the lock.
+        // The lock is held while waiting: one worker waits for a frame, the others for the lock.
         let next = frames.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(frame) = next else { return };
         match files.write(&frame) {
@@ -304,8 +310,7 @@ fn work(files: &FrameFiles, frames: &Mutex<Receiver<RenderedFrame>>, shared: &Sh
                 shared.bytes.fetch_add(bytes, Ordering::Relaxed);
             }
             Err(error) => {
-                // Later frames would most likely fail alike (a full disk): the first failure is the one to
-                // tell.
+                // The first failure is kept; later ones usually have the same cause, such as a full disk.
                 shared.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
             }
         }

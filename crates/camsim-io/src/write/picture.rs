@@ -1,4 +1,4 @@
-//! One picture to a file of the user's own name.
+//! Writes one picture to a path of the user's choice.
 
 use std::path::Path;
 
@@ -9,11 +9,11 @@ use camsim_core::{
 
 use super::{WriteError, exr_file, png_file, write_atomic};
 
-/// Writes one frame's picture; the ending of `path` says how: `.exr` is linear R G B A in 32-bit floats, with
-/// the depth `Z` where the frame has one; `.png` is encoded as `output` says.
+/// Writes the picture of one frame. The extension of `path` selects the format: `.exr` is linear R, G, B, A
+/// in 32-bit floats, with depth `Z` if the frame has it; `.png` is encoded as `output` says.
 ///
 /// # Errors
-/// Another ending; planes that do not fill the frame; a file that cannot be written.
+/// The extension is another, a plane does not match the size of the frame, or the file cannot be written.
 pub fn write_picture(path: &Path, frame: &RenderedFrame, output: OutputEncoding) -> Result<(), WriteError> {
     let pixels = frame.size_px[0] as usize * frame.size_px[1] as usize;
     let depth = frame.depth_m.as_deref().filter(|depth| depth.len() == pixels);

@@ -1,4 +1,4 @@
-//! PNG files: colour in the encoding of `camera.photometric.output`, validity, contact sheets.
+//! Encodes PNG files: colour in the encoding of `camera.photometric.output`, validity, contact sheets.
 
 use std::{io::Cursor, path::Path};
 
@@ -13,8 +13,7 @@ use super::{
     encode::{code8, code16, luminance, srgb8},
 };
 
-/// Colour: RGBA of 8 or 16 bits, luminance without alpha for the `luma` encodings, as a grey camera writes
-/// it.
+/// Encodes colour: RGBA of 8 or 16 bits, or luminance without alpha for the `luma` encodings.
 pub(super) fn encode_color(
     path: &Path,
     frame: &RenderedFrame,
@@ -30,7 +29,7 @@ pub(super) fn encode_color(
         OutputEncoding::Linear8 => {
             (frame.color_rgba.iter().map(|&v| code8(v)).collect(), ExtendedColorType::Rgba8)
         }
-        // The encoder takes samples in the machine's order.
+        // The encoder expects samples in native byte order.
         OutputEncoding::LinearF32 | OutputEncoding::LinearF16 => (
             frame.color_rgba.iter().flat_map(|&v| code16(v).to_ne_bytes()).collect(),
             ExtendedColorType::Rgba16,
@@ -43,7 +42,7 @@ pub(super) fn encode_color(
     encode(path, frame.size_px, &bytes, kind)
 }
 
-/// Validity: 255 where alpha is above 0.
+/// Encodes validity: 255 where alpha is above 0.
 pub(super) fn encode_valid(path: &Path, frame: &RenderedFrame) -> Result<Vec<u8>, WriteError> {
     let bytes: Vec<u8> = frame.color_rgba.chunks_exact(4).map(|p| if p[3] > 0.0 { 255 } else { 0 }).collect();
     encode(path, frame.size_px, &bytes, ExtendedColorType::L8)
@@ -62,11 +61,11 @@ fn encode(
     Ok(out.into_inner())
 }
 
-/// Frames side by side, `columns` a row, each shrunk by `shrink` (mean of linear values), as an sRGB PNG. All
-/// frames have the size of the first.
+/// Writes a contact sheet as an sRGB PNG: frames in rows of `columns`, each reduced by the factor `shrink`
+/// (mean of linear values).
 ///
 /// # Errors
-/// There is no frame, one has another size, or the file cannot be written.
+/// There is no frame, their sizes differ, or the file cannot be written.
 pub fn contact_sheet(
     path: &Path,
     frames: &[RenderedFrame],
@@ -93,13 +92,13 @@ pub fn contact_sheet(
                 let mut count = 0.0_f32;
                 for sy in y * shrink..((y + 1) * shrink).min(source_height) {
                     for sx in x * shrink..((x + 1) * shrink).min(source_width) {
-                        let at = (sy as usize * source_width as usize + sx as usize) * 4;
-                        sum.iter_mut().zip(&frame.color_rgba[at..]).for_each(|(sum, value)| *sum += value);
+                        let first = (sy as usize * source_width as usize + sx as usize) * 4;
+                        sum.iter_mut().zip(&frame.color_rgba[first..]).for_each(|(sum, value)| *sum += value);
                         count += 1.0;
                     }
                 }
-                let at = ((corner[1] + y) as usize * sheet[0] as usize + (corner[0] + x) as usize) * 3;
-                bytes[at..at + 3].copy_from_slice(&sum.map(|sum| srgb8(sum / count)));
+                let first = ((corner[1] + y) as usize * sheet[0] as usize + (corner[0] + x) as usize) * 3;
+                bytes[first..first + 3].copy_from_slice(&sum.map(|sum| srgb8(sum / count)));
             }
         }
     }

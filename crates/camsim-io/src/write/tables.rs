@@ -1,4 +1,4 @@
-//! Tables: rows of a frame, the platform's trajectory, the camera's.
+//! Tables: rows of a frame, trajectories of platform and camera.
 
 use std::fmt::Write as _;
 
@@ -8,14 +8,14 @@ use camsim_core::{
 };
 use glam::{DQuat, DVec3};
 
-/// Header of `rows/*.csv`; q = ned_from_camera.
+/// Columns of `rows/*.csv`; q is ned_from_camera.
 pub const ROWS_COLUMNS: &str = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
-/// Header of `trajectory.csv` and of `camsim track`; q = ned_from_body, body rates in rad/s, t_s on the log's
-/// clock.
+/// Columns of `trajectory.csv` and of `camsim track`; q is ned_from_body, body rates are in rad/s, t_s is on
+/// the log's clock.
 pub const TRAJECTORY_COLUMNS: &str =
     "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
-/// Header of `camera_trajectory.csv` and of `camsim track --of camera`: the optical frame with lever arm,
-/// mount and vibration; q = ned_from_camera, rates in optical axes, rad/s.
+/// Columns of `camera_trajectory.csv` and of `camsim track --of camera`: motion of the camera, with lever
+/// arm, mount and vibration; q is ned_from_camera, rates are in camera axes, rad/s.
 pub const CAMERA_TRAJECTORY_COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,qw,qx,qy,qz,wx,wy,wz";
 
 /// One line of `trajectory.csv`.
@@ -34,13 +34,13 @@ pub struct CameraRecord {
     pub t_ns: i64,
     /// Optical centre and attitude.
     pub pose: CameraPose,
-    /// Of the optical centre, m/s.
+    /// Velocity of the optical centre, m/s.
     pub velocity_ned_m_s: DVec3,
-    /// Relative to NED, in optical axes.
+    /// Angular rate relative to NED, in camera axes, rad/s.
     pub rate_camera_rad_s: DVec3,
 }
 
-/// Numbers in the shortest form that reads back to the same bits.
+/// Appends comma-separated numbers, in the shortest form that reads back to the same bits.
 pub(super) fn push(line: &mut String, values: &[f64]) {
     for value in values {
         // Writing to a String cannot fail.
@@ -48,17 +48,18 @@ pub(super) fn push(line: &mut String, values: &[f64]) {
     }
 }
 
+/// Components of a quaternion, scalar first.
 pub(super) fn wxyz(q: DQuat) -> [f64; 4] {
     [q.w, q.x, q.y, q.z]
 }
 
-/// Decimal seconds of integer nanoseconds, without rounding.
+/// Nanoseconds as decimal seconds, exactly.
 fn seconds(t_ns: i64) -> String {
     let (whole, rest) = (t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000);
     format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
 }
 
-/// `rows/*.csv` of one frame.
+/// Text of `rows/*.csv` of one frame.
 pub fn rows_csv(rows: &[RowRecord]) -> String {
     let mut text = format!("{ROWS_COLUMNS}\n");
     for row in rows {
@@ -71,7 +72,7 @@ pub fn rows_csv(rows: &[RowRecord]) -> String {
     text
 }
 
-/// `trajectory.csv`.
+/// Text of `trajectory.csv`.
 pub fn trajectory_csv(records: impl IntoIterator<Item = TrajectoryRecord>) -> String {
     let mut text = format!("{TRAJECTORY_COLUMNS}\n");
     for TrajectoryRecord { t_ns, state } in records {
@@ -87,7 +88,7 @@ pub fn trajectory_csv(records: impl IntoIterator<Item = TrajectoryRecord>) -> St
     text
 }
 
-/// `camera_trajectory.csv`.
+/// Text of `camera_trajectory.csv`.
 pub fn camera_trajectory_csv(records: impl IntoIterator<Item = CameraRecord>) -> String {
     let mut text = format!("{CAMERA_TRAJECTORY_COLUMNS}\n");
     for CameraRecord { t_ns, pose, velocity_ned_m_s, rate_camera_rad_s } in records {

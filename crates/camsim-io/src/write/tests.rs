@@ -81,7 +81,7 @@ fn files_below(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn every_channel_reads_back_in_every_compression() {
+fn all_channels_read_back_in_all_compressions() {
     for (pixel, compression, tolerance) in [
         (ExrPixel::Float, ExrCompression::None, 0.0),
         (ExrPixel::Float, ExrCompression::Zip1, 0.0),
@@ -127,7 +127,7 @@ fn every_channel_reads_back_in_every_compression() {
 }
 
 #[test]
-fn png_follows_the_encoding() {
+fn png_has_the_configured_encoding() {
     for (output, kind) in [
         (OutputEncoding::Srgb8, image::ColorType::Rgba8),
         (OutputEncoding::Linear8, image::ColorType::Rgba8),
@@ -139,14 +139,14 @@ fn png_follows_the_encoding() {
         let read = image::load_from_memory(&bytes).unwrap();
         assert_eq!(read.color(), kind);
         let expected = &frame(0).color_rgba;
-        let bright = |at: usize| f64::from(expected[at * 4]);
+        let red = |pixel: usize| f64::from(expected[pixel * 4]);
         match read {
             image::DynamicImage::ImageRgba8(read) if output == OutputEncoding::Srgb8 => {
                 let pixel = read.as_raw()[40 * 4];
-                assert!((f64::from(pixel) - 255.0 * srgb_from_linear(bright(40))).abs() <= 0.51);
+                assert!((f64::from(pixel) - 255.0 * srgb_from_linear(red(40))).abs() <= 0.51);
             }
             image::DynamicImage::ImageRgba16(read) => {
-                assert!((f64::from(read.as_raw()[40 * 4]) - 65535.0 * bright(40)).abs() <= 0.51);
+                assert!((f64::from(read.as_raw()[40 * 4]) - 65535.0 * red(40)).abs() <= 0.51);
             }
             image::DynamicImage::ImageLuma16(read) => {
                 let p = &expected[160..163];
@@ -164,7 +164,7 @@ fn png_follows_the_encoding() {
 }
 
 #[test]
-fn no_format_writes_nothing() {
+fn empty_format_writes_no_files() {
     let dir = tempfile::tempdir().unwrap();
     let spec = OutputSpec { format: vec![], ..everything(ExrPixel::Half, ExrCompression::Zip1) };
     let writer = FrameWriter::new(FrameFiles::new(dir.path(), &spec, OutputEncoding::Srgb8), 1);
@@ -174,9 +174,9 @@ fn no_format_writes_nothing() {
 }
 
 #[test]
-fn failures_are_told_with_the_path_and_leave_nothing_behind() {
+fn failures_name_the_path_and_leave_no_files() {
     let dir = tempfile::tempdir().unwrap();
-    // A file where a folder should be fails for every user, root included.
+    // A file in place of a folder causes an error for all users, root included.
     fs::write(dir.path().join("color"), "in the way").unwrap();
     let files = FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8);
     let writer = FrameWriter::new(files, 2);
@@ -196,13 +196,13 @@ fn failures_are_told_with_the_path_and_leave_nothing_behind() {
     let short = RenderedFrame { color_rgba: vec![0.0; 5], ..frame(3) };
     let writer =
         FrameWriter::new(FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8), 1);
-    let told = writer.write(short);
-    let error = told.err().or_else(|| writer.finish().err()).unwrap().to_string();
+    let result = writer.write(short);
+    let error = result.err().or_else(|| writer.finish().err()).unwrap().to_string();
     assert!(error.contains("frame 3") && error.contains("33x21"), "{error}");
 }
 
 #[test]
-fn values_that_are_not_numbers_are_written_without_panic() {
+fn non_finite_values_are_written_without_panic() {
     let mut odd = frame(0);
     odd.color_rgba[..8].copy_from_slice(&[
         f32::NAN,
@@ -224,7 +224,7 @@ fn values_that_are_not_numbers_are_written_without_panic() {
 }
 
 #[test]
-fn tables_have_their_columns() {
+fn tables_have_the_documented_columns() {
     let state = BodyState {
         position_ned_m: DVec3::new(1.0, 2.0, 3.0),
         velocity_ned_m_s: DVec3::ZERO,
@@ -248,7 +248,7 @@ fn tables_have_their_columns() {
 }
 
 #[test]
-fn a_contact_sheet_holds_all_frames() {
+fn contact_sheet_has_all_frames() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("sheet.png");
     contact_sheet(&path, &[frame(0), frame(1), frame(2)], 2, 3).unwrap();

@@ -1,8 +1,8 @@
-//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left;
-//! as plans make it, and with the sampling of the whole camera held. An effect can hide what is wrong with a
-//! picture: without blur, vignette or lens it takes a finer one to keep `quality.max_error_dn`, so that plans
-//! may spend more time where less is to be done. What the effect itself takes is the difference that is left
-//! when pictures are sampled alike.
+//! Cost of each effect of a camera: each is left out alone, and one after the other until none is left. This
+//! is done with the variants' own plans, and with the sampling plan of the full camera. The two differ
+//! because an effect can hide errors: without blur, vignette or lens a frame needs finer sampling to keep
+//! `quality.max_error_dn`, so it may take longer. With the same sampling the difference is the cost of the
+//! effect itself.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ use camsim_plan::{FramePlan, Planner};
 use serde::Serialize;
 
 use super::{
-    BenchError, blit,
-    knobs::MAX_SIDE_PX,
-    rounds::{self, Effort, FRAME, Times},
+    BenchError, frame_copy,
+    methods::MAX_SIDE_PX,
+    rounds::{self, FRAME, RoundLimits, TimedSequence, Times},
 };
 use crate::timing::quartiles;
 
-/// Something that a perfect camera does not have.
+/// An effect that a perfect camera does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Gaussian noise.
@@ -32,17 +32,17 @@ pub enum Effect {
     Vignette,
     /// The exposure, and with it motion blur.
     Blur,
-    /// The shaking mount.
+    /// Vibration of the mount.
     Vibration,
     /// Distortion.
     Lens,
-    /// The readout: every row at the same instant.
+    /// The readout; without it every row has the same instant.
     RollingShutter,
-    /// Samples at silhouettes: one a pixel.
+    /// Silhouette rays; without them each pixel has one source.
     Silhouettes,
 }
 
-/// All of them, in the order in which they are left out one after the other.
+/// All effects, in the order in which they are left out.
 pub const EFFECTS: [Effect; 7] = [
     Effect::Noise,
     Effect::Vignette,
@@ -54,7 +54,7 @@ pub const EFFECTS: [Effect; 7] = [
 ];
 
 impl Effect {
-    /// For tables.
+    /// Name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -64,12 +64,12 @@ impl Effect {
             Self::Vibration => "vibration",
             Self::Lens => "lens",
             Self::RollingShutter => "rolling shutter",
-            Self::Silhouettes => "samples at silhouettes",
+            Self::Silhouettes => "silhouette rays",
         }
     }
 
-    /// Takes it out of a sequence.
-    fn leave_out(self, sequence: &mut Sequence) -> Result<(), MountError> {
+    /// Removes the effect from a sequence.
+    fn remove_from(self, sequence: &mut Sequence) -> Result<(), MountError> {
         let camera = &mut sequence.scenario.camera;
         match self {
             Self::Noise => camera.photometric.noise_sigma = 0.0,
@@ -100,17 +100,17 @@ impl Effect {
 pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>, MountError> {
     let mut sequence = sequence.clone();
     for effect in effects {
-        effect.leave_out(&mut sequence)?;
+        effect.remove_from(&mut sequence)?;
     }
     Ok(Arc::new(sequence))
 }
 
-/// The sampling of a plan, or with grids where it reads areas, whatever it leaves of a picture; each frame
-/// from an ideal frame of its own.
-fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
+/// Forces the sampling of a plan, without a tolerance, and with an ideal frame for each output frame. Area
+/// reads, which cannot be forced, become grids of taps.
+fn with_sampling_of(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
     let taps = match plan.taps {
         TapStage::Bilinear | TapStage::Spline => 1,
-        // No number asks for areas: a grid of as many reads as they have ideal pixels comes nearest to them.
+        // The nearest grid has as many taps as the area has ideal pixels.
         TapStage::Area => (plan.ideal.scale(&plan.camera).ceil() as u32).max(2),
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
     };
@@ -125,49 +125,50 @@ fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
             Silhouettes::Plain
         },
         frames_per_ideal: 1,
-        max_error_dn: ANY_DN,
+        max_error_dn: NO_TOLERANCE_DN,
         ..quality.clone()
     }
 }
 
-/// A tolerance that chooses nothing.
-const ANY_DN: f64 = 255.0;
+/// A tolerance that every frame keeps.
+const NO_TOLERANCE_DN: f64 = 255.0;
 
 /// One row of the ablation.
 #[derive(Clone, Debug, Serialize)]
 pub struct AblationRow {
-    /// What is left out.
+    /// Effects that are left out.
     pub without: String,
     /// Milliseconds a frame, median of the rounds.
     pub ms_per_frame_p50: f64,
-    /// Processor milliseconds a frame, median; null where it is not known.
+    /// Processor milliseconds a frame, median of the rounds; null where it is not known.
     pub cpu_ms_per_frame: Option<f64>,
-    /// Difference to the whole camera in the same round, quartiles, ms; null for the copy, which is measured
-    /// apart.
+    /// Quartiles of the differences to the full camera in the same rounds, ms; null for the picture copy,
+    /// which is measured separately.
     pub to_full_ms: Option<[f64; 3]>,
-    /// The same three of frames that are sampled as the plan samples the whole camera's.
+    /// Milliseconds a frame with the full camera's sampling, median of the rounds.
     pub alike_ms_per_frame_p50: Option<f64>,
-    /// See above.
+    /// Processor milliseconds a frame with the full camera's sampling, median; null where it is not known.
     pub alike_cpu_ms_per_frame: Option<f64>,
-    /// See above.
+    /// Quartiles of the differences to the full camera, all with its sampling, ms.
     pub alike_to_full_ms: Option<[f64; 3]>,
 }
 
-/// Times of a camera without each effect, without more and more of them, without any over a picture that is
-/// kept, and of a bare copy.
+/// Measures a camera without each effect, without more and more of them, without any over a fixed ideal
+/// frame, and the copy of a picture.
 ///
 /// # Errors
-/// Whatever the renderer meets.
+/// Any error of rendering.
 pub fn measure(
     engine: &Engine,
     full: &Arc<Sequence>,
-    effort: Effort,
+    limits: RoundLimits,
 ) -> Result<Vec<AblationRow>, BenchError> {
-    let mut names = vec!["nothing: the whole camera".to_owned()];
-    let mut variants = vec![(full.clone(), false)];
+    let mut names = vec!["nothing: the full camera".to_owned()];
+    let timed = |sequence, is_still| TimedSequence { engine, sequence, is_still };
+    let mut variants = vec![timed(full.clone(), false)];
     for effect in EFFECTS {
         names.push(effect.name().to_owned());
-        variants.push((without(full, &[effect])?, false));
+        variants.push(timed(without(full, &[effect])?, false));
     }
     for count in 2..=EFFECTS.len() {
         let all = count == EFFECTS.len();
@@ -179,16 +180,16 @@ pub fn measure(
         } else {
             format!("... and {last}")
         });
-        variants.push((without(full, &EFFECTS[..count])?, false));
+        variants.push(timed(without(full, &EFFECTS[..count])?, false));
     }
-    names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());
-    variants.push((without(full, &EFFECTS)?, true));
-    let planned = times(engine, &variants, effort)?;
+    names.push("a perfect camera that stands still: its ideal frame is drawn once".to_owned());
+    variants.push(timed(without(full, &EFFECTS)?, true));
+    let planned = times(&variants, limits)?;
     let plan =
         Planner::new(full.clone(), &[Channel::Color], MAX_SIDE_PX).and_then(|planner| planner.plan(FRAME));
     let alike = match &plan {
-        Ok(plan) => times(engine, &alike(&variants, plan), effort)?.into_iter().map(Some).collect(),
-        // The renderer has made it: this cannot be.
+        Ok(plan) => times(&sampled_alike(&variants, plan), limits)?.into_iter().map(Some).collect(),
+        // Does not happen: the renderer has rendered this frame.
         Err(_) => vec![None; planned.len()],
     };
     let full_alike = alike.first().cloned().flatten();
@@ -200,29 +201,25 @@ pub fn measure(
         .collect();
     if let Some(gpu) = engine.gpu() {
         let rounds = planned[0].wall_ms.len().max(3);
-        let copy = blit::measure(gpu, full.scenario.camera.size_px, rounds, effort.burst)?;
+        let copy = frame_copy::measure(gpu, full.scenario.camera.size_px, rounds, limits.burst)?;
         let name = "all: a finished picture copied on the gpu and to memory";
         rows.push(row(name.to_owned(), &copy, None, None));
     }
     Ok(rows)
 }
 
-fn times(
-    engine: &Engine,
-    variants: &[(Arc<Sequence>, bool)],
-    effort: Effort,
-) -> Result<Vec<Times>, BenchError> {
-    Ok(rounds::measure(engine, variants, effort)?.into_iter().map(|measured| measured.times).collect())
+fn times(variants: &[TimedSequence<'_>], limits: RoundLimits) -> Result<Vec<Times>, BenchError> {
+    Ok(rounds::measure(variants, limits)?.into_iter().map(|measured| measured.times).collect())
 }
 
-/// The same, sampled as `plan` is.
-fn alike(variants: &[(Arc<Sequence>, bool)], plan: &FramePlan) -> Vec<(Arc<Sequence>, bool)> {
-    let held = |(sequence, still): &(Arc<Sequence>, bool)| {
-        let mut sequence = (**sequence).clone();
-        sequence.scenario.quality = sampled_as(plan, &sequence.scenario.quality);
-        (Arc::new(sequence), *still)
+/// The variants with the sampling of one plan.
+fn sampled_alike<'a>(variants: &[TimedSequence<'a>], plan: &FramePlan) -> Vec<TimedSequence<'a>> {
+    let with_sampling = |variant: &TimedSequence<'a>| {
+        let mut sequence = (*variant.sequence).clone();
+        sequence.scenario.quality = with_sampling_of(plan, &sequence.scenario.quality);
+        TimedSequence { sequence: Arc::new(sequence), ..*variant }
     };
-    variants.iter().map(held).collect()
+    variants.iter().map(with_sampling).collect()
 }
 
 fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times, &Times)>) -> AblationRow {
@@ -246,7 +243,7 @@ mod tests {
     use crate::cases::cases;
 
     #[test]
-    fn a_camera_without_anything_is_perfect() {
+    fn camera_without_all_effects_is_perfect() {
         let cases = cases().expect("cases");
         let full = &cases.iter().find(|case| case.name == "all-effects").expect("the case").sequence;
         let bare = without(full, &EFFECTS).expect("a mount");
@@ -261,9 +258,9 @@ mod tests {
                 && camera.photometric.vignette.is_none()
                 && bare.vignette.is_none()
         );
-        // The path is the platform's own again.
+        // Without vibration the path is that of the platform.
         assert_eq!(bare.path.highest_vibration_hz(), 0.0);
-        // Each effect is there to be left out.
+        // The case has each effect.
         for effect in EFFECTS {
             let one = without(full, &[effect]).expect("a mount");
             assert!(one.scenario != full.scenario, "{effect:?}");

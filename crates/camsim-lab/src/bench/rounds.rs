@@ -1,13 +1,12 @@
 //! Times of several variants, measured in turn.
 //!
-//! A machine is never quite idle, so what is compared is measured in the same rounds: each round renders a
-//! burst of frames with every variant. A time a frame is that of a burst, two frames in flight, divided by
-//! its frames: plan, poses, passes and read-back are in it, files are not. What the frames of a burst share,
-//! such as one ideal frame, is planned and drawn anew in each.
+//! Other programs disturb measurements, so variants are compared within rounds: each round renders a burst of
+//! frames with every variant. The time of a frame is that of a burst, two frames in flight, divided by the
+//! number of its frames: it contains plan, poses, passes and read-back, no files. What the frames of a burst
+//! share, such as one ideal frame, is planned and drawn anew in each burst.
 //!
-//! The time for all of it is shared out evenly: a variant leaves when it has used its share, so that slow
-//! ones have few rounds and quick ones many. Rounds that two variants have in common are the first ones of
-//! both.
+//! All variants have equal shares of the time budget. A variant leaves when its share is used, so slow ones
+//! have few rounds and fast ones many. The common rounds of two variants are the first rounds of both.
 
 use std::{
     convert::Infallible,
@@ -21,68 +20,78 @@ use camsim_engine::{Engine, Finished, Session};
 use super::BenchError;
 use crate::timing::{ms, processor_ms, quantile, quartiles};
 
-/// A frame that takes longer is measured by itself.
-pub const SLOW: Duration = Duration::from_secs(1);
+/// Time of a frame above which a burst has one frame only.
+const SLOW_FRAME: Duration = Duration::from_secs(1);
 
-/// How long to measure.
+/// The frame whose picture is compared with the truth.
+pub const FRAME: u64 = 1;
+
+/// Numbers of rounds, and the time for them.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
-    /// Frames of a burst: enough for two in flight to pay. A frame that takes longer than [`SLOW`] is a burst
-    /// of its own: what overlaps is little beside it.
+pub struct RoundLimits {
+    /// Frames in a burst: enough that two in flight overlap. Frames that take longer than a second are
+    /// measured one by one, since little overlaps.
     pub burst: u64,
-    /// Rounds of each variant at least, whatever they take.
+    /// Smallest number of rounds of each variant, whatever they take.
     pub min_rounds: usize,
-    /// Rounds at most.
+    /// Largest number of rounds.
     pub max_rounds: usize,
-    /// For all variants together; each has the same share, and leaves when it has used it.
+    /// Time for all variants together.
     pub budget: Duration,
 }
 
-impl Effort {
-    /// Whether one of `variants` that has spent `spent_ms` in its rounds goes on to round `round`, counted
-    /// from 0.
-    fn goes_on(&self, round: usize, spent_ms: f64, variants: usize) -> bool {
+impl RoundLimits {
+    /// Whether a variant takes part in round `round`, counted from 0, after `spent_ms` in earlier rounds.
+    fn has_round(&self, round: usize, spent_ms: f64, variants: usize) -> bool {
         round < self.min_rounds || (round < self.max_rounds && spent_ms * (variants as f64) < ms(self.budget))
     }
 }
 
-/// What was measured of one variant.
+/// A sequence on a renderer.
+#[derive(Clone, Debug)]
+pub struct TimedSequence<'a> {
+    /// The renderer.
+    pub engine: &'a Engine,
+    /// The sequence.
+    pub sequence: Arc<Sequence>,
+    /// Whether frame 0 is rendered over and over, so that its ideal frame is drawn once.
+    pub is_still: bool,
+}
+
+/// Measurements of one variant.
 #[derive(Debug)]
 pub struct Measured {
-    /// Its times.
+    /// Times of all rounds.
     pub times: Times,
-    /// The frame [`FRAME`] (of a camera that stands still, frame 0).
+    /// Frame [`FRAME`], or frame 0 if the variant is still.
     pub finished: Option<Finished>,
 }
 
-/// The frame that is handed out.
-pub const FRAME: u64 = 1;
-
-/// Milliseconds a frame of one variant, an entry a round.
+/// Milliseconds per frame of one variant, one entry per round.
 #[derive(Clone, Debug, Default)]
 pub struct Times {
-    /// By the clock.
+    /// Wall-clock time.
     pub wall_ms: Vec<f64>,
-    /// On processors, over all threads; empty where it is not known.
+    /// Processor time over all threads; empty where it is not known.
     pub processor_ms: Vec<f64>,
-    /// Session and first frames: upload, shader compilation, lens map; seconds.
+    /// Time to open the session and render the first frame (upload, shader compilation, lens map), seconds.
     pub start_s: f64,
 }
 
 impl Times {
-    /// Median and 99th percentile of the bursts, milliseconds a frame.
+    /// Median and 99th percentile of the wall-clock time, milliseconds per frame.
     #[must_use]
     pub fn p50_p99_ms(&self) -> [f64; 2] {
         [0.5, 0.99].map(|part| quantile(&self.wall_ms, part))
     }
 
-    /// Median processor time a frame, milliseconds.
+    /// Median processor time per frame, milliseconds.
     #[must_use]
     pub fn processor_p50_ms(&self) -> Option<f64> {
         (!self.processor_ms.is_empty()).then(|| quantile(&self.processor_ms, 0.5))
     }
 
-    /// This variant's time over another's in the rounds that both were in.
+    /// Ratios of this variant's wall-clock times to another's in their common rounds.
     #[must_use]
     pub fn ratios(&self, other: &Self) -> Vec<f64> {
         self.wall_ms.iter().zip(&other.wall_ms).map(|(own, other)| own / other).collect()
@@ -90,12 +99,12 @@ impl Times {
 
     /// Quartiles of [`Self::ratios`].
     #[must_use]
-    pub fn ratio_to(&self, other: &Self) -> [f64; 3] {
+    pub fn ratio_quartiles(&self, other: &Self) -> [f64; 3] {
         quartiles(&self.ratios(other))
     }
 }
 
-/// Renders frames and gives the last.
+/// Renders frames and returns the last one.
 fn render(
     session: &mut Session<'_>,
     frames: impl IntoIterator<Item = u64>,
@@ -108,53 +117,49 @@ fn render(
     Ok(last)
 }
 
-/// Times and a frame of `variants`, in their order. Each renders the frames of its sequence over and over;
-/// those of which `still` says so render one frame, so that its ideal frame is drawn once and kept.
+/// Measures `variants`; the results are in their order. Each variant renders the frames of its sequence over
+/// and over.
 ///
 /// # Errors
-/// Whatever the renderer meets.
-pub fn measure(
-    engine: &Engine,
-    variants: &[(Arc<Sequence>, bool)],
-    effort: Effort,
-) -> Result<Vec<Measured>, BenchError> {
+/// Any error of rendering.
+pub fn measure(variants: &[TimedSequence<'_>], limits: RoundLimits) -> Result<Vec<Measured>, BenchError> {
     let mut running = Vec::new();
-    for (sequence, still) in variants {
+    for TimedSequence { engine, sequence, is_still } in variants {
         let begin = Instant::now();
         let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color])?;
-        let before_first = begin.elapsed();
+        let session_opened = begin.elapsed();
         // The first dispatch of a pipeline compiles it.
-        let finished = render(&mut session, [if *still { 0 } else { FRAME }])?;
-        let burst = if begin.elapsed() - before_first > SLOW { 1 } else { effort.burst };
+        let finished = render(&mut session, [if *is_still { 0 } else { FRAME }])?;
+        let burst = if begin.elapsed() - session_opened > SLOW_FRAME { 1 } else { limits.burst };
         let times = Times { start_s: begin.elapsed().as_secs_f64(), ..Times::default() };
-        let frames = (0..).map(move |k| if *still { 0 } else { k % sequence.frames.max(1) });
-        running.push((session, frames, *still, burst, Measured { times, finished }));
+        let frames = (0..).map(move |k| if *is_still { 0 } else { k % sequence.frames.max(1) });
+        running.push((session, frames, *is_still, burst, Measured { times, finished }));
     }
     let count = running.len();
-    for round in 0..effort.max_rounds {
-        let mut any = false;
-        // Each variant takes each place in the round once in a while.
+    for round in 0..limits.max_rounds {
+        let mut is_finished = true;
+        // The order rotates from round to round.
         for place in 0..count {
-            let (session, frames, still, burst, Measured { times, .. }) =
+            let (session, frames, is_still, burst, Measured { times, .. }) =
                 &mut running[(place + round) % count];
-            let a_frame = |sum_ms: f64| sum_ms / *burst as f64;
-            if !effort.goes_on(round, *burst as f64 * times.wall_ms.iter().sum::<f64>(), count) {
+            let per_frame = |burst_ms: f64| burst_ms / *burst as f64;
+            if !limits.has_round(round, *burst as f64 * times.wall_ms.iter().sum::<f64>(), count) {
                 continue;
             }
-            any = true;
+            is_finished = false;
             let frames: Vec<u64> = frames.take(*burst as usize).collect();
-            if !*still {
+            if !*is_still {
                 session.forget();
             }
-            let busy = processor_ms();
+            let processor_begin_ms = processor_ms();
             let begin = Instant::now();
             render(session, frames)?;
-            times.wall_ms.push(a_frame(ms(begin.elapsed())));
+            times.wall_ms.push(per_frame(ms(begin.elapsed())));
             times
                 .processor_ms
-                .extend(busy.zip(processor_ms()).map(|(before, after)| a_frame(after - before)));
+                .extend(processor_begin_ms.zip(processor_ms()).map(|(begin, end)| per_frame(end - begin)));
         }
-        if !any {
+        if is_finished {
             break;
         }
     }
@@ -166,20 +171,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slow_variants_leave_early_and_quick_ones_stay() {
-        let effort = Effort { burst: 2, min_rounds: 3, max_rounds: 9, budget: Duration::from_secs(10) };
-        let rounds = |ms_a_round: f64| {
-            (0..).take_while(|&round| effort.goes_on(round, ms_a_round * round as f64, 10)).count()
+    fn slow_variants_have_fewer_rounds() {
+        let limits = RoundLimits { burst: 2, min_rounds: 3, max_rounds: 9, budget: Duration::from_secs(10) };
+        let rounds = |round_ms: f64| {
+            (0..).take_while(|&round| limits.has_round(round, round_ms * round as f64, 10)).count()
         };
-        // A second each: 3 rounds of 2 s all the same, 4 rounds of 300 ms, no more than 9 of 10 ms.
+        // The share is one second: 3 rounds of 2 s all the same, 4 rounds of 300 ms, at most 9 of 10 ms.
         assert_eq!([2000.0, 300.0, 10.0].map(rounds), [3, 4, 9]);
     }
 
     #[test]
-    fn ratios_are_of_the_rounds_that_both_were_in() {
+    fn ratios_are_taken_over_common_rounds() {
         let times = |wall_ms: &[f64]| Times { wall_ms: wall_ms.to_vec(), ..Times::default() };
-        let [slow, quick] = [times(&[20.0, 40.0, 20.0]), times(&[10.0, 20.0, 10.0, 500.0, 500.0])];
-        assert_eq!(slow.ratio_to(&quick), [2.0; 3]);
-        assert_eq!(quick.ratio_to(&slow), [0.5; 3]);
+        let [slow, fast] = [times(&[20.0, 40.0, 20.0]), times(&[10.0, 20.0, 10.0, 500.0, 500.0])];
+        assert_eq!(slow.ratio_quartiles(&fast), [2.0; 3]);
+        assert_eq!(fast.ratio_quartiles(&slow), [0.5; 3]);
     }
 }

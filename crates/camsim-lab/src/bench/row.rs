@@ -1,12 +1,12 @@
-//! A point of the table.
+//! A row of the table.
 
 use camsim_core::reference::CoordErrors;
 use camsim_plan::FramePlan;
 use serde::Serialize;
 
-use super::{knobs::Family, rounds::Times, truth::PictureErrors};
+use super::{methods::MethodFamily, rounds::Times, truth::PictureErrors};
 
-/// One point of the table. The first twelve are the stable ones.
+/// One row of the table: a case with a method. The first twelve fields are stable.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Name of the case.
@@ -19,63 +19,67 @@ pub struct Row {
     pub height: u32,
     /// Milliseconds a frame, median of the rounds.
     pub ms_per_frame_p50: f64,
-    /// The same, 99th percentile.
+    /// Milliseconds a frame, 99th percentile of the rounds.
     pub ms_per_frame_p99: f64,
     /// Processor milliseconds a frame over all threads, median; null where it is not known.
     pub cpu_ms_per_frame: Option<f64>,
-    /// RMS error of the source coordinates, px; null where it was not measured.
+    /// RMS source error, px; null if not measured.
     pub coord_rms_px: Option<f64>,
-    /// 99th percentile.
+    /// 99th percentile of the source error, px.
     pub coord_p99_px: Option<f64>,
-    /// Largest.
+    /// Largest source error, px.
     pub coord_max_px: Option<f64>,
-    /// Of linear values with peak 1 against the oracle's picture.
+    /// PSNR of linear values with peak 1 against the reference picture.
     pub psnr_db: Option<f64>,
-    /// The plan's own bound on `coord_p99_px`, px.
+    /// Predicted source error, px.
     pub predicted_px: Option<f64>,
-    /// What is forced, or `auto` and the tolerance.
+    /// Name of the method: what is forced, or `auto` and the tolerance.
     pub knob: String,
-    /// The row of this case whose plans are the same in every frame, so that its times and errors are this
-    /// row's too; null if none is above it.
+    /// Name of a row above with the same plans in every frame, whose times and errors are repeated here; null
+    /// without one.
     pub same_as: Option<String>,
-    /// What the row varies.
+    /// Kind of method.
     #[serde(skip)]
-    pub family: Family,
-    /// Kind of the case.
+    pub family: MethodFamily,
+    /// Group of the case.
     pub group: &'static str,
     /// Time over that of the case's default row in the same round: quartiles.
     pub time_to_default: Option<[f64; 3]>,
-    /// PSNR of pixels within 3 px of a silhouette; null without silhouettes.
+    /// PSNR within 3 px of silhouettes; null without silhouettes.
     pub edge_psnr_db: Option<f64>,
-    /// RMS of pixels farther than that from any silhouette, px.
+    /// RMS source error away from silhouettes, px.
     pub smooth_rms_px: Option<f64>,
-    /// 99th percentile of the same: what `predicted_px` bounds.
+    /// 99th percentile of the source error away from silhouettes, px, which `predicted_px` bounds.
     pub smooth_p99_px: Option<f64>,
     /// Share of the compared pixels within 3 px of a silhouette.
     pub edge_share: Option<f64>,
-    /// Pixels compared: coordinates, picture.
+    /// Numbers of pixels compared: coordinates, picture.
     pub compared: [u64; 2],
-    /// Pixels with a source that the oracle has none for, and the other way round.
+    /// Number of valid pixels that have no source in the reference.
     pub falsely_valid: u64,
-    /// See above.
+    /// Number of invalid pixels that have a source in the reference.
     pub missing: u64,
-    /// No row of this case and size has both less time and less coordinate error.
+    /// Whether the row is on the Pareto front of time and RMS source error.
     pub coord_front: bool,
-    /// The same with PSNR.
+    /// Whether the row is on the Pareto front of time and PSNR.
     pub image_front: bool,
-    /// Opening the session and its first two frames, seconds.
+    /// Time to open the session and render its first frame, seconds.
     pub start_s: f64,
-    /// Rounds that the times are of.
+    /// Number of rounds.
     pub rounds: usize,
-    /// What the plan does.
+    /// Passes of the plan, in words.
     pub passes: Vec<String>,
-    /// Each round's times.
+    /// Times of every round.
     #[serde(skip)]
     pub times: Times,
+    /// Median milliseconds a frame on the renderers of [`super::Options::compared`]; `None` without an
+    /// adapter.
+    #[serde(skip)]
+    pub compared_ms: Vec<Option<f64>>,
 }
 
 impl Row {
-    /// One that nothing is known of.
+    /// A row without measurements.
     pub(super) fn empty(case: &str, [width, height]: [u32; 2]) -> Self {
         Self {
             case: case.to_owned(),
@@ -92,7 +96,7 @@ impl Row {
             predicted_px: None,
             knob: String::new(),
             same_as: None,
-            family: Family::Tolerance,
+            family: MethodFamily::Tolerance,
             group: "",
             time_to_default: None,
             edge_psnr_db: None,
@@ -108,13 +112,14 @@ impl Row {
             rounds: 0,
             passes: Vec::new(),
             times: Times::default(),
+            compared_ms: Vec::new(),
         }
     }
 
     pub(super) fn set_times(&mut self, times: &Times, default: Option<&Times>) {
         [self.ms_per_frame_p50, self.ms_per_frame_p99] = times.p50_p99_ms();
         self.cpu_ms_per_frame = times.processor_p50_ms();
-        self.time_to_default = default.map(|default| times.ratio_to(default));
+        self.time_to_default = default.map(|default| times.ratio_quartiles(default));
         self.start_s = times.start_s;
         self.rounds = times.wall_ms.len();
         self.times = times.clone();
@@ -129,7 +134,7 @@ impl Row {
         self.coord_rms_px = Some(coords.all.rms_px);
         self.coord_p99_px = Some(coords.all.p99_px);
         self.coord_max_px = Some(coords.all.max_px);
-        // No pixel away from silhouettes says nothing of them.
+        // Without a pixel away from silhouettes there is no such error.
         let smooth = Some(coords.smooth).filter(|smooth| smooth.count > 0);
         self.smooth_rms_px = smooth.map(|smooth| smooth.rms_px);
         self.smooth_p99_px = smooth.map(|smooth| smooth.p99_px);
@@ -145,13 +150,13 @@ impl Row {
     }
 }
 
-/// A row that this version cannot render.
+/// A method that this version cannot render.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refused {
-    /// The case.
+    /// Name of the case.
     pub case: String,
-    /// The row.
+    /// Name of the method.
     pub knob: String,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }

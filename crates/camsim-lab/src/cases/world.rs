@@ -1,4 +1,4 @@
-//! What the cases look at: ground, hills and houses from a hash, the same on every machine.
+//! Procedural scenes: ground, hills and houses from a hash, the same on every machine.
 
 use std::sync::Arc;
 
@@ -9,42 +9,43 @@ use camsim_core::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Metres that one copy of the ground's picture covers.
+/// Width of one copy of the ground texture, metres.
 const GROUND_M: f64 = 768.0;
-/// Its side in pixels: half a metre each, what a pixel of f = 307.6 px sees from 154 m.
+/// Side of the ground texture, pixels: half a metre each, as a camera with f = 307.6 px resolves from 154 m.
 const GROUND_PX: u32 = 1536;
-/// Metres and pixels of the picture on houses.
+/// Width of one copy of the facade texture, metres.
 const FACADE_M: f64 = 64.0;
+/// Side of the facade texture, pixels.
 const FACADE_PX: u32 = 512;
 /// Terrain cells along a side.
 const CELLS: u32 = 96;
 
-/// Pictures and relief that cases share, made once.
+/// Textures and relief, shared by all scenes.
 #[derive(Clone, Debug)]
 pub struct World {
     ground: Arc<Texture>,
     facade: Arc<Texture>,
-    /// Heights of the terrain's points about 0, in units of their standard deviation.
+    /// Heights of the grid points, with mean 0 and standard deviation 1.
     relief: Arc<Vec<f64>>,
 }
 
 impl World {
-    /// Everything from one seed.
+    /// Makes textures and relief from one seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        // Equal variance an octave is an amplitude spectrum of 1/f, as natural pictures have. Relief falls
-        // faster: hills, no needles.
+        // Textures have the amplitude spectrum of natural images, 1/f: equal variance in each octave. The
+        // relief falls faster, for smooth hills.
         let relief = fractal(CELLS, 2, CELLS / 4, 0.5, seed ^ 3);
         let points = CELLS + 1;
-        let at = |i: u32| f64::from(relief[((i / points % CELLS) * CELLS + i % points % CELLS) as usize]);
+        let height = |i: u32| f64::from(relief[((i / points % CELLS) * CELLS + i % points % CELLS) as usize]);
         Self {
-            ground: Arc::new(picture(GROUND_PX, seed ^ 1)),
-            facade: Arc::new(picture(FACADE_PX, seed ^ 2)),
-            relief: Arc::new((0..points * points).map(at).collect()),
+            ground: Arc::new(texture(GROUND_PX, seed ^ 1)),
+            facade: Arc::new(texture(FACADE_PX, seed ^ 2)),
+            relief: Arc::new((0..points * points).map(height).collect()),
         }
     }
 
-    /// Level ground at height 0, 6 km wide: one flat surface that fills the view.
+    /// Level ground at height 0, 6 km wide.
     #[must_use]
     pub fn plane(&self) -> Scene {
         const COPIES: f64 = 8.0;
@@ -56,10 +57,10 @@ impl World {
         Scene { meshes: vec![ground], sky_linear: [0.35, 0.55, 0.9], ..Scene::default() }
     }
 
-    /// Hills about height 0 with a standard deviation of `relief_m`, `width_m` wide.
+    /// Hills with mean height 0 and standard deviation `relief_m`, `width_m` wide.
     ///
     /// # Errors
-    /// A relief or width that makes no terrain.
+    /// Width or relief make no terrain.
     pub fn hills(&self, width_m: f64, relief_m: f64) -> Result<Scene, TerrainError> {
         let heights: Vec<f64> = self.relief.iter().map(|height| relief_m * height).collect();
         let terrain = Terrain::from_heights(
@@ -83,13 +84,14 @@ impl World {
     /// Houses on hills 768 m wide.
     ///
     /// # Errors
-    /// As [`Self::hills`].
+    /// The relief makes no terrain.
     pub fn town_on_hills(&self, half_m: f64, relief_m: f64) -> Result<Scene, TerrainError> {
         let mut scene = self.hills(GROUND_M, relief_m)?;
         let cell_m = GROUND_M / f64::from(CELLS);
         let index =
             |m: f64| ((m / cell_m + 0.5 * f64::from(CELLS)).round().clamp(0.0, f64::from(CELLS))) as u32;
-        // Five metres into the ground, so that no slope shows a house's underside. Row 0 is the north.
+        // Houses reach 5 m into the ground, so that no gap opens on slopes. Row 0 of the relief is in the
+        // north.
         let houses = self.houses(half_m, 5.0, &|north_m, east_m| {
             relief_m * self.relief[((CELLS - index(north_m)) * (CELLS + 1) + index(east_m)) as usize]
         });
@@ -97,9 +99,10 @@ impl World {
         Ok(scene)
     }
 
-    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, turned and moved at
-    /// random. `ground_m` is the height of the ground at (north, east).
-    fn houses(&self, half_m: f64, sunk_m: f64, ground_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
+    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, with random position
+    /// and rotation, down to `depth_m` below the ground. `ground_m` is the height of the ground at (north,
+    /// east).
+    fn houses(&self, half_m: f64, depth_m: f64, ground_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
         const PLOT_M: f64 = 40.0;
         let mut shape = Shape::default();
         let plots = (half_m / PLOT_M).floor() as i32;
@@ -109,16 +112,16 @@ impl World {
                 .map(|plots| plots * PLOT_M);
             let half = [4.0 + 4.0 * random(2), 4.0 + 4.0 * random(3)];
             let ground_m = ground_m(centre[0], centre[1]);
-            let heights_m = [ground_m - sunk_m, ground_m + 6.0 + 14.0 * random(4)];
+            let heights_m = [ground_m - depth_m, ground_m + 6.0 + 14.0 * random(4)];
             push_box(&mut shape, centre, half, random(5) * std::f64::consts::PI, heights_m);
         }
         Mesh::new(shape.vertices, shape.indices, self.facade.clone(), DVec3::ZERO, Wrap::Repeat)
     }
 }
 
-/// Four walls and a roof from `heights_m[0]` to `heights_m[1]`.
-fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f64, heights_m: [f64; 2]) {
-    let (sin, cos) = turn_rad.sin_cos();
+/// Adds a box without a bottom, from `heights_m[0]` to `heights_m[1]`.
+fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], rotation_rad: f64, heights_m: [f64; 2]) {
+    let (sin, cos) = rotation_rad.sin_cos();
     let corner = |a: f64, b: f64| {
         let (x, y) = (a * half_m[0], b * half_m[1]);
         [centre_m[0] + x * cos - y * sin, centre_m[1] + x * sin + y * cos]
@@ -128,25 +131,25 @@ fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f
     let mut face = |points: [[f64; 3]; 4], size_m: [f64; 2]| {
         let first = shape.vertices.len() as u32;
         for (point, [a, b]) in points.into_iter().zip([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) {
-            // Each house has its own part of the picture.
+            // Each house has its own part of the texture.
             let uv =
                 [a * size_m[0] + centre_m[0], b * size_m[1] + centre_m[1]].map(|m| (m / FACADE_M) as f32);
             shape.vertices.push(MeshVertex::new(point.map(|m| m as f32), uv));
         }
         shape.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
     };
-    let at = |[n, e]: [f64; 2], height_m: f64| [n, e, -height_m];
-    face(corners.map(|c| at(c, top_m)), [2.0 * half_m[1], 2.0 * half_m[0]]);
+    let point = |[n, e]: [f64; 2], height_m: f64| [n, e, -height_m];
+    face(corners.map(|c| point(c, top_m)), [2.0 * half_m[1], 2.0 * half_m[0]]);
     for k in 0..4 {
         let (a, b) = (corners[k], corners[(k + 1) % 4]);
         face(
-            [at(a, top_m), at(b, top_m), at(b, bottom_m), at(a, bottom_m)],
+            [point(a, top_m), point(b, top_m), point(b, bottom_m), point(a, bottom_m)],
             [2.0 * half_m[(k + 1) % 2], top_m - bottom_m],
         );
     }
 }
 
-/// A vignette: cos^4 of the angle off the axis of a 640x480 camera with f = 400 px.
+/// A vignette map: cos^4 of the angle to the axis of a 640x480 camera with f = 400 px.
 #[must_use]
 pub fn vignette() -> GrayImage {
     let [width, height] = [160_u32, 120];
@@ -158,8 +161,8 @@ pub fn vignette() -> GrayImage {
     GrayImage { size_px: [width, height], values: (0..width * height).map(value).collect() }
 }
 
-/// A picture with a 1/f spectrum of brightness and a fainter one of hue; it repeats without a seam.
-fn picture(side: u32, seed: u64) -> Texture {
+/// A periodic texture with a 1/f spectrum of brightness and weaker variations of hue.
+fn texture(side: u32, seed: u64) -> Texture {
     let brightness = fractal(side, 3, side / 2, 1.0, seed);
     let hue = fractal(side, 3, side / 8, 1.0, !seed);
     let byte = |value: f32| (118.0 + 42.0 * value).clamp(2.0, 253.0) as u8;
@@ -170,8 +173,8 @@ fn picture(side: u32, seed: u64) -> Texture {
     Texture { size_px: [side, side], rgba8: pixels.collect(), encoding: Encoding::Srgb }
 }
 
-/// Periodic noise of mean 0 and standard deviation 1: octaves of smoothly interpolated lattices from
-/// `coarsest` to `finest` periods a side, each `persistence` times as strong as the one before.
+/// Periodic fractal noise with mean 0 and standard deviation 1: octaves of value noise with `coarsest` to
+/// `finest` periods per side, each `persistence` times as strong as the one before.
 fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -> Vec<f32> {
     let mut sum = vec![0.0_f32; (side * side) as usize];
     let (mut periods, mut amplitude) = (coarsest.max(1), 1.0_f64);
@@ -179,20 +182,20 @@ fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -
         let lattice: Vec<f32> = (0..periods * periods)
             .map(|i| (2.0 * unit(hash(seed, u64::from(periods) << 32 | u64::from(i))) - 1.0) as f32)
             .collect();
-        let place = |k: u32| {
-            let at = f64::from(k) * f64::from(periods) / f64::from(side);
-            let t = at.fract();
-            (at as u32 % periods, (at as u32 + 1) % periods, (t * t * (3.0 - 2.0 * t)) as f32)
+        let lattice_position = |k: u32| {
+            let position = f64::from(k) * f64::from(periods) / f64::from(side);
+            let t = position.fract();
+            (position as u32 % periods, (position as u32 + 1) % periods, (t * t * (3.0 - 2.0 * t)) as f32)
         };
         sum.par_chunks_exact_mut(side as usize).enumerate().for_each(|(row, values)| {
-            let (y0, y1, ty) = place(row as u32);
+            let (y0, y1, ty) = lattice_position(row as u32);
             for (column, value) in values.iter_mut().enumerate() {
-                let (x0, x1, tx) = place(column as u32);
-                let along = |y: u32| {
+                let (x0, x1, tx) = lattice_position(column as u32);
+                let interpolated = |y: u32| {
                     let (a, b) = (lattice[(y * periods + x0) as usize], lattice[(y * periods + x1) as usize]);
                     a + tx * (b - a)
                 };
-                let (top, bottom) = (along(y0), along(y1));
+                let (top, bottom) = (interpolated(y0), interpolated(y1));
                 *value += amplitude as f32 * (top + ty * (bottom - top));
             }
         });
@@ -215,7 +218,7 @@ pub(crate) fn hash(seed: u64, counter: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// [0, 1).
+/// A number in [0, 1) from random bits.
 fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
@@ -225,20 +228,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_repeats_without_a_seam_and_has_the_spectrum_asked_for() {
+    fn noise_is_periodic_and_has_the_given_spectrum() {
         let side = 128;
         let noise = fractal(side, 2, 32, 1.0, 7);
         assert_eq!(noise, fractal(side, 2, 32, 1.0, 7));
-        let at = |x: u32, y: u32| f64::from(noise[(y % side * side + x % side) as usize]);
-        // Mean square difference at a lag grows with the lag for every octave that it does not yet span, and
-        // is about 2 beyond.
+        let value = |x: u32, y: u32| f64::from(noise[(y % side * side + x % side) as usize]);
+        // The mean square difference at a lag grows with the lag, up to about 2 beyond the longest period.
         let structure = |lag: u32| {
             (0..side * side)
-                .map(|i| (at(i % side + lag, i / side) - at(i % side, i / side)).powi(2))
+                .map(|i| (value(i % side + lag, i / side) - value(i % side, i / side)).powi(2))
                 .sum::<f64>()
                 / f64::from(side * side)
         };
-        let seam = (0..side).map(|y| (at(0, y) - at(side - 1, y)).powi(2)).sum::<f64>() / f64::from(side);
+        let seam =
+            (0..side).map(|y| (value(0, y) - value(side - 1, y)).powi(2)).sum::<f64>() / f64::from(side);
         assert!(seam < 2.0 * structure(1), "{seam} {}", structure(1));
         let [one, four, sixteen] = [1, 4, 16].map(structure);
         assert!(
@@ -248,18 +251,19 @@ mod tests {
     }
 
     #[test]
-    fn houses_stand_on_the_hills_and_are_closed() {
+    fn houses_stand_on_the_hills() {
         let world = World::new(5);
         let scene = world.town_on_hills(120.0, 10.0).expect("a terrain");
         let (terrain, houses) = (scene.terrain.expect("hills"), &scene.meshes[0]);
         assert_eq!(houses.shape.indices.len() % 30, 0);
         let mut above = 0;
         for corners in houses.shape.vertices.chunks_exact(20) {
-            // The roof comes first.
+            // The roof is the first face.
             let roof = DVec3::from_array(corners[0].position_m.map(f64::from));
-            let from = DVec3::new(roof.x, roof.y, -500.0);
+            let origin = DVec3::new(roof.x, roof.y, -500.0);
             let ground =
-                terrain.intersect(from, DVec3::Z, f64::INFINITY).expect("ground under every house").t - 500.0;
+                terrain.intersect(origin, DVec3::Z, f64::INFINITY).expect("ground under every house").t
+                    - 500.0;
             above += u32::from(roof.z < ground);
             assert!(
                 corners.iter().any(|c| f64::from(c.position_m[2]) > ground),

@@ -1,71 +1,70 @@
-//! Finding dark circles in a picture, as somebody without the truth must.
+//! Detection of dark circles in a picture, without use of the ground truth.
 
 use camsim_core::{frame::RenderedFrame, reference::ErrorStats};
 use glam::DVec2;
 
-use super::pattern::Seen;
+use super::circle_grid::CircleImage;
 
-/// Linear light that separates black circles from the white target.
+/// Linear value that separates black circles from the white target.
 const THRESHOLD: f32 = 0.5;
-/// Pixels around what lies below the threshold that still belong to the circle: they carry its antialiased
-/// rim.
+/// Width of the antialiased rim around the pixels below the threshold.
 const RIM_PX: i32 = 2;
-/// Smallest area of a circle that counts, pixels.
+/// Smallest number of dark pixels of a circle.
 pub const LEAST_PX: usize = 12;
 
-/// A dark spot.
+/// A dark blob.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
-    /// Centre of its area, pixels.
+pub struct Blob {
+    /// Centroid of the area, pixels.
     pub centroid_px: DVec2,
-    /// Its area, square pixels.
+    /// Area, square pixels.
     pub area_px2: f64,
 }
 
-/// All dark spots that touch neither the border of the picture nor a pixel without a ray. A pixel that is
-/// half dark counts half, so that the centroid is that of the area, not of a staircase.
+/// All dark blobs that touch neither the border of the picture nor a pixel without a ray. Pixels are weighted
+/// by their darkness, so that centroids are accurate to a fraction of a pixel.
 #[must_use]
-pub fn spots(frame: &RenderedFrame) -> Vec<Spot> {
+pub fn detect_blobs(frame: &RenderedFrame) -> Vec<Blob> {
     let [width, height] = frame.size_px.map(|side| side as i32);
     let light = |x: i32, y: i32| {
-        let at = 4 * (y * width + x) as usize;
-        let [r, g, b, a] = [0, 1, 2, 3].map(|k| frame.color_rgba[at + k]);
+        let index = 4 * (y * width + x) as usize;
+        let [r, g, b, a] = [0, 1, 2, 3].map(|k| frame.color_rgba[index + k]);
         (a > 0.0).then_some((r + g + b) / 3.0)
     };
     let inside = |x: i32, y: i32| x >= 0 && y >= 0 && x < width && y < height;
-    let mut taken = vec![false; (width * height) as usize];
-    let mut found = Vec::new();
+    let mut visited = vec![false; (width * height) as usize];
+    let mut blobs = Vec::new();
     for start in 0..width * height {
         let seed = (start % width, start / width);
-        if taken[start as usize] || light(seed.0, seed.1).is_none_or(|value| value >= THRESHOLD) {
+        if visited[start as usize] || light(seed.0, seed.1).is_none_or(|value| value >= THRESHOLD) {
             continue;
         }
-        taken[start as usize] = true;
+        visited[start as usize] = true;
         let (mut core, mut next) = (vec![seed], 0);
         while let Some(&(x, y)) = core.get(next) {
             next += 1;
             for (x, y) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
                 if inside(x, y)
-                    && !taken[(y * width + x) as usize]
+                    && !visited[(y * width + x) as usize]
                     && light(x, y).is_some_and(|value| value < THRESHOLD)
                 {
-                    taken[(y * width + x) as usize] = true;
+                    visited[(y * width + x) as usize] = true;
                     core.push((x, y));
                 }
             }
         }
-        found.extend(spot(&core, &light, &inside));
+        blobs.extend(blob(&core, &light, &inside));
     }
-    found
+    blobs
 }
 
-/// Centroid over a core of dark pixels and its rim; `None` where picture or rays end too close by, or hardly
-/// anything is there.
-fn spot(
+/// The blob of a core of dark pixels with its rim; `None` if it touches the border or a pixel without a ray,
+/// or is too small.
+fn blob(
     core: &[(i32, i32)],
     light: &impl Fn(i32, i32) -> Option<f32>,
     inside: &impl Fn(i32, i32) -> bool,
-) -> Option<Spot> {
+) -> Option<Blob> {
     if core.len() < LEAST_PX {
         return None;
     }
@@ -92,40 +91,39 @@ fn spot(
         area += dark;
         moment += dark * (DVec2::new(f64::from(x), f64::from(y)) - origin);
     }
-    Some(Spot { centroid_px: origin + moment / area, area_px2: area })
+    Some(Blob { centroid_px: origin + moment / area, area_px2: area })
 }
 
-/// Circles found and missed in one picture.
+/// True circles of a picture, matched with detected blobs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Matches {
-    /// Where a circle must be, and the spot found there.
-    pub pairs: Vec<(Seen, Spot)>,
-    /// Circles wholly in view that were not found.
+pub struct CircleMatches {
+    /// Matched circles with their blobs.
+    pub pairs: Vec<(CircleImage, Blob)>,
+    /// Number of circles without a blob.
     pub missed: usize,
 }
 
-/// Gives each circle the spot in its place: nearer than half its size, of an area within a third of its own.
+/// Matches each circle with the nearest blob within half its radius whose area differs by less than a third.
 #[must_use]
-pub fn matches(seen: &[Seen], spots: &[Spot]) -> Matches {
-    let mut matches = Matches::default();
-    for circle in seen {
+pub fn match_circles(circles: &[CircleImage], blobs: &[Blob]) -> CircleMatches {
+    let mut matches = CircleMatches::default();
+    for circle in circles {
         let reach_px = 0.5 * (circle.area_px2 / std::f64::consts::PI).sqrt();
-        let fits = |spot: &&Spot| {
-            spot.centroid_px.distance(circle.centroid_px) < reach_px
-                && (spot.area_px2 / circle.area_px2 - 1.0).abs() < 0.34
+        let is_match = |blob: &&Blob| {
+            blob.centroid_px.distance(circle.centroid_px) < reach_px
+                && (blob.area_px2 / circle.area_px2 - 1.0).abs() < 0.34
         };
-        let distance = |spot: &&Spot| spot.centroid_px.distance(circle.centroid_px);
-        match spots.iter().filter(fits).min_by(|a, b| distance(a).total_cmp(&distance(b))) {
-            Some(spot) => matches.pairs.push((*circle, *spot)),
+        let distance = |blob: &&Blob| blob.centroid_px.distance(circle.centroid_px);
+        match blobs.iter().filter(is_match).min_by(|a, b| distance(a).total_cmp(&distance(b))) {
+            Some(blob) => matches.pairs.push((*circle, *blob)),
             None => matches.missed += 1,
         }
     }
     matches
 }
 
-impl Matches {
-    /// Statistics of [`Matches::errors_px`]; not a number where nothing was found, which is not an error of
-    /// 0.
+impl CircleMatches {
+    /// Statistics of [`CircleMatches::errors_px`]; NaN without matched circles.
     #[must_use]
     pub fn stats(&self) -> ErrorStats {
         match self.pairs.is_empty() {
@@ -134,10 +132,10 @@ impl Matches {
         }
     }
 
-    /// Distance of each spot from its circle's true centroid, pixels.
+    /// Distance of each blob from the true centroid of its circle, pixels.
     #[must_use]
     pub fn errors_px(&self) -> Vec<f64> {
-        self.pairs.iter().map(|(seen, spot)| seen.centroid_px.distance(spot.centroid_px)).collect()
+        self.pairs.iter().map(|(circle, blob)| circle.centroid_px.distance(blob.centroid_px)).collect()
     }
 }
 
@@ -145,15 +143,15 @@ impl Matches {
 mod tests {
     use super::*;
 
-    /// A white picture with dark discs, each pixel by its area.
+    /// A white picture with dark discs, integrated over each pixel.
     fn picture(discs: &[(DVec2, f64)]) -> RenderedFrame {
         let size_px = [64, 48];
         let light = |i: u32| {
             let inside = |k: u32| {
-                let place = DVec2::new(f64::from(i % 64), f64::from(i / 64))
+                let point = DVec2::new(f64::from(i % 64), f64::from(i / 64))
                     + (DVec2::new(f64::from(k % 64), f64::from(k / 64)) + 0.5) / 64.0
                     - 0.5;
-                discs.iter().any(|(centre, radius)| place.distance(*centre) < *radius)
+                discs.iter().any(|(centre, radius)| point.distance(*centre) < *radius)
             };
             1.0 - (0..4096).filter(|&k| inside(k)).count() as f32 / 4096.0
         };
@@ -162,40 +160,40 @@ mod tests {
     }
 
     #[test]
-    fn centres_are_found_to_a_fraction_of_a_pixel() {
+    fn centroids_are_accurate_to_a_fraction_of_a_pixel() {
         let discs = [(DVec2::new(20.3, 15.7), 6.2), (DVec2::new(44.9, 30.1), 4.4)];
         let mut frame = picture(&[discs[0], discs[1], (DVec2::new(1.0, 40.0), 5.0)]);
-        let found = spots(&frame);
-        assert_eq!(found.len(), 2, "the one at the border does not count: {found:?}");
-        for (spot, (centre, radius)) in found.iter().zip(discs) {
-            // What the picture itself, of 64 x 64 places a pixel, does not know of the disc is below 1e-3. A
-            // rim pixel's share counts at the pixel's centre, not at that of the part covered: 0.0017 and
-            // 0.0035 px for these two discs.
+        let blobs = detect_blobs(&frame);
+        assert_eq!(blobs.len(), 2, "the one at the border does not count: {blobs:?}");
+        for (blob, (centre, radius)) in blobs.iter().zip(discs) {
+            // The picture itself, of 64 x 64 samples per pixel, is accurate to 1e-3. The covered share of a
+            // rim pixel counts at the pixel's centre, which shifts these two centroids by 0.0017 and 0.0035
+            // px.
             let area_px2 = std::f64::consts::PI * radius * radius;
-            let (shift, growth) = (spot.centroid_px.distance(centre), spot.area_px2 / area_px2 - 1.0);
-            assert!(shift < 5e-3 && growth.abs() < 5e-3, "{spot:?}: {shift} {growth}");
+            let (shift, growth) = (blob.centroid_px.distance(centre), blob.area_px2 / area_px2 - 1.0);
+            assert!(shift < 5e-3 && growth.abs() < 5e-3, "{blob:?}: {shift} {growth}");
         }
-        // A pixel without a ray in the rim spoils a spot.
+        // A blob with a pixel without a ray in its rim is left out.
         frame.color_rgba[4 * (15 * 64 + 27) + 3] = 0.0;
-        assert_eq!(spots(&frame).len(), 1);
+        assert_eq!(detect_blobs(&frame).len(), 1);
     }
 
     #[test]
-    fn only_what_is_in_place_matches() {
-        let seen = |x: f64| Seen {
+    fn blobs_match_by_position_and_area() {
+        let circle = |x: f64| CircleImage {
             centroid_px: DVec2::new(x, 9.0),
             area_px2: 100.0,
             centre_px: DVec2::ZERO,
             bounds_px: [DVec2::ZERO; 2],
         };
-        let spot = |x: f64, area_px2: f64| Spot { centroid_px: DVec2::new(x, 9.0), area_px2 };
-        let matches = matches(
-            &[seen(10.0), seen(40.0), seen(80.0)],
-            &[spot(10.5, 95.0), spot(44.0, 100.0), spot(80.1, 30.0)],
+        let blob = |x: f64, area_px2: f64| Blob { centroid_px: DVec2::new(x, 9.0), area_px2 };
+        let matches = match_circles(
+            &[circle(10.0), circle(40.0), circle(80.0)],
+            &[blob(10.5, 95.0), blob(44.0, 100.0), blob(80.1, 30.0)],
         );
         assert_eq!((matches.pairs.len(), matches.missed), (1, 2));
         assert_eq!(matches.errors_px(), [0.5]);
         assert_eq!(matches.stats().rms_px, 0.5);
-        assert!(Matches::default().stats().rms_px.is_nan(), "nothing found is no error of 0");
+        assert!(CircleMatches::default().stats().rms_px.is_nan(), "NaN without matches");
     }
 }

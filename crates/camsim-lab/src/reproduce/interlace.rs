@@ -6,43 +6,45 @@ use camsim_core::{
 };
 
 use super::{
-    Picture, Report, ReproduceError, Setup, Table,
-    displace::{Ideal, Light, Model, Path},
-    rig::{self, Motion, TARGET_M},
+    ExperimentReport, Picture, ReproduceError, Setup, Table,
+    displacement::{Averaging, DisplacementModel, PaperIdealFrame, SamplePath},
+    test_bench::{self, Motion, TARGET_M},
 };
 
-/// Lag between the fields, seconds: 36 deg of the turn.
+/// Time between the fields, seconds; the camera turns by 36 deg in it.
 const LAG_S: f64 = 1.0;
 
-/// Even rows (counted from 0) of one frame, odd rows of another.
-pub(super) fn woven(even: &RenderedFrame, odd: &RenderedFrame) -> RenderedFrame {
+/// Interlaces two frames: even rows, counted from 0, of the first and odd rows of the second.
+pub(super) fn interlace_frames(even: &RenderedFrame, odd: &RenderedFrame) -> RenderedFrame {
     let mut frame = odd.clone();
     let row = 4 * frame.size_px[0] as usize;
-    for (mine, other) in
+    for (target, source) in
         frame.color_rgba.chunks_exact_mut(row).zip(even.color_rgba.chunks_exact(row)).step_by(2)
     {
-        mine.copy_from_slice(other);
+        target.copy_from_slice(source);
     }
     frame
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let mut report = Report::default();
+// Long because: a list of methods and their figures.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let mut report = ExperimentReport::default();
     report.notes.push(format!(
-        "Bench as in 8.4; the rows of the first field (0-based even ones) are {LAG_S} s older. The truth is woven from two pictures of a perfect camera."
+        "Test bench as in 8.4. The rows of the first field (even ones, counted from 0) are {LAG_S} s older. \
+         The truth is interlaced from two frames of a perfect camera."
     ));
-    let scene = rig::target(setup, TARGET_M)?;
-    let bench = rig::sequence(rig::pinhole(setup.width_px), Motion::turning(), &scene)?;
-    let interlaced = rig::at(
+    let scene = test_bench::target(setup, TARGET_M)?;
+    let bench = test_bench::sequence(test_bench::pinhole(setup.width_px), Motion::turning(), &scene)?;
+    let interlaced = test_bench::with_shutter(
         &bench,
         LAG_S,
         ShutterSpec { interlace_ms: FieldOr::Ms(1e3 * LAG_S), ..ShutterSpec::default() },
     );
-    let [first, second] = [0.0, LAG_S].map(|stamp_s| rig::snapshot(setup.engine, &bench, stamp_s));
+    let [first, second] = [0.0, LAG_S].map(|stamp_s| test_bench::snapshot(setup.engine, &bench, stamp_s));
     let (first, second) = (first?, second?);
-    let truth = woven(&first, &second);
-    let own = rig::picture(setup.engine, &interlaced)?;
-    let ideal = Ideal::at(setup.engine, &bench, LAG_S)?;
+    let truth = interlace_frames(&first, &second);
+    let own = test_bench::render_first(setup.engine, &interlaced)?;
+    let ideal = PaperIdealFrame::render(setup.engine, &bench, LAG_S)?;
     let mut table = Table::new(
         "Fig. 20 against rows of two perfect pictures, linear light",
         &["method", "PSNR, dB", "largest difference"],
@@ -54,25 +56,25 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             "paper: linear, one step",
             ideal.frame(
                 &interlaced.scenario.camera,
-                Model::Linear(f64::INFINITY),
+                DisplacementModel::Linear(f64::INFINITY),
                 1,
-                Path::Straight,
-                Light::Linear,
+                SamplePath::Straight,
+                Averaging::Linear,
             )?,
         ),
         (
             "paper: RK2",
             ideal.frame(
                 &interlaced.scenario.camera,
-                Model::Rk2(step_rad),
+                DisplacementModel::Rk2(step_rad),
                 1,
-                Path::Straight,
-                Light::Linear,
+                SamplePath::Straight,
+                Averaging::Linear,
             )?,
         ),
         ("camsim", own),
     ] {
-        let difference = rig::difference(&frame, &truth)?;
+        let difference = test_bench::difference(&frame, &truth)?;
         table.row([method.into(), format!("{:.1}", difference.psnr_db()), format!("{:.3}", difference.max)]);
         frames.push(frame);
     }
@@ -80,8 +82,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     report.tables.push(("fig20", table));
     report.pictures.push(Picture {
         name: "fig20",
-        caption: "Fig. 20: (a, b) a perfect camera at both instants, (c) interlaced by the linear model in one step, (d) by RK2, (e) by camsim, (f) woven from \
-                  (a) and (b)."
+        caption: "Fig. 20: (a, b) a perfect camera at both instants, interlaced (c) by the linear model in \
+                  one step, (d) by RK2, (e) by camsim, (f) from (a) and (b)."
             .into(),
         frames,
         columns: 3,

@@ -1,4 +1,4 @@
-//! 8.3: circles through the paper's lens, from its 60 camera poses (figs. 11 and 12).
+//! 8.3: circles seen through the paper's lens from its 60 camera poses (figs. 11 and 12).
 
 use std::sync::Arc;
 
@@ -19,30 +19,30 @@ use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    Picture, Report, ReproduceError, Setup, Table,
-    circles::{LEAST_PX, matches, spots},
-    pattern::Seen,
-    rig, short,
+    ExperimentReport, Picture, ReproduceError, Setup, Table,
+    circle_grid::CircleImage,
+    circles::{LEAST_PX, detect_blobs, match_circles},
+    short, test_bench,
 };
 use crate::plot::{Plot, Series};
 
-/// Width of the target in the unit of the poses.
+/// Width of the target, in the unit of the poses.
 const TARGET_M: f64 = 3000.0;
-/// Frames of the contact sheets, of all poses.
-const SHOWN: usize = 12;
-/// Width of a ring of the plot, pixels at 640.
+/// Number of frames on a contact sheet.
+const SHEET_FRAMES: usize = 12;
+/// Width of a ring of the plot, in pixels of a frame of 640 pixels.
 const RING_PX: f64 = 20.0;
-/// Fewest circles of a ring that is plotted.
+/// Smallest number of circles in a ring that is plotted.
 const RING_CIRCLES: usize = 20;
 
-/// A calibration and the poses that go with it.
+/// A calibration and the file of its poses.
 struct Calibration {
     name: &'static str,
     poses: &'static str,
     camera: CameraSpec,
 }
 
-/// The paper's table 2, as the reference program has it. There, image corners are at whole numbers.
+/// Table 2 of the paper, with the digits of the paper's program, in which integers are pixel corners.
 fn calibrations(width_px: u32) -> [Calibration; 2] {
     let scale = f64::from(width_px) / 640.0;
     let opencv = CameraSpec {
@@ -52,7 +52,7 @@ fn calibrations(width_px: u32) -> [Calibration; 2] {
             model: LensModel::BrownConrady,
             coefficients: vec![-0.428_129, 0.158_059, 0.000_245, -0.002_286, -0.029_194],
         },
-        ..rig::pinhole(width_px)
+        ..test_bench::pinhole(width_px)
     };
     [
         Calibration {
@@ -63,34 +63,35 @@ fn calibrations(width_px: u32) -> [Calibration; 2] {
         Calibration {
             name: "Agisoft Lens",
             poses: "camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv",
-            camera: rig::fisheye(width_px),
+            camera: test_bench::fisheye(width_px),
         },
     ]
 }
 
-/// One pose a second. Without the paper's files: poses around the target, tilted up to 25 deg towards it.
+/// The paper's poses, one per second; without its files poses around the target, tilted up to 25 deg towards
+/// it.
 fn poses(setup: &Setup<'_>, file: &str) -> Result<Vec<LogRow>, ReproduceError> {
     if let Some(path) = setup.data_file(file) {
         let spec = FlightSpec {
             log: path.clone(),
             format: LogFormat::CsvNed,
-            ..rig::scenario(rig::pinhole(96)).flight
+            ..test_bench::scenario(test_bench::pinhole(96)).flight
         };
         return Ok(read_flight_log(&path, &spec, HeightConversion::None)?.rows);
     }
     let pose = |i: u32| {
         let i = f64::from(i);
-        let (around, out) = (2.399_963 * i, (i / 60.0).sqrt());
-        let tilt = 25f64.to_radians() * out;
-        let sideways = DVec3::new(around.cos(), around.sin(), 0.0);
+        let (azimuth, radius) = (2.399_963 * i, (i / 60.0).sqrt());
+        let tilt = 25f64.to_radians() * radius;
+        let outward = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
         let height_m = 3000.0 + 300.0 * (1.7 * i).sin();
-        // Leaning about the horizontal axis across the way out turns the view from straight down back to the
-        // target.
+        // A tilt about the horizontal axis across the outward direction turns the view from straight down
+        // towards the target.
         let attitude =
-            DQuat::from_axis_angle(sideways.cross(DVec3::Z), -tilt) * DQuat::from_rotation_z(0.7 * i);
+            DQuat::from_axis_angle(outward.cross(DVec3::Z), -tilt) * DQuat::from_rotation_z(0.7 * i);
         LogRow {
             t_s: i,
-            position_ned_m: height_m * tilt.tan() * sideways - height_m * DVec3::Z,
+            position_ned_m: height_m * tilt.tan() * outward - height_m * DVec3::Z,
             ned_from_body: attitude,
         }
     };
@@ -103,11 +104,11 @@ fn sequence(
     scene: &Arc<Scene>,
 ) -> Result<Arc<Sequence>, ReproduceError> {
     let spec = TrackerSpec { kind: TrackerKind::Linear, ..TrackerSpec::default() };
-    let tracked = track(rows, &spec).map_err(|error| ReproduceError::made("the list of poses", error))?;
+    let tracked = track(rows, &spec).map_err(|error| ReproduceError::setup("the list of poses", error))?;
     let path = CameraPath::new(tracked.trajectory, &camera.mount)
-        .map_err(|error| ReproduceError::made("the mount", error))?;
+        .map_err(|error| ReproduceError::setup("the mount", error))?;
     Ok(Arc::new(Sequence {
-        scenario: rig::scenario(camera),
+        scenario: test_bench::scenario(camera),
         path: Arc::new(path),
         epoch_ns: 0,
         start_s: 0.0,
@@ -118,84 +119,93 @@ fn sequence(
     }))
 }
 
-/// What was found in all pictures of one calibration.
-pub(super) struct Found {
-    /// Every circle with its spot.
-    pub pairs: Vec<(Seen, super::circles::Spot)>,
-    /// Circles wholly in view that were not found.
+/// Circles detected in all frames of one calibration.
+pub(super) struct CircleDetections {
+    /// Matched circles with their blobs.
+    pub pairs: Vec<(CircleImage, super::circles::Blob)>,
+    /// Number of circles wholly in view without a blob.
     pub missed: usize,
-    /// True circles of each picture, in the order of the grid; `None` where not wholly in view.
-    seen: Vec<Vec<Option<Seen>>>,
+    /// True circles of each frame, in the order of the grid; `None` if not wholly in view.
+    true_circles: Vec<Vec<Option<CircleImage>>>,
+    /// Rendered frames.
     frames: Vec<RenderedFrame>,
 }
 
-/// Renders the first `count` poses and looks for circles.
-pub(super) fn find(setup: &Setup<'_>, which: usize, count: u64) -> Result<Found, ReproduceError> {
+/// Renders the first `count` poses of a calibration (0 OpenCV, 1 Agisoft) and detects circles.
+pub(super) fn detect(
+    setup: &Setup<'_>,
+    calibration: usize,
+    count: u64,
+) -> Result<CircleDetections, ReproduceError> {
     let [opencv, agisoft] = calibrations(setup.width_px);
-    let calibration = if which == 0 { opencv } else { agisoft };
+    let calibration = if calibration == 0 { opencv } else { agisoft };
     let rows = poses(setup, calibration.poses)?;
-    let sequence = sequence(calibration.camera, &rows, &rig::target(setup, TARGET_M)?)?;
-    let (camera, shutter) = rig::checked(&sequence)?;
-    let mut found = Found { pairs: Vec::new(), missed: 0, seen: Vec::new(), frames: Vec::new() };
-    for finished in rig::render(setup.engine, &sequence, &[], 0..count.min(sequence.frames))? {
+    let sequence = sequence(calibration.camera, &rows, &test_bench::target(setup, TARGET_M)?)?;
+    let (camera, shutter) = test_bench::camera_and_shutter(&sequence)?;
+    let mut detections =
+        CircleDetections { pairs: Vec::new(), missed: 0, true_circles: Vec::new(), frames: Vec::new() };
+    for finished in test_bench::render(setup.engine, &sequence, &[], 0..count.min(sequence.frames))? {
         let stamp_s = finished.plan.stamp_s;
-        let listed: Vec<Option<Seen>> = super::pattern::circles(TARGET_M)
+        let true_circles: Vec<Option<CircleImage>> = super::circle_grid::circles(TARGET_M)
             .iter()
             .map(|circle| {
                 circle
-                    .seen(|point| rig::project(&sequence, &camera, &shutter, stamp_s, point))
-                    .filter(|seen| inside(seen, camera.size_px))
+                    .image(|point| test_bench::project(&sequence, &camera, &shutter, stamp_s, point))
+                    .filter(|circle| is_inside(circle, camera.size_px))
             })
             .collect();
-        let here = matches(&listed.iter().flatten().copied().collect::<Vec<_>>(), &spots(&finished.frame));
-        found.missed += here.missed;
-        found.pairs.extend(here.pairs);
-        found.seen.push(listed);
-        found.frames.push(finished.frame);
+        let in_view: Vec<CircleImage> = true_circles.iter().flatten().copied().collect();
+        let matches = match_circles(&in_view, &detect_blobs(&finished.frame));
+        detections.missed += matches.missed;
+        detections.pairs.extend(matches.pairs);
+        detections.true_circles.push(true_circles);
+        detections.frames.push(finished.frame);
     }
-    Ok(found)
+    Ok(detections)
 }
 
-/// Wholly in the picture, and a little inside.
-fn inside(seen: &Seen, size_px: [u32; 2]) -> bool {
+/// Whether a circle is wholly within the frame, with a margin of 3 px.
+fn is_inside(circle: &CircleImage, size_px: [u32; 2]) -> bool {
     let last = DVec2::new(f64::from(size_px[0]) - 1.0, f64::from(size_px[1]) - 1.0);
-    seen.bounds_px[0].cmpge(DVec2::splat(3.0)).all() && seen.bounds_px[1].cmple(last - 3.0).all()
+    circle.bounds_px[0].cmpge(DVec2::splat(3.0)).all() && circle.bounds_px[1].cmple(last - 3.0).all()
 }
 
-impl Found {
+impl CircleDetections {
     fn errors_px(&self) -> Vec<f64> {
-        self.pairs.iter().map(|(seen, spot)| seen.centroid_px.distance(spot.centroid_px)).collect()
+        self.pairs.iter().map(|(circle, blob)| circle.centroid_px.distance(blob.centroid_px)).collect()
     }
 
-    /// RMS error by distance from the principal point.
+    /// Points (distance from the principal point, RMS error), px.
     fn rings(&self, principal_px: DVec2, width_px: u32) -> Vec<(f64, f64)> {
         let ring_px = RING_PX * f64::from(width_px) / 640.0;
         let mut rings: Vec<Vec<f64>> = Vec::new();
-        for (seen, spot) in &self.pairs {
-            let ring = (seen.centroid_px.distance(principal_px) / ring_px) as usize;
+        for (circle, blob) in &self.pairs {
+            let ring = (circle.centroid_px.distance(principal_px) / ring_px) as usize;
             rings.resize(rings.len().max(ring + 1), Vec::new());
-            rings[ring].push(seen.centroid_px.distance(spot.centroid_px));
+            rings[ring].push(circle.centroid_px.distance(blob.centroid_px));
         }
         let filled = rings.into_iter().enumerate().filter(|(_, errors)| errors.len() >= RING_CIRCLES);
         filled.map(|(ring, errors)| ((ring as f64 + 0.5) * ring_px, ErrorStats::of(errors).rms_px)).collect()
     }
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let mut report = Report::default();
+// Long because: a list of tables, plots and pictures.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let mut report = ExperimentReport::default();
     let source = if setup.data.is_some() {
-        "the 60 poses of the reference program's two path files, one by each calibration"
+        "the 60 poses of the paper's program, from one file per calibration"
     } else {
-        "60 poses made here (the paper's need --data): no pose of the paper is among them"
+        "60 built-in poses, none of them the paper's, which need --data"
     };
     report.notes.push(format!(
-        "Poses: {source}. A circle's true place is the centre of the area of its image, by projecting its rim through the lens's forward model alone. The paper \
-         compares its pictures with photographs, which are not at hand; its 0.73 px holds their noise and the error of calibration, poses and print, these figures \
-         only camsim's own error and that of finding circles."
+        "Poses: {source}. The true position of a circle is the centroid of its image, from its rim projected \
+         by the forward lens model. The paper compares its frames with photographs, which are not available; \
+         its 0.73 px contain their noise and the errors of calibration, poses and print. These figures \
+         contain only the errors of camsim and of the detection."
     ));
-    let found = [find(setup, 0, u64::MAX)?, find(setup, 1, u64::MAX)?];
+    let detections = [detect(setup, 0, u64::MAX)?, detect(setup, 1, u64::MAX)?];
     if let Some((calibration, _)) =
-        calibrations(setup.width_px).iter().zip(&found).find(|(_, found)| found.pairs.is_empty())
+        calibrations(setup.width_px).iter().zip(&detections).find(|(_, found)| found.pairs.is_empty())
     {
         return Err(ReproduceError::NoCircle {
             calibration: calibration.name,
@@ -218,12 +228,12 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         ],
     );
     let mut series = Vec::new();
-    for (calibration, found) in calibrations(setup.width_px).iter().zip(&found) {
+    for (calibration, found) in calibrations(setup.width_px).iter().zip(&detections) {
         let camera = camsim_core::camera::CameraModel::from_spec(&calibration.camera)
-            .map_err(|error| ReproduceError::made("the camera", error))?;
+            .map_err(|error| ReproduceError::setup("the camera", error))?;
         let stats = ErrorStats::of(found.errors_px());
-        let naive = ErrorStats::of(
-            found.pairs.iter().map(|(seen, spot)| seen.centre_px.distance(spot.centroid_px)).collect(),
+        let of_centres = ErrorStats::of(
+            found.pairs.iter().map(|(circle, blob)| circle.centre_px.distance(blob.centroid_px)).collect(),
         );
         table.row([
             calibration.name.into(),
@@ -233,7 +243,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             short(stats.rms_px),
             short(stats.p99_px),
             short(stats.max_px),
-            short(naive.rms_px),
+            short(of_centres.rms_px),
             format!("{:.2} %", 100.0 * (1.0 - camera.check().valid_fraction)),
         ]);
         series.push(Series {
@@ -244,29 +254,30 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     }
     report.tables.push(("circles", table));
     if setup.data.is_some() {
-        report.tables.push(("calibrations", between(&found)));
+        report.tables.push(("calibrations", calibration_difference(&detections)));
     }
-    match by_radius(series) {
+    match radius_plot(series) {
         Some(plot) => report.plots.push(("radius", plot)),
-        None => report
-            .notes
-            .push(format!("No plot by radius: no ring of the picture has {RING_CIRCLES} circles found; wider pictures have more.")),
+        None => report.notes.push(format!(
+            "No plot by radius: no ring has {RING_CIRCLES} detected circles; choose a larger --width."
+        )),
     }
-    report.tables.push(("inverse", inverse(setup)?));
-    let [opencv, agisoft] = found;
-    let mut shown = Vec::new();
+    report.tables.push(("inverse", inverse_table(setup)?));
+    let [opencv, agisoft] = detections;
+    let mut frames = Vec::new();
     for (calibration, found) in calibrations(setup.width_px).iter().zip([&opencv, &agisoft]) {
-        let Some(own) = found.frames.first() else { continue };
-        shown.push(own.clone());
-        shown.push(with_paper_roots(own, &model(calibration)?));
+        let Some(frame) = found.frames.first() else { continue };
+        frames.push(frame.clone());
+        frames.push(with_paper_roots(frame, &model(calibration)?));
     }
     report.pictures.push(Picture {
         name: "fig12",
-        caption: "Fig. 12: the first pose by OpenCV's (above) and Agisoft Lens's calibration (below). (a, c) camsim; red: no ray of the lens arrives there. \
-                  (b, d) the paper's Gauss-Newton on the same picture: red where it does not converge, blue where it converges to a ray that the lens does not \
-                  image there."
+        caption: "Fig. 12: the first pose with the calibration of OpenCV (above) and of Agisoft Lens \
+                  (below). (a, c) camsim; red pixels have no ray. (b, d) the paper's Gauss-Newton on the \
+                  same frame: red where it does not converge, blue where it converges to a ray that the lens \
+                  images elsewhere."
             .into(),
-        frames: shown,
+        frames,
         columns: 2,
         shrink: 1,
     });
@@ -274,7 +285,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         ("poses-opencv", "Every fifth pose with OpenCV's calibration.", opencv),
         ("poses-agisoft", "Every fifth pose with Agisoft Lens's calibration.", agisoft),
     ] {
-        let step = found.frames.len().div_ceil(SHOWN).max(1);
+        let step = found.frames.len().div_ceil(SHEET_FRAMES).max(1);
         report.pictures.push(Picture {
             name,
             caption: caption.into(),
@@ -286,8 +297,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     Ok(report)
 }
 
-/// The plot of [`Found::rings`]; `None` where every calibration's are empty, which is nothing to draw.
-fn by_radius(series: Vec<Series>) -> Option<Plot> {
+/// Plot of [`CircleDetections::rings`]; `None` without points.
+fn radius_plot(series: Vec<Series>) -> Option<Plot> {
     series.iter().any(|series| !series.points.is_empty()).then(|| Plot {
         title: "Error of circle centres by their place in the picture".into(),
         x_label: "distance from the principal point, px".into(),
@@ -298,45 +309,45 @@ fn by_radius(series: Vec<Series>) -> Option<Plot> {
 }
 
 fn model(calibration: &Calibration) -> Result<CameraModel, ReproduceError> {
-    CameraModel::from_spec(&calibration.camera).map_err(|error| ReproduceError::made("the camera", error))
+    CameraModel::from_spec(&calibration.camera).map_err(|error| ReproduceError::setup("the camera", error))
 }
 
-/// What the paper's Gauss-Newton makes of a pixel.
+/// Result of the paper's Gauss-Newton at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Root {
-    /// As the truth, or both have no ray.
+pub(super) enum RootKind {
+    /// The true ray, or rightly none.
     Right,
-    /// No answer although there is a ray.
+    /// No ray, although there is one.
     Missed,
-    /// A ray that the lens does not image there, or an answer 1 px and more away.
+    /// A ray that the lens does not image there, or one that is off by 1 px or more.
     False,
 }
 
-/// The paper's Gauss-Newton at every pixel, row by row: whether it has an answer, and which.
-pub(super) fn paper_roots(camera: &CameraModel) -> Vec<(bool, Root)> {
+/// The paper's Gauss-Newton at every pixel, row by row: whether it converges, and the kind of its result.
+pub(super) fn paper_roots(camera: &CameraModel) -> Vec<(bool, RootKind)> {
     let [width, height] = camera.size_px;
     let focal_px = camera.focal_px.x;
     let root = |i: u32| {
         let pixel = DVec2::new(f64::from(i % width), f64::from(i / width));
-        let found = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
-        let kind = match (found, camera.unproject(pixel)) {
-            (None, Some(_)) => Root::Missed,
-            (Some(found), truth) if truth.is_none_or(|truth| focal_px * found.distance(truth) >= 1.0) => {
-                Root::False
+        let ray = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
+        let kind = match (ray, camera.unproject(pixel)) {
+            (None, Some(_)) => RootKind::Missed,
+            (Some(ray), truth) if truth.is_none_or(|truth| focal_px * ray.distance(truth) >= 1.0) => {
+                RootKind::False
             }
-            _ => Root::Right,
+            _ => RootKind::Right,
         };
-        (found.is_some(), kind)
+        (ray.is_some(), kind)
     };
     (0..width * height).into_par_iter().map(root).collect()
 }
 
-/// A picture as the paper's lens inverse would have it, false roots in blue.
+/// The frame with the invalid pixels of the paper's lens inverse, and false roots in blue.
 fn with_paper_roots(frame: &RenderedFrame, camera: &CameraModel) -> RenderedFrame {
     let mut frame = frame.clone();
-    for (pixel, (found, kind)) in frame.color_rgba.chunks_exact_mut(4).zip(paper_roots(camera)) {
-        match (found, kind) {
-            (_, Root::False) => pixel.copy_from_slice(&[0.0, 0.0, 1.0, 1.0]),
+    for (pixel, (converges, kind)) in frame.color_rgba.chunks_exact_mut(4).zip(paper_roots(camera)) {
+        match (converges, kind) {
+            (_, RootKind::False) => pixel.copy_from_slice(&[0.0, 0.0, 1.0, 1.0]),
             (false, _) => pixel[3] = 0.0,
             _ => {}
         }
@@ -344,9 +355,9 @@ fn with_paper_roots(frame: &RenderedFrame, camera: &CameraModel) -> RenderedFram
     frame
 }
 
-/// Rays lost and invented by the paper's inverse; camsim's is the truth here, and the error of its way back
-/// stands beside.
-fn inverse(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
+/// Missing and false rays of the paper's lens inverse. The truth is camsim's inverse, whose round-trip error
+/// is in the last column.
+fn inverse_table(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
     let mut table = Table::new(
         "Inverse of the lens at every pixel (50 steps, 0.1 px as in the paper)",
         &[
@@ -360,32 +371,32 @@ fn inverse(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
     for calibration in &calibrations(setup.width_px) {
         let camera = model(calibration)?;
         let (check, roots) = (camera.check(), paper_roots(&camera));
-        let count = |kind: Root| roots.iter().filter(|root| root.1 == kind).count() as f64;
+        let count = |kind: RootKind| roots.iter().filter(|root| root.1 == kind).count() as f64;
         let pixels = roots.len() as f64;
         table.row([
             calibration.name.into(),
             format!("{:.2} %", 100.0 * check.valid_fraction),
-            format!("{:.2} %", 100.0 * count(Root::Missed) / (check.valid_fraction * pixels)),
-            format!("{:.2} %", 100.0 * count(Root::False) / pixels),
+            format!("{:.2} %", 100.0 * count(RootKind::Missed) / (check.valid_fraction * pixels)),
+            format!("{:.2} %", 100.0 * count(RootKind::False) / pixels),
             short(check.worst_roundtrip_px),
         ]);
     }
     Ok(table)
 }
 
-/// How far the same circle of the same photograph is apart by the two calibrations: both were fitted to these
+/// Distance between the images of the same circle by the two calibrations, which were fitted to the same
 /// photographs.
-fn between([opencv, agisoft]: &[Found; 2]) -> Table {
+fn calibration_difference([opencv, agisoft]: &[CircleDetections; 2]) -> Table {
     let shifts: Vec<DVec2> = opencv
-        .seen
+        .true_circles
         .iter()
-        .zip(&agisoft.seen)
+        .zip(&agisoft.true_circles)
         .flat_map(|(a, b)| a.iter().zip(b))
         .filter_map(|(a, b)| Some((*a)?.centroid_px - (*b)?.centroid_px))
         .collect();
     let mean = shifts.iter().sum::<DVec2>() / shifts.len().max(1) as f64;
-    let [stats, rest] = [DVec2::ZERO, mean]
-        .map(|middle| ErrorStats::of(shifts.iter().map(|shift| shift.distance(middle)).collect()));
+    let [stats, centred] = [DVec2::ZERO, mean]
+        .map(|origin| ErrorStats::of(shifts.iter().map(|shift| shift.distance(origin)).collect()));
     let mut table = Table::new(
         "Between the two calibrations of the same photographs, px",
         &["", "circles", "RMS", "99 %", "largest", "mean shift x, y", "RMS without it"],
@@ -397,7 +408,7 @@ fn between([opencv, agisoft]: &[Found; 2]) -> Table {
         short(stats.p99_px),
         short(stats.max_px),
         format!("{:.2}, {:.2}", mean.x, mean.y),
-        short(rest.rms_px),
+        short(centred.rms_px),
     ]);
     table
 }
@@ -407,15 +418,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rings_are_plotted_where_one_is_full() {
+    fn plot_needs_a_ring_with_points() {
         let series =
             |points: &[(f64, f64)]| Series { name: String::new(), points: points.to_vec(), joined: true };
-        assert_eq!(by_radius(vec![series(&[]), series(&[])]), None);
-        assert!(by_radius(vec![series(&[]), series(&[(10.0, 0.1)])]).is_some_and(|plot| plot.svg().is_ok()));
+        assert_eq!(radius_plot(vec![series(&[]), series(&[])]), None);
+        assert!(
+            radius_plot(vec![series(&[]), series(&[(10.0, 0.1)])]).is_some_and(|plot| plot.svg().is_ok())
+        );
     }
 
     #[test]
-    fn calibrations_are_those_of_the_files() {
+    fn calibrations_equal_those_of_the_files() {
         let Some(data) = std::env::var_os("CAMSIM_DATA").map(std::path::PathBuf::from) else {
             eprintln!("CAMSIM_DATA is not set: the calibration files are not read");
             return;
@@ -424,16 +437,16 @@ mod tests {
             .iter()
             .zip(["S3FishEye5ParamCam-OpenCV.xml", "S3FishEye5ParamCam-AgisoftLens.xml"])
         {
-            let there =
+            let imported =
                 camsim_io::camera_file::import_camera(&data.join("camsim").join(file)).expect("a camera");
-            let here = &calibration.camera;
+            let own = &calibration.camera;
             let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
-            assert!(near(&here.focal_px, &there.focal_px), "{file}");
+            assert!(near(&own.focal_px, &imported.focal_px), "{file}");
             assert!(
-                near(&here.principal_point_px.expect("given"), &there.principal_point_px.expect("given")),
+                near(&own.principal_point_px.expect("given"), &imported.principal_point_px.expect("given")),
                 "{file}"
             );
-            assert!(near(&here.lens.coefficients, &there.lens.coefficients), "{file}");
+            assert!(near(&own.lens.coefficients, &imported.lens.coefficients), "{file}");
         }
     }
 }

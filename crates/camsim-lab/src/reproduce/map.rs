@@ -1,4 +1,4 @@
-//! 8.8: time constants of one second over terrain, through the fisheye (fig. 21).
+//! 8.8: delay, readout, exposure and field time of one second over terrain, through the fisheye (fig. 21).
 
 use std::sync::Arc;
 
@@ -13,22 +13,22 @@ use camsim_io::{builtin, load::load_sequence, scenario_file::read_scenario};
 use glam::DVec2;
 
 use super::{
-    Picture, Report, ReproduceError, Setup, Table,
-    displace::{Ideal, Model},
-    rig, short,
+    ExperimentReport, Picture, ReproduceError, Setup, Table,
+    displacement::{DisplacementModel, PaperIdealFrame},
+    short, test_bench,
 };
 
-/// Every time constant, seconds.
-const LONG_S: f64 = 1.0;
-/// Colour of the sky, sRGB: the paper's.
+/// Delay, readout, exposure and field time, seconds.
+const EFFECT_S: f64 = 1.0;
+/// The paper's colour of the sky, sRGB.
 const SKY: [f64; 3] = [0.65, 0.85, 1.0];
-/// Every so many pixels are compared with the oracle.
+/// Step of the compared pixels in x and y.
 const STEP_PX: u32 = 4;
 
 /// The flight over terrain: the paper's lawnmower log moved over an alpine valley, or the built-in flight.
 fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceError> {
-    // As in the paper, the view is along the nose.
-    let camera = CameraSpec { mount: Default::default(), ..rig::fisheye(setup.width_px) };
+    // As in the paper, the camera looks along the nose.
+    let camera = CameraSpec { mount: Default::default(), ..test_bench::fisheye(setup.width_px) };
     let (scenario, name) = match setup.data {
         Some(data) => {
             let terrain = TerrainSpec {
@@ -36,7 +36,7 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
                 ortho: Some(data.join("terrain/sertig/sertig_valley_color.tif")),
                 ..TerrainSpec::default()
             };
-            let own = rig::scenario(camera);
+            let own = test_bench::scenario(camera);
             let scenario = Scenario {
                 flight: FlightSpec {
                     log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"),
@@ -48,7 +48,8 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             };
             (
                 scenario,
-                "the paper's lawnmower log, moved and scaled over an alpine valley (the paper's own ground is not at hand)",
+                "the paper's lawnmower log, moved and scaled over an alpine valley (the paper's own terrain \
+                 is not available)",
             )
         }
         None => {
@@ -60,90 +61,98 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
     Ok((load_sequence(&scenario)?.sequence, name))
 }
 
-/// An instant in a left turn at least half as sharp as the sharpest one, path time, seconds: of those, one a
-/// second, the one with most land in the picture; and how much that is. The paper's view along the nose
-/// always has the horizon in it, and the land has an edge.
+/// Finds an instant of a left turn with much land in view: of the instants, one per second, whose yaw rate is
+/// at least half of the largest, the one with the largest share of land. Returns path time in seconds, and
+/// the share. The view along the nose always contains the horizon, and the terrain has a border.
 fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError> {
     let (start_s, end_s) = sequence.path.span_s();
     let trajectory = &sequence.path.trajectory;
-    let left_rate = |t_s: f64| {
+    let left_yaw_rate = |t_s: f64| {
         -(-2..=2).map(|k| trajectory.state(t_s + 0.5 * f64::from(k)).rate_body_rad_s.z).sum::<f64>()
     };
-    // One frame a second, far enough from both ends for every effect.
-    let each_second = rig::at(sequence, start_s + 3.0, ShutterSpec::default());
-    let oracle = rig::oracle(&each_second)?;
+    // One frame per second, with room for the effects at both ends.
+    let each_second = test_bench::with_shutter(sequence, start_s + 3.0, ShutterSpec::default());
+    let reference = test_bench::reference(&each_second)?;
     let instants: Vec<(u64, f64)> =
         (0..(end_s - start_s - 6.0).max(1.0) as u64).map(|i| (i, start_s + 3.0 + i as f64)).collect();
-    let sharpest = instants.iter().map(|(_, t_s)| left_rate(*t_s)).fold(f64::MIN, f64::max);
+    let largest_rate = instants.iter().map(|(_, t_s)| left_yaw_rate(*t_s)).fold(f64::MIN, f64::max);
     let [width, height] = sequence.scenario.camera.size_px;
-    let land = |frame: u64| {
-        let view = oracle.view(frame);
+    let land_share = |frame: u64| {
+        let view = reference.view(frame);
         let step = (width / 32).max(1) as usize;
-        let looks = (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| [x, y]));
-        let looks: Vec<bool> =
-            looks.filter_map(|at| view.sample(at, DVec2::ZERO, 0.0)).map(|look| look.hit.is_some()).collect();
-        looks.iter().filter(|hit| **hit).count() as f64 / looks.len().max(1) as f64
+        let pixels = (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| [x, y]));
+        let hits: Vec<bool> = pixels
+            .filter_map(|pixel| view.sample(pixel, DVec2::ZERO, 0.0))
+            .map(|sample| sample.hit.is_some())
+            .collect();
+        hits.iter().filter(|hit| **hit).count() as f64 / hits.len().max(1) as f64
     };
     let turns = instants
         .into_iter()
-        .filter(|(_, t_s)| left_rate(*t_s) >= 0.5 * sharpest)
-        .map(|(frame, t_s)| (t_s, land(frame)));
+        .filter(|(_, t_s)| left_yaw_rate(*t_s) >= 0.5 * largest_rate)
+        .map(|(frame, t_s)| (t_s, land_share(frame)));
     Ok(turns.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((start_s, 0.0)))
 }
 
-/// The paper's RK2 from the frame of the stamp against the oracle at one phase of the exposure, in pixels of
-/// the ideal frame, and how many of the pixels looked at have their source outside of it.
+/// Source errors of the paper's RK2 at one phase of the exposure, in pixels of its ideal frame, and the
+/// number of compared pixels whose source is outside of that frame.
 fn paper_errors(
     setup: &Setup<'_>,
     sequence: &Arc<Sequence>,
     phase: f64,
 ) -> Result<(ErrorStats, usize), ReproduceError> {
-    let ideal = Ideal::at(setup.engine, sequence, sequence.start_s)?;
+    let ideal = PaperIdealFrame::render(setup.engine, sequence, sequence.start_s)?;
     let key = IdealView { pose: ideal.pose, ideal: ideal.geometry };
-    let oracle = rig::oracle(sequence)?;
-    let view = oracle.view(0);
+    let reference = test_bench::reference(sequence)?;
+    let view = reference.view(0);
     let [width, height] = sequence.scenario.camera.size_px;
     let (mut errors, mut outside) = (Vec::new(), 0);
     for y in (0..height).step_by(STEP_PX as usize) {
         for x in (0..width).step_by(STEP_PX as usize) {
-            let Some(look) = view.sample([x, y], DVec2::ZERO, phase) else { continue };
-            let found =
-                ideal.source_px(look.uv, look.t_s - sequence.start_s, Model::Rk2(2.5_f64.to_radians()));
-            let truth = key.source_px(&look);
-            if !ideal.geometry.contains(found) || !ideal.geometry.contains(truth) {
+            let Some(sample) = view.sample([x, y], DVec2::ZERO, phase) else { continue };
+            let source_px = ideal.source_px(
+                sample.uv,
+                sample.t_s - sequence.start_s,
+                DisplacementModel::Rk2(2.5_f64.to_radians()),
+            );
+            let truth_px = key.source_px(&sample);
+            if !ideal.geometry.contains(source_px) || !ideal.geometry.contains(truth_px) {
                 outside += 1;
                 continue;
             }
-            errors.push(found.distance(truth));
+            errors.push(source_px.distance(truth_px));
         }
     }
     Ok((ErrorStats::of(errors), outside))
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let mut report = Report::default();
+// Long because: a list of effects and their figures.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let mut report = ExperimentReport::default();
     let (flight, name) = load(setup)?;
     let (turn_s, land) = left_turn_over_land(&flight)?;
     let motion = flight.path.trajectory.state(turn_s);
     report.notes.push(format!(
-        "Flight: {name}. Instant: {turn_s:.1} s, the left turn with most land in the picture, {:.0} % of it, of those at least half as sharp as the sharpest ({:.1} deg/s about the \
-         body's down axis, {:.0} m/s). The paper's fisheye looks along the nose; every \
-         time constant is {LONG_S} s. Errors are distances of source coordinates from the oracle's, of every {STEP_PX}th pixel each way, in pixels of the ideal frame.",
+        "Flight: {name}. Instant: {turn_s:.1} s, in the left turn with the most land in view ({:.0} % of the \
+         frame; {:.1} deg/s about the body's down axis, {:.0} m/s). The paper's fisheye looks along the \
+         nose. Delay, readout, exposure and field time are {EFFECT_S} s each. Errors are source errors \
+         against the reference renderer, at every {STEP_PX}th pixel in x and y, in pixels of the ideal \
+         frame.",
         100.0 * land,
         motion.rate_body_rad_s.z.to_degrees(),
         motion.velocity_ned_m_s.length()
     ));
-    let long_ms = 1e3 * LONG_S;
+    let effect_ms = 1e3 * EFFECT_S;
     let none = ShutterSpec::default();
     let effects = [
         ("nothing", turn_s, none.clone(), 0.0),
-        ("delay, 1 s later", turn_s + LONG_S, ShutterSpec { delay_ms: long_ms, ..none.clone() }, 0.0),
-        ("rolling shutter", turn_s, ShutterSpec { readout_ms: long_ms, ..none.clone() }, 0.0),
-        ("exposure (its end)", turn_s, ShutterSpec { exposure_ms: long_ms, ..none.clone() }, 0.5),
-        ("interlacing", turn_s, ShutterSpec { interlace_ms: FieldOr::Ms(long_ms), ..none }, 0.0),
+        ("delay, 1 s later", turn_s + EFFECT_S, ShutterSpec { delay_ms: effect_ms, ..none.clone() }, 0.0),
+        ("rolling shutter", turn_s, ShutterSpec { readout_ms: effect_ms, ..none.clone() }, 0.0),
+        ("exposure (its end)", turn_s, ShutterSpec { exposure_ms: effect_ms, ..none.clone() }, 0.5),
+        ("interlacing", turn_s, ShutterSpec { interlace_ms: FieldOr::Ms(effect_ms), ..none }, 0.0),
     ];
     let mut table = Table::new(
-        "Source coordinates against the oracle, px",
+        "Source errors, px",
         &[
             "effect",
             "paper: RMS",
@@ -161,13 +170,14 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     );
     let mut frames = Vec::new();
     for (name, stamp_s, shutter, phase) in effects {
-        let sequence = rig::at(&flight, stamp_s, shutter);
+        let sequence = test_bench::with_shutter(&flight, stamp_s, shutter);
         let (paper, outside) = paper_errors(setup, &sequence, phase)?;
         let finished =
-            rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
-        let finished = finished.ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))?;
+            test_bench::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?
+                .pop();
+        let finished = finished.ok_or_else(|| ReproduceError::setup("the sequence", "it gave no frame"))?;
         let own = coord_errors(
-            &rig::oracle(&sequence)?,
+            &test_bench::reference(&sequence)?,
             finished.plan.frame,
             &finished.plan.ideal_view(),
             &finished.frame,
@@ -191,16 +201,20 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             own.missing.to_string(),
         ]);
     }
-    let delayed = rig::difference(&frames[0], &frames[1])?;
+    let delayed = test_bench::difference(&frames[0], &frames[1])?;
     report.notes.push(format!(
-        "Fig. 21 (a) and (b), \"visually indistinguishable\" in the paper: camsim's differ by {:.1e} RMS of the linear range, {} at most.",
+        "Fig. 21 (a) and (b), \"visually indistinguishable\" in the paper, differ in camsim by {:.1e} RMS of \
+         the linear range, at most by {}.",
         delayed.rmse,
         short(delayed.max)
     ));
     report.tables.push(("fig21", table));
     report.pictures.push(Picture {
         name: "fig21",
-        caption: "Fig. 21 by camsim: (a) no temporal distortion, (b) 1 s later with 1 s of delay, (c) 1 s of readout, (d) 1 s of exposure, (e) fields 1 s apart.".into(),
+        caption:
+            "Fig. 21 by camsim: (a) no temporal distortion, (b) 1 s later with 1 s of delay, (c) 1 s of \
+                  readout, (d) 1 s of exposure, (e) fields 1 s apart."
+                .into(),
         frames,
         columns: 2,
         shrink: 1,

@@ -1,4 +1,4 @@
-//! What an experiment gives, and its files.
+//! Results of an experiment, and their files.
 
 use std::path::{Path, PathBuf};
 
@@ -11,22 +11,22 @@ use crate::plot::Plot;
 /// Frames side by side.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Name of its file, without extension.
+    /// File name without extension.
     pub name: &'static str,
-    /// What it shows; `(a)`, `(b)` ... count its frames by rows.
+    /// Caption; `(a)`, `(b)` ... count the frames by rows.
     pub caption: String,
-    /// The frames, of one size.
+    /// Frames of one size.
     pub frames: Vec<RenderedFrame>,
-    /// How many stand side by side.
+    /// Number of frames in a row.
     pub columns: u32,
-    /// By how much they are made smaller.
+    /// Reduction factor.
     pub shrink: u32,
 }
 
 /// Result of an experiment.
 #[derive(Clone, Debug, Default)]
-pub struct Report {
-    /// What to know before reading on.
+pub struct ExperimentReport {
+    /// Notes on inputs and methods.
     pub notes: Vec<String>,
     /// Tables, with the names of their files.
     pub tables: Vec<(&'static str, Table)>,
@@ -36,12 +36,12 @@ pub struct Report {
     pub pictures: Vec<Picture>,
 }
 
-impl Report {
-    /// Writes every table as CSV, every plot as SVG, every picture as PNG (pixels without a ray are red, as
-    /// in the paper), and all of it as `report.md` under `title`. Gives the files.
+impl ExperimentReport {
+    /// Writes each table as CSV, each plot as SVG, each picture as PNG (invalid pixels are red, as in the
+    /// paper), and `report.md` with `title`. Returns the paths of the files.
     ///
     /// # Errors
-    /// A file cannot be written, or there is nothing to plot.
+    /// A file cannot be written, or a plot has no point.
     pub fn write(&self, folder: &Path, title: &str) -> Result<Vec<PathBuf>, ReproduceError> {
         let mut files = Vec::new();
         for (name, table) in &self.tables {
@@ -53,7 +53,7 @@ impl Report {
             write_atomic(&folder.join(format!("{name}.svg")), plot.svg()?.as_bytes())?;
         }
         for picture in &self.pictures {
-            let frames: Vec<RenderedFrame> = picture.frames.iter().map(with_red_void).collect();
+            let frames: Vec<RenderedFrame> = picture.frames.iter().map(with_red_invalid_pixels).collect();
             files.push(folder.join(format!("{}.png", picture.name)));
             contact_sheet(
                 &folder.join(format!("{}.png", picture.name)),
@@ -67,7 +67,7 @@ impl Report {
         Ok(files)
     }
 
-    /// Everything as Markdown; plots and pictures are named by their files.
+    /// The report as Markdown, with links to the files of plots and pictures.
     #[must_use]
     pub fn markdown(&self, title: &str) -> String {
         let mut text = format!("# {title}\n");
@@ -87,8 +87,8 @@ impl Report {
     }
 }
 
-/// The paper's red where no ray exists.
-fn with_red_void(frame: &RenderedFrame) -> RenderedFrame {
+/// The frame with invalid pixels in red, as in the paper.
+fn with_red_invalid_pixels(frame: &RenderedFrame) -> RenderedFrame {
     let mut frame = frame.clone();
     for pixel in frame.color_rgba.chunks_exact_mut(4).filter(|pixel| pixel[3] <= 0.0) {
         pixel.copy_from_slice(&[1.0, 0.0, 0.0, 1.0]);

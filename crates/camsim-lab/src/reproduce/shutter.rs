@@ -6,35 +6,35 @@ use camsim_core::{scenario::ShutterSpec, sequence::Sequence};
 use glam::DVec2;
 
 use super::{
-    Picture, Report, ReproduceError, Setup, Table,
-    circles::{Matches, matches, spots},
-    displace::{Ideal, Light, Model, Path},
-    rig::{self, FLIGHT_M_S, HEIGHT_M, Motion, TARGET_M},
+    ExperimentReport, Picture, ReproduceError, Setup, Table,
+    circles::{CircleMatches, detect_blobs, match_circles},
+    displacement::{Averaging, DisplacementModel, PaperIdealFrame, SamplePath},
     short,
+    test_bench::{self, FLIGHT_M_S, HEIGHT_M, Motion, TARGET_M},
 };
 
-/// Readout time, seconds: large, so that the effect shows.
+/// Readout time, seconds; large to make the effect visible.
 const READOUT_S: f64 = 1.0;
 
-/// What was found in one picture of one motion.
-pub(super) struct Seen {
-    /// Motion.
+/// Measurements in one frame of one motion.
+pub(super) struct ShutterResult {
+    /// Name of the motion.
     pub motion: &'static str,
-    /// Circles.
-    pub circles: Matches,
-    /// Pixels that show the wrong surface.
-    pub wrong: usize,
+    /// Detected circles.
+    pub circles: CircleMatches,
+    /// Number of pixels that show the wrong surface.
+    pub wrong_surface: usize,
 }
 
-/// Affine change of the circle grid against the picture of a still camera: `[[xx, xy], [yx, yy]]`, least
-/// squares about the image centre.
-pub(super) fn affine(still: &[DVec2], moved: &[DVec2]) -> [[f64; 2]; 2] {
-    let middle = |points: &[DVec2]| points.iter().sum::<DVec2>() / points.len().max(1) as f64;
-    let (still_middle, moved_middle) = (middle(still), middle(moved));
+/// Affine map `[[xx, xy], [yx, yy]]` from the circle centres of a still camera to those of a moving one, by
+/// least squares about the means.
+pub(super) fn fit_affine(still: &[DVec2], moved: &[DVec2]) -> [[f64; 2]; 2] {
+    let mean = |points: &[DVec2]| points.iter().sum::<DVec2>() / points.len().max(1) as f64;
+    let (still_mean, moved_mean) = (mean(still), mean(moved));
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     let (mut bx, mut by) = (DVec2::ZERO, DVec2::ZERO);
     for (a, b) in still.iter().zip(moved) {
-        let (a, b) = (*a - still_middle, *b - moved_middle);
+        let (a, b) = (*a - still_mean, *b - moved_mean);
         xx += a.x * a.x;
         xy += a.x * a.y;
         yy += a.y * a.y;
@@ -46,21 +46,23 @@ pub(super) fn affine(still: &[DVec2], moved: &[DVec2]) -> [[f64; 2]; 2] {
     [solve(bx), solve(by)]
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let mut report = Report::default();
+// Long because: a list of motions and methods.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let mut report = ExperimentReport::default();
     report.notes.push(format!(
-        "Bench as in 8.4; readout {READOUT_S} s from top to bottom, its middle at the stamp. True places of the circles: each point projected at the time of \
-         the row in which it lands. Right and wrong surfaces: the oracle's ray through each pixel's centre at the time of its row."
+        "Test bench as in 8.4. The readout is {READOUT_S} s from top to bottom with its middle at the stamp. \
+         True positions of circles: each point is projected at the time of its row. Wrong surfaces: compared \
+         with the exact ray through each pixel's centre at the time of its row."
     ));
-    let scene = rig::target(setup, TARGET_M)?;
+    let scene = test_bench::target(setup, TARGET_M)?;
     let rolling = ShutterSpec { readout_ms: 1e3 * READOUT_S, ..ShutterSpec::default() };
     let mut table = Table::new(
-        "Circles of figs. 18 and 19 against their true places",
+        "Circles of figs. 18 and 19 against their true positions",
         &["motion", "method", "px RMS", "largest", "missed", "pixels with the wrong surface"],
     );
     let mut shapes = Table::new(
-        "Shape of the target in camsim's pictures against closed form",
-        &["motion", "what", "closed form", "found", "by the true places"],
+        "Shape of the target in camsim's frames against closed form",
+        &["motion", "what", "closed form", "found", "from the true positions"],
     );
     let mut fig19 = Vec::new();
     for (motion, name) in [
@@ -69,37 +71,43 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         (Motion::flying(0.0, -1.0), "upwards"),
         (Motion::flying(0.0, 1.0), "downwards"),
     ] {
-        let bench =
-            rig::at(&*rig::sequence(rig::pinhole(setup.width_px), motion, &scene)?, 0.0, rolling.clone());
-        let still = rig::snapshot(setup.engine, &bench, 0.0)?;
-        let ideal = Ideal::at(setup.engine, &bench, 0.0)?;
+        let bench = test_bench::with_shutter(
+            &*test_bench::sequence(test_bench::pinhole(setup.width_px), motion, &scene)?,
+            0.0,
+            rolling.clone(),
+        );
+        let still = test_bench::snapshot(setup.engine, &bench, 0.0)?;
+        let ideal = PaperIdealFrame::render(setup.engine, &bench, 0.0)?;
         let paper = ideal.frame(
             &bench.scenario.camera,
-            Model::Rk2(2.5_f64.to_radians()),
+            DisplacementModel::Rk2(2.5_f64.to_radians()),
             1,
-            Path::Straight,
-            Light::Linear,
+            SamplePath::Straight,
+            Averaging::Linear,
         )?;
-        let own = rig::picture(setup.engine, &bench)?;
+        let own = test_bench::render_first(setup.engine, &bench)?;
         for (method, frame) in [("paper: RK2 from the frame of the stamp", &paper), ("camsim", &own)] {
-            let found = look(&bench, name, frame)?;
-            let stats = found.circles.stats();
+            let result = measure(&bench, name, frame)?;
+            let stats = result.circles.stats();
             table.row([
                 name.into(),
                 method.into(),
                 short(stats.rms_px),
                 short(stats.max_px),
-                found.circles.missed.to_string(),
-                found.wrong.to_string(),
+                result.circles.missed.to_string(),
+                result.wrong_surface.to_string(),
             ]);
             if method == "camsim" {
-                shape(&bench, &found, &mut shapes)?;
+                shape_row(&bench, &result, &mut shapes)?;
             }
         }
         match name {
             "rotation clockwise" => report.pictures.push(Picture {
                 name: "fig18",
-                caption: "Fig. 18: (a) still camera, (b) camera turning clockwise, the paper's method, (c) the same by camsim.".into(),
+                caption:
+                    "Fig. 18: (a) still camera, (b) camera in clockwise rotation by the paper's method, \
+                          (c) the same by camsim."
+                        .into(),
                 frames: vec![still, paper, own],
                 columns: 3,
                 shrink: 2,
@@ -109,8 +117,9 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     }
     report.pictures.push(Picture {
         name: "fig19",
-        caption: "Fig. 19, row by row: to the right (shear), upwards (elongation), downwards (shortening); still camera, the paper's method, camsim. \
-                  The paper's method loses a rim of the target wherever depth is read in the sky."
+        caption: "Fig. 19, row by row: to the right (shear), upwards (elongation), downwards (shortening); \
+                  still camera, the paper's method, camsim. The paper's method loses a rim of the target \
+                  where it reads the depth of the sky."
             .into(),
         frames: fig19,
         columns: 3,
@@ -121,24 +130,24 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     Ok(report)
 }
 
-/// Finds the circles of a frame of the bench.
-pub(super) fn look(
+/// Detects the circles of a frame.
+pub(super) fn measure(
     bench: &Arc<Sequence>,
     motion: &'static str,
     frame: &camsim_core::frame::RenderedFrame,
-) -> Result<Seen, ReproduceError> {
-    let circles = matches(&rig::seen_circles(bench, 0.0, TARGET_M)?, &spots(frame));
-    Ok(Seen { motion, circles, wrong: rig::wrong_surface(bench, frame)? })
+) -> Result<ShutterResult, ReproduceError> {
+    let circles = match_circles(&test_bench::circles_in_view(bench, 0.0, TARGET_M)?, &detect_blobs(frame));
+    Ok(ShutterResult { motion, circles, wrong_surface: test_bench::count_wrong_surface(bench, frame)? })
 }
 
-/// Shear or stretch of the grid against its closed form: with the image moving at `rate` px/s, `rows` rows
-/// and readout `t_r`, a point of still row y appears where `y' = y + rate t_r (y'/rows)`.
-fn shape(bench: &Sequence, found: &Seen, table: &mut Table) -> Result<(), ReproduceError> {
-    let (camera, _) = rig::checked(bench)?;
+/// Adds shear or stretch of the grid and its closed form: for an image motion of `rate` px/s, `rows` rows and
+/// readout `t_r`, a point at row y of a still camera appears at `y' = y + rate t_r (y'/rows)`.
+fn shape_row(bench: &Sequence, result: &ShutterResult, table: &mut Table) -> Result<(), ReproduceError> {
+    let (camera, _) = test_bench::camera_and_shutter(bench)?;
     let rate_px_s = camera.focal_px.y * FLIGHT_M_S / HEIGHT_M;
     let share = rate_px_s * READOUT_S / f64::from(camera.size_px[1]);
-    // Right: the image moves left, lower rows later. Up: the image moves down. Down: it moves up.
-    let (what, k, closed) = match found.motion {
+    // Flight to the right: the image moves left, lower rows later. Upwards: it moves down. Downwards: up.
+    let (what, k, closed) = match result.motion {
         "to the right" => ("shear, px of x for one of y", [0, 1], -share),
         "upwards" => ("height, relative", [1, 1], 1.0 / (1.0 - share)),
         "downwards" => ("height, relative", [1, 1], 1.0 / (1.0 + share)),
@@ -146,33 +155,34 @@ fn shape(bench: &Sequence, found: &Seen, table: &mut Table) -> Result<(), Reprod
     };
     let mut global = bench.clone();
     global.scenario.camera.shutter = ShutterSpec::default();
-    let (still_camera, still_shutter) = rig::checked(&global)?;
-    // The same circles in a still camera's picture: by their ground places, in the order of the grid.
-    let pairs: Vec<(DVec2, DVec2, DVec2)> = super::pattern::circles(TARGET_M)
+    let (still_camera, still_shutter) = test_bench::camera_and_shutter(&global)?;
+    // Of each circle in view: centroid in a still camera, detected centroid, true centroid.
+    let triples: Vec<(DVec2, DVec2, DVec2)> = super::circle_grid::circles(TARGET_M)
         .iter()
         .filter_map(|circle| {
-            let (moving, shutter) = rig::checked(bench).ok()?;
-            let here = circle.seen(|p| rig::project(bench, &moving, &shutter, 0.0, p))?;
-            let spot = found
+            let (moving_camera, shutter) = test_bench::camera_and_shutter(bench).ok()?;
+            let moved = circle.image(|p| test_bench::project(bench, &moving_camera, &shutter, 0.0, p))?;
+            let blob = result
                 .circles
                 .pairs
                 .iter()
-                .find(|(seen, _)| seen.centroid_px.distance(here.centroid_px) < 1e-6)?
+                .find(|(circle, _)| circle.centroid_px.distance(moved.centroid_px) < 1e-6)?
                 .1;
-            let still = circle.seen(|p| rig::project(&global, &still_camera, &still_shutter, 0.0, p))?;
-            Some((still.centroid_px, spot.centroid_px, here.centroid_px))
+            let still =
+                circle.image(|p| test_bench::project(&global, &still_camera, &still_shutter, 0.0, p))?;
+            Some((still.centroid_px, blob.centroid_px, moved.centroid_px))
         })
         .collect();
-    let still: Vec<DVec2> = pairs.iter().map(|p| p.0).collect();
-    let [found_shape, true_shape] =
-        [pairs.iter().map(|p| p.1).collect::<Vec<_>>(), pairs.iter().map(|p| p.2).collect()]
-            .map(|moved| affine(&still, &moved)[k[0]][k[1]]);
+    let still: Vec<DVec2> = triples.iter().map(|p| p.0).collect();
+    let [detected, exact] =
+        [triples.iter().map(|p| p.1).collect::<Vec<_>>(), triples.iter().map(|p| p.2).collect()]
+            .map(|moved| fit_affine(&still, &moved)[k[0]][k[1]]);
     table.row([
-        found.motion.into(),
+        result.motion.into(),
         what.into(),
         format!("{closed:.5}"),
-        format!("{found_shape:.5}"),
-        format!("{true_shape:.5}"),
+        format!("{detected:.5}"),
+        format!("{exact:.5}"),
     ]);
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! 8.9: frames a second.
+//! 8.9: frame rates.
 
 use std::{
     convert::Infallible,
@@ -9,19 +9,19 @@ use camsim_core::scenario::{Auto, CameraSpec, Channel, Preset, ShutterSpec, Silh
 use camsim_engine::Session;
 
 use super::{
-    Report, ReproduceError, Setup, Table,
-    rig::{self, Motion, TARGET_M},
+    ExperimentReport, ReproduceError, Setup, Table,
+    test_bench::{self, Motion, TARGET_M},
 };
 use crate::plot::{Plot, Series};
 
-/// Rounds; each renders a burst with every variant in turn.
+/// Number of rounds; each renders a burst with every variant in turn.
 const ROUNDS: usize = 9;
-/// Frames of a burst: enough for two in flight to pay.
+/// Frames in a burst: enough that two in flight overlap.
 const BURST: u64 = 3;
-/// No round begins after this.
+/// Time after which no round begins.
 const BUDGET: Duration = Duration::from_secs(120);
-/// The reference program under a software adapter on two cores, 640 x 480, its best time in ms a frame; the
-/// last row's exposure is 100 ms.
+/// Name, lens, readout in ms, exposure in ms, exposure samples of the paper preset, and ms per frame of the
+/// paper's program at 640 x 480 on a software adapter with two cores (its best time).
 const CASES: [(&str, bool, f64, f64, u32, f64); 5] = [
     ("ideal camera, nothing on", false, 0.0, 0.0, 1, 23.6),
     ("fisheye", true, 0.0, 0.0, 1, 32.0),
@@ -30,27 +30,31 @@ const CASES: [(&str, bool, f64, f64, u32, f64); 5] = [
     ("the same, exposure 100 ms, 100 samples", true, 33.0, 100.0, 100, 115.4),
 ];
 
-struct Variant<'a> {
+/// A session and its times.
+struct TimedSession<'a> {
     session: Session<'a>,
+    /// Milliseconds per frame, one entry per round.
     ms: Vec<f64>,
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let mut report = Report::default();
-    let scene = rig::target(setup, TARGET_M)?;
-    // The path of the reference program's measurements: the turn of its rotation file.
+// Long because: a list of cases and their figures.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let mut report = ExperimentReport::default();
+    let scene = test_bench::target(setup, TARGET_M)?;
+    // The rotation of the measurements of the paper's program.
     let mut variants = Vec::new();
     for (_, lens, readout_ms, exposure_ms, samples, _) in CASES {
         for (preset, silhouettes) in
             [(Preset::Paper, false), (Preset::Default, true), (Preset::Default, false)]
         {
-            let camera = if lens { rig::fisheye(setup.width_px) } else { rig::pinhole(setup.width_px) };
+            let camera =
+                if lens { test_bench::fisheye(setup.width_px) } else { test_bench::pinhole(setup.width_px) };
             let camera = CameraSpec {
                 fps: 30.0,
                 shutter: ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() },
                 ..camera
             };
-            let mut sequence = (*rig::sequence(camera, Motion::turning(), &scene)?).clone();
+            let mut sequence = (*test_bench::sequence(camera, Motion::turning(), &scene)?).clone();
             sequence.scenario.quality.preset = preset;
             if !silhouettes {
                 sequence.scenario.quality.silhouettes = Silhouettes::Plain;
@@ -60,8 +64,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             }
             let mut session = setup.engine.session::<Infallible>(sequence.into(), &[Channel::Color])?;
             // The first dispatch of a pipeline compiles it.
-            burst(&mut session, 0)?;
-            variants.push(Variant { session, ms: Vec::new() });
+            render_burst(&mut session, 0)?;
+            variants.push(TimedSession { session, ms: Vec::new() });
         }
     }
     let begin = Instant::now();
@@ -73,15 +77,17 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         for place in 0..count {
             let variant = &mut variants[(place + round) % count];
             let begin = Instant::now();
-            burst(&mut variant.session, round as u64)?;
+            render_burst(&mut variant.session, round as u64)?;
             variant.ms.push(1e3 * begin.elapsed().as_secs_f64() / BURST as f64);
         }
     }
     let ms: Vec<f64> = variants.iter().map(|variant| median(variant.ms.clone())).collect();
     report.notes.push(format!(
-        "Adapter: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, variants in turn. The paper: more than 33 frames/s with 100 samples on a \
-         GeForce 940MX. \"Reference program\": its published code, measured at 640x480 with the same scene under Mesa's software adapter on two cores, so only such a \
-         machine compares with it. camsim takes as many samples as its tolerance needs, whatever the row says.",
+        "Renderer: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, all \
+         variants in turn. The paper: more than 33 frames/s with 100 samples on a GeForce 940MX. \"Reference \
+         program\": the paper's published code, measured at 640x480 with the same scene on Mesa's software \
+         adapter with two cores, so it compares with such a machine only. camsim takes as many samples as \
+         its tolerance needs, whatever the row says.",
         setup.engine,
         setup.width_px,
         setup.width_px * 3 / 4,
@@ -96,7 +102,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             "frames/s",
             "camsim",
             "frames/s",
-            "camsim without silhouette samples",
+            "camsim without silhouette rays",
             "frames/s",
         ],
     );
@@ -131,7 +137,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             series: vec![
                 series("paper preset", 0),
                 series("camsim", 1),
-                series("camsim without silhouette samples", 2),
+                series("camsim without silhouette rays", 2),
                 Series {
                     name: "reference program (software adapter, two cores)".into(),
                     points: reference,
@@ -143,7 +149,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     Ok(report)
 }
 
-fn burst(session: &mut Session<'_>, round: u64) -> Result<(), ReproduceError> {
+fn render_burst(session: &mut Session<'_>, round: u64) -> Result<(), ReproduceError> {
     Ok(session.render::<Infallible>(round * BURST..(round + 1) * BURST, &mut |finished| {
         std::hint::black_box(finished);
         Ok(())

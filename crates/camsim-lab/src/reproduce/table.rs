@@ -1,13 +1,13 @@
-//! Tables: the same rows for the terminal, for Markdown, and for programs.
+//! Tables as text, Markdown and CSV.
 
 /// Rows of text under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
-    /// What is tabulated.
+    /// Title.
     pub title: String,
     /// Column names, with units.
     pub columns: Vec<String>,
-    /// Cells, as many a row as columns.
+    /// Cells of each row, one per column.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -29,7 +29,7 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// Columns of equal width: the first left-aligned, the others right-aligned.
+    /// The table as text: the first column is aligned left, the others right.
     #[must_use]
     pub fn text(&self) -> String {
         let lines: Vec<&Vec<String>> = std::iter::once(&self.columns).chain(&self.rows).collect();
@@ -54,7 +54,7 @@ impl Table {
         text
     }
 
-    /// A Markdown table under its title in bold.
+    /// The table as Markdown, with the title in bold.
     #[must_use]
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| {
@@ -71,7 +71,7 @@ impl Table {
         text
     }
 
-    /// Comma-separated values with a header; cells with commas or quotes are quoted.
+    /// The table as CSV with a header; cells with commas or quotes are quoted.
     #[must_use]
     pub fn csv(&self) -> String {
         let cell = |cell: &String| {
@@ -86,7 +86,7 @@ impl Table {
     }
 }
 
-/// A number with three significant digits, as short as that is readable.
+/// A number with three significant digits.
 #[must_use]
 pub fn short(value: f64) -> String {
     match value.abs() {
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_forms_of_one_table() {
+    fn table_is_written_as_text_markdown_and_csv() {
         let mut table = Table::new("steps", &["solver", "error, px"]);
         table.row(["rk2".into(), "0.02".into()]);
         table.row(["a|b".into()]);
@@ -119,8 +119,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_three_digits() {
-        let found = [0.0, 0.018_45, 3.578, 17.02, 123.4, 2.34e-5, f64::NAN].map(short);
-        assert_eq!(found, ["0", "0.0185", "3.58", "17.0", "123", "2.3e-5", "-"]);
+    fn numbers_have_three_digits() {
+        let texts = [0.0, 0.018_45, 3.578, 17.02, 123.4, 2.34e-5, f64::NAN].map(short);
+        assert_eq!(texts, ["0", "0.0185", "3.58", "17.0", "123", "2.3e-5", "-"]);
     }
 }

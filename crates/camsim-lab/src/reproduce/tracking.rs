@@ -1,4 +1,4 @@
-//! 8.1: how far the tracker is from the interpolated log.
+//! 8.1: distance of the tracker from the interpolated log.
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
@@ -7,37 +7,38 @@ use camsim_core::{
 };
 use camsim_io::{builtin, flight_log::read_flight_log};
 
-use super::{Report, ReproduceError, Setup, Table, rig, short};
+use super::{ExperimentReport, ReproduceError, Setup, Table, short, test_bench};
 use crate::plot::{Plot, Series};
 
 /// The paper's limits: 2 g and 60 deg/s^2.
 const MAX_ACCELERATION_M_S2: f64 = 19.6;
 const MAX_ANGULAR_ACCELERATION_DEG_S2: f64 = 60.0;
-/// RMS of the reference program on the same log (glitch rows left out), measured: north, east, down in m,
+/// Measured RMS errors of the paper's program on the same log, without its outliers: north, east, down in m;
 /// roll, pitch, yaw in deg.
 const REFERENCE_PROGRAM: [f64; 6] = [0.379, 0.314, 0.075, 0.201, 0.038, 0.052];
-/// Part of the flight that is plotted, seconds from its first row, and the step.
+/// Plotted part of the flight, seconds from its first row.
 const PLOTTED_S: [f64; 2] = [100.0, 130.0];
+/// Step of the plot.
 const PLOT_STEP_S: f64 = 0.1;
 
-/// One tracker's result.
-pub(super) struct Followed {
-    /// `sqrt` or `spline`.
+/// Result of one tracker.
+pub(super) struct TrackedFlight {
+    /// Name of the tracker.
     pub name: &'static str,
-    /// Motion.
+    /// Tracked motion.
     pub tracked: TrackResult,
-    /// Errors.
+    /// Errors against the log.
     pub report: TrackReport,
 }
 
-/// The log and both trackers on it.
-pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), ReproduceError> {
+/// Reads the log and tracks it with both trackers.
+pub(super) fn track_log(setup: &Setup<'_>) -> Result<(FlightLog, Vec<TrackedFlight>), ReproduceError> {
     let log = match setup.data_file("camsim/path_lawnmower.csv") {
         Some(path) => {
             let spec = FlightSpec {
                 log: path.clone(),
                 format: LogFormat::CsvLla,
-                ..rig::scenario(rig::pinhole(96)).flight
+                ..test_bench::scenario(test_bench::pinhole(96)).flight
             };
             read_flight_log(&path, &spec, HeightConversion::None)?
         }
@@ -48,7 +49,7 @@ pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), Re
             read_flight_log(&flight.log, &flight, HeightConversion::None)?
         }
     };
-    let mut followed = Vec::new();
+    let mut flights = Vec::new();
     for (name, kind) in [("sqrt", TrackerKind::Sqrt), ("spline", TrackerKind::Spline)] {
         let spec = TrackerSpec {
             kind,
@@ -56,30 +57,33 @@ pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), Re
             max_angular_acceleration_deg_s2: Auto::Value(MAX_ANGULAR_ACCELERATION_DEG_S2),
             ..TrackerSpec::default()
         };
-        let tracked = track(&log.rows, &spec).map_err(|error| ReproduceError::made("the tracker", error))?;
+        let tracked = track(&log.rows, &spec).map_err(|error| ReproduceError::setup("the tracker", error))?;
         let report = tracked
             .report(&log.rows)
-            .ok_or_else(|| ReproduceError::made("the flight log", "it has no row"))?;
-        followed.push(Followed { name, tracked, report });
+            .ok_or_else(|| ReproduceError::setup("the flight log", "it has no row"))?;
+        flights.push(TrackedFlight { name, tracked, report });
     }
-    Ok((log, followed))
+    Ok((log, flights))
 }
 
-pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
-    let (log, followed) = follow(setup)?;
+// Long because: a list of tables.
+pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
+    let (log, flights) = track_log(setup)?;
     let real = setup.data.is_some();
-    let mut report = Report::default();
+    let mut report = ExperimentReport::default();
     let (flight, program) = if real {
         ("FSR 2015-ASL, lawnmower sequence", REFERENCE_PROGRAM.map(short))
     } else {
         (
-            "camsim's built-in flight: the paper's log needs --data, and its figures do not compare with these",
+            "camsim's built-in flight, whose figures do not compare with the paper's; the paper's log needs \
+             --data",
             [(); 6].map(|()| "-".to_owned()),
         )
     };
     report.notes.push(format!(
-        "Log: {flight}; {} rows, {:.0} s. Limits as in the paper: 2 g and 60 deg/s^2, here on the lengths of the vectors. The paper's own table 1 \
-         is a picture and its numbers are not in the text at hand; \"reference program\" is its published code, measured on the same log.",
+        "Log: {flight}; {} rows, {:.0} s. Limits as in the paper: 2 g and 60 deg/s^2, here of the lengths of \
+         the vectors. The numbers of the paper's table 1 are not available; \"reference program\" is the \
+         paper's published code, measured on the same log.",
         log.rows.len(),
         log.duration_s()
     ));
@@ -88,7 +92,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         &["channel", "sqrt", "spline", "reference program", "sqrt, max", "spline, max"],
     );
     let [sqrt, spline] =
-        [0, 1].map(|k: usize| (listed(&followed[k].report.rms), listed(&followed[k].report.max_error)));
+        [0, 1].map(|k: usize| (components(&flights[k].report.rms), components(&flights[k].report.max_error)));
     for (i, name) in
         ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg", "attitude, deg"]
             .into_iter()
@@ -105,23 +109,23 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         ]);
     }
     report.tables.push(("rms", table));
-    report.tables.push(("motion", motion(&followed)));
-    report.plots.push(("error", error_plot(&log, &followed)));
+    report.tables.push(("motion", motion_table(&flights)));
+    report.plots.push(("error", error_plot(&log, &flights)));
     Ok(report)
 }
 
-fn listed(channels: &Channels) -> [f64; 7] {
+fn components(channels: &Channels) -> [f64; 7] {
     let Channels { north_m, east_m, down_m, roll_deg, pitch_deg, yaw_deg, attitude_deg } = *channels;
     [north_m, east_m, down_m, roll_deg, pitch_deg, yaw_deg, attitude_deg]
 }
 
-/// What the motions take of the limits.
-fn motion(followed: &[Followed]) -> Table {
+/// The largest speeds and accelerations of the motions.
+fn motion_table(flights: &[TrackedFlight]) -> Table {
     let mut table = Table::new(
         "Largest motion used",
         &["tracker", "speed, m/s", "acceleration, m/s^2", "rate, deg/s", "angular acceleration, deg/s^2"],
     );
-    for Followed { name, report, .. } in followed {
+    for TrackedFlight { name, report, .. } in flights {
         let used = &report.max_used;
         table.row([
             (*name).to_owned(),
@@ -134,8 +138,8 @@ fn motion(followed: &[Followed]) -> Table {
     table
 }
 
-/// Distance from the log over a part of the flight.
-fn error_plot(log: &FlightLog, followed: &[Followed]) -> Plot {
+/// Plot of the distance from the log over a part of the flight.
+fn error_plot(log: &FlightLog, flights: &[TrackedFlight]) -> Plot {
     let end_s = log.duration_s();
     let [begin_s, last_s] = if end_s > PLOTTED_S[1] { PLOTTED_S } else { [0.0, end_s] };
     let points = |tracked: &TrackResult| {
@@ -152,9 +156,9 @@ fn error_plot(log: &FlightLog, followed: &[Followed]) -> Plot {
         x_label: "time from the first row, s".into(),
         y_label: "distance, m".into(),
         log: [false, false],
-        series: followed
+        series: flights
             .iter()
-            .map(|f| Series { name: f.name.into(), points: points(&f.tracked), joined: true })
+            .map(|flight| Series { name: flight.name.into(), points: points(&flight.tracked), joined: true })
             .collect(),
     }
 }

@@ -137,8 +137,8 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// RMS difference of the colours of two frames over the pixels that are valid in both, 1/255; and the number of
-/// pixels that are valid in one alone: the lens inverses round otherwise where the lens folds its image.
+/// RMS difference of the colours of two frames over the pixels that are valid in both, 1/255; and the number
+/// of pixels that are valid in one alone: the lens inverses round otherwise where the lens folds its image.
 pub fn apart_dn(a: &RenderedFrame, b: &RenderedFrame) -> (f64, usize) {
     let pixels = a.color_rgba.chunks_exact(4).zip(b.color_rgba.chunks_exact(4));
     let (valid, other): (Vec<_>, Vec<_>) = pixels.partition(|(a, b)| a[3] == b[3]);

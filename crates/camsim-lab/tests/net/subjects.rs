@@ -11,7 +11,7 @@ use camsim_core::{
     trajectory::Trajectory,
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
-use camsim_lab::{bench::knobs::resize, cases};
+use camsim_lab::{bench::methods::resize, cases};
 use camsim_plan::{FramePlan, PlanError, Planner};
 use glam::{DQuat, DVec3};
 

@@ -45,17 +45,17 @@ pub(crate) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
     let EdgeCase { outline, pose, ideal, quality, max_side_px, plain, .. } = *case;
     let mut skip = |what, reason: String| skipped.push(Skip { what, reason });
     if let Some(reason) = case.reason_for_none {
-        skip("silhouette supersampling", reason.to_owned());
+        skip("silhouette rays", reason.to_owned());
         return EdgeStage::None;
     }
     if quality.silhouettes == Silhouettes::Auto && quality.max_error_dn >= IGNORED_DN {
-        skip("silhouette supersampling", format!("quality.max_error_dn is {IGNORED_DN} or more"));
+        skip("silhouette rays", format!("quality.max_error_dn is {IGNORED_DN} or more"));
         return EdgeStage::None;
     }
     if let Some(SilhouetteError { at_silhouettes_dn: at_dn, error_dn, .. }) = plain {
         skip(
-            "silhouette supersampling",
-            format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"),
+            "silhouette rays",
+            format!("without them {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"),
         );
         return EdgeStage::None;
     }

@@ -106,7 +106,7 @@ impl<'a> Draft<'a> {
         let Self { context, scene, picture, ideal, motion, .. } = *self;
         let quality = context.quality();
         if context.is_paper() {
-            self.skip("silhouette supersampling", "quality.preset \"paper\" takes one sample a pixel");
+            self.skip("silhouette rays", "quality.preset \"paper\" takes one sample a pixel");
             self.blur = paper::blur_stage(&context.inputs.shutter, quality, &mut self.skipped);
             return None;
         }

@@ -8,7 +8,7 @@
 #[cfg(test)]
 mod tests;
 
-use camsim_core::{mount::CameraPath, pose::CameraPose};
+use camsim_core::{mount::CameraPath, pose::CameraPose, scene::TerrainTriangle, shutter::RowAxis};
 use glam::{DVec2, DVec3};
 
 use crate::{ir::frame_plan::FramePlan, view::surfaces::Surfaces};
@@ -19,39 +19,159 @@ pub struct PixelTruth {
     /// Source in the mid-window ideal frame, pixels, at the given exposure phase. It may lie beyond the
     /// frame's border, and behind that camera it is mirrored.
     pub source_px: DVec2,
-    /// Point (NED, metres) and planar depth in the row's own camera (metres) at mid-exposure; `None` is sky.
-    pub hit: Option<(DVec3, f64)>,
+    /// The surface at mid-exposure; `None` is sky.
+    pub hit: Option<PixelHit>,
 }
 
-/// What the ray `uv` of a pixel meets, each at its own instant: source at exposure phase `phase` (-0.5 to
-/// 0.5), point and depth at mid-exposure. The terrain is met at full detail, which what was drawn is within
-/// [`FramePlan::terrain_error_px`] of.
-pub(crate) fn pixel_truth(
-    path: &CameraPath,
-    surfaces: &Surfaces,
-    plan: &FramePlan,
-    [x, y]: [u32; 2],
-    uv: DVec2,
-    phase: f64,
-) -> PixelTruth {
-    let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-    let cast = |t_s: f64| {
-        let pose = path.pose(t_s);
-        let ray_ned = pose.ned_from_camera * uv.extend(1.0);
-        let depth_m = surfaces.first_hit(pose.position_ned_m, ray_ned).map(|hit| hit.depth_m);
-        (pose, ray_ned, depth_m)
-    };
-    let source_px = |(pose, ray_ned, depth_m): (CameraPose, DVec3, Option<f64>)| {
+/// The surface that the centre of a pixel sees at mid-exposure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelHit {
+    /// The point, NED, metres.
+    pub point_ned_m: DVec3,
+    /// Planar depth in the row's own camera, metres.
+    pub depth_m: f64,
+    /// Unit normal of the triangle, NED, towards the camera.
+    pub normal_ned: DVec3,
+    /// 0 = terrain, 1 + i = mesh i of the scene.
+    pub surface: u32,
+    /// The triangle, on the terrain.
+    pub triangle: Option<TerrainTriangle>,
+}
+
+/// A hit along a ray.
+struct RayHit {
+    depth_m: f64,
+    normal_ned: DVec3,
+    surface: u32,
+    triangle: Option<TerrainTriangle>,
+}
+
+/// Rays of the pixels of a frame, each at its own instant. The terrain is met at full detail, which what was
+/// drawn is within [`FramePlan::terrain_error_px`] of.
+#[derive(Debug)]
+pub struct FrameRays<'a> {
+    surfaces: &'a Surfaces,
+    plan: &'a FramePlan,
+    /// Camera at mid-exposure of each row, or of each column in either field.
+    mid: Vec<CameraPose>,
+    /// Camera at the exposure phase of the coordinates; empty where that is mid-exposure.
+    at_phase: Vec<CameraPose>,
+}
+
+impl<'a> FrameRays<'a> {
+    /// Rays whose coordinates are of exposure phase `phase`, -0.5 to 0.5.
+    pub(crate) fn new(path: &CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
+        let [columns, rows] = plan.camera.size_px;
+        let pixels: Vec<[u32; 2]> = match plan.shutter.row_axis() {
+            RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
+            RowAxis::Columns => (0..columns).flat_map(|x| [[x, 0], [x, 1]]).collect(),
+        };
+        let poses = |shift_s: f64| {
+            pixels
+                .iter()
+                .map(|&[x, y]| path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + shift_s))
+                .collect()
+        };
+        let shift_s = phase * plan.shutter.exposure_s();
+        let at_phase = if shift_s == 0.0 { Vec::new() } else { poses(shift_s) };
+        Self { surfaces, plan, mid: poses(0.0), at_phase }
+    }
+
+    /// What the ray `uv` of a pixel meets.
+    #[must_use]
+    pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {
+        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned).map(|hit| RayHit {
+            depth_m: hit.depth_m,
+            normal_ned: hit.normal_ned,
+            surface: hit.surface as u32,
+            triangle: self.surfaces.terrain().zip(hit.terrain).map(|(terrain, hit)| hit.triangle_of(terrain)),
+        });
+        self.truth(pixel, uv, hit)
+    }
+
+    /// What the ray `uv` of a pixel meets if that is on the same unfolded patch of the terrain as a triangle
+    /// that a pixel nearby sees ([`camsim_core::scene::Terrain::walk`]), and no model is within `window` times
+    /// its depth in front of it.
+    #[must_use]
+    pub fn walk(&self, from: TerrainTriangle, pixel: [u32; 2], uv: DVec2, window: f64) -> Option<PixelTruth> {
+        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let terrain = self.surfaces.terrain()?;
+        let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
+        let in_front_m = window * depth_m;
+        let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
+        let is_hidden = self.surfaces.model_hit(start_ned_m, ray_ned, in_front_m).is_some();
+        let normal_ned = terrain.normal_ned(triangle);
+        let hit = RayHit { depth_m, normal_ned, surface: 0, triangle: Some(triangle) };
+        (!is_hidden).then(|| self.truth(pixel, uv, Some(hit)))
+    }
+
+    /// Whether a walk from a triangle that a pixel nearby sees ends at the triangle that this pixel sees: no
+    /// silhouette of the terrain lies between them.
+    #[must_use]
+    pub fn connects(&self, from: TerrainTriangle, pixel: [u32; 2], uv: DVec2, to: TerrainTriangle) -> bool {
+        if from == to {
+            return true;
+        }
+        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let walk = |from| self.surfaces.terrain()?.walk(from, pose.position_ned_m, ray_ned);
+        // A ray on an edge hits both of its triangles.
+        walk(from).is_some_and(|(triangle, depth_m)| {
+            triangle == to || walk(to).is_some_and(|(_, to_m)| (depth_m - to_m).abs() <= ON_AN_EDGE * depth_m)
+        })
+    }
+
+    /// Camera of a pixel at mid-exposure.
+    #[must_use]
+    pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
+        self.ray(&self.mid, pixel, DVec2::ZERO).0
+    }
+
+    /// Whether a surface lies between a camera and what it sees along a ray at planar depth `depth_m`
+    /// (infinite for the sky), leaving out the last millionth of the way.
+    #[must_use]
+    pub fn is_hidden(&self, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
+        let hit = self.surfaces.first_hit(position_ned_m, ray_ned);
+        hit.is_some_and(|hit| hit.depth_m < (1.0 - LAST_PART) * depth_m)
+    }
+
+    fn ray<'b>(&self, poses: &'b [CameraPose], [x, y]: [u32; 2], uv: DVec2) -> (&'b CameraPose, DVec3) {
+        let pose = match self.plan.shutter.row_axis() {
+            RowAxis::Rows => &poses[y as usize],
+            RowAxis::Columns => &poses[2 * x as usize + (y % 2) as usize],
+        };
+        (pose, pose.ned_from_camera * uv.extend(1.0))
+    }
+
+    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>) -> PixelTruth {
+        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let source_px = if self.at_phase.is_empty() {
+            self.source_px(pose, ray_ned, hit.as_ref().map(|hit| hit.depth_m))
+        } else {
+            let (pose, ray_ned) = self.ray(&self.at_phase, pixel, uv);
+            let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned);
+            self.source_px(pose, ray_ned, hit.map(|hit| hit.depth_m))
+        };
+        let hit = hit.map(|RayHit { depth_m, normal_ned, surface, triangle }| PixelHit {
+            point_ned_m: pose.position_ned_m + depth_m * ray_ned,
+            depth_m,
+            normal_ned: if normal_ned.dot(ray_ned) > 0.0 { -normal_ned } else { normal_ned },
+            surface,
+            triangle,
+        });
+        PixelTruth { source_px, hit }
+    }
+
+    fn source_px(&self, pose: &CameraPose, ray_ned: DVec3, depth_m: Option<f64>) -> DVec2 {
+        let key_pose = &self.plan.key_pose;
         // Times the inverse depth, which is 0 for the sky.
-        let shift_ned_m = pose.position_ned_m - plan.key_pose.position_ned_m;
+        let shift_ned_m = pose.position_ned_m - key_pose.position_ned_m;
         let point = ray_ned + depth_m.map_or(DVec3::ZERO, |depth_m| shift_ned_m / depth_m);
-        plan.ideal.px_from_point(plan.key_pose.ned_from_camera.conjugate() * point)
-    };
-    let mid = cast(mid_s);
-    let (pose, ray_ned, depth_m) = mid;
-    let exposure_s = plan.shutter.exposure_s();
-    PixelTruth {
-        source_px: source_px(if phase * exposure_s == 0.0 { mid } else { cast(mid_s + phase * exposure_s) }),
-        hit: depth_m.map(|depth_m| (pose.position_ned_m + depth_m * ray_ned, depth_m)),
+        self.plan.ideal.px_from_point(key_pose.ned_from_camera.conjugate() * point)
     }
 }
+
+/// Part of the way to a point that rounding may take for a surface in front of it.
+const LAST_PART: f64 = 1e-6;
+/// Relative difference of the depths that the two triangles of an edge give to a ray that hits it: rounding.
+const ON_AN_EDGE: f64 = 1e-9;

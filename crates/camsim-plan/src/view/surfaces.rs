@@ -49,6 +49,8 @@ pub(crate) struct SurfaceHit {
     pub uv: [f64; 2],
     /// Factor of the texture's colour there, light included.
     pub tint: DVec3,
+    /// Unit normal of the triangle, NED, of either sign.
+    pub normal_ned: DVec3,
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
 }
@@ -145,6 +147,24 @@ impl Surfaces {
         self.first_hit_in(&self.deep, origin_ned_m, direction_ned)
     }
 
+    /// First model along `origin + t direction`, 0 <= t <= `limit`.
+    pub fn model_hit(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Option<SurfaceHit> {
+        self.model_hit_in(&self.deep, origin_ned_m, direction_ned, limit)
+    }
+
+    fn model_hit_in(
+        &self,
+        tree: &RayBvh,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+    ) -> Option<SurfaceHit> {
+        let meet = |mesh: u32, limit: f64| {
+            self.mesh_hit(mesh as usize, origin_ned_m, direction_ned, limit).map(|hit| (hit.depth_m, hit))
+        };
+        tree.first(origin_ned_m, direction_ned, limit, meet).map(|(_, hit)| hit)
+    }
+
     pub fn first_hit_in(
         &self,
         tree: &RayBvh,
@@ -154,19 +174,18 @@ impl Surfaces {
         let ground =
             self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
-        let on_mesh = tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
-            self.mesh_hit(mesh as usize, origin_ned_m, direction_ned, limit).map(|hit| (hit.depth_m, hit))
-        });
+        let on_mesh = self.model_hit_in(tree, origin_ned_m, direction_ned, limit);
         let on_ground = || {
             ground.map(|hit| SurfaceHit {
                 depth_m: hit.t,
                 surface: 0,
                 uv: hit.uv,
                 tint: DVec3::ONE,
+                normal_ned: hit.normal_ned,
                 terrain: Some(hit),
             })
         };
-        on_mesh.map(|(_, hit)| hit).or_else(on_ground)
+        on_mesh.or_else(on_ground)
     }
 
     /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the
@@ -204,9 +223,11 @@ impl Surfaces {
         let [r, g, b, _] = mesh.tint_at(corners, weights);
         let light =
             self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
+        let points_m = corners.map(|corner| mesh.position_ned_m(corner));
         SurfaceHit {
             depth_m,
             surface: 1 + i,
+            normal_ned: (points_m[1] - points_m[0]).cross(points_m[2] - points_m[0]).normalize_or_zero(),
             uv: mesh.uv_at(corners, weights),
             tint: light * DVec3::new(r, g, b),
             terrain: None,

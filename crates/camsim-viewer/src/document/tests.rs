@@ -8,12 +8,13 @@ fn demo() -> Document {
 }
 
 #[test]
-fn every_key_of_the_format_has_a_place() {
+fn every_key_of_the_format_can_be_set() {
     let mut document = demo();
     for (key, kind) in keys() {
-        let under_list =
-            keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
-        if matches!(kind, Kind::Tables | Kind::Later) || under_list {
+        let under_list = keys()
+            .iter()
+            .any(|(list, kind)| *kind == ValueKind::Tables && key.starts_with(&format!("{list}.")));
+        if matches!(kind, ValueKind::Tables | ValueKind::Unsupported) || under_list {
             continue;
         }
         document.set(key, Some(Value::Integer(7)), false);
@@ -24,7 +25,7 @@ fn every_key_of_the_format_has_a_place() {
 }
 
 #[test]
-fn a_drag_is_one_step_and_undo_takes_all_of_it_back() {
+fn a_drag_is_one_undo_step() {
     let mut document = demo();
     let key = "camera.shutter.readout_ms";
     for ms in 1..20 {
@@ -44,7 +45,7 @@ fn a_drag_is_one_step_and_undo_takes_all_of_it_back() {
 }
 
 #[test]
-fn what_is_not_legal_is_named_and_the_last_legal_scenario_stays() {
+fn illegal_values_are_reported_and_the_last_legal_scenario_stays() {
     let mut document = demo();
     document.set("camera.shutter.exposure_ms", Some(Value::Float(-3.0)), false);
     let problem = document.problem("camera.shutter").expect("a problem");
@@ -57,7 +58,7 @@ fn what_is_not_legal_is_named_and_the_last_legal_scenario_stays() {
 }
 
 #[test]
-fn a_saved_scenario_opens_as_the_same_one() {
+fn a_saved_scenario_opens_unchanged() {
     let folder = tempfile::tempdir().expect("a folder");
     let demo_path = camsim_io::builtin::unpack(folder.path()).expect("unpacked");
     let mut document = Document::open(&demo_path).expect("the built-in scenario");
@@ -77,7 +78,7 @@ fn a_saved_scenario_opens_as_the_same_one() {
 }
 
 #[test]
-fn the_command_line_says_what_was_changed() {
+fn the_command_line_sets_each_changed_key() {
     let mut document = demo();
     document.set("camera.shutter.readout_ms", Some(Value::Float(0.0)), false);
     document.set(
@@ -89,7 +90,7 @@ fn the_command_line_says_what_was_changed() {
     assert!(line.starts_with("camsim render "), "{line}");
     assert!(line.contains("--set camera.shutter.readout_ms=0.0"), "{line}");
     assert!(line.contains("--set 'camera.lens.coefficients=[0.1, 0.0]'"), "{line}");
-    // What a shell makes of it gives the same scenario.
+    // The file with these values gives the same scenario.
     let sets: Vec<_> = document.changes().into_iter().map(|(key, value)| (key, value.to_string())).collect();
     let text = std::fs::read_to_string(&document.path).expect("text");
     assert_eq!(parse_scenario(&text, &document.path, &sets).expect("legal"), *document.scenario);
@@ -107,7 +108,7 @@ fn a_calibration_replaces_the_camera_but_not_its_mount() {
 }
 
 #[test]
-fn a_file_that_is_no_scenario_says_so() {
+fn opening_a_file_with_an_unknown_key_names_line_and_key() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("bad.toml");
     std::fs::write(&path, "[camera]\nfsp = 3\n").expect("written");
@@ -116,12 +117,12 @@ fn a_file_that_is_no_scenario_says_so() {
 }
 
 #[test]
-fn the_last_key_of_a_table_takes_the_table_with_it() {
+fn removing_the_last_key_of_a_table_removes_the_table() {
     let mut document = demo();
     assert_eq!(document.scenario.scene.light, None);
     document.set("scene.light.sun", Some(Value::Float(0.5)), false);
     assert_eq!(document.scenario.scene.light.map(|light| light.sun), Some(0.5));
     document.set("scene.light.sun", None, false);
-    // Else an empty table would be a light by default.
+    // An empty table would be the default light.
     assert_eq!((document.scenario.scene.light, document.value("scene.light")), (None, None));
 }

@@ -1,61 +1,61 @@
-//! A letter box with room for one letter: the latest.
+//! A channel that holds only the latest request.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Holds the latest request until somebody takes it.
+/// Holds the latest request until a thread takes it.
 #[derive(Debug)]
 pub struct Mailbox<T> {
-    slot: Mutex<Slot<T>>,
+    state: Mutex<MailboxState<T>>,
     arrived: Condvar,
 }
 
 #[derive(Debug)]
-struct Slot<T> {
-    letter: Option<T>,
+struct MailboxState<T> {
+    request: Option<T>,
     closed: bool,
 }
 
 impl<T> Default for Mailbox<T> {
     fn default() -> Self {
-        Self { slot: Mutex::new(Slot { letter: None, closed: false }), arrived: Condvar::new() }
+        Self { state: Mutex::new(MailboxState { request: None, closed: false }), arrived: Condvar::new() }
     }
 }
 
 impl<T> Mailbox<T> {
-    /// Puts a letter in; one that nobody has taken is thrown away.
-    pub fn put(&self, letter: T) {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner).letter = Some(letter);
+    /// Puts a request in, in place of one that has not been taken.
+    pub fn put(&self, request: T) {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).request = Some(request);
         self.arrived.notify_one();
     }
 
-    /// Takes a letter back that nobody has taken.
+    /// Withdraws a request that has not been taken.
     pub fn clear(&self) {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner).letter = None;
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).request = None;
     }
 
-    /// Waits for a letter; `None` once the box is closed.
+    /// Waits for a request; `None` once the mailbox is closed.
     pub fn take(&self) -> Option<T> {
-        let mut slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
-            if slot.closed {
+            if state.closed {
                 return None;
             }
-            if let Some(letter) = slot.letter.take() {
-                return Some(letter);
+            if let Some(request) = state.request.take() {
+                return Some(request);
             }
-            slot = self.arrived.wait(slot).unwrap_or_else(PoisonError::into_inner);
+            state = self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// Whether a letter waits, or none will come any more: what is at work is out of date.
-    pub fn is_newer(&self) -> bool {
-        let slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.closed || slot.letter.is_some()
+    /// Whether work in progress is outdated: a newer request waits, or the mailbox is closed.
+    pub fn has_newer(&self) -> bool {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.closed || state.request.is_some()
     }
 
-    /// No more letters.
+    /// Ends [`Mailbox::take`] in all threads.
     pub fn close(&self) {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
         self.arrived.notify_all();
     }
 }
@@ -65,20 +65,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_latest_letter_wins_and_a_closed_box_gives_none() {
+    fn only_the_latest_request_is_kept_and_a_closed_mailbox_gives_none() {
         let mailbox = Mailbox::default();
-        assert!(!mailbox.is_newer());
+        assert!(!mailbox.has_newer());
         mailbox.put(1);
         mailbox.put(2);
-        assert!(mailbox.is_newer());
+        assert!(mailbox.has_newer());
         assert_eq!(mailbox.take(), Some(2));
-        assert!(!mailbox.is_newer());
+        assert!(!mailbox.has_newer());
         mailbox.put(7);
         mailbox.clear();
-        assert!(!mailbox.is_newer());
+        assert!(!mailbox.has_newer());
         mailbox.put(3);
         mailbox.close();
-        assert!(mailbox.is_newer(), "who is at work should stop");
+        assert!(mailbox.has_newer(), "work in progress should stop");
         assert_eq!(mailbox.take(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! What window and engine say to each other.
+//! Messages between window and engine.
 
 use std::{sync::Arc, time::Duration};
 
@@ -7,30 +7,30 @@ use camsim_io::load::Loaded;
 use eframe::egui::ColorImage;
 
 use super::{
-    errors::Errors,
+    error_overlay::ErrorOverlay,
     picture::{Difference, Picture},
 };
 
-/// How much of the camera's imperfections is in a picture, in the order of the pipeline.
+/// Stage of the pipeline up to which a picture shows the camera's imperfections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Stage {
     /// A pinhole with an instant shutter on a still mount.
     Ideal,
-    /// With the lens.
+    /// Ideal, with lens distortion.
     Lens,
-    /// With everything that takes time too: delay, readout, exposure, interlacing, vibration.
+    /// Lens, with delay, readout, exposure, interlacing and vibration.
     Time,
-    /// With light, vignette and noise too: what `camsim render` writes.
+    /// Time, with light, vignette and noise: what `camsim render` writes.
     Photometric,
-    /// The same by exact rays, on the CPU.
+    /// The photometric stage by exact rays, on the CPU.
     Oracle,
 }
 
 impl Stage {
-    /// In pipeline order, the oracle last.
+    /// All stages in pipeline order, the oracle last.
     pub const ALL: [Self; 5] = [Self::Ideal, Self::Lens, Self::Time, Self::Photometric, Self::Oracle];
 
-    /// For buttons.
+    /// Text of its button.
     pub fn label(self) -> &'static str {
         match self {
             Self::Ideal => "ideal",
@@ -41,139 +41,138 @@ impl Stage {
         }
     }
 
-    /// For whoever asks what a button does.
-    pub fn explanation(self) -> &'static str {
+    /// Text of its tooltip.
+    pub fn tooltip(self) -> &'static str {
         match self {
-            Self::Ideal => "A pinhole with an instant shutter on a still mount, without noise and vignette",
-            Self::Lens => "With lens distortion (the paper's eqs. 8 and 9)",
-            Self::Time => "With delay t_d, readout t_r, exposure t_e, interlacing t_i and vibration too",
+            Self::Ideal => "pinhole with an instant shutter on a rigid mount, without noise and vignette",
+            Self::Lens => "ideal, with lens distortion (the paper's eqs. 8 and 9)",
+            Self::Time => "lens, with delay t_d, readout t_r, exposure t_e, interlacing t_i and vibration",
             Self::Photometric => {
-                "With light, vignette and noise too: the very pixels that `camsim render` writes"
+                "time, with light, vignette and noise: the pixels that `camsim render` writes"
             }
             Self::Oracle => {
-                "The same by exact rays, each at its own instant, on the CPU: slow, drawn strip by strip"
+                "the photometric stage by exact rays, each at its own instant, on the CPU: slow, row by row"
             }
         }
     }
 }
 
-/// How large pictures are wanted.
+/// Size and tolerances of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Size {
-    /// Small and within wider tolerances, while something moves.
+    /// Smaller, with wider tolerances: during drags and play.
     Preview,
     /// As the scenario says.
     Full,
 }
 
-/// What the window wants to show now.
+/// What the window needs to show now.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct FrameRequest {
     /// The scenario, valid and with its paths resolved.
     pub scenario: Arc<Scenario>,
-    /// Counts up when files are to be read again although their names are the same.
-    pub reading: u64,
-    /// Frame number; the last one where there are fewer.
+    /// Incremented when files are to be read again although the scenario is the same.
+    pub reload_count: u64,
+    /// Frame number, clamped to the last one.
     pub frame: u64,
-    /// What to render, never [`Stage::Oracle`].
+    /// Stages to render, never [`Stage::Oracle`].
     pub stages: Vec<Stage>,
-    /// How large.
+    /// Size of the pictures.
     pub size: Size,
-    /// Whether depth is wanted too.
-    pub truth: bool,
-    /// Whether the predicted error from place to place is wanted too; of previews it never is: it would hold
-    /// up the next one.
+    /// Whether depth is needed.
+    pub depth: bool,
+    /// Whether predicted errors over the image are needed; never with previews, which they would delay.
     pub errors: bool,
-    /// Enlargement of the difference of the two stages, if it is wanted.
+    /// Gain of the difference of the two stages; `None` if no difference is needed.
     pub gain: Option<f32>,
 }
 
-/// What the window wants of the oracle.
+/// What the window needs of the oracle.
 #[derive(Clone, Debug)]
-pub struct ExactWanted {
-    /// The sequence as it is rendered.
+pub struct OracleRequest {
+    /// The sequence to trace rays in.
     pub sequence: Arc<Sequence>,
-    /// The frame to draw; `None` for looks into it alone.
+    /// The frame to render; `None` for exact rays of single pixels only.
     pub frame: Option<u64>,
-    /// What to hold against it, with the enlargement of the difference.
+    /// The picture to compare with, and the gain of the difference.
     pub against: Option<(Arc<Picture>, f32)>,
 }
 
-/// What the threads say.
+/// Replies of the threads.
 #[derive(Debug)]
 pub enum Reply {
-    /// What is rendered on.
+    /// Name of the renderer or graphics adapter in use.
     Adapter(String),
-    /// What takes long at the moment; empty for nothing.
+    /// The slow task in progress; empty for none.
     Busy(String),
     /// A scenario's files have been read.
     Loaded(Arc<Loaded>),
-    /// Pictures.
+    /// The pictures of a frame.
     Frame(Box<FrameReply>),
-    /// What is predicted of pictures that were sent.
+    /// Predicted errors of pictures that were sent before.
     Errors(Box<ErrorsReply>),
-    /// Looks into a sequence are possible.
-    Looks(Arc<Oracle>),
-    /// A picture of the oracle, or part of it.
-    Exact(Box<ExactPicture>),
-    /// What went wrong, and what to do.
+    /// Exact rays in a sequence are ready.
+    Oracle(Arc<Oracle>),
+    /// The oracle's picture; rows may still be missing.
+    OraclePicture(Box<OraclePicture>),
+    /// A fault: what went wrong, and what to do.
     Failed(String),
-    /// What happened and is over, until somebody has read it.
-    Told(String),
+    /// An event that the user should know of, shown until dismissed.
+    Notice(String),
 }
 
-/// Depth of a frame, beside its picture.
+/// Depth of a frame.
 #[derive(Clone, Debug)]
-pub struct Truth {
-    /// Planar depth, metres, 0 = nothing there; row-major.
+pub struct DepthPicture {
+    /// Planar depth, metres, 0 for the sky; row-major.
     pub depth_m: Vec<f32>,
-    /// The nearest and the farthest of it; `None` where nothing is.
+    /// Least and largest depth; `None` if no pixel has a surface.
     pub range_m: Option<[f32; 2]>,
-    /// As a screen shows it.
+    /// Colour-coded depth.
     pub image: Arc<ColorImage>,
 }
 
 /// Pictures of a frame.
 #[derive(Clone, Debug)]
 pub struct FrameReply {
-    /// What they were made for.
-    pub wanted: Wanted,
-    /// Its frame, brought into the sequence.
+    /// The request.
+    pub request: FrameRequest,
+    /// Frame number, clamped to the sequence.
     pub frame: u64,
-    /// One for each stage wanted.
+    /// One picture for each stage requested.
     pub pictures: Vec<Arc<Picture>>,
-    /// Depth of each of the pictures, if wanted.
-    pub truths: Vec<Arc<Truth>>,
-    /// What is predicted of each of the pictures, if wanted and known already; else it follows.
-    pub errors: Vec<Arc<Errors>>,
-    /// The difference of the two pictures, if wanted.
+    /// Depth of each picture, if requested.
+    pub depths: Vec<Arc<DepthPicture>>,
+    /// Predicted errors of each picture, if requested and cached; otherwise [`Reply::Errors`] follows.
+    pub errors: Vec<Arc<ErrorOverlay>>,
+    /// The difference of the two pictures, if requested.
     pub difference: Option<Arc<Difference>>,
-    /// From taking up the request to this reply; `None` if all of it was there already.
+    /// Time from request to reply; `None` if all pictures were cached.
     pub took: Option<Duration>,
 }
 
-/// The predicted errors of a frame's pictures, which are not kept waiting for them.
+/// Predicted errors of pictures that were sent before.
 #[derive(Clone, Debug)]
 pub struct ErrorsReply {
-    /// What the pictures were made for.
-    pub wanted: Wanted,
-    /// One for each of them.
-    pub errors: Vec<Arc<Errors>>,
+    /// The request that the pictures were rendered for.
+    pub request: FrameRequest,
+    /// One for each picture.
+    pub errors: Vec<Arc<ErrorOverlay>>,
 }
 
-/// A picture of the oracle as far as it has come.
+/// The oracle's picture with the rows rendered so far.
 #[derive(Clone, Debug)]
-pub struct ExactPicture {
-    /// What of.
+pub struct OraclePicture {
+    /// The sequence that it shows.
     pub sequence: Arc<Sequence>,
-    /// Which frame.
+    /// Frame number.
     pub frame: u64,
-    /// Linear R G B A of the rows that are done; alpha is 0 in the others.
+    /// Linear R G B A, row-major; alpha is 0 in missing rows.
     pub color_rgba: Arc<Vec<f32>>,
-    /// As a screen shows it.
+    /// sRGB picture for the screen.
     pub image: Arc<ColorImage>,
-    /// The difference, if something was to be held against it: that picture less this one.
+    /// The requested picture less this one.
     pub difference: Option<Arc<Difference>>,
-    /// Rows that are done, from the top.
+    /// Number of rendered rows, from the top.
     pub rows: u32,
 }

@@ -1,4 +1,4 @@
-//! A rendered frame as the window shows it.
+//! Rendered frames, differences and depth as images for the screen.
 
 use std::sync::Arc;
 
@@ -10,36 +10,36 @@ use eframe::egui::{Color32, ColorImage};
 
 use super::messages::Stage;
 
-/// A picture with all that there is to say about it.
+/// A rendered frame with its plan and times.
 #[derive(Debug)]
 pub struct Picture {
-    /// What is in it.
+    /// The stage that it shows.
     pub stage: Stage,
-    /// Linear values and rows.
+    /// Linear values and row poses.
     pub frame: RenderedFrame,
-    /// How it was made.
+    /// The plan that it was rendered by.
     pub plan: FramePlan,
-    /// How long that took.
+    /// Times of its passes.
     pub times: FrameTimes,
-    /// As a screen shows it.
+    /// sRGB picture for the screen.
     pub image: Arc<ColorImage>,
 }
 
-/// The difference of two pictures, enlarged.
+/// The difference of two pictures.
 #[derive(Debug, Default)]
 pub struct Difference {
-    /// Grey is none.
+    /// Difference times gain about middle grey; magenta where one picture alone is valid.
     pub image: Arc<ColorImage>,
-    /// Root of the mean square over pixels that are valid in both, 1/255 of the linear range.
+    /// RMS over pixels that are valid in both, DN.
     pub rms_dn: f64,
-    /// Largest, same unit.
+    /// Largest absolute difference, DN.
     pub max_dn: f64,
-    /// Share of the pixels that are valid in just one of them.
+    /// Share of the pixels that are valid in one picture alone.
     pub one_sided: f64,
 }
 
-/// The codes that an sRGB PNG of these linear values has; transparent where there is no ray.
-pub fn screen(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
+/// The codes that an sRGB PNG of these linear values has; transparent at invalid pixels.
+pub fn srgb_image(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
     let rgba: Vec<u8> = color_rgba
         .as_chunks::<4>()
         .0
@@ -49,8 +49,8 @@ pub fn screen(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
     ColorImage::from_rgba_unmultiplied(size_px.map(|side| side as usize), &rgba)
 }
 
-/// `a - b` times `gain` about a middle grey, in linear values, of the first `rows`: one of them may not have
-/// come further. `None` for pictures of different size.
+/// `a - b` times `gain` about middle grey, in linear values, over the first `rows` rows. `None` for pictures
+/// of different size.
 pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32, rows: u32) -> Option<Difference> {
     if a.len() != b.len() || a.len() != 4 * size_px[0] as usize * size_px[1] as usize {
         return None;
@@ -82,13 +82,13 @@ pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32, rows: u32)
     Some(Difference { image, rms_dn, max_dn: 255.0 * max, one_sided })
 }
 
-/// The nearest and the farthest depth; `None` where nothing is.
+/// Least and largest depth, metres; `None` if no pixel has a surface.
 pub fn depth_range_m(depth_m: &[f32]) -> Option<[f32; 2]> {
     let known = depth_m.iter().copied().filter(|d| *d > 0.0 && d.is_finite());
     known.map(|d| [d, d]).reduce(|[near, far], [d, _]| [near.min(d), far.max(d)])
 }
 
-/// Depth from near (bright) to far (dark) by its logarithm; transparent where nothing is.
+/// Depth on a logarithmic colour scale from near (bright) to far (dark); transparent for the sky.
 pub fn depth_image(size_px: [u32; 2], depth_m: &[f32], range_m: Option<[f32; 2]>) -> ColorImage {
     let [near, far] = range_m.unwrap_or([1.0; 2]);
     let span = (far / near).ln().max(1e-6);
@@ -103,7 +103,7 @@ pub fn depth_image(size_px: [u32; 2], depth_m: &[f32], range_m: Option<[f32; 2]>
     ColorImage::new(size_px.map(|side| side as usize), pixels.collect())
 }
 
-/// From dark blue over green to yellow, rising in lightness all the way.
+/// Colour scale from dark blue (0) over green to yellow (1) with increasing lightness.
 pub fn ramp(share: f64) -> [u8; 3] {
     let share = share.clamp(0.0, 1.0);
     let linear = [0.9 * share.powi(2), 0.02 + 0.8 * share, 0.25 * (1.0 - share).powi(2) + 0.08];
@@ -115,43 +115,43 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_are_srgb_and_invalid_pixels_transparent() {
-        let image = screen([2, 1], &[0.215_861, 0.0, 1.0, 1.0, 0.3, 0.0, 0.0, 0.0]);
+    fn images_are_srgb_with_transparent_invalid_pixels() {
+        let image = srgb_image([2, 1], &[0.215_861, 0.0, 1.0, 1.0, 0.3, 0.0, 0.0, 0.0]);
         assert_eq!(image.pixels[0].to_array(), [128, 0, 255, 255]);
         assert_eq!(image.pixels[1], Color32::TRANSPARENT);
     }
 
     #[test]
-    fn a_difference_has_the_size_of_its_values() {
+    fn difference_has_rms_maximum_and_one_sided_share() {
         let a = [0.5, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.0];
         let b = [0.4, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let found = difference([3, 1], &a, &b, 4.0, 1).expect("of one size");
-        assert!((found.rms_dn - 255.0 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-4, "{}", found.rms_dn);
-        assert!((found.max_dn - 25.5).abs() < 1e-4);
-        assert!((found.one_sided - 1.0 / 3.0).abs() < 1e-9);
-        assert_eq!(found.image.pixels[0].to_array(), [230, 128, 128, 255]);
-        assert_eq!(found.image.pixels[2], Color32::TRANSPARENT);
+        let result = difference([3, 1], &a, &b, 4.0, 1).expect("of one size");
+        assert!((result.rms_dn - 255.0 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-4, "{}", result.rms_dn);
+        assert!((result.max_dn - 25.5).abs() < 1e-4);
+        assert!((result.one_sided - 1.0 / 3.0).abs() < 1e-9);
+        assert_eq!(result.image.pixels[0].to_array(), [230, 128, 128, 255]);
+        assert_eq!(result.image.pixels[2], Color32::TRANSPARENT);
         assert!(difference([2, 1], &a, &b, 4.0, 1).is_none());
     }
 
     #[test]
-    fn rows_that_have_not_come_are_not_compared() {
+    fn missing_rows_are_not_compared() {
         let a = [0.5, 0.5, 0.5, 1.0, 0.2, 0.2, 0.2, 1.0, 0.7, 0.7, 0.7, 1.0];
         let b = [0.4, 0.5, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let found = difference([1, 3], &a, &b, 4.0, 1).expect("of one size");
+        let result = difference([1, 3], &a, &b, 4.0, 1).expect("of one size");
         assert!(
-            (found.max_dn - 25.5).abs() < 1e-4 && found.one_sided == 0.0,
+            (result.max_dn - 25.5).abs() < 1e-4 && result.one_sided == 0.0,
             "{} {}",
-            found.max_dn,
-            found.one_sided
+            result.max_dn,
+            result.one_sided
         );
-        assert_eq!(found.image.pixels[1..], [Color32::TRANSPARENT; 2]);
+        assert_eq!(result.image.pixels[1..], [Color32::TRANSPARENT; 2]);
         let all = difference([1, 3], &a, &b, 4.0, 3).expect("of one size");
         assert!((all.one_sided - 2.0 / 3.0).abs() < 1e-9 && all.image.pixels[2] != Color32::TRANSPARENT);
     }
 
     #[test]
-    fn near_is_bright_and_nothing_is_transparent() {
+    fn near_depth_is_bright_and_sky_is_transparent() {
         let depth_m = [10.0, 1000.0, 0.0];
         assert_eq!((depth_range_m(&depth_m), depth_range_m(&[0.0])), (Some([10.0, 1000.0]), None));
         let image = depth_image([3, 1], &depth_m, depth_range_m(&depth_m));

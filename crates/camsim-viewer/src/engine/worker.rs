@@ -1,4 +1,4 @@
-//! A thread that renders pictures.
+//! The threads that render pictures.
 
 use std::{
     convert::Infallible,
@@ -12,92 +12,98 @@ use camsim_engine::{Backend, Engine, Finished, GpuError, RenderError, Session};
 use camsim_plan::PlanError;
 
 use super::{
-    Speaker,
-    errors::Errors,
-    library::{Library, LibraryError},
+    ReplySender,
+    error_overlay::ErrorOverlay,
     mailbox::Mailbox,
-    messages::{ErrorsReply, FrameReply, Reply, Size, Stage, Truth, Wanted},
-    picture::{Picture, depth_image, depth_range_m, difference, screen},
-    variants::{preview, staged},
+    messages::{DepthPicture, ErrorsReply, FrameReply, FrameRequest, Reply, Size, Stage},
+    picture::{Picture, depth_image, depth_range_m, difference, srgb_image},
+    scenario_cache::{ScenarioCache, ScenarioCacheError},
+    variants::{preview_scenario, stage_scenario},
 };
 
-/// Pictures that are kept: two stages in two sizes, and those of the frame before.
-const KEPT: usize = 8;
+/// Cached pictures: two stages in two sizes, of this frame and the one before.
+const CACHE_SIZE: usize = 8;
 
 /// Why a request could not be answered.
 #[derive(Debug, thiserror::Error)]
 enum Fault {
     #[error(transparent)]
-    Load(#[from] LibraryError),
+    Load(#[from] ScenarioCacheError),
     #[error(transparent)]
     Mount(#[from] camsim_core::mount::MountError),
     #[error(transparent)]
     Render(#[from] RenderError<Infallible>),
     #[error(transparent)]
     Plan(#[from] PlanError),
-    #[error("the renderer stopped at a fault of its own; the next change is tried on a device opened anew")]
+    #[error("internal error in the renderer; the next change opens the device anew")]
     Stopped,
     #[error("frame {0} was not rendered; move the timeline to try again")]
     Missing(u64),
 }
 
 impl Fault {
-    /// After which nothing works on this device.
-    fn is_of_device(&self) -> bool {
+    /// Whether the device must be opened anew.
+    fn is_device_lost(&self) -> bool {
         matches!(self, Self::Stopped | Self::Render(RenderError::Gpu(GpuError::Device(_))))
     }
 }
 
-/// Serves requests until the box is closed.
-pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
-    run_on(|| Engine::open(Backend::Auto), mailbox, library, speaker);
+/// Serves requests until the mailbox is closed.
+pub fn run(mailbox: &Mailbox<FrameRequest>, scenarios: &ScenarioCache, reply_sender: &ReplySender) {
+    run_on(|| Engine::open(Backend::Auto), mailbox, scenarios, reply_sender);
 }
 
-/// The same on what `open` gives: anew after a loss, with the request that met it once more, and with each
-/// request where there is nothing to run on.
+/// Serves requests on the engine that `open` gives. Opens it anew after the loss of a device, and tries the
+/// failed request once more; if it cannot be opened, tries again with each request.
 fn run_on(
     open: impl Fn() -> Result<Engine, GpuError>,
-    mailbox: &Mailbox<Wanted>,
-    library: &Library,
-    speaker: &Speaker,
+    mailbox: &Mailbox<FrameRequest>,
+    scenarios: &ScenarioCache,
+    reply_sender: &ReplySender,
 ) {
-    let mut waiting = None;
-    // A request that loses one device after the other is told, not tried for ever.
-    let mut lost_with: Option<Wanted> = None;
+    let mut retry = None;
+    // A request is tried on two devices at most.
+    let mut lost_request: Option<FrameRequest> = None;
     loop {
         let engine = match open() {
             Ok(engine) => engine,
             Err(error) => {
-                speaker.say(Reply::Failed(error.to_string()));
-                waiting = mailbox.take();
-                if waiting.is_none() {
+                reply_sender.send(Reply::Failed(error.to_string()));
+                retry = mailbox.take();
+                if retry.is_none() {
                     return;
                 }
                 continue;
             }
         };
-        speaker.say(Reply::Adapter(engine.to_string()));
-        let mut worker =
-            Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
+        reply_sender.send(Reply::Adapter(engine.to_string()));
+        let mut worker = Worker {
+            engine: &engine,
+            reply_sender,
+            scenarios,
+            session: None,
+            cache: Vec::new(),
+            rendered: 0,
+        };
         loop {
-            let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
-            // wgpu panics where a device goes while something is made on it.
-            let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&wanted, mailbox)))
+            let Some(request) = retry.take().or_else(|| mailbox.take()) else { return };
+            // wgpu panics if the device is lost while a resource is created.
+            let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&request, mailbox)))
                 .unwrap_or(Err(Fault::Stopped));
             let Err(fault) = served else {
-                if lost_with.take().is_some_and(|lost| lost == wanted) {
-                    speaker.say(Reply::Told(
-                        "the graphics device was lost; the frame is of another one, opened anew".into(),
+                if lost_request.take().is_some_and(|lost| lost == request) {
+                    reply_sender.send(Reply::Notice(
+                        "the graphics device was lost and opened anew; the frame was rendered again".into(),
                     ));
                 }
                 continue;
             };
-            speaker.say(Reply::Busy(String::new()));
-            speaker.say(Reply::Failed(fault.to_string()));
-            if fault.is_of_device() {
-                if lost_with.as_ref() != Some(&wanted) {
-                    waiting = Some(wanted.clone());
-                    lost_with = Some(wanted);
+            reply_sender.send(Reply::Busy(String::new()));
+            reply_sender.send(Reply::Failed(fault.to_string()));
+            if fault.is_device_lost() {
+                if lost_request.as_ref() != Some(&request) {
+                    retry = Some(request.clone());
+                    lost_request = Some(request);
                 }
                 break;
             }
@@ -105,90 +111,90 @@ fn run_on(
     }
 }
 
-/// A picture that was made.
-struct Kept {
+/// A rendered picture, by its sequence, stage and size.
+struct CachedPicture {
     sequence: Arc<Sequence>,
     stage: Stage,
     size: Size,
     picture: Arc<Picture>,
-    errors: Option<Arc<Errors>>,
+    errors: Option<Arc<ErrorOverlay>>,
 }
 
 struct Worker<'a> {
     engine: &'a Engine,
-    speaker: &'a Speaker,
-    library: &'a Library,
+    reply_sender: &'a ReplySender,
+    scenarios: &'a ScenarioCache,
     session: Option<Session<'a>>,
-    kept: Vec<Kept>,
+    cache: Vec<CachedPicture>,
     /// Frames rendered so far.
     rendered: u64,
 }
 
 impl<'a> Worker<'a> {
-    fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
-        let (begun, before) = (Instant::now(), self.rendered);
-        let loaded = match self.library.load(wanted, self.speaker) {
-            Err(LibraryError::Superseded) => return Ok(()),
+    fn serve(&mut self, request: &FrameRequest, mailbox: &Mailbox<FrameRequest>) -> Result<(), Fault> {
+        let (began, before) = (Instant::now(), self.rendered);
+        let loaded = match self.scenarios.load(request, self.reply_sender) {
+            Err(ScenarioCacheError::Superseded) => return Ok(()),
             loaded => loaded?,
         };
         let sequence = &loaded.sequence;
-        let frame = wanted.frame.min(sequence.frames.saturating_sub(1));
+        let frame = request.frame.min(sequence.frames.saturating_sub(1));
         let mut pictures = Vec::new();
-        for &stage in &wanted.stages {
-            // A preview is finished in any case: in a long drag somebody always wants something newer.
-            if wanted.size == Size::Full && !pictures.is_empty() && mailbox.is_newer() {
+        for &stage in &request.stages {
+            // Previews are always finished: during a long drag there is always a newer request.
+            if request.size == Size::Full && !pictures.is_empty() && mailbox.has_newer() {
                 return Ok(());
             }
-            pictures.push(self.picture(sequence, stage, wanted.size, frame)?);
+            pictures.push(self.picture(sequence, stage, request.size, frame)?);
         }
-        let mut truths = Vec::new();
-        if wanted.truth {
-            for &stage in &wanted.stages {
-                truths.push(Arc::new(self.truth(sequence, stage, wanted.size, frame)?));
+        let mut depths = Vec::new();
+        if request.depth {
+            for &stage in &request.stages {
+                depths.push(Arc::new(self.depth_picture(sequence, stage, request.size, frame)?));
             }
         }
-        let errors = if wanted.errors { self.known_errors(&pictures) } else { Vec::new() };
-        let missing = wanted.errors && errors.is_empty();
-        let difference = match (wanted.gain, pictures.as_slice()) {
+        let errors = if request.errors { self.cached_errors(&pictures) } else { Vec::new() };
+        let errors_missing = request.errors && errors.is_empty();
+        let difference = match (request.gain, pictures.as_slice()) {
             (Some(gain), [a, b]) => {
                 let size_px = a.frame.size_px;
                 difference(size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain, size_px[1]).map(Arc::new)
             }
             _ => None,
         };
-        let took = (self.rendered > before).then(|| begun.elapsed());
+        let took = (self.rendered > before).then(|| began.elapsed());
         let reply = FrameReply {
-            wanted: wanted.clone(),
+            request: request.clone(),
             frame,
             pictures: pictures.clone(),
-            truths,
+            depths,
             errors,
             difference,
             took,
         };
-        self.speaker.say(Reply::Frame(Box::new(reply)));
-        if missing {
-            self.tell_errors(wanted, sequence, &pictures, mailbox)?;
+        self.reply_sender.send(Reply::Frame(Box::new(reply)));
+        if errors_missing {
+            self.send_error_overlays(request, sequence, &pictures, mailbox)?;
         }
         Ok(())
     }
 
-    /// What is predicted of pictures that are on show already, unless somebody wants something newer.
-    fn tell_errors(
+    /// Computes and sends the predicted errors of pictures that were sent, unless a newer request arrives.
+    fn send_error_overlays(
         &mut self,
-        wanted: &Wanted,
+        request: &FrameRequest,
         sequence: &Arc<Sequence>,
         pictures: &[Arc<Picture>],
-        mailbox: &Mailbox<Wanted>,
+        mailbox: &Mailbox<FrameRequest>,
     ) -> Result<(), Fault> {
         let mut errors = Vec::new();
         for picture in pictures {
-            if mailbox.is_newer() {
+            if mailbox.has_newer() {
                 return Ok(());
             }
-            errors.push(self.errors(sequence, wanted.size, picture)?);
+            errors.push(self.errors(sequence, request.size, picture)?);
         }
-        self.speaker.say(Reply::Errors(Box::new(ErrorsReply { wanted: wanted.clone(), errors })));
+        self.reply_sender.send(Reply::Errors(Box::new(ErrorsReply { request: request.clone(), errors })));
         Ok(())
     }
 
@@ -199,22 +205,22 @@ impl<'a> Worker<'a> {
         size: Size,
         frame: u64,
     ) -> Result<Arc<Picture>, Fault> {
-        let same = |kept: &Kept| {
-            Arc::ptr_eq(&kept.sequence, sequence)
-                && (kept.stage, kept.size) == (stage, size)
-                && kept.picture.frame.index == frame
+        let is_same = |cached: &CachedPicture| {
+            Arc::ptr_eq(&cached.sequence, sequence)
+                && (cached.stage, cached.size) == (stage, size)
+                && cached.picture.frame.index == frame
         };
-        if let Some(kept) = self.kept.iter().find(|kept| same(kept)) {
-            return Ok(kept.picture.clone());
+        if let Some(cached) = self.cache.iter().find(|cached| is_same(cached)) {
+            return Ok(cached.picture.clone());
         }
-        let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
-        let Finished { frame, plan, times, .. } = done;
-        let image = Arc::new(screen(frame.size_px, &frame.color_rgba));
+        let finished = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
+        let Finished { frame, plan, times, .. } = finished;
+        let image = Arc::new(srgb_image(frame.size_px, &frame.color_rgba));
         let picture = Arc::new(Picture { stage, frame, plan, times, image });
-        if self.kept.len() >= KEPT {
-            self.kept.remove(0);
+        if self.cache.len() >= CACHE_SIZE {
+            self.cache.remove(0);
         }
-        self.kept.push(Kept {
+        self.cache.push(CachedPicture {
             sequence: sequence.clone(),
             stage,
             size,
@@ -224,51 +230,52 @@ impl<'a> Worker<'a> {
         Ok(picture)
     }
 
-    fn truth(
+    fn depth_picture(
         &mut self,
         sequence: &Arc<Sequence>,
         stage: Stage,
         size: Size,
         frame: u64,
-    ) -> Result<Truth, Fault> {
-        let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color, Channel::Depth], frame)?;
-        let depth_m = done.frame.depth_m.unwrap_or_default();
+    ) -> Result<DepthPicture, Fault> {
+        let finished =
+            self.render(&variant(sequence, stage, size)?, &[Channel::Color, Channel::Depth], frame)?;
+        let depth_m = finished.frame.depth_m.unwrap_or_default();
         let range_m = depth_range_m(&depth_m);
-        let image = Arc::new(depth_image(done.frame.size_px, &depth_m, range_m));
-        Ok(Truth { depth_m, range_m, image })
+        let image = Arc::new(depth_image(finished.frame.size_px, &depth_m, range_m));
+        Ok(DepthPicture { depth_m, range_m, image })
     }
 
-    /// What is predicted of all of the pictures, if all of it was worked out before.
-    fn known_errors(&self, pictures: &[Arc<Picture>]) -> Vec<Arc<Errors>> {
-        let of = |picture| {
-            self.kept
+    /// The predicted errors of all pictures, if all are cached; else empty.
+    fn cached_errors(&self, pictures: &[Arc<Picture>]) -> Vec<Arc<ErrorOverlay>> {
+        let errors_of = |picture| {
+            self.cache
                 .iter()
-                .find(|kept| Arc::ptr_eq(&kept.picture, picture))
-                .and_then(|kept| kept.errors.clone())
+                .find(|cached| Arc::ptr_eq(&cached.picture, picture))
+                .and_then(|cached| cached.errors.clone())
         };
-        pictures.iter().map(of).collect::<Option<Vec<_>>>().unwrap_or_default()
+        pictures.iter().map(errors_of).collect::<Option<Vec<_>>>().unwrap_or_default()
     }
 
-    /// What is predicted of a picture, from place to place.
+    /// The predicted errors of a picture, cached or computed.
     fn errors(
         &mut self,
         sequence: &Arc<Sequence>,
         size: Size,
         picture: &Arc<Picture>,
-    ) -> Result<Arc<Errors>, Fault> {
-        if let Some(errors) = self.known_errors(std::slice::from_ref(picture)).pop() {
+    ) -> Result<Arc<ErrorOverlay>, Fault> {
+        if let Some(errors) = self.cached_errors(std::slice::from_ref(picture)).pop() {
             return Ok(errors);
         }
         let planned = variant(sequence, picture.stage, size)?;
         let map = self.session(&planned, &[Channel::Color])?.planner().error_map(&picture.plan)?;
-        let errors = Arc::new(Errors::new(picture, map));
-        if let Some(kept) = self.kept.iter_mut().find(|kept| Arc::ptr_eq(&kept.picture, picture)) {
-            kept.errors = Some(errors.clone());
+        let errors = Arc::new(ErrorOverlay::new(picture, map));
+        if let Some(cached) = self.cache.iter_mut().find(|cached| Arc::ptr_eq(&cached.picture, picture)) {
+            cached.errors = Some(errors.clone());
         }
         Ok(errors)
     }
 
-    /// One frame, by the session that there is.
+    /// Renders one frame.
     fn render(
         &mut self,
         sequence: &Arc<Sequence>,
@@ -276,42 +283,42 @@ impl<'a> Worker<'a> {
         frame: u64,
     ) -> Result<Finished, Fault> {
         let session = self.session(sequence, channels)?;
-        let mut done = None;
+        let mut result = None;
         let mut keep = |finished| {
-            done = Some(finished);
+            result = Some(finished);
             Ok(())
         };
         session.render::<Infallible>([frame], &mut keep)?;
         self.rendered += 1;
-        done.ok_or(Fault::Missing(frame))
+        result.ok_or(Fault::Missing(frame))
     }
 
-    /// The session, for the frames of a sequence.
+    /// The session, made or renewed for a sequence and channels.
     fn session(&mut self, sequence: &Arc<Sequence>, channels: &[Channel]) -> Result<&mut Session<'a>, Fault> {
         Ok(match &mut self.session {
             Some(session) => {
                 let planner = session.planner();
-                let truth = channels.contains(&Channel::Depth);
-                if !same_frames(planner.sequence(), sequence) || planner.wants_truth() != truth {
+                let wants_depth = channels.contains(&Channel::Depth);
+                if !same_frames(planner.sequence(), sequence) || planner.wants_truth() != wants_depth {
                     session.renew::<Infallible>(sequence.clone(), channels)?;
                 }
                 session
             }
             none => {
-                self.speaker.say(Reply::Busy("preparing the device".into()));
+                self.reply_sender.send(Reply::Busy("preparing the renderer".into()));
                 let session = self.engine.session::<Infallible>(sequence.clone(), channels)?;
-                self.speaker.say(Reply::Busy(String::new()));
+                self.reply_sender.send(Reply::Busy(String::new()));
                 none.insert(session)
             }
         })
     }
 }
 
-/// The sequence of a stage: what is loaded is shared, only the camera differs.
+/// The sequence of a stage and size. It shares the loaded files; only the camera differs.
 fn variant(sequence: &Arc<Sequence>, stage: Stage, size: Size) -> Result<Arc<Sequence>, Fault> {
-    let mut scenario = staged(&sequence.scenario, stage);
+    let mut scenario = stage_scenario(&sequence.scenario, stage);
     if size == Size::Preview {
-        scenario = preview(&scenario);
+        scenario = preview_scenario(&scenario);
     }
     if scenario == sequence.scenario {
         return Ok(sequence.clone());
@@ -327,7 +334,7 @@ fn variant(sequence: &Arc<Sequence>, stage: Stage, size: Size) -> Result<Arc<Seq
     Ok(Arc::new(variant))
 }
 
-/// Whether two sequences have the same frames: the same scenario, made of the same files as they were read.
+/// Whether two sequences have the same frames: equal scenarios and the same loaded files.
 fn same_frames(a: &Sequence, b: &Sequence) -> bool {
     let same_vignette = match (&a.vignette, &b.vignette) {
         (Some(a), Some(b)) => Arc::ptr_eq(a, b),

@@ -4,82 +4,86 @@ use camsim_core::scenario::Channel;
 use eframe::egui::{self, RichText, Role, Ui};
 
 use super::{
-    numbers::{self, Field},
+    number_field::{self, NumberField},
     parameters,
-    tips::Explained,
+    tooltips::WithTooltip,
     widgets::named,
 };
 use crate::{
-    message::{ExportWish, Message, Outbox},
+    message::{ExportRequest, Message, Outbox},
     state::State,
 };
 
-/// What the page keeps of a scenario from pass to pass.
+/// Settings of the page, stored per scenario from pass to pass.
 #[derive(Clone)]
-struct Kept {
+struct ExportSettings {
+    /// Output folder.
     folder: String,
-    /// First and last frame; `None` for those of the loop, or all.
+    /// First and last frame; `None` for the loop, or for all.
     frames: Option<[u64; 2]>,
 }
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(document) = &state.document else {
         ui.label("nothing open");
         return;
     };
     if !state.can_export() {
-        ui.label("this window was opened without a renderer to files; use `camsim render`");
+        ui.label("this window has no exporter; use `camsim render`");
         return;
     }
-    ui.label("Renders frames to files: the same as `camsim render` writes with these keys of [output].");
-    // Another scenario's frames go beside that one.
+    ui.label("Renders frames to files as `camsim render` does, by these keys of [output].");
+    // The default folder is beside the scenario's file.
     let id = egui::Id::unique(("export", &document.path));
-    let start =
+    let default_folder =
         || document.path.parent().unwrap_or(std::path::Path::new("")).join("frames").display().to_string();
-    let mut kept =
-        ui.data(|data| data.get_temp::<Kept>(id)).unwrap_or_else(|| Kept { folder: start(), frames: None });
-    let edit =
-        ui.add(egui::TextEdit::singleline(&mut kept.folder).desired_width(f32::INFINITY).hint_text("folder"));
+    let mut settings = ui
+        .data(|data| data.get_temp::<ExportSettings>(id))
+        .unwrap_or_else(|| ExportSettings { folder: default_folder(), frames: None });
+    let edit = ui.add(
+        egui::TextEdit::singleline(&mut settings.folder).desired_width(f32::INFINITY).hint_text("folder"),
+    );
     named(&edit, Role::TextInput, "folder");
-    let [first, last] = frames(ui, state, &mut kept.frames, out);
-    ui.data_mut(|data| data.insert_temp(id, kept.clone()));
-    let wish = ExportWish { folder: kept.folder.into(), frames: [first, last + 1] };
+    let [first, last] = frames(ui, state, &mut settings.frames, out);
+    ui.data_mut(|data| data.insert_temp(id, settings.clone()));
+    let request = ExportRequest { folder: settings.folder.into(), frames: [first, last + 1] };
     parameters::rows(ui, state, "output", out);
     let output = &document.scenario.output;
     if output.format.is_empty() {
-        let text = "no file format: frames are rendered, but no pictures are written";
+        let text = "no file format: no pictures are written";
         ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
     } else if !output.channels.contains(&Channel::Color) {
-        ui.weak("without color no pictures are written");
+        ui.weak("without the channel color no pictures are written");
     }
     let running = state.export.as_ref().is_some_and(|job| job.progress().ended.is_none());
     let may_start = !running
-        && !wish.folder.as_os_str().is_empty()
+        && !request.folder.as_os_str().is_empty()
         && state.timeline.frames > 0
         && document.problems.is_empty();
-    if ui.add_enabled(may_start, egui::Button::new("Render")).explained("to this folder").clicked() {
-        out.push(Message::Export(wish.clone()));
+    if ui.add_enabled(may_start, egui::Button::new("Render")).with_tooltip("render to this folder").clicked()
+    {
+        out.push(Message::Export(request.clone()));
     }
     progress(ui, state, out);
     egui::CollapsingHeader::new("as a command line").show(ui, |ui| {
-        let left_out = document.left_out();
-        if !left_out.is_empty() {
+        let removed_keys = document.removed_keys();
+        if !removed_keys.is_empty() {
             ui.label(format!(
-                "{} is left out, which a command line cannot say: save the scenario first",
-                left_out.join(", ")
+                "a command line cannot remove {}: save the scenario first",
+                removed_keys.join(", ")
             ));
         }
         ui.add(
             egui::Label::new(
-                RichText::new(document.render_command(&wish.folder, Some(wish.frames))).monospace(),
+                RichText::new(document.render_command(&request.folder, Some(request.frames))).monospace(),
             )
             .wrap(),
         );
     });
 }
 
-/// First and last frame, which may be others than the loop's.
+/// Draws the choice of frames; returns the first and the last.
 fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut Outbox) -> [u64; 2] {
     let timeline = &state.timeline;
     let all_last = timeline.last();
@@ -87,7 +91,7 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
         chosen.map_or(timeline.bounds(), |frames| frames.map(|frame| frame.min(all_last)));
     ui.horizontal_wrapped(|ui| {
         ui.label("frames");
-        let field = |name, tip| Field {
+        let field = |name, tip| NumberField {
             name,
             label: "",
             unit: "",
@@ -98,16 +102,16 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
             tip,
         };
         if let Some((frame, _)) =
-            numbers::number(ui, &field("first frame to render", "the first one"), first as f64, out)
+            number_field::drag_value(ui, &field("first frame to render", "first frame"), first as f64, out)
         {
             first = frame as u64;
             last = last.max(first);
             *chosen = Some([first, last]);
         }
         ui.label("to");
-        if let Some((frame, _)) = numbers::number(
+        if let Some((frame, _)) = number_field::drag_value(
             ui,
-            &field("last frame to render", "the last one, which is rendered, too"),
+            &field("last frame to render", "last frame, inclusive"),
             last as f64,
             out,
         ) {
@@ -116,7 +120,7 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
             *chosen = Some([first, last]);
         }
         if chosen.is_some()
-            && ui.small_button("as the timeline").explained("the loop's frames, or all").clicked()
+            && ui.small_button("as the timeline").with_tooltip("the loop's frames, or all").clicked()
         {
             *chosen = None;
         }
@@ -132,6 +136,7 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
     [first, last]
 }
 
+/// Progress and result of the last export.
 fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(job) = &state.export else { return };
     let progress = job.progress();
@@ -139,8 +144,9 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;
-            let left =
-                job.left_s().map_or_else(String::new, |left_s| format!(", about {} left", span(left_s)));
+            let left = job
+                .remaining_s()
+                .map_or_else(String::new, |remaining_s| format!(", about {} left", duration(remaining_s)));
             ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {
@@ -159,8 +165,8 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     }
 }
 
-/// A time that nobody needs to the second.
-fn span(seconds: f64) -> String {
+/// A duration with one or two digits.
+fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 90.0 => format!("{s:.0} s"),
         s if s < 5400.0 => format!("{:.0} min", s / 60.0),
@@ -170,10 +176,13 @@ fn span(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::span;
+    use super::duration;
 
     #[test]
-    fn times_are_told_as_people_do() {
-        assert_eq!([0.2, 89.0, 91.0, 3600.0, 9000.0].map(span), ["0 s", "89 s", "2 min", "60 min", "2.5 h"]);
+    fn durations_have_suitable_units() {
+        assert_eq!(
+            [0.2, 89.0, 91.0, 3600.0, 9000.0].map(duration),
+            ["0 s", "89 s", "2 min", "60 min", "2.5 h"]
+        );
     }
 }

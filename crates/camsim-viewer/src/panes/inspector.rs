@@ -1,4 +1,4 @@
-//! The pixel under the cursor: its value, its instant, its ray, what it sees, and how sure that is.
+//! The pixel under the cursor, or the pinned one: values, row time, ray, surface, predicted errors.
 
 use camsim_core::{
     camera::CameraModel, geodesy::LocalFrame, reference::RaySample, scenario::SceneSpec,
@@ -10,87 +10,93 @@ use eframe::egui::{self, Ui};
 use glam::DVec2;
 
 use super::{
-    tips::Explained,
+    tooltips::WithTooltip,
     widgets::{fact, facts, fixed, signed},
 };
 use crate::{
-    heard::PixelTruth,
+    engine_state::StagePicture,
     message::{Message, Outbox},
     motion,
     state::State,
 };
 
-/// Pieces of a stretch of a pixel's way, to measure it.
-const PIECES: u32 = 4;
+/// Chords that measure the length of each stretch of an exposure path.
+const CHORDS: u32 = 4;
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(pixel) = state.pinned.or(state.hovered) else {
-        ui.label("Move over the picture; click to keep a pixel here.");
+        ui.label("Move over the picture; click to pin a pixel.");
         return;
     };
     ui.horizontal(|ui| {
         ui.heading(format!("pixel ({}, {})", pixel[0], pixel[1]));
-        if state.pinned.is_some() && ui.button("let go").explained("follow the cursor again (Esc)").clicked()
+        if state.pinned.is_some()
+            && ui.button("unpin").with_tooltip("follow the cursor again (Esc)").clicked()
         {
             out.push(Message::Pin(None));
         }
     });
     for stage in state.view.stages() {
-        if let Some(sight) = state.heard.sight(stage) {
-            value(ui, state, &sight, pixel);
+        if let Some(picture) = state.engine.stage_picture(stage) {
+            values(ui, state, &picture, pixel);
         }
     }
-    let plan = state.heard.picture().map(|picture| &picture.plan);
+    let plan = state.engine.picture().map(|picture| &picture.plan);
     geometry(ui, state, pixel, plan);
 }
 
-/// Values of a picture.
-fn value(ui: &mut Ui, state: &State, sight: &PixelTruth<'_>, [x, y]: [u32; 2]) {
-    let full =
-        state.heard.shown.as_ref().map_or(sight.size_px, |shown| shown.reply.wanted.scenario.camera.size_px);
-    let factor = if full == sight.size_px { 1 } else { crate::engine::preview_factor(full) };
-    let at = 4 * ((y / factor) as usize * sight.size_px[0] as usize + (x / factor) as usize);
-    let Some(&[r, g, b, a]) = sight.color_rgba.get(at..at + 4).and_then(|pixel| pixel.first_chunk::<4>())
+/// Values of a pixel in one picture.
+fn values(ui: &mut Ui, state: &State, picture: &StagePicture<'_>, [x, y]: [u32; 2]) {
+    let full = state
+        .engine
+        .shown
+        .as_ref()
+        .map_or(picture.size_px, |shown| shown.reply.request.scenario.camera.size_px);
+    let factor = if full == picture.size_px { 1 } else { crate::engine::preview_factor(full) };
+    let index = 4 * ((y / factor) as usize * picture.size_px[0] as usize + (x / factor) as usize);
+    let Some(&[r, g, b, a]) =
+        picture.color_rgba.get(index..index + 4).and_then(|pixel| pixel.first_chunk::<4>())
     else {
         return;
     };
     ui.separator();
-    ui.strong(sight.stage.label());
-    if sight.stage == crate::engine::Stage::Oracle
-        && state.heard.current_exact().is_some_and(|exact| y >= exact.picture.rows)
+    ui.strong(picture.stage.label());
+    if picture.stage == crate::engine::Stage::Oracle
+        && state.engine.current_oracle_picture().is_some_and(|oracle| y >= oracle.picture.rows)
     {
-        ui.label("on its way: its rows come from the top");
+        ui.label("not rendered yet: rows are rendered from the top");
         return;
     }
-    facts(ui, sight.stage.label(), |ui| {
+    facts(ui, picture.stage.label(), |ui| {
         fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
         fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
         fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
-        if let Some(depth_m) = sight.depth.and_then(|(truth, _)| truth.depth_m.get(at / 4)) {
+        if let Some(depth_m) = picture.depth.and_then(|(depth, _)| depth.depth_m.get(index / 4)) {
             fact(
                 ui,
                 "depth, rendered",
                 format!("{depth_m:.3} m"),
-                "as the depth channel has it; 0 = nothing there",
+                "value of the depth channel; 0 for the sky",
             );
         }
     });
 }
 
+/// Exact geometry of a pixel, from the oracle.
 fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan>) {
-    let Some(shown) = &state.heard.shown else { return };
+    let Some(shown) = &state.engine.shown else { return };
     ui.separator();
     ui.strong("by exact rays");
-    let Some(looks) = state.heard.current_looks() else {
-        ui.label("once the hand rests");
+    let Some(oracle) = state.engine.current_oracle() else {
+        ui.label("after a pause of the input");
         return;
     };
     let frame = shown.reply.frame;
-    let view = looks.view(frame);
-    let stamp_s = looks.stamp_s(frame);
+    let view = oracle.view(frame);
+    let stamp_s = oracle.stamp_s(frame);
     let mid_s = view.mid_s(pixel);
-    let look = view.sample(pixel, DVec2::ZERO, 0.0);
+    let sample = view.sample(pixel, DVec2::ZERO, 0.0);
     facts(ui, "geometry", |ui| {
         fact(
             ui,
@@ -99,56 +105,59 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
             "mid-exposure after the frame's stamp, Delta t = t_d + ((r + 0.5)/N - 0.5) t_r",
         );
         fact(ui, "flight time", format!("{} s", fixed(mid_s, 6)), "seconds from the log's first good row");
-        match &look {
+        match &sample {
             None => fact(ui, "invalid", no_ray(state, pixel), "alpha 0"),
-            Some(look) => {
-                ray(ui, look);
-                seen(ui, state, look);
-                let path = motion::path(looks, frame, pixel);
-                moved(ui, pixel, path.as_ref());
+            Some(sample) => {
+                ray_facts(ui, sample);
+                hit_facts(ui, state, sample);
+                let path = motion::pixel_path(oracle, frame, pixel);
+                motion_facts(ui, pixel, path.as_ref());
             }
         }
-        let full = shown.reply.wanted.size == crate::engine::Size::Full;
-        if let (Some(plan), Some(look)) = (plan.filter(|_| full), &look) {
-            source(ui, plan, look);
-            samples(ui, plan, |phase| view.sample(pixel, DVec2::ZERO, phase));
+        let full = shown.reply.request.size == crate::engine::Size::Full;
+        if let (Some(plan), Some(sample)) = (plan.filter(|_| full), &sample) {
+            source_facts(ui, plan, sample);
+            sample_facts(ui, plan, |phase| view.sample(pixel, DVec2::ZERO, phase));
         }
     });
     if let Some(plan) = plan {
-        certainty(ui, plan, predicted_here(state, pixel));
+        predicted_errors(ui, plan, predicted_here(state, pixel));
     }
 }
 
+/// Why a pixel has no ray.
 fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
     let camera = state.document.as_ref().map(|document| CameraModel::from_spec(&document.scenario.camera));
     match camera {
         Some(Ok(camera)) if camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_some() => {
-            "the exact rays have no lens for it".into()
+            "the oracle has no ray here".into()
         }
         _ => "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into(),
     }
 }
 
-fn ray(ui: &mut Ui, look: &RaySample) {
+/// The ray of a pixel.
+fn ray_facts(ui: &mut Ui, sample: &RaySample) {
     fact(
         ui,
         "ray u, v",
-        format!("{}, {}", fixed(look.uv.x, 6), fixed(look.uv.y, 6)),
+        format!("{}, {}", fixed(sample.uv.x, 6), fixed(sample.uv.y, 6)),
         "ideal normalised coordinates (x/z, y/z), the lens's inverse",
     );
-    let off_axis = look.uv.length().atan().to_degrees();
+    let off_axis = sample.uv.length().atan().to_degrees();
     fact(ui, "off axis", format!("{off_axis:.3} deg"), "angle to the optical axis");
 }
 
-fn seen(ui: &mut Ui, state: &State, look: &RaySample) {
-    let Some(hit) = &look.hit else {
+/// The surface that a ray hits.
+fn hit_facts(ui: &mut Ui, state: &State, sample: &RaySample) {
+    let Some(hit) = &sample.hit else {
         return fact(ui, "sees", "sky", "no surface along the ray");
     };
-    let scene = state.heard.sequence().map(|sequence| &sequence.scenario.scene);
+    let scene = state.engine.sequence().map(|sequence| &sequence.scenario.scene);
     fact(
         ui,
         "sees",
-        scene.map_or_else(String::new, |scene| surface(scene, hit.surface)),
+        scene.map_or_else(String::new, |scene| surface_name(scene, hit.surface)),
         "the first surface along the ray",
     );
     fact(
@@ -158,7 +167,7 @@ fn seen(ui: &mut Ui, state: &State, look: &RaySample) {
         "planar, along the optical axis at the row's mid-exposure",
     );
     let point = hit.point_ned_m;
-    let range_m = point.distance(look.pose.position_ned_m);
+    let range_m = point.distance(sample.pose.position_ned_m);
     fact(ui, "range", format!("{range_m:.3} m"), "from the optical centre");
     fact(
         ui,
@@ -166,14 +175,13 @@ fn seen(ui: &mut Ui, state: &State, look: &RaySample) {
         format!("{}, {}, {} m", fixed(point.x, 3), fixed(point.y, 3), fixed(point.z, 3)),
         "in the local frame",
     );
-    if let Some(frame) = state.heard.loaded.as_ref().and_then(|loaded| loaded.log.frame) {
-        world(ui, &frame, point);
+    if let Some(frame) = state.engine.loaded.as_ref().and_then(|loaded| loaded.log.frame) {
+        geodetic_facts(ui, &frame, point);
     }
 }
 
-/// What a surface is called: the terrain, then the pattern, the board and the models as the scene counts
-/// them.
-fn surface(scene: &SceneSpec, number: u32) -> String {
+/// Name of a surface by its number: terrain, pattern, board, then models.
+fn surface_name(scene: &SceneSpec, number: u32) -> String {
     let flat = [("pattern", scene.pattern.is_some()), ("board", scene.board.is_some())];
     let named = std::iter::once("terrain")
         .chain(flat.into_iter().filter_map(|(name, is_there)| is_there.then_some(name)));
@@ -186,81 +194,87 @@ fn surface(scene: &SceneSpec, number: u32) -> String {
     })
 }
 
-fn world(ui: &mut Ui, frame: &LocalFrame, point: glam::DVec3) {
-    let place = frame.geodetic_from_ned(point);
-    fact(ui, "lat, lon", format!("{:.7}, {:.7} deg", place.lat_deg(), place.lon_deg()), "WGS-84");
-    fact(ui, "height", format!("{:.3} m", place.height_m), "in the scenario's vertical datum");
+/// Geodetic coordinates of a point.
+fn geodetic_facts(ui: &mut Ui, frame: &LocalFrame, point: glam::DVec3) {
+    let geodetic = frame.geodetic_from_ned(point);
+    fact(ui, "lat, lon", format!("{:.7}, {:.7} deg", geodetic.lat_deg(), geodetic.lon_deg()), "WGS-84");
+    fact(ui, "height", format!("{:.3} m", geodetic.height_m), "in the scenario's vertical datum");
 }
 
-fn moved(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
+/// Displacement and blur of a pixel.
+fn motion_facts(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
     let Some(path) = path else { return };
     let here = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]));
-    let shift = path.at_stamp_px.map(|at| here - at);
+    let shift = path.at_stamp_px.map(|stamp_px| here - stamp_px);
     let text = shift.map_or_else(
-        || "out of sight at the stamp".to_owned(),
+        || "not visible at the stamp".to_owned(),
         |shift| format!("{}, {} px", signed(shift.x, 3), signed(shift.y, 3)),
     );
     fact(
         ui,
         "displacement",
         text,
-        "from where it would be in a frame taken at the stamp at once (the paper's Delta x)",
+        "from its position in a global-shutter frame at the stamp (the paper's Delta x)",
     );
     let length_px: f64 = path.exposure_px.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-    fact(ui, "blur", format!("{} px", fixed(length_px, 3)), "length of its way over the exposure t_e");
+    fact(ui, "blur", format!("{} px", fixed(length_px, 3)), "length of its path over the exposure t_e");
 }
 
-fn source(ui: &mut Ui, plan: &FramePlan, look: &RaySample) {
+/// Source of a pixel in the ideal frame.
+fn source_facts(ui: &mut Ui, plan: &FramePlan, sample: &RaySample) {
     let key = plan.ideal_view();
-    let at = key.source_px(look);
+    let source = key.source_px(sample);
     let [width, height] = plan.ideal.size_px.map(f64::from);
-    let inside = at.x > -0.5 && at.y > -0.5 && at.x < width - 0.5 && at.y < height - 0.5;
-    let where_ = if inside || plan.has_displaced_key() { "" } else { " (outside: the pixel is invalid)" };
+    let inside = source.x > -0.5 && source.y > -0.5 && source.x < width - 0.5 && source.y < height - 0.5;
+    let note = if inside || plan.has_displaced_key() { "" } else { " (outside: the pixel is invalid)" };
     fact(
         ui,
         "source",
-        format!("{:.3}, {:.3} px{where_}", at.x, at.y),
-        "where it lies in the ideal frame of the middle of the frame's window",
+        format!("{:.3}, {:.3} px{note}", source.x, source.y),
+        "in the ideal frame at the middle of the frame's window",
     );
 }
 
-/// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the
-/// kernel counts them. For taps it may have more.
-fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<RaySample>) {
+/// Number of exposure samples of this pixel by the length of its exposure path, stretch by stretch as the
+/// renderer counts them. For taps it may have more.
+fn sample_facts(ui: &mut Ui, plan: &FramePlan, sample: impl Fn(f64) -> Option<RaySample>) {
     let Some(blur) = plan.blur else { return };
     let key = plan.ideal_view();
-    let pieces = PIECES * blur.stretches();
-    let at = |piece: u32| look(f64::from(piece) / f64::from(pieces) - 0.5).map(|look| key.source_px(&look));
-    let Some(way) = (0..=pieces).map(at).collect::<Option<Vec<DVec2>>>() else { return };
-    let steps: Vec<f64> = way.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-    let of_stretch =
+    let chords = CHORDS * blur.stretches();
+    let source_px =
+        |chord: u32| sample(f64::from(chord) / f64::from(chords) - 0.5).map(|sample| key.source_px(&sample));
+    let Some(path) = (0..=chords).map(source_px).collect::<Option<Vec<DVec2>>>() else { return };
+    let steps: Vec<f64> = path.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
+    let stretch_samples =
         |steps: &[f64]| samples_for(steps.iter().sum(), blur.samples_per_px, 1, blur.max_samples);
-    let count: u32 = steps.chunks(PIECES as usize).map(of_stretch).sum();
+    let count: u32 = steps.chunks(CHORDS as usize).map(stretch_samples).sum();
     let length_px: f64 = steps.iter().sum();
     fact(
         ui,
         "samples here",
         format!("at least {count}, over {} px", fixed(length_px, 2)),
-        "of the exposure, by the length of its source's way through the ideal frame; as many as the footprint has taps, if that is more",
+        "exposure samples, by the length of its exposure path in the ideal frame; more if the footprint has \
+         more taps",
     );
 }
 
-/// The predicted error around a pixel, if it is known.
+/// The predicted error near a pixel, if it was requested.
 fn predicted_here(state: &State, [x, y]: [u32; 2]) -> Option<String> {
-    let shown = state.heard.shown.as_ref()?;
+    let shown = state.engine.shown.as_ref()?;
     let Some(errors) = shown.reply.errors.first() else {
-        return state.shows_errors().then(|| "once the hand rests".to_owned());
+        return state.shows_errors().then(|| "after a pause of the input".to_owned());
     };
     let near_px = errors.map.near_px([x, y]);
-    Some(near_px.map_or_else(|| "counted apart: silhouettes around".to_owned(), |px| format!("{px:.5} px")))
+    Some(near_px.map_or_else(|| "none: near silhouettes".to_owned(), |px| format!("{px:.5} px")))
 }
 
-/// That a tolerance is broken, if it is; the plan's page says by what.
-fn unless(kept: bool) -> &'static str {
-    if kept { "" } else { ", not kept" }
+/// Marks an exceeded tolerance; the plan's page names the cause.
+fn exceeded_mark(is_kept: bool) -> &'static str {
+    if is_kept { "" } else { ", exceeded" }
 }
 
-fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
+/// Predicted errors as the frame is rendered.
+fn predicted_errors(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
     ui.separator();
     ui.strong("as rendered");
     facts(ui, "certainty", |ui| {
@@ -270,20 +284,21 @@ fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
                 ui,
                 "predicted here",
                 here,
-                "largest error of the source coordinate in the plan's dry runs around this pixel, with their safety; pixels at mid-exposure are below it but for about one in a hundred",
+                "largest source error of the planner's dry runs near this pixel, with a safety factor; \
+                 about 99 % of pixels at mid-exposure are below it",
             );
         }
         fact(
             ui,
             "predicted error",
-            format!("{:.4} px{}", predicted.total_px, unless(predicted.source_error_kept)),
-            "of the frame: bound on 99 % of its pixels' source coordinates",
+            format!("{:.4} px{}", predicted.total_px, exceeded_mark(predicted.source_error_kept)),
+            "bound on the source error of 99 % of the frame's pixels",
         );
         fact(
             ui,
             "of grey levels",
-            format!("{:.3} of 255{}", predicted.picture_dn(), unless(predicted.picture_error_kept)),
-            "expected RMS of the picture, from resampling, blur samples and silhouettes",
+            format!("{:.3} of 255{}", predicted.picture_dn(), exceeded_mark(predicted.picture_error_kept)),
+            "expected RMS picture error, from resampling, blur samples and silhouettes",
         );
         let samples = plan.blur.map_or_else(
             || "1".to_owned(),

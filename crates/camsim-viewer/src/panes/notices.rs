@@ -1,10 +1,9 @@
-//! Faults and news, above the picture: what went wrong is told where one looks, and nothing disappears
-//! unread.
+//! Faults, problems of the scenario, notices and progress, above the picture.
 
 use eframe::egui;
 
 use super::{
-    tips::Explained,
+    tooltips::WithTooltip,
     widgets::{named, waiting},
 };
 use crate::{
@@ -12,31 +11,31 @@ use crate::{
     state::State,
 };
 
-/// Lines above the picture.
+/// Draws the lines above the picture.
 pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
-    if let Some(fault) = &state.heard.fault {
+    if let Some(fault) = &state.engine.fault {
         line(ui, fault, true);
     }
     for problem in state.document.iter().flat_map(|document| &document.problems).take(3) {
         line(ui, &problem.to_string(), true);
     }
-    for (at, notice) in state.notices.iter().enumerate() {
+    for (index, notice) in state.notices.iter().enumerate() {
         ui.horizontal(|ui| {
             let name = format!("dismiss: {notice}");
-            let dismiss = ui.small_button("x").explained(&name);
+            let dismiss = ui.small_button("x").with_tooltip(&name);
             named(&dismiss, egui::Role::Button, &name);
             if dismiss.clicked() {
-                out.push(Message::Dismiss(at));
+                out.push(Message::Dismiss(index));
             }
             line(ui, notice, false);
         });
     }
-    if !state.heard.busy.is_empty() {
+    if !state.engine.busy.is_empty() {
         ui.horizontal(|ui| {
             waiting(ui);
-            let seconds = state.heard.busy_since.map_or(0, |since| since.elapsed().as_secs());
-            let so_far = if seconds > 0 { format!(" ({seconds} s)") } else { String::new() };
-            ui.label(format!("{}{so_far}", state.heard.busy));
+            let seconds = state.engine.busy_since.map_or(0, |since| since.elapsed().as_secs());
+            let elapsed = if seconds > 0 { format!(" ({seconds} s)") } else { String::new() };
+            ui.label(format!("{}{elapsed}", state.engine.busy));
         });
     }
 }

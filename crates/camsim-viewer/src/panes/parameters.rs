@@ -1,4 +1,4 @@
-//! The whole scenario, grouped as in its file.
+//! All keys of the scenario, grouped by the tables of its file.
 
 mod editors;
 mod lists;
@@ -6,11 +6,11 @@ mod presets;
 
 use std::sync::LazyLock;
 
-use camsim_io::scenario_file::{Kind, keys};
+use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{self, RichText, Role, Ui};
 
 use super::{
-    tips::{Aside, Explained},
+    tooltips::{TooltipPlacement, WithTooltip},
     widgets::named,
 };
 use crate::{
@@ -20,13 +20,13 @@ use crate::{
     state::State,
 };
 
-/// The pane.
+/// Draws the pane.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(document) = &state.document else {
         ui.label("nothing open");
         return;
     };
-    Aside::Right(ui.max_rect().x_range()).set(ui.ctx());
+    TooltipPlacement::Right(ui.max_rect().x_range()).set(ui.ctx());
     presets::show(ui, out);
     egui::ScrollArea::vertical().id_salt("parameters").auto_shrink(false).show(ui, |ui| {
         for group in groups() {
@@ -35,11 +35,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     });
 }
 
-/// Keys of each table in the order of the format, without those of list elements; found once.
+/// Keys of each table in the order of the format, without those of list elements.
 fn groups() -> &'static [Group] {
     static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
         let mut groups: Vec<Group> = Vec::new();
-        for (key, kind) in keys().iter().filter(|(key, kind)| *kind != Kind::Later && !is_element(key)) {
+        for (key, kind) in
+            keys().iter().filter(|(key, kind)| *kind != ValueKind::Unsupported && !is_element(key))
+        {
             let name = key.rsplit_once('.').map_or("", |(group, _)| group);
             match groups.iter_mut().find(|group| group.name == name) {
                 Some(group) => group.keys.push((*key, *kind)),
@@ -51,23 +53,23 @@ fn groups() -> &'static [Group] {
     &GROUPS
 }
 
-/// What the sections are called, top to bottom.
+/// Titles of the sections in order.
 #[cfg(test)]
 pub fn section_names() -> Vec<&'static str> {
     groups().iter().map(Group::title).collect()
 }
 
-/// Whether a key is of the elements of a list.
+/// Whether a key belongs to elements of a list of tables.
 fn is_element(key: &str) -> bool {
     keys().iter().any(|(list, kind)| {
-        *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
+        *kind == ValueKind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
     })
 }
 
-/// A table of the format.
+/// A table of the format with its keys.
 struct Group {
     name: &'static str,
-    keys: Vec<(&'static str, Kind)>,
+    keys: Vec<(&'static str, ValueKind)>,
 }
 
 impl Group {
@@ -76,6 +78,7 @@ impl Group {
     }
 }
 
+/// Draws the section of a table.
 fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: &mut Outbox) {
     let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
     let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
@@ -89,14 +92,14 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
     egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
         for (key, kind) in &group.keys {
             match kind {
-                Kind::Tables => lists::show(ui, state, document, key, out),
+                ValueKind::Tables => lists::show(ui, state, document, key, out),
                 kind => row(ui, state, document, key, *kind, out),
             }
         }
     });
 }
 
-/// The keys of a table, for another page.
+/// Draws the keys of a table on another page.
 pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
     let Some(document) = &state.document else { return };
     for (key, kind) in groups().iter().filter(|group| group.name == name).flat_map(|group| &group.keys) {
@@ -104,19 +107,19 @@ pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
     }
 }
 
-/// A key: its name, its value, its unit; what was changed can be reset.
-fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, out: &mut Outbox) {
-    let Some(param) = params::of(key) else { return };
-    row_at(ui, state, document, key, kind, param, out);
+/// Draws a key with its editor and unit, and a reset button if it was changed.
+fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: ValueKind, out: &mut Outbox) {
+    let Some(param) = params::find(key) else { return };
+    row_with_param(ui, state, document, key, kind, param, out);
 }
 
-/// The same for an element of a list, whose key has an index that its facts have not.
-fn row_at(
+/// Draws a key whose description is given: that of a list element is found under its key without index.
+fn row_with_param(
     ui: &mut Ui,
     state: &State,
     document: &Document,
     key: &str,
-    kind: Kind,
+    kind: ValueKind,
     param: &Param,
     out: &mut Outbox,
 ) {
@@ -130,14 +133,15 @@ fn row_at(
         text = text.color(ui.visuals().hyperlink_color).strong();
     }
     ui.horizontal_wrapped(|ui| {
-        ui.label(text).explained(format!("{key}: {}", param.tip));
+        ui.label(text).with_tooltip(format!("{key}: {}", param.tip));
         editors::show(ui, document, key, kind, param, out);
         if !param.unit.is_empty() {
             ui.weak(param.unit);
         }
         if changed {
             let name = format!("reset {key}");
-            let reset = ui.small_button("reset").explained(format!("{name} to {}", opened(document, key)));
+            let reset =
+                ui.small_button("reset").with_tooltip(format!("{name} to {}", opened_text(document, key)));
             named(&reset, Role::Button, &name);
             if reset.clicked() {
                 out.push(Message::Reset(key.to_owned()));
@@ -147,11 +151,12 @@ fn row_at(
     if let Some(problem) = problem {
         ui.label(RichText::new(&problem.message).color(ui.visuals().error_fg_color).small());
     }
-    if let Some(refusal) = state.refused.as_ref().filter(|refusal| refusal.key() == key) {
-        ui.label(RichText::new(&refusal.text).color(ui.visuals().warn_fg_color).small());
+    if let Some(rejected) = state.rejected_input.as_ref().filter(|rejected| rejected.key() == key) {
+        ui.label(RichText::new(&rejected.text).color(ui.visuals().warn_fg_color).small());
     }
 }
 
-fn opened(document: &Document, key: &str) -> String {
-    document.opened(key).map_or_else(|| "nothing".to_owned(), ToString::to_string)
+/// Text of the value when the file was opened.
+fn opened_text(document: &Document, key: &str) -> String {
+    document.opened_value(key).map_or_else(|| "nothing".to_owned(), ToString::to_string)
 }

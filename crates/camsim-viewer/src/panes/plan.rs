@@ -1,4 +1,4 @@
-//! The frame's plan: passes with their times, what is left out and why, and how far off the pixels will be.
+//! The plan of the shown frame: passes and times, predicted errors, passes that are left out.
 
 use camsim_plan::Predicted;
 use eframe::egui::{self, RichText, Ui};
@@ -9,16 +9,16 @@ use crate::{
     state::State,
 };
 
-/// The page.
+/// Draws the page.
 pub fn show(ui: &mut Ui, state: &State) {
-    let Some(shown) = &state.heard.shown else {
+    let Some(shown) = &state.engine.shown else {
         ui.label("no frame yet");
         return;
     };
-    if shown.reply.wanted.size == Size::Preview {
-        ui.weak("of the preview; the frame's own plan follows when the hand rests");
+    if shown.reply.request.size == Size::Preview {
+        ui.weak("plan of the preview; that of the full frame follows after a pause of the input");
     }
-    let has_terrain = state.heard.sequence().is_some_and(|sequence| sequence.scene.terrain.is_some());
+    let has_terrain = state.engine.sequence().is_some_and(|sequence| sequence.scene.terrain.is_some());
     for picture in &shown.reply.pictures {
         ui.strong(format!("frame {}, {}", picture.plan.frame, picture.stage.label()));
         passes(ui, picture);
@@ -26,15 +26,16 @@ pub fn show(ui: &mut Ui, state: &State) {
         skipped(ui, picture);
         ui.separator();
     }
-    if let Some(ms) = state.heard.full_ms {
-        ui.label(format!("{:.1} frames/s one by one in full size", 1e3 / ms.max(1e-3)));
+    if let Some(ms) = state.engine.full_ms {
+        ui.label(format!("{:.1} frames/s in full size, one by one", 1e3 / ms.max(1e-3)));
     }
-    ui.weak(format!("on {}", state.heard.adapter));
-    for warning in state.heard.loaded.iter().flat_map(|loaded| &loaded.warnings) {
+    ui.weak(format!("on {}", state.engine.adapter));
+    for warning in state.engine.loaded.iter().flat_map(|loaded| &loaded.warnings) {
         ui.label(RichText::new(warning).color(ui.visuals().warn_fg_color));
     }
 }
 
+/// Passes and their times.
 fn passes(ui: &mut Ui, picture: &Picture) {
     for pass in picture.plan.passes() {
         ui.label(format!("- {pass}"));
@@ -45,27 +46,23 @@ fn passes(ui: &mut Ui, picture: &Picture) {
             ui,
             "planned in",
             format!("{:.1} ms", times.plan_ms),
-            "on the cpu: choice of methods by dry runs, triangles, poses",
+            "on the cpu: choice of methods, triangles, poses",
         );
         fact(ui, "recorded in", format!("{:.1} ms", times.record_ms), "on the cpu");
         fact(ui, "submitted in", format!("{:.1} ms", times.submit_ms), "by the driver");
         fact(ui, "waited", format!("{:.1} ms", times.wait_ms), "for the gpu");
         fact(ui, "read in", format!("{:.1} ms", times.read_ms), "from the gpu");
         for pass in &times.passes {
-            fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by its time stamps");
+            fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by time stamps");
         }
     });
 }
 
-/// What is predicted, and whether that is what the scenario asks for.
+/// Predicted errors, and whether they are within the scenario's tolerances.
 fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let predicted = &picture.plan.predicted;
     if predicted.probes == 0 {
-        verdict(
-            ui,
-            false,
-            Some("no pixel that was tried has a source in the ideal frame: the picture is empty"),
-        );
+        verdict(ui, false, Some("no probe has a source in the ideal frame: the picture is empty"));
         return;
     }
     facts(ui, &format!("errors {}", picture.stage.label()), |ui| source_error(ui, picture, has_terrain));
@@ -74,17 +71,18 @@ fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     verdict(ui, predicted.picture_error_kept, predicted.picture_error_obstacle.as_deref());
     if picture.plan.extrapolated {
         ui.label(
-            RichText::new("reaches outside the log: extrapolated at constant velocity")
+            RichText::new("beyond the log: extrapolated at constant velocity")
                 .color(ui.visuals().warn_fg_color),
         );
     }
 }
 
-fn verdict(ui: &mut Ui, kept: bool, cause: Option<&str>) {
-    if kept {
+/// Whether a tolerance is kept, and otherwise why not.
+fn verdict(ui: &mut Ui, is_kept: bool, cause: Option<&str>) {
+    if is_kept {
         ui.weak("within the tolerance");
     } else {
-        let text = format!("the tolerance is NOT KEPT: {}", cause.unwrap_or("see camsim explain"));
+        let text = format!("the tolerance is EXCEEDED: {}", cause.unwrap_or("see camsim explain"));
         ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
     }
 }
@@ -97,14 +95,14 @@ fn source_error(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
         ui,
         "predicted error",
         format!("{:.4} px", predicted.total_px),
-        "bound on the 99th percentile of the source coordinate's error",
+        "bound on the 99th percentile of the source error",
     );
     let parts = [
         ("lens", predicted.lens_px, "lens inverse"),
         ("temporal", predicted.temporal_px, "model of the motion"),
-        ("depth", predicted.depth_px, "depth between pixels of the ideal frame"),
-        ("nodes", predicted.nodes_px, "curves between the nodes of the exposure"),
-        ("single precision", predicted.rounding_px, "poses, depth, coordinates"),
+        ("depth", predicted.depth_px, "interpolation of the ideal frame's depth"),
+        ("nodes", predicted.nodes_px, "interpolation between nodes of the exposure path"),
+        ("single precision", predicted.rounding_px, "rounding of poses, depth, coordinates"),
     ];
     for (what, px, tip) in parts {
         fact(ui, what, format!("{px:.5} px"), tip);
@@ -114,21 +112,16 @@ fn source_error(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
             ui,
             "terrain",
             format!("{:.3} px", plan.terrain_error_px / plan.ideal.scale(&plan.camera)),
-            "bound on what its level of detail moves in the picture",
+            "bound on the image error of its level of detail",
         );
     }
     if predicted.silhouette_share > 0.0 {
         let share = format!("at least {:.1} %", 100.0 * predicted.silhouette_share);
-        fact(
-            ui,
-            "counted apart",
-            share,
-            "pixels at a step or fold of depth: no bound on their source coordinates",
-        );
+        fact(ui, "silhouettes", share, "pixels at silhouettes and creases: no bound on their source error");
     }
     if let Some(disocclusion) = predicted.disocclusion {
         let text = format!("{:.4} %, {:.2} px wide", 100.0 * disocclusion.share, disocclusion.width_px);
-        fact(ui, "disocclusion", text, "of the picture that no ideal frame sees, behind silhouettes");
+        fact(ui, "disocclusion", text, "share of the picture that no ideal frame shows, behind silhouettes");
     }
 }
 
@@ -138,38 +131,39 @@ fn picture_error(ui: &mut Ui, predicted: &Predicted) {
         ui,
         "picture error",
         format!("{:.3} of 255", predicted.picture_dn()),
-        "expected RMS of the picture, all causes together",
+        "expected RMS picture error, all causes",
     );
     fact(
         ui,
         "resampling",
         format!("{:.3}", predicted.resampling_dn),
-        "of the ideal frame, away from silhouettes",
+        "resampling of the ideal frame, away from silhouettes",
     );
-    fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
+    fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "finite number of exposure samples");
     fact(
         ui,
         "misregistration",
         format!("{:.3}", predicted.misregistration_dn),
-        "by the error of sources, away from silhouettes",
+        "by source errors, away from silhouettes",
     );
     if let Some(terrain) = predicted.terrain {
-        fact(ui, "terrain", format!("{:.3}", terrain.error_dn()), "its level of detail, at silhouettes too");
+        fact(ui, "terrain", format!("{:.3}", terrain.error_dn()), "level of detail, also at silhouettes");
     }
     if let Some(silhouettes) = predicted.silhouettes {
         fact(
             ui,
             "silhouettes",
             format!("{:.3}", silhouettes.error_dn),
-            "as they are made: by the ideal frame's pixels or by rays",
+            "by pixels of the ideal frame or by silhouette rays",
         );
     }
     if let Some(blended) = predicted.blended_depth {
         let text = format!("{:.3}, {:.0} % of the picture", blended.error_dn, 100.0 * blended.share);
-        fact(ui, "blended surfaces", text, "whose light moves with the depth of one");
+        fact(ui, "blended surfaces", text, "blended surfaces, reprojected by the depth of one");
     }
 }
 
+/// Passes that are left out, with reasons.
 fn skipped(ui: &mut Ui, picture: &Picture) {
     egui::CollapsingHeader::new(format!("left out ({})", picture.plan.skipped.len()))
         .id_salt(("skipped", picture.stage.label()))

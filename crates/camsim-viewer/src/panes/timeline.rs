@@ -1,4 +1,4 @@
-//! The timeline: play, scrub, loop, and when the rows of the frame are exposed.
+//! The timeline: play, scrubbing, loop, and the exposure times of the frame's rows.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use camsim_io::load::Loaded;
 use eframe::egui::{self, Color32, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use super::{
-    numbers::{self, Field},
-    tips::{Aside, Explained},
+    number_field::{self, NumberField},
+    tooltips::{TooltipPlacement, WithTooltip},
     widgets::{fixed, named, signed},
 };
 use crate::{
@@ -17,18 +17,18 @@ use crate::{
     timeline::{SPEEDS, Timeline},
 };
 
-/// Height of the bar, points.
-const BAR: f32 = 22.0;
-/// Height of the drawing of the rows' times.
-const ROWS: f32 = 34.0;
+/// Height of the scrub bar, points.
+const BAR_HEIGHT: f32 = 22.0;
+/// Height of the diagram of row times, points.
+const ROWS_HEIGHT: f32 = 34.0;
 
-/// The pane.
+/// Draws the pane.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
-    Aside::Above(ui.max_rect().y_range()).set(ui.ctx());
+    TooltipPlacement::Above(ui.max_rect().y_range()).set(ui.ctx());
     ui.add_space(2.0);
     ui.add_enabled_ui(state.timeline.frames > 0, |ui| {
         ui.horizontal_wrapped(|ui| controls(ui, state, out));
-        bar(ui, state, out);
+        scrub_bar(ui, state, out);
         row_times(ui, state);
     });
     ui.add_space(2.0);
@@ -37,7 +37,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let timeline = &state.timeline;
     let mut button = |ui: &mut Ui, text: &str, name: &str, message: Message| {
-        let response = ui.button(text).explained(name);
+        let response = ui.button(text).with_tooltip(name);
         named(&response, Role::Button, name);
         if response.clicked() {
             out.push(message);
@@ -54,7 +54,7 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     button(ui, ">", "next frame", Message::Step(1));
     button(ui, ">|", "last frame", Message::Seek(timeline.bounds()[1]));
     let mut changed = timeline.clone();
-    let field = Field {
+    let field = NumberField {
         name: "speed",
         label: "",
         unit: "x",
@@ -62,16 +62,16 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
         speed: 0.01,
         decimals: 2,
         whole: false,
-        tip: "of play, times the flight's own time",
+        tip: "speed of play, times real time",
     };
-    changed.speed = numbers::slider(ui, &field, timeline.speed, out);
+    changed.speed = number_field::slider(ui, &field, timeline.speed, out);
     loop_controls(ui, timeline, &mut changed);
     if changed != *timeline {
         out.push(Message::Timeline(changed));
     }
     ui.separator();
     let last_s = timeline.seconds(timeline.last());
-    let field = Field {
+    let field = NumberField {
         name: "time",
         label: "",
         unit: "s",
@@ -79,29 +79,29 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
         speed: 0.5 / timeline.fps,
         decimals: 4,
         whole: false,
-        tip: "from the beginning of the window; click to type a time",
+        tip: "time from the window's begin; click to type",
     };
-    if let Some((seconds, _)) = numbers::number(ui, &field, timeline.seconds(timeline.frame), out) {
+    if let Some((seconds, _)) = number_field::drag_value(ui, &field, timeline.seconds(timeline.frame), out) {
         out.push(Message::Seek(timeline.frame_at(seconds)));
     }
     ui.label(format!("of {last_s:.2} s"));
     let flight = state
-        .heard
+        .engine
         .stamp_s(timeline.frame)
         .map_or_else(String::new, |t_s| format!(", flight time {} s", fixed(t_s, 3)));
-    ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames)).explained(
-        "frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row",
-    );
+    ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames))
+        .with_tooltip("frames count from 0; flight time is the frame's stamp, from the log's first good row");
 }
 
 fn loop_controls(ui: &mut Ui, timeline: &Timeline, changed: &mut Timeline) {
     let [first, last] = timeline.bounds();
     let frame = timeline.frame;
-    if ui.button("loop from").explained("the loop begins at this frame").clicked() && frame < timeline.last()
+    if ui.button("loop from").with_tooltip("begin the loop at this frame").clicked()
+        && frame < timeline.last()
     {
         changed.range = Some([frame, if last > frame { last } else { timeline.last() }]);
     }
-    if ui.button("loop to").explained("the loop ends at this frame").clicked() && frame > 0 {
+    if ui.button("loop to").with_tooltip("end the loop at this frame").clicked() && frame > 0 {
         changed.range = Some([if first < frame { first } else { 0 }, frame]);
     }
     if let Some([first, last]) = timeline.range
@@ -111,9 +111,11 @@ fn loop_controls(ui: &mut Ui, timeline: &Timeline, changed: &mut Timeline) {
     }
 }
 
-fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
+/// The scrub bar, with marks at gaps and repaired rows of the log.
+fn scrub_bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let timeline = &state.timeline;
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR), Sense::click_and_drag());
+    let (rect, response) =
+        ui.allocate_exact_size(vec2(ui.available_width(), BAR_HEIGHT), Sense::click_and_drag());
     response.widget_info(|| WidgetInfo::slider(ui.is_enabled(), timeline.frame as f64, "timeline"));
     let last = timeline.last().max(1) as f64;
     let inner = rect.shrink2(vec2(6.0, 4.0));
@@ -124,23 +126,23 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
         let span = Rect::from_x_y_ranges(x_of(first as f64)..=x_of(end as f64), inner.y_range());
         painter.rect_filled(span, 0.0, ui.visuals().selection.bg_fill.gamma_multiply(0.5));
     }
-    let mut marked = f32::NEG_INFINITY;
+    let mut marked_until = f32::NEG_INFINITY;
     for [from, to] in gaps(state) {
         let left = x_of(from.max(0.0));
         let right = x_of(to.min(last)).max(left + 1.0);
-        // Of thousands within a point one is enough.
-        if right >= marked + 1.0 {
+        // At most one mark per point.
+        if right >= marked_until + 1.0 {
             let span = Rect::from_x_y_ranges(left..=right, inner.y_range());
             painter.rect_filled(span, 0.0, ui.visuals().warn_fg_color.gamma_multiply(0.6));
-            marked = right;
+            marked_until = right;
         }
     }
-    let mut marked = f32::NEG_INFINITY;
+    let mut marked_until = f32::NEG_INFINITY;
     for x in repaired(state).map(x_of) {
-        // Of thousands side by side a line a point is enough.
-        if x >= marked + 1.0 {
+        // At most one line per point.
+        if x >= marked_until + 1.0 {
             painter.vline(x, inner.y_range(), Stroke::new(1.0, ui.visuals().error_fg_color));
-            marked = x;
+            marked_until = x;
         }
     }
     let x = x_of(timeline.frame as f64);
@@ -155,41 +157,45 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     } else if timeline.dragged {
         out.push(Message::Timeline(Timeline { dragged: false, ..timeline.clone() }));
     }
-    response.explained_by(|ui| log_report(ui, state));
+    response.with_tooltip_ui(|ui| log_report(ui, state));
 }
 
-/// Spans without rows of the log as far as they are on the timeline, in frames, in order.
+/// Gaps of the log on the timeline, in frames, in order.
 fn gaps(state: &State) -> impl Iterator<Item = [f64; 2]> + '_ {
     let last = state.timeline.last() as f64;
-    let of = |sequence: &'_ Arc<Sequence>| {
+    let in_frames = |sequence: &'_ Arc<Sequence>| {
         let sequence = sequence.clone();
         move |span: &[f64; 2]| span.map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps)
     };
     let spans = state
-        .heard
+        .engine
         .sequence()
         .into_iter()
-        .flat_map(move |sequence| state.heard.gaps_s.iter().map(of(sequence)));
+        .flat_map(move |sequence| state.engine.gaps_s.iter().map(in_frames(sequence)));
     spans.filter(move |[from, to]| *to >= 0.0 && *from <= last)
 }
 
-/// Frames at rows of the log that were repaired, in order.
+/// Frames of repaired rows of the log, in order.
 fn repaired(state: &State) -> impl Iterator<Item = f64> + '_ {
     let last = state.timeline.last() as f64;
-    let of = |loaded: &'_ Arc<Loaded>| {
+    let in_frames = |loaded: &'_ Arc<Loaded>| {
         let sequence = loaded.sequence.clone();
         move |t_s: &f64| (t_s - sequence.start_s) * sequence.scenario.camera.fps
     };
-    let frames =
-        state.heard.loaded.iter().flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(of(loaded)));
+    let frames = state
+        .engine
+        .loaded
+        .iter()
+        .flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(in_frames(loaded)));
     frames.filter(move |frame| (0.0..=last).contains(frame))
 }
 
+/// Tooltip of the scrub bar: report and warnings of the log.
 fn log_report(ui: &mut Ui, state: &State) {
     ui.label("drag to scrub; arrow keys step");
-    if let Some(loaded) = &state.heard.loaded {
+    if let Some(loaded) = &state.engine.loaded {
         let report = loaded.log.report.to_string();
-        // What was repaired is a warning, too.
+        // Repairs are also among the warnings.
         if !loaded.warnings.iter().any(|warning| warning.contains(&report)) {
             ui.label(report);
         }
@@ -199,16 +205,16 @@ fn log_report(ui: &mut Ui, state: &State) {
     }
 }
 
-/// Rows downwards, time to the right: each row's exposure as it lies about the frame's stamp.
+/// Diagram of exposures about the frame's stamp: rows downwards, time to the right.
 fn row_times(ui: &mut Ui, state: &State) {
     let Some(document) = &state.document else { return };
     let camera = &document.scenario.camera;
     let Ok(shutter) = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px) else { return };
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROWS), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROWS_HEIGHT), Sense::hover());
     let painter = ui.painter_at(rect);
     let (first_s, last_s) = shutter.window_s();
     let period_s = 1.0 / camera.fps;
-    // Two periods, or what the frame takes.
+    // Two frame periods, or the frame's window if it is longer.
     let (left_s, right_s) =
         (first_s.min(-period_s) - 0.05 * period_s, last_s.max(period_s) + 0.05 * period_s);
     let x_of = |t_s: f64| rect.left() + rect.width() * ((t_s - left_s) / (right_s - left_s)) as f32;
@@ -233,14 +239,17 @@ fn row_times(ui: &mut Ui, state: &State) {
     }
     painter.vline(x_of(0.0), rect.y_range(), Stroke::new(1.5, Color32::from_rgb(220, 70, 60)));
     let text = format!("{} to {} ms", signed(1e3 * first_s, 1), signed(1e3 * last_s, 1));
-    // Left of the next frame's line.
-    let at = pos2(x_of(period_s).min(rect.right()) - 4.0, rect.top() + 2.0);
+    // Left of the next frame's stamp.
+    let position = pos2(x_of(period_s).min(rect.right()) - 4.0, rect.top() + 2.0);
     painter.text(
-        at,
+        position,
         egui::Align2::RIGHT_TOP,
         text,
         egui::FontId::proportional(11.0),
         ui.visuals().text_color(),
     );
-    response.explained("each row's exposure about the frame's stamp (red), with the periods of the frames beside it; time to the right");
+    response.with_tooltip(
+        "exposure of each row about the frame's stamp (red); grey lines are stamps of other frames; \
+         time to the right",
+    );
 }

@@ -1,40 +1,39 @@
-//! Small things that several panes draw.
+//! Widgets that several panes use.
 
 use std::{f32::consts::TAU, time::Duration};
 
 use eframe::egui::{self, Response, Role, Sense, Shape, Stroke, Ui, WidgetInfo, vec2};
 
-use super::tips::Explained;
+use super::tooltips::WithTooltip;
 
-/// Time between two looks at [`waiting`].
-const BEAT: Duration = Duration::from_millis(250);
-/// Steps of it in a turn.
-const BEATS: u64 = 8;
+/// Time between two steps of [`waiting`].
+const STEP: Duration = Duration::from_millis(250);
+/// Steps of a turn.
+const STEPS: u64 = 8;
 
-/// One choice of several. `name` is what assistive technology and tests call it, where the text alone would
-/// not tell.
-pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, explanation: &str) -> Response {
-    let response = ui.selectable_label(selected, text).explained(explanation);
+/// One choice of several. `name` is its name for assistive technology and tests, where `text` is ambiguous.
+pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, tooltip: &str) -> Response {
+    let response = ui.selectable_label(selected, text).with_tooltip(tooltip);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, ui.is_enabled(), selected, name));
     response
 }
 
-/// Says that something takes a while. egui's own spinner has the window drawn as often as it can be, which on
-/// a software adapter takes the very processors that are waited for: this one moves four times a second.
+/// Spinner with four steps a second. egui's spinner repaints at full rate, which on a software adapter takes
+/// the processor time that is waited for.
 pub fn waiting(ui: &mut Ui) -> Response {
     let side = ui.spacing().interact_size.y;
     let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, ui.is_enabled(), "working"));
-    let beat = (ui.input(|input| input.time) / BEAT.as_secs_f64()) as u64 % BEATS;
+    let turn_step = (ui.input(|input| input.time) / STEP.as_secs_f64()) as u64 % STEPS;
     let point = |step: u16| {
-        let angle = TAU * (beat as f32 / BEATS as f32 + 0.7 * f32::from(step) / 20.0);
+        let angle = TAU * (turn_step as f32 / STEPS as f32 + 0.7 * f32::from(step) / 20.0);
         rect.center() + 0.35 * side * vec2(angle.cos(), angle.sin())
     };
     ui.painter().add(Shape::line(
         (0..=20).map(point).collect(),
         Stroke::new(0.1 * side, ui.visuals().strong_text_color()),
     ));
-    ui.ctx().request_repaint_after(BEAT);
+    ui.ctx().request_repaint_after(STEP);
     response
 }
 
@@ -43,9 +42,9 @@ pub fn named(response: &Response, kind: Role, name: &str) {
     response.widget_info(|| WidgetInfo::labeled(kind, response.enabled(), name));
 }
 
-/// A row of a table: what, and how much. The value can be selected and copied.
-pub fn fact(ui: &mut Ui, what: &str, value: impl Into<String>, explanation: &str) {
-    ui.label(egui::RichText::new(what).weak()).explained(explanation);
+/// A row of a table: label and value, which can be selected and copied.
+pub fn fact(ui: &mut Ui, label: &str, value: impl Into<String>, tooltip: &str) {
+    ui.label(egui::RichText::new(label).weak()).with_tooltip(tooltip);
     ui.label(value.into());
     ui.end_row();
 }
@@ -55,7 +54,7 @@ pub fn facts(ui: &mut Ui, name: &str, rows: impl FnOnce(&mut Ui)) {
     egui::Grid::new(name).num_columns(2).spacing([10.0, 3.0]).show(ui, rows);
 }
 
-/// A number with so many decimals; what rounds to nothing has no sign.
+/// A number with `decimals` decimals, without "-0".
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -64,7 +63,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// The same, always with a sign.
+/// As [`fixed`], always with a sign.
 pub fn signed(value: f64, decimals: usize) -> String {
     let text = fixed(value, decimals);
     if text.starts_with('-') { text } else { format!("+{text}") }
@@ -79,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_has_no_sign_and_something_keeps_it() {
+    fn zero_has_no_minus_sign() {
         assert_eq!([fixed(-0.0, 3), fixed(-0.0004, 3), fixed(-0.0006, 3)], ["0.000", "0.000", "-0.001"]);
         assert_eq!([signed(-0.0, 1), signed(0.26, 1), signed(-0.06, 1)], ["+0.0", "+0.3", "-0.1"]);
         assert_eq!(fixed(f64::NAN, 2), "NaN");

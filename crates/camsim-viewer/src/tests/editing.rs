@@ -1,4 +1,4 @@
-//! Parameters, steps, files.
+//! Editing of parameters, undo and redo, saving.
 
 use std::path::PathBuf;
 
@@ -6,33 +6,33 @@ use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use toml::Value;
 
-use super::harness::{Window, demo, has, send, shown};
+use super::harness::{Window, demo, has, send, shown_request};
 use crate::{engine::Size, message::Message};
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn an_edit_gives_a_new_frame_and_undo_the_old_one() {
+fn an_edit_renders_a_new_frame_and_undo_restores_the_old_one() {
     let mut window = Window::open(Some(demo()));
     window.settle();
-    let before = window.state().heard.picture().expect("a picture").frame.color_rgba.clone();
+    let before = window.state().engine.picture().expect("a picture").frame.color_rgba.clone();
     let key = "camera.shutter.exposure_ms";
     window.harness.get_by_label(key).set_value_accesskit(30.0);
     window.step();
     window.step();
     assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 30.0);
-    assert!(has(&window, &format!("reset {key}")), "what is changed can be reset");
+    assert!(has(&window, &format!("reset {key}")), "a changed key can be reset");
     window.wait("a preview", |state| {
-        shown(state).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 30.0)
+        shown_request(state).is_some_and(|request| request.scenario.camera.shutter.exposure_ms == 30.0)
     });
     window.settle();
-    let after = window.state().heard.picture().expect("a picture");
+    let after = window.state().engine.picture().expect("a picture");
     assert_ne!(after.frame.color_rgba, before);
     assert!(after.plan.motion.blur_px > 2.0, "{}", after.plan.motion.blur_px);
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     window.step();
     window.settle();
     assert_eq!(
-        window.state().heard.picture().expect("a picture").frame.color_rgba,
+        window.state().engine.picture().expect("a picture").frame.color_rgba,
         before,
         "undone to the last bit"
     );
@@ -44,7 +44,7 @@ fn an_edit_gives_a_new_frame_and_undo_the_old_one() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn what_is_not_legal_is_told_where_it_stands_and_the_picture_stays() {
+fn an_illegal_value_is_reported_at_its_key_and_the_picture_stays() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     send(&mut window, Message::Set("camera.shutter.exposure_ms".into(), Some(Value::Float(-1.0)), false));
@@ -52,16 +52,14 @@ fn what_is_not_legal_is_told_where_it_stands_and_the_picture_stays() {
     window.settle();
     let problem = window.state().document.as_ref().expect("open").problems[0].message.clone();
     assert!(window.harness.query_all_by_label(&problem).next().is_some(), "{problem}");
-    assert!(
-        shown(window.state()).is_some_and(
-            |wanted| wanted.scenario.camera.shutter.exposure_ms == 8.0 && wanted.size == Size::Full
-        )
-    );
+    assert!(shown_request(window.state()).is_some_and(|request| request.scenario.camera.shutter.exposure_ms
+        == 8.0
+        && request.size == Size::Full));
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn saved_and_opened_again_it_is_the_same() {
+fn a_saved_scenario_opens_unchanged() {
     let folder = tempfile::tempdir().expect("a folder");
     let demo = camsim_io::builtin::unpack(folder.path()).expect("unpacked");
     let mut window = Window::open(Some(demo));
@@ -76,13 +74,13 @@ fn saved_and_opened_again_it_is_the_same() {
     window.step();
     window.click("Save here");
     assert!(saved.is_file(), "{:?}", window.state().notices);
-    // That is told for a moment, and nobody need dismiss it.
-    let told = format!("saved {}", saved.display());
-    assert!(has(&window, &told) && window.state().notices.is_empty());
+    // The confirmation disappears by itself.
+    let confirmation = format!("saved {}", saved.display());
+    assert!(has(&window, &confirmation) && window.state().notices.is_empty());
     for _ in 0..400 {
         window.step();
     }
-    assert!(!has(&window, &told));
+    assert!(!has(&window, &confirmation));
     let scenario = window.state().document.as_ref().expect("open").scenario.clone();
     send(&mut window, Message::Open(saved.clone()));
     assert_eq!(window.state().document.as_ref().expect("open").scenario, scenario);
@@ -92,7 +90,7 @@ fn saved_and_opened_again_it_is_the_same() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn dropped_files_find_their_place_and_bad_ones_are_told() {
+fn dropped_files_are_used_and_bad_ones_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: &str| {
         let path: PathBuf = folder.path().join(name);
@@ -102,8 +100,8 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     let before = window.state().document.as_ref().expect("open").scenario.clone();
-    // Bad ones: told, and what is open stays.
-    for (name, text, told) in [
+    // Bad files are reported, and the open scenario stays.
+    for (name, text, expected) in [
         ("bad.toml", "[flight]\nlgo = \"x\"\n[scene]\n", "bad.toml:2"),
         ("bad.yaml", "nonsense: [", "bad.yaml"),
         ("picture.xyz", "x", "picture.xyz"),
@@ -111,7 +109,7 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
         let path = write(name, text);
         send(&mut window, Message::Drop(path));
         let notice = window.state().notices.last().cloned().unwrap_or_default();
-        assert!(notice.contains(told), "{name}: {notice}");
+        assert!(notice.contains(expected), "{name}: {notice}");
         assert_eq!(window.state().document.as_ref().expect("open").scenario, before, "{name}");
     }
     window.step();
@@ -119,7 +117,7 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     let count = window.state().notices.len();
     window.click(&dismiss);
     assert_eq!(window.state().notices.len(), count - 1);
-    // A camera of camsim's own, and a log that is none: the engine says so, and the next good one is shown.
+    // A camera file of camsim; then a file that is no log: the engine reports it, and undo renders again.
     let camera = write("camera.toml", "size_px = [320, 240]\nfocal_px = [200.0, 200.0]\n");
     send(&mut window, Message::Drop(camera));
     assert_eq!(
@@ -131,15 +129,15 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     let log = write("none.csv", "this is,no log\n");
     send(&mut window, Message::Drop(log));
     window.wait("the fault", |state| {
-        state.heard.fault.as_deref().is_some_and(|fault| fault.contains("none.csv"))
+        state.engine.fault.as_deref().is_some_and(|fault| fault.contains("none.csv"))
     });
     send(&mut window, Message::Undo);
     window.settle();
-    assert!(window.state().heard.fault.is_none());
-    // A picture asks what it is for.
+    assert!(window.state().engine.fault.is_none());
+    // A dropped picture opens a prompt for its use.
     let vignette = demo().with_file_name("vignette.png");
     send(&mut window, Message::Drop(vignette));
-    // A window is measured before it is shown.
+    // egui measures a window before it shows it.
     (0..3).for_each(|_| window.step());
     window.click("vignette map");
     assert!(window.state().dropped_picture.is_none());
@@ -147,7 +145,7 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn text_goes_to_the_clipboard() {
+fn scenario_and_command_line_are_copied_to_the_clipboard() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     send(&mut window, Message::Set("camera.shutter.readout_ms".into(), Some(Value::Float(0.0)), false));
@@ -157,43 +155,43 @@ fn text_goes_to_the_clipboard() {
             _ => None,
         })
     };
-    for (button, told) in
+    for (button, expected) in
         [("as TOML", "readout_ms = 0.0"), ("as command line", "--set camera.shutter.readout_ms=0.0")]
     {
         window.click("Copy");
         window.harness.get_by_label(button).click();
-        let mut found = None;
+        let mut text = None;
         for _ in 0..4 {
             window.step();
-            found = found.or_else(|| copied(&window));
+            text = text.or_else(|| copied(&window));
         }
-        let text = found.unwrap_or_default();
-        assert!(text.contains(told), "{button}: {text}");
+        let text = text.unwrap_or_default();
+        assert!(text.contains(expected), "{button}: {text}");
     }
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn what_render_would_warn_of_is_on_show() {
+fn warnings_of_render_are_shown() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     let shown = |window: &Window| window.harness.query_all_by_label_contains("warning").count();
     assert_eq!(
-        (shown(&window), &window.state().heard.loaded.as_ref().expect("loaded").warnings),
+        (shown(&window), &window.state().engine.loaded.as_ref().expect("loaded").warnings),
         (0, &Vec::new())
     );
     send(&mut window, Message::Set("tracker.max_acceleration_m_s2".into(), Some(Value::Float(0.2)), false));
     window.settle();
-    let warnings = window.state().heard.loaded.as_ref().expect("loaded").warnings.clone();
-    let told =
+    let warnings = window.state().engine.loaded.as_ref().expect("loaded").warnings.clone();
+    let expected =
         warnings.iter().find(|warning| warning.contains("tracker.max_acceleration_m_s2")).expect("held back");
-    assert!(!has(&window, told));
+    assert!(!has(&window, expected));
     window.click(&if warnings.len() == 1 {
         "1 warning".to_owned()
     } else {
         format!("{} warnings", warnings.len())
     });
-    assert!(has(&window, told));
+    assert!(has(&window, expected));
     send(&mut window, Message::Undo);
     window.settle();
     assert_eq!(shown(&window), 0);

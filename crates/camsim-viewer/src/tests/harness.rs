@@ -1,4 +1,4 @@
-//! A window without a screen.
+//! A headless window for tests.
 
 use std::{
     path::{Path, PathBuf},
@@ -15,27 +15,28 @@ use egui_kittest::{
 
 use crate::{
     app::Viewer,
-    engine::{Size, Wanted},
+    display_image,
+    engine::{FrameRequest, Size},
     export::Exporter,
     settings::Settings,
-    sheet,
     state::State,
 };
 
-/// Longest wait for a picture: debug builds on two busy processors are slow.
-const PATIENCE: Duration = Duration::from_secs(240);
+/// Longest wait for a picture: debug builds on two busy processor cores are slow.
+const TIMEOUT: Duration = Duration::from_secs(240);
 
 /// The built-in flight.
 pub fn demo() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml")
 }
 
-/// A small flat scene with every effect, quick to render: the tests of panes need no mountains.
+/// A flat scene with every effect, quick to render.
 pub fn pattern() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
 }
 
-/// Ten hours in circles over that scene, a row a second with a gap of a minute; in a folder of its own.
+/// Ten hours of circles over the scene of [`pattern`], one row per second with a gap of a minute, in
+/// `folder`.
 pub fn long_flight(folder: &Path) -> PathBuf {
     camsim_io::builtin::unpack(folder).expect("unpacked");
     let mut log = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
@@ -56,108 +57,112 @@ pub fn long_flight(folder: &Path) -> PathBuf {
     path
 }
 
-/// A viewer and its window.
+/// A viewer in a headless window.
 pub struct Window {
     pub harness: Harness<'static, Option<Viewer>>,
-    /// A word for each repaint that is asked for: by the engine with each reply.
+    /// A message for each repaint request; the engine sends one with each reply.
     repaints: Receiver<()>,
 }
 
 impl Window {
-    /// Of 1000 x 700 points, on a scenario.
+    /// A window of 1000 x 700 points.
     pub fn open(scenario: Option<PathBuf>) -> Self {
         Self::with(scenario, None, [1000.0, 700.0])
     }
 
+    /// A window with an exporter and a size in points.
     pub fn with(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2]) -> Self {
-        Self::drawn(scenario, exporter, size, true)
+        Self::with_pipeline(scenario, exporter, size, true)
     }
 
-    /// With pictures drawn by their own pipeline, as in a window of eframe's, or by egui.
-    pub fn drawn(
+    /// A window whose images are drawn by their own pipeline, as in eframe's window, or by egui.
+    pub fn with_pipeline(
         scenario: Option<PathBuf>,
         exporter: Option<Exporter>,
         size: [f32; 2],
-        by_own_pipeline: bool,
+        own_pipeline: bool,
     ) -> Self {
         let mut start = Some((scenario, exporter));
-        // egui's predictable filter takes the nearest texel also where a picture is made smaller; a window of
-        // eframe's does not.
-        let of_window = RendererOptions { dithering: false, ..RendererOptions::default() };
+        // egui's predictable filter reads the nearest texel also of reduced images, unlike eframe's window.
+        let eframe_options = RendererOptions { dithering: false, ..RendererOptions::default() };
         let render = create_render_state(
             default_wgpu_setup(),
-            if by_own_pipeline { RendererOptions::PREDICTABLE } else { of_window },
+            if own_pipeline { RendererOptions::PREDICTABLE } else { eframe_options },
         );
-        let of_window = render.clone();
+        let render_state = render.clone();
         let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
             if let Some((scenario, exporter)) = start.take() {
-                if by_own_pipeline {
-                    sheet::register(ui.ctx(), &of_window);
+                if own_pipeline {
+                    display_image::register(ui.ctx(), &render_state);
                 }
                 *viewer = Some(Viewer::new(ui.ctx(), scenario, Settings::default(), exporter));
             }
-            // What eframe does by clearing.
+            // eframe clears the window in this colour.
             ui.painter().rect_filled(ui.ctx().content_rect(), 0.0, ui.visuals().panel_fill);
-            viewer.as_mut().expect("made in the first pass").show(ui);
+            viewer.as_mut().expect("created in the first pass").show(ui);
         };
         let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
         let harness =
             builder.renderer(WgpuTestRenderer::from_render_state(render)).build_ui_state(show, None);
         let (sender, repaints) = channel();
         harness.ctx.set_request_repaint_callback(move |_| {
-            // The window may be gone.
+            // The window may have been dropped.
             let _ = sender.send(());
         });
         Self { harness, repaints }
     }
 
+    /// The state of the viewer.
     pub fn state(&self) -> &State {
         &self.harness.state().as_ref().expect("open").state
     }
 
+    /// The state of the viewer, to change.
     pub fn state_mut(&mut self) -> &mut State {
         &mut self.harness.state_mut().as_mut().expect("open").state
     }
 
+    /// Runs one pass.
     pub fn step(&mut self) {
         self.harness.step();
     }
 
-    /// Lets the window run until something is so.
+    /// Runs passes until a condition holds.
     #[track_caller]
-    pub fn wait(&mut self, what: &str, mut is_so: impl FnMut(&State) -> bool) {
-        let begun = Instant::now();
-        while !is_so(self.state()) {
+    pub fn wait(&mut self, description: &str, mut condition: impl FnMut(&State) -> bool) {
+        let began = Instant::now();
+        while !condition(self.state()) {
             assert!(
-                begun.elapsed() < PATIENCE,
-                "{what}: not within {PATIENCE:?}; fault {:?}, notices {:?}",
-                self.state().heard.fault,
+                began.elapsed() < TIMEOUT,
+                "{description}: not within {TIMEOUT:?}; fault {:?}, notices {:?}",
+                self.state().engine.fault,
                 self.state().notices
             );
             self.step();
-            // Time goes on by the steps, too: that a hand rests is not told by a repaint.
+            // With a timeout: egui's time advances by steps, and idle input requests no repaint.
             let _ = self.repaints.recv_timeout(Duration::from_millis(5));
         }
         self.step();
     }
 
-    /// Lets the window run until a node of that name is there.
+    /// Runs passes until a node has the label.
     #[track_caller]
     pub fn wait_for(&mut self, label: &str) {
-        let begun = Instant::now();
+        let began = Instant::now();
         while !has(self, label) {
-            assert!(begun.elapsed() < PATIENCE, "{label}: not within {PATIENCE:?}");
+            assert!(began.elapsed() < TIMEOUT, "{label}: not within {TIMEOUT:?}");
             self.step();
             let _ = self.repaints.recv_timeout(Duration::from_millis(5));
         }
     }
 
-    /// Until what is wanted is on show, in full size.
+    /// Runs passes until the requested frame is shown in full size.
     #[track_caller]
     pub fn settle(&mut self) {
         self.wait("the full picture", |state| {
-            let wanted = state.wanted();
-            wanted.as_ref().is_some_and(|wanted| wanted.size == Size::Full) && shown(state) == wanted.as_ref()
+            let request = state.frame_request();
+            request.as_ref().is_some_and(|request| request.size == Size::Full)
+                && shown_request(state) == request.as_ref()
         });
     }
 
@@ -168,27 +173,27 @@ impl Window {
         self.settle();
     }
 
-    /// Until the oracle answers for what is on show.
+    /// Runs passes until the oracle is ready for the shown sequence.
     #[track_caller]
-    pub fn settle_exact(&mut self) {
+    pub fn settle_oracle(&mut self) {
         self.settle();
-        self.wait("looks", |state| state.heard.current_looks().is_some());
+        self.wait("the oracle", |state| state.engine.current_oracle().is_some());
     }
 
     #[track_caller]
     pub fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).click();
-        // Pressed, let go, done, shown.
+        // Press, release, and a pass that shows the effect.
         (0..3).for_each(|_| self.step());
     }
 
-    /// What a screen would show.
+    /// The rendered window.
     pub fn picture(&mut self) -> image::RgbaImage {
         self.harness.render().expect("rendered")
     }
 
-    /// Holds a part of the window against its picture in `tests/snapshots`: what tells times, paths or noise
-    /// is left out. Fonts and lines may differ a little between drivers.
+    /// Compares a part of the window, without times, paths and noise, with its picture in `tests/snapshots`.
+    /// Fonts and lines may differ slightly between drivers.
     #[track_caller]
     pub fn snapshot(&mut self, name: &str, part: egui::Rect) {
         self.harness.check_accessibility();
@@ -200,7 +205,7 @@ impl Window {
         egui_kittest::image_snapshot_options(&part, name, &options);
     }
 
-    /// The panel on the right, below its tabs.
+    /// The right panel below its tabs.
     pub fn page(&self) -> egui::Rect {
         let tabs = self.harness.get_by_label("Export").rect();
         egui::Rect::from_min_max(
@@ -210,17 +215,17 @@ impl Window {
     }
 }
 
-/// What the pictures on show were made for.
-pub fn shown(state: &State) -> Option<&Wanted> {
-    state.heard.shown.as_ref().map(|shown| &shown.reply.wanted)
+/// The request of the shown frame.
+pub fn shown_request(state: &State) -> Option<&FrameRequest> {
+    state.engine.shown.as_ref().map(|shown| &shown.reply.request)
 }
 
-/// Whether a node of that name is there.
+/// Whether a visible node has the label.
 pub fn has(window: &Window, label: &str) -> bool {
     window.harness.query_all_by_label(label).next().is_some_and(|node| !node.accesskit_node().is_hidden())
 }
 
-/// What a pane would wish.
+/// Applies a message as if a pane had sent it.
 pub fn send(window: &mut Window, message: crate::message::Message) {
     let context = window.harness.ctx.clone();
     window.state_mut().apply(message, &context);

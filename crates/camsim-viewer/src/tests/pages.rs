@@ -1,4 +1,4 @@
-//! The pages on the right, the shortcuts, and windows in odd states.
+//! Pages of the right panel, shortcuts, window sizes.
 
 use std::{
     path::PathBuf,
@@ -19,13 +19,13 @@ use crate::{message::Message, motion, view::Tab};
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_inspector_tells_what_the_pixel_sees() {
+fn the_inspector_shows_the_geometry_of_the_pixel() {
     let mut window = Window::open(Some(demo()));
-    window.settle_exact();
+    window.settle_oracle();
     let pixel = [300, 400];
     send(&mut window, Message::Pin(Some(pixel)));
     window.step();
-    // From the formulas of the paper, by hand: eqs. 8 and 9 for the lens, section 6 for the row's time.
+    // Expected values by the formulas of the paper: eqs. 8 and 9 for the lens, section 6 for the row time.
     let scenario = window.state().document.as_ref().expect("open").scenario.clone();
     let camera = CameraModel::from_spec(&scenario.camera).expect("a camera");
     let uv = camera.unproject(DVec2::new(300.0, 400.0)).expect("a ray");
@@ -35,22 +35,22 @@ fn the_inspector_tells_what_the_pixel_sees() {
     assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_row_s(400))), "the row's time");
     assert!(has(&window, "terrain"));
     let [r, g, b, a] =
-        window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
+        window.state().engine.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
     assert_eq!(a, 255);
     assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
-    // Asked for with the pixel: what the plan's dry runs around it say, which the oracle's source bears out.
-    window.settle_exact();
+    // Pinning a pixel requests the predicted errors near it.
+    window.settle_oracle();
     window.wait("its errors", |state| {
-        state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty())
+        state.engine.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty())
     });
-    let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
+    let reply = &window.state().engine.shown.as_ref().expect("shown").reply;
     let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
     let near_px = map.near_px(pixel).expect("ground");
-    // The plan answers for the frames that are made like this one too.
+    // The plan's bound also covers other frames of its group.
     assert!(
         near_px > 0.0 && near_px <= map.largest_px() && map.largest_px() <= plan.predicted.total_px + 1e-9
     );
-    assert!(has(&window, &format!("{near_px:.5} px")), "what is predicted here");
+    assert!(has(&window, &format!("{near_px:.5} px")), "the predicted error here");
     window.harness.key_press(Key::Escape);
     window.step();
     assert_eq!(window.state().pinned, None);
@@ -58,14 +58,14 @@ fn the_inspector_tells_what_the_pixel_sees() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn motion_paths_end_where_the_pixel_is() {
+fn the_middle_of_each_exposure_path_is_the_pixel() {
     let mut window = Window::open(Some(demo()));
-    window.settle_exact();
-    let looks = Arc::clone(window.state().heard.current_looks().expect("looks"));
-    let paths = motion::paths(&looks, 0);
+    window.settle_oracle();
+    let oracle = Arc::clone(window.state().engine.current_oracle().expect("the oracle"));
+    let paths = motion::grid_paths(&oracle, 0);
     assert!(paths.len() > 100, "{}", paths.len());
     for path in paths.iter() {
-        // The middle of the exposure is the pixel's own instant.
+        // A pixel's time is its mid-exposure.
         let middle = path.exposure_px[path.exposure_px.len() / 2];
         assert!(middle.distance(path.pixel) < 1e-6, "{middle} {}", path.pixel);
     }
@@ -73,19 +73,19 @@ fn motion_paths_end_where_the_pixel_is() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn plan_plots_map_and_export_have_what_they_should() {
+fn plan_plots_map_and_export_show_their_contents() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     window.click("Plan");
     assert!(has(&window, "- readback"), "the last pass");
     assert!(has(&window, "predicted error"));
     let is_broken = |window: &Window| {
-        window.harness.query_all_by_label_contains("the tolerance is NOT KEPT: ").next().is_some()
+        window.harness.query_all_by_label_contains("the tolerance is EXCEEDED: ").next().is_some()
     };
     assert!(!is_broken(&window));
     send(&mut window, Message::Set("quality.max_error_dn".into(), Some(toml::Value::Float(0.02)), false));
     window.settle();
-    assert!(is_broken(&window), "grey levels have a tolerance too");
+    assert!(is_broken(&window), "the tolerance in DN");
     send(&mut window, Message::Undo);
     window.settle();
     window.click("Plots");
@@ -100,18 +100,18 @@ fn plan_plots_map_and_export_have_what_they_should() {
     assert_eq!(window.state().view.tab, Tab::Map);
     window.settle();
     window.click("Export");
-    assert!(has(&window, "this window was opened without a renderer to files; use `camsim render`"));
+    assert!(has(&window, "this window has no exporter; use `camsim render`"));
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn an_export_shows_progress_and_can_be_cancelled() {
-    // Renders a frame for each word.
-    let (word, words) = channel::<()>();
-    let words = Mutex::new(words);
+    // Finishes a frame for each message.
+    let (finish, finished) = channel::<()>();
+    let finished = Mutex::new(finished);
     let exporter: crate::Exporter = Arc::new(move |job| {
         for _ in job.frames[0]..job.frames[1] {
-            let _ = words.lock().expect("one export at a time").recv();
+            let _ = finished.lock().expect("one export at a time").recv();
             if !job.tick() {
                 return Err("stopped on request".into());
             }
@@ -122,10 +122,10 @@ fn an_export_shows_progress_and_can_be_cancelled() {
     window.settle();
     window.click("Export");
     window.click("Render");
-    (0..3).for_each(|_| word.send(()).expect("the exporter listens"));
+    (0..3).for_each(|_| finish.send(()).expect("the exporter listens"));
     window.wait("progress", |state| state.export.as_ref().is_some_and(|job| job.progress().done == 3));
     window.click("Cancel");
-    drop(word);
+    drop(finish);
     window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
     assert!(has(&window, "stopped on request"));
     window.click("Render");
@@ -135,12 +135,12 @@ fn an_export_shows_progress_and_can_be_cancelled() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
-    type Seen = (OutputSpec, [u64; 2], PathBuf);
-    let seen: Arc<Mutex<Vec<Seen>>> = Arc::default();
-    let of_exporter = seen.clone();
+fn an_export_uses_channels_formats_frames_and_folder_of_its_page() {
+    type ExportCall = (OutputSpec, [u64; 2], PathBuf);
+    let calls: Arc<Mutex<Vec<ExportCall>>> = Arc::default();
+    let exporter_calls = calls.clone();
     let exporter: crate::Exporter = Arc::new(move |job| {
-        of_exporter.lock().expect("one at a time").push((
+        exporter_calls.lock().expect("one at a time").push((
             job.scenario.output.clone(),
             job.frames,
             job.folder.clone(),
@@ -184,21 +184,21 @@ fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
     }
     (expected.exr_pixel, expected.exr_compression) = (ExrPixel::Float, ExrCompression::Piz);
     expected.channels.sort_by_key(|channel| *channel as u8);
-    // What the page says of it is what `camsim render` would be told.
+    // The page shows the equivalent `camsim render`.
     let commands: Vec<_> =
         window.harness.query_all_by_label_contains("--frames 3..8 -o '/tmp/some where'").collect();
     assert_eq!(commands.len(), 1);
     window.click("Render");
     window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
-    assert_eq!(*seen.lock().expect("over"), [(expected, [3, 8], PathBuf::from("/tmp/some where"))]);
-    assert_eq!(window.state().timeline.range, None, "the loop is another thing");
+    assert_eq!(*calls.lock().expect("over"), [(expected, [3, 8], PathBuf::from("/tmp/some where"))]);
+    assert_eq!(window.state().timeline.range, None, "the loop is unchanged");
     window.click("as the timeline");
     assert!(has(&window, "all 60 frames; set a loop in the timeline, or type, for fewer"));
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn shortcuts_are_listed_and_colours_change() {
+fn shortcuts_are_listed_and_the_theme_changes() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
     window.click("?");
@@ -208,7 +208,7 @@ fn shortcuts_are_listed_and_colours_change() {
     window.snapshot("shortcuts", part);
     window.harness.key_press(Key::Escape);
     window.step();
-    assert!(!window.state().help);
+    assert!(!window.state().shows_shortcuts);
     window.click("Light");
     assert!(!window.harness.ctx.global_style().visuals.dark_mode);
     let part = window.harness.get_by_label("timeline").rect().expand2(egui::vec2(0.0, 36.0));
@@ -217,7 +217,7 @@ fn shortcuts_are_listed_and_colours_change() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn small_large_and_minimised_windows_behave() {
+fn small_large_and_minimised_windows_keep_the_picture() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
     for size in [[60.0, 40.0], [480.0, 320.0], [1.0, 1.0], [2500.0, 1400.0], [1000.0, 700.0]] {
@@ -225,7 +225,7 @@ fn small_large_and_minimised_windows_behave() {
         window.step();
         window.step();
     }
-    // The picture keeps its place: pages, then parameters, go before they would lie on it.
+    // Narrow windows leave out the pages, then the parameters, before they would cover the picture.
     for (width, pages, parameters) in
         [(500.0, false, false), (700.0, false, true), (900.0, true, true), (1000.0, true, true)]
     {
@@ -248,7 +248,7 @@ fn small_large_and_minimised_windows_behave() {
             );
         }
     }
-    // A minimised window gets no passes; the clock then jumps, and play goes on from where it was.
+    // A minimised window has no passes; when the clock jumps afterwards, play continues from its frame.
     window.click("play");
     let before = window.state().timeline.frame;
     window.state_mut().tick(1e4);
@@ -258,7 +258,7 @@ fn small_large_and_minimised_windows_behave() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn nothing_open_and_a_log_of_ten_hours() {
+fn a_log_of_ten_hours_opens_in_an_empty_window() {
     let mut window = Window::open(None);
     window.step();
     assert!(has(&window, "nothing open"));
@@ -276,13 +276,13 @@ fn nothing_open_and_a_log_of_ten_hours() {
             window.wait_for("north, m");
         }
     }
-    assert_eq!(window.state().heard.gaps_s, [[4999.0, 5060.0]]);
-    assert_eq!(window.state().heard.shown.as_ref().expect("shown").reply.frame, 900_000);
+    assert_eq!(window.state().engine.gaps_s, [[4999.0, 5060.0]]);
+    assert_eq!(window.state().engine.shown.as_ref().expect("shown").reply.frame, 900_000);
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn files_that_are_held_over_the_window_are_named() {
+fn files_dragged_over_the_window_are_named() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
     let held = egui::HoveredFile { path: Some(pattern()), mime: String::new() };

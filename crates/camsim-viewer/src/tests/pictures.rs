@@ -1,4 +1,4 @@
-//! What is on show.
+//! Pictures: stages, comparison, overlays, the oracle.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -18,12 +18,12 @@ use crate::{
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_picture_on_show_is_what_render_writes() {
+fn the_shown_picture_equals_the_png_of_render() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     window.state_mut().timeline.seek(17);
     window.settle();
-    let of_view = window.state().heard.picture().expect("a picture").image.clone();
+    let shown_image = window.state().engine.picture().expect("a picture").image.clone();
 
     let scenario = read_scenario(&demo(), &[], None).expect("legal");
     let sequence = load_sequence(&scenario).expect("loaded").sequence;
@@ -38,17 +38,17 @@ fn the_picture_on_show_is_what_render_writes() {
     };
     session.render::<Infallible>([17], &mut write).expect("rendered");
     let written = image::open(&path).expect("a picture").to_rgba8();
-    assert_eq!(of_view.size, [written.width() as usize, written.height() as usize]);
-    for (place, (shown, written)) in of_view.pixels.iter().zip(written.pixels()).enumerate() {
-        assert_eq!(shown.to_array(), written.0, "pixel {place}");
+    assert_eq!(shown_image.size, [written.width() as usize, written.height() as usize]);
+    for (index, (shown, written)) in shown_image.pixels.iter().zip(written.pixels()).enumerate() {
+        assert_eq!(shown.to_array(), written.0, "pixel {index}");
     }
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn at_one_to_one_the_screen_has_the_pictures_own_codes() {
-    for (by_own_pipeline, pixels_per_point) in [(true, 1.0), (false, 1.0), (true, 2.0), (false, 2.0)] {
-        let mut window = Window::drawn(Some(pattern()), None, [1600.0, 1000.0], by_own_pipeline);
+fn at_1_to_1_the_screen_has_the_codes_of_the_picture() {
+    for (own_pipeline, pixels_per_point) in [(true, 1.0), (false, 1.0), (true, 2.0), (false, 2.0)] {
+        let mut window = Window::with_pipeline(Some(pattern()), None, [1600.0, 1000.0], own_pipeline);
         window.harness.set_pixels_per_point(pixels_per_point);
         codes_on_the_screen(&mut window, pixels_per_point);
     }
@@ -58,9 +58,9 @@ fn codes_on_the_screen(window: &mut Window, pixels_per_point: f32) {
     window.settle();
     window.click("1:1");
     assert!(has(window, "100 %"));
-    // The middle of the picture on the middle of the pane may lie between two pixels of the screen.
+    // The middle of the picture may lie between two screen pixels.
     let rect = window.harness.get_by_label("picture").rect();
-    let image = window.state().heard.picture().expect("a picture").image.clone();
+    let image = window.state().engine.picture().expect("a picture").image.clone();
     let [width, height] = image.size;
     let screen = window.picture();
     let origin = rect.center() * pixels_per_point - egui::vec2(width as f32, height as f32) * 0.5;
@@ -69,10 +69,11 @@ fn codes_on_the_screen(window: &mut Window, pixels_per_point: f32) {
     for y in 0..40 {
         for x in 0..40 {
             let (px, py) = (width / 2 - 20 + x, height / 2 - 20 + y);
-            let at = [origin.x + px as f32 + 0.5, origin.y + py as f32 + 0.5].map(|v| v.floor() as u32);
+            let [screen_x, screen_y] =
+                [origin.x + px as f32 + 0.5, origin.y + py as f32 + 0.5].map(|v| v.floor() as u32);
             all += 1;
             same += u32::from(
-                screen.get_pixel(at[0], at[1]).0[..3] == image.pixels[py * width + px].to_array()[..3],
+                screen.get_pixel(screen_x, screen_y).0[..3] == image.pixels[py * width + px].to_array()[..3],
             );
         }
     }
@@ -81,11 +82,11 @@ fn codes_on_the_screen(window: &mut Window, pixels_per_point: f32) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn both_ways_of_drawing_agree_at_any_zoom() {
-    let [own, of_egui] = [true, false].map(|by_own_pipeline| {
-        let mut window = Window::drawn(Some(pattern()), None, [1000.0, 700.0], by_own_pipeline);
+fn own_pipeline_and_egui_agree_at_any_zoom() {
+    let [own, egui_screens] = [true, false].map(|own_pipeline| {
+        let mut window = Window::with_pipeline(Some(pattern()), None, [1000.0, 700.0], own_pipeline);
         window.settle();
-        // Invalid pixels show what is behind them.
+        // Invalid pixels show the red background.
         window.state_mut().view.overlays.invalid = true;
         let mut screens = Vec::new();
         for (compare, zoom) in
@@ -102,35 +103,35 @@ fn both_ways_of_drawing_agree_at_any_zoom() {
         }
         screens
     });
-    for (step, (own, of_egui)) in own.iter().zip(&of_egui).enumerate() {
-        // Where a texel ends between two pixels of the screen either may show it; smooth ones are rounded
-        // otherwise.
-        let far = |(a, b): &(&image::Rgba<u8>, &image::Rgba<u8>)| (0..3).any(|k| a.0[k].abs_diff(b.0[k]) > 2);
-        let differing = own.pixels().zip(of_egui.pixels()).filter(far).count();
+    for (step, (own, egui_screens)) in own.iter().zip(&egui_screens).enumerate() {
+        // Borders of texels within a screen pixel and filtered values are rounded differently.
+        let differs =
+            |(a, b): &(&image::Rgba<u8>, &image::Rgba<u8>)| (0..3).any(|k| a.0[k].abs_diff(b.0[k]) > 2);
+        let differing = own.pixels().zip(egui_screens.pixels()).filter(differs).count();
         assert!(differing * 500 < own.pixels().len(), "{differing} of {} in step {step}", own.pixels().len());
     }
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn stages_can_be_wiped_and_subtracted() {
+fn stages_are_compared_by_wipe_difference_and_side_by_side() {
     let mut window = Window::open(Some(demo()));
     window.settle();
     window.click("wipe");
     window.click("B: + lens");
     window.settle();
     assert_eq!(window.state().view.stages(), [Stage::Photometric, Stage::Lens]);
-    let pair = &window.state().heard.shown.as_ref().expect("shown").reply.pictures;
+    let pair = &window.state().engine.shown.as_ref().expect("shown").reply.pictures;
     assert_eq!(pair.len(), 2);
     assert_ne!(pair[0].frame.color_rgba, pair[1].frame.color_rgba);
-    // Noise and vignette are in A alone.
+    // Only A has noise and vignette.
     assert!(pair[1].plan.skipped.iter().any(|skip| skip.what == "noise"));
     assert!(!pair[0].plan.skipped.iter().any(|skip| skip.what == "noise"));
     window.click("A: ideal");
     window.click("difference");
     window.settle();
-    let (difference, _) = window.state().heard.difference(false).expect("a difference");
-    assert!(difference.rms_dn > 1.0, "a lens moves the picture: {}", difference.rms_dn);
+    let (difference, _) = window.state().engine.difference(false).expect("a difference");
+    assert!(difference.rms_dn > 1.0, "the lens changes the picture: {}", difference.rms_dn);
     window.click("side by side");
     window.settle();
     let picture = window.picture();
@@ -142,9 +143,9 @@ fn stages_can_be_wiped_and_subtracted() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
+fn overlays_are_drawn_and_depth_replaces_colour() {
     let mut window = Window::open(Some(pattern()));
-    window.settle_exact();
+    window.settle_oracle();
     let plain = window.picture();
     let overlays =
         Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
@@ -155,7 +156,7 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
         ("error", Overlays { error: true, ..Overlays::default() }),
     ] {
         window.state_mut().view.overlays = only;
-        // Some are asked for.
+        // Some overlays need another request.
         window.settle();
         window.wait("errors", |state| !only.error || has_errors(state));
         assert_ne!(window.picture(), plain, "{name} shows");
@@ -165,7 +166,7 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
     window.wait("errors", has_errors);
     let part = window.harness.get_by_label("picture").rect();
     window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));
-    // On the right of a wipe, too: of two stages the one that takes time is there.
+    // Right of the wipe line, too, where the stage with row times is.
     let half = View { compare: Compare::Wipe, a: Stage::Ideal, b: Stage::Time, ..View::default() };
     let [without, with] = [false, true].map(|rows| {
         window.state_mut().view = View { overlays: Overlays { rows, ..Overlays::default() }, ..half.clone() };
@@ -187,27 +188,27 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
     window.state_mut().view =
         View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
     window.settle();
-    let truth = window
+    let depth = window
         .state()
-        .heard
+        .engine
         .shown
         .as_ref()
-        .and_then(|shown| shown.reply.truths.first().cloned())
+        .and_then(|shown| shown.reply.depths.first().cloned())
         .expect("depth");
-    assert_eq!(truth.depth_m.len(), 640 * 480);
-    assert!(truth.depth_m.iter().any(|depth| *depth > 100.0));
+    assert_eq!(depth.depth_m.len(), 640 * 480);
+    assert!(depth.depth_m.iter().any(|depth| *depth > 100.0));
 }
 
-/// Whether what is predicted of the pictures on show has come.
+/// Whether predicted errors of the shown pictures have arrived.
 fn has_errors(state: &State) -> bool {
-    state.heard.shown.as_ref().is_some_and(|shown| {
+    state.engine.shown.as_ref().is_some_and(|shown| {
         !shown.reply.errors.is_empty() && shown.errors.len() == shown.reply.pictures.len()
     })
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_oracle_draws_strip_by_strip_and_agrees() {
+fn the_oracle_picture_agrees_with_the_rendered_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::open(Some(small(folder.path())));
     window.settle();
@@ -216,12 +217,12 @@ fn the_oracle_draws_strip_by_strip_and_agrees() {
     window.settle();
     window.wait("all rows", |state| {
         state
-            .heard
-            .current_exact()
-            .is_some_and(|exact| exact.picture.rows == 24 && exact.picture.difference.is_some())
+            .engine
+            .current_oracle_picture()
+            .is_some_and(|oracle| oracle.picture.rows == 24 && oracle.picture.difference.is_some())
     });
-    let (difference, _) = window.state().heard.difference(true).expect("a difference");
-    let predicted_dn = window.state().heard.picture().expect("a picture").plan.predicted.picture_dn();
+    let (difference, _) = window.state().engine.difference(true).expect("a difference");
+    let predicted_dn = window.state().engine.picture().expect("a picture").plan.predicted.picture_dn();
     // The oracle's pixels have a standard error of a quarter of max_error_dn, which is 1.
     assert!(
         difference.rms_dn < predicted_dn.max(1.0) + 0.5,
@@ -231,7 +232,7 @@ fn the_oracle_draws_strip_by_strip_and_agrees() {
     assert_eq!(window.state().view.compare, Compare::Difference);
 }
 
-/// The pattern by a camera of 32 x 24 pixels.
+/// [`pattern`] with a camera of 32 x 24 pixels.
 fn small(folder: &std::path::Path) -> std::path::PathBuf {
     let sets = [
         ("camera.size_px", "[32, 24]"),
@@ -247,19 +248,19 @@ fn small(folder: &std::path::Path) -> std::path::PathBuf {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_camera_without_a_picture_leaves_the_last_one_as_it_was() {
+fn a_camera_that_cannot_be_rendered_leaves_the_last_picture() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
     let shown_px = window.state().document.as_ref().expect("open").scenario.camera.size_px;
     let middle = window.harness.get_by_label("picture").rect().center();
-    // Sees all around, which no flat ideal frame can.
+    // A field of view that no perspective ideal frame covers.
     let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![0.0] };
     let camera = CameraSpec { size_px: [512, 512], focal_px: [150.0, 150.0], lens, ..CameraSpec::default() };
     send(&mut window, Message::Camera(Box::new(camera)));
     window.wait("the fault", |state| {
-        state.heard.fault.as_ref().is_some_and(|fault| fault.contains("too wide"))
+        state.engine.fault.as_ref().is_some_and(|fault| fault.contains("too wide"))
     });
-    // The fault's text has moved the pane.
+    // The text of the fault has moved the pane.
     let pane = window.harness.get_by_label("picture").rect();
     assert!(pane.contains(middle));
     window.harness.event(egui::Event::PointerMoved(pane.center()));
@@ -267,6 +268,6 @@ fn a_camera_without_a_picture_leaves_the_last_one_as_it_was() {
     let [x, y] = window.state().hovered.expect("on the picture");
     assert!(x.abs_diff(shown_px[0] / 2) <= 1 && y.abs_diff(shown_px[1] / 2) <= 1, "{x} {y} of {shown_px:?}");
     send(&mut window, Message::Undo);
-    window.wait("a picture without fault", |state| state.heard.fault.is_none());
+    window.wait("a picture without fault", |state| state.engine.fault.is_none());
     window.settle();
 }

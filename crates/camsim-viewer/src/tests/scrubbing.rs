@@ -1,54 +1,55 @@
-//! The timeline.
+//! Play, scrubbing and keys of the timeline.
 
 use eframe::egui::{self, Key, PointerButton};
 use egui_kittest::kittest::Queryable;
 
-use super::harness::{Window, demo, pattern, send, shown};
+use super::harness::{Window, demo, pattern, send, shown_request};
 use crate::{engine::Size, message::Message, state::State, view::Compare};
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_drag_shows_previews_and_a_resting_hand_the_full_frame() {
+fn a_drag_shows_previews_and_its_end_the_full_frame() {
     let mut window = Window::open(Some(demo()));
-    // Which must not hold up a preview.
+    // Predicted errors must not delay previews.
     window.state_mut().view.overlays.error = true;
     window.settle();
     let bar = window.harness.get_by_label("timeline").rect();
-    let at = |share: f32| egui::pos2(bar.left() + 6.0 + share * (bar.width() - 12.0), bar.center().y);
-    window.harness.event(egui::Event::PointerMoved(at(0.25)));
+    let bar_position =
+        |share: f32| egui::pos2(bar.left() + 6.0 + share * (bar.width() - 12.0), bar.center().y);
+    window.harness.event(egui::Event::PointerMoved(bar_position(0.25)));
     let button = |pressed, pos| egui::Event::PointerButton {
         pos,
         button: PointerButton::Primary,
         pressed,
         modifiers: egui::Modifiers::NONE,
     };
-    window.harness.event(button(true, at(0.25)));
+    window.harness.event(button(true, bar_position(0.25)));
     window.step();
-    window.harness.event(egui::Event::PointerMoved(at(0.5)));
+    window.harness.event(egui::Event::PointerMoved(bar_position(0.5)));
     window.step();
-    let there = (0.5_f64 * 119.0).round() as u64;
+    let target = (0.5_f64 * 119.0).round() as u64;
     assert!(window.state().timeline.dragged);
-    assert_eq!(window.state().timeline.frame, there);
+    assert_eq!(window.state().timeline.frame, target);
     window.wait("the preview", |state| {
-        shown(state).is_some_and(|wanted| (wanted.frame, wanted.size) == (there, Size::Preview))
+        shown_request(state).is_some_and(|request| (request.frame, request.size) == (target, Size::Preview))
     });
-    assert_eq!(window.state().heard.picture().expect("a picture").frame.size_px, [320, 240]);
-    let wanted = window.state().wanted().expect("open");
+    assert_eq!(window.state().engine.picture().expect("a picture").frame.size_px, [320, 240]);
+    let request = window.state().frame_request().expect("open");
     assert!(
-        wanted.size == Size::Preview
-            && !wanted.errors
-            && window.state().heard.shown.as_ref().expect("shown").errors.is_empty()
+        request.size == Size::Preview
+            && !request.errors
+            && window.state().engine.shown.as_ref().expect("shown").errors.is_empty()
     );
-    window.harness.event(button(false, at(0.5)));
+    window.harness.event(button(false, bar_position(0.5)));
     window.step();
     assert!(!window.state().timeline.dragged);
     window.settle();
-    let picture = window.state().heard.picture().expect("a picture");
-    assert_eq!((picture.frame.size_px, picture.frame.index), ([640, 480], there));
-    let shown = |state: &State| {
-        state.heard.shown.as_ref().map(|shown| (shown.reply.wanted.errors, shown.errors.len()))
+    let picture = window.state().engine.picture().expect("a picture");
+    assert_eq!((picture.frame.size_px, picture.frame.index), ([640, 480], target));
+    let errors_shown = |state: &State| {
+        state.engine.shown.as_ref().map(|shown| (shown.reply.request.errors, shown.errors.len()))
     };
-    window.wait("its errors", |state| shown(state) == Some((true, 1)));
+    window.wait("its errors", |state| errors_shown(state) == Some((true, 1)));
 }
 
 #[test]
@@ -73,12 +74,13 @@ fn buttons_and_keys_step_play_and_loop() {
     assert_eq!(window.state().timeline.range, Some([12, 119]));
     window.click("loop 12-119 off");
     window.click("first frame");
-    // So slowly that frames come before the end on the slowest machine.
+    // Slow enough that frames are rendered before the end on any machine.
     window.state_mut().timeline.speed = 0.1;
     window.click("play");
-    window.wait("time goes on", |state| state.timeline.frame > 3);
-    window
-        .wait("frames of it", |state| state.heard.shown.as_ref().is_some_and(|shown| shown.reply.frame > 0));
+    window.wait("play advances", |state| state.timeline.frame > 3);
+    window.wait("frames during play", |state| {
+        state.engine.shown.as_ref().is_some_and(|shown| shown.reply.frame > 0)
+    });
     window.click("stop");
     assert!(!window.state().timeline.playing);
     window.settle();
@@ -86,7 +88,8 @@ fn buttons_and_keys_step_play_and_loop() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn every_key_press_counts_also_within_one_pass() {
+fn every_key_press_counts_within_one_pass() {
+    // Long because: each step goes on from the state that the one before left.
     let mut window = Window::open(Some(pattern()));
     window.settle();
     let press = |window: &mut Window, key: Key, modifiers: egui::Modifiers, repeat: bool| {
@@ -105,7 +108,7 @@ fn every_key_press_counts_also_within_one_pass() {
     (0..8).for_each(|_| press(&mut window, Key::ArrowRight, none, false));
     window.step();
     assert_eq!(window.state().timeline.frame, 8);
-    // In the order in which they came: to the beginning first, then on.
+    // In order: to the first frame, then forward.
     for (key, modifiers) in
         [(Key::Home, none), (Key::ArrowRight, shift), (Key::ArrowRight, shift), (Key::ArrowLeft, none)]
     {
@@ -113,8 +116,7 @@ fn every_key_press_counts_also_within_one_pass() {
     }
     window.step();
     assert_eq!(window.state().timeline.frame, 19);
-    // Two switches in one pass are both thrown; one that is thrown twice is as it was; a held one does not
-    // flicker.
+    // Two toggles in one pass both apply, one toggled twice is unchanged, and a held one does not repeat.
     let before = window.state().view.clone();
     for key in [Key::G, Key::I, Key::M, Key::M, Key::W] {
         press(&mut window, key, none, false);
@@ -148,10 +150,10 @@ fn every_key_press_counts_also_within_one_pass() {
         repeat: false,
         modifiers: none,
     });
-    // Steps of the scenario.
+    // Undo and redo.
     let exposure_ms =
         |window: &Window| window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms;
-    let at_first_ms = exposure_ms(&window);
+    let initial_ms = exposure_ms(&window);
     for value in [3.0, 4.0, 5.0, 6.0] {
         send(
             &mut window,
@@ -164,12 +166,12 @@ fn every_key_press_counts_also_within_one_pass() {
     (0..2).for_each(|_| press(&mut window, Key::Y, command, false));
     (0..3).for_each(|_| press(&mut window, Key::Z, command, false));
     window.step();
-    assert_eq!(exposure_ms(&window), at_first_ms);
-    // What follows a question that a key opens is typed into it.
+    assert_eq!(exposure_ms(&window), initial_ms);
+    // Keys after one that opens a prompt go to the prompt.
     for (key, modifiers) in [(Key::S, command), (Key::ArrowRight, none)] {
         press(&mut window, key, modifiers, false);
     }
     window.step();
-    assert!(window.state().question.is_some());
+    assert!(window.state().path_prompt.is_some());
     assert_eq!(window.state().timeline.frame, 23);
 }

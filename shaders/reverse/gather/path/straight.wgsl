@@ -1,5 +1,5 @@
 // A straight line from node to node. Twin: camsim_core::temporal::path::Curve.
-const STEPS: u32 = 1u;
+const SEGMENT_STEPS: u32 = 1u;
 
 struct Curve {
     begin_px: vec2<f32>,
@@ -9,14 +9,14 @@ struct Curve {
     end: Source,
 }
 
-// From a node on, so many steps after the first.
+// From a node, `step` steps after the first.
 fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, step: u32) -> Curve {
-    let end = node_at(pixel, ray, step + 1u);
-    let d1 = end.at_px - begin.at_px;
-    return Curve(begin.at_px, d1, length(d1), begin.inside && end.inside, end);
+    let end = node_at_step(pixel, ray, step + 1u);
+    let d1 = end.position_px - begin.position_px;
+    return Curve(begin.position_px, d1, length(d1), begin.inside && end.inside, end);
 }
 
-// Place after so many steps.
-fn along(curve: Curve, steps: f32) -> vec2<f32> {
+// Position after a number of steps.
+fn position_on_curve(curve: Curve, steps: f32) -> vec2<f32> {
     return curve.begin_px + steps * curve.d1;
 }

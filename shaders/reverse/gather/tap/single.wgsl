@@ -1,8 +1,8 @@
 // Each sample is one read.
-fn reads_of(area: Footprint, samples: u32) -> u32 {
+fn read_count(pixel_footprint: Footprint, samples: u32) -> u32 {
     return samples;
 }
 
-fn sample_of(area: Footprint, read: u32) -> u32 {
+fn sample_index(pixel_footprint: Footprint, read: u32) -> u32 {
     return read;
 }

@@ -10,15 +10,15 @@ use camsim_core::{
     shutter::Shutter,
 };
 use camsim_io::{
-    frame_file::{FrameSet, list::Entry},
+    frame_file::{FrameSet, list::FrameEntry},
     inputs,
-    manifest::{PATHS, check_resume_of, portable_inputs},
+    manifest::{PATHS, check_resume_key, portable_inputs},
     portable::{relative_to, write_camera},
     write::{FrameFiles, FrameWriter, write_atomic},
 };
 use serde::Serialize;
 
-use super::{Args, in_file, read, settings, warn_no_source};
+use super::{ApplyArgs, in_file, read, settings, warn_no_source};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -34,16 +34,17 @@ const GAP_S: f64 = 1.0;
 
 /// `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+pub enum ImageFormatArg {
     /// OpenEXR, linear
     Exr,
     /// PNG in the encoding of photometric.output
     Png,
 }
 
-/// Inputs of the frames of a folder, which must be equal for `--resume`. Paths are relative to the folder.
+/// ApplyInputs of the frames of a folder, which must be equal for `--resume`. Paths are relative to the
+/// folder.
 #[derive(Debug, Serialize)]
-struct Inputs {
+struct ApplyInputs {
     camera: CameraSpec,
     /// Text of FRAME.toml.
     frame_toml: String,
@@ -60,10 +61,10 @@ struct Inputs {
 
 /// `run.json`.
 #[derive(Debug, Serialize)]
-struct Manifest<'a> {
+struct ApplyManifest<'a> {
     version: &'static str,
     paths: &'static str,
-    apply: &'a Inputs,
+    apply: &'a ApplyInputs,
     /// First frame, and one past the last.
     frames: [u64; 2],
     written: u64,
@@ -73,14 +74,14 @@ struct Manifest<'a> {
 
 /// Renders the selected frames; nothing is written before the motion of all of them is checked.
 pub(super) fn run(
-    args: &Args,
+    args: &ApplyArgs,
     spec: &CameraSpec,
     set: &FrameSet,
     vignette: Option<&GrayImage>,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
     let folder = &args.output;
-    if super::ends_as_picture(args) {
+    if super::is_picture_path(args) {
         let (frame, count) = (args.frame.display(), set.entries().len());
         return Err(Failure::bad_input(anyhow!(
             "-o {}: {frame} names {count} frames, so it must be a folder",
@@ -89,19 +90,19 @@ pub(super) fn run(
     }
     let frames = chosen(args, set)?;
     check_motion(args, spec, set, &frames)?;
-    tell_gaps(args, spec, set, &frames, console)?;
+    warn_of_gaps(args, spec, set, &frames, console)?;
     let inputs = inputs(args, spec, set)?;
     let files = FrameFiles::new(folder, &output_spec(args, set), spec.photometric.output);
     let number = |index: u64| args.frame_number.saturating_add(index);
     let numbers: Vec<u64> = frames.iter().map(|&index| number(index)).collect();
-    let made = check_resume_of(folder, "apply", "from other inputs", &inputs);
+    let made = check_resume_key(folder, "apply", "from other inputs", &inputs);
     let is_ours = matches!(made, Ok(true));
     match made {
         Ok(true) => {}
         Ok(false) => refuse_unknown(folder, &numbers, &files, args.resume)?,
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
         Err(error) => {
-            refuse_others(&numbers, &files, &error.what())?;
+            refuse_others(&numbers, &files, &error.reason())?;
             console
                 .warn(format_args!("{} belongs to other inputs: its frames are replaced", folder.display()));
         }
@@ -112,7 +113,7 @@ pub(super) fn run(
     }
     let todo: Vec<u64> =
         frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
-    let mut manifest = Manifest {
+    let mut manifest = ApplyManifest {
         version: env!("CARGO_PKG_VERSION"),
         paths: PATHS,
         apply: &inputs,
@@ -122,7 +123,7 @@ pub(super) fn run(
         finished: false,
     };
     write_manifest(args, &manifest)?;
-    files.sweep(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
+    files.remove_temporaries(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
     write_camera(folder, spec).or_failed()?;
     write_table(args, set, &files)?;
 
@@ -130,17 +131,17 @@ pub(super) fn run(
     let watch = interrupt::watch();
     let rendered = render(args, spec, set, vignette, &todo, files.clone(), &watch, console);
     // Rows list the existing frames, from any run.
-    let told = write_table(args, set, &files);
+    let table_written = write_table(args, set, &files);
     manifest.written = todo.iter().filter(|&&index| files.exist(number(index))).count() as u64;
     manifest.finished = rendered.is_ok() && !(watch.is_asked() && manifest.written < todo.len() as u64);
     write_manifest(args, &manifest)?;
     let no_source = rendered?;
-    told?;
+    table_written?;
     if !manifest.finished {
         let done = manifest.written + manifest.skipped;
-        let go_on = console.command_with("--resume");
+        let resume_command = console.command_with("--resume");
         return Err(Failure::interrupted(anyhow!(
-            "{done} of {} frames are in {}; to resume: {go_on}",
+            "{done} of {} frames are in {}; to resume: {resume_command}",
             frames.len(),
             folder.display()
         )));
@@ -159,7 +160,7 @@ pub(super) fn run(
     Ok(())
 }
 
-fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
+fn chosen(args: &ApplyArgs, set: &FrameSet) -> Result<Vec<u64>, Failure> {
     let count = set.entries().len() as u64;
     let Some(list) = &args.frames else { return Ok((0..count).collect()) };
     list.resolve(count).map_err(|error| match error {
@@ -173,7 +174,7 @@ fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
 }
 
 /// First and last instant of a frame relative to its stamp.
-fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], Failure> {
+fn window_s(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], Failure> {
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
         .map_err(|error| in_file(args, &error.into()))
         .or_bad_input()?;
@@ -182,8 +183,8 @@ fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], 
 }
 
 /// Warns of frames within gaps of the trajectory.
-pub(super) fn tell_gaps(
-    args: &Args,
+pub(super) fn warn_of_gaps(
+    args: &ApplyArgs,
     spec: &CameraSpec,
     set: &FrameSet,
     frames: &[u64],
@@ -198,7 +199,8 @@ pub(super) fn tell_gaps(
     if let Some((frame, _)) = steps.first() {
         let longest_s = steps.iter().fold(0.0_f64, |longest, (_, step_s)| longest.max(*step_s));
         console.warn(format_args!(
-            "{}: {} of {} frames, first frame {frame}, are in gaps of the trajectory of up to {longest_s:.1} s, which are interpolated by a straight line and a constant rotation",
+            "{}: {} of {} frames, first frame {frame}, are in gaps of the trajectory of up to {longest_s:.1} \
+             s, which are interpolated by a straight line and a constant rotation",
             args.frame.display(),
             steps.len(),
             frames.len()
@@ -208,7 +210,7 @@ pub(super) fn tell_gaps(
 }
 
 /// Checks that the window of every frame is within the trajectory.
-fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
+fn check_motion(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
     let [first_s, last_s] = window_s(args, spec, set)?;
     let mut covered = Vec::new();
     let mut missing = None;
@@ -231,22 +233,23 @@ fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) 
     )))
 }
 
-fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Failure> {
+fn inputs(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<ApplyInputs, Failure> {
     let folder = &args.output;
     // There are too many images to read their contents.
-    let text = |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::dated(path));
+    let text =
+        |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::size_and_mtime(path));
     let mut camera = spec.clone();
     for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
         *path = relative_to(path, folder);
     }
-    let files = inputs::of_files(
+    let files = inputs::file_fingerprints(
         set.motion_file()
             .into_iter()
             .chain(spec.photometric.vignette.as_deref())
             .map(Path::to_owned)
             .collect(),
     );
-    let picture = |entry: &Entry| {
+    let picture = |entry: &FrameEntry| {
         let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
         format!(
             "{}, {}, {stamp}",
@@ -254,7 +257,7 @@ fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Fail
             entry.depth.as_deref().map_or("no depth".to_owned(), text)
         )
     };
-    Ok(Inputs {
+    Ok(ApplyInputs {
         camera,
         frame_toml: std::fs::read_to_string(&args.frame).or_bad_input()?,
         preset: format!("{:?}", args.preset).to_lowercase(),
@@ -272,12 +275,12 @@ fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Fail
     })
 }
 
-fn output_spec(args: &Args, set: &FrameSet) -> OutputSpec {
+fn output_spec(args: &ApplyArgs, set: &FrameSet) -> OutputSpec {
     let mut format = Vec::new();
     for wanted in &args.format {
         let image = match wanted {
-            Format::Exr => ImageFormat::Exr,
-            Format::Png => ImageFormat::Png,
+            ImageFormatArg::Exr => ImageFormat::Exr,
+            ImageFormatArg::Png => ImageFormat::Png,
         };
         if !format.contains(&image) {
             format.push(image);
@@ -295,13 +298,13 @@ fn output_spec(args: &Args, set: &FrameSet) -> OutputSpec {
     }
 }
 
-fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
+fn write_manifest(args: &ApplyArgs, manifest: &ApplyManifest<'_>) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(manifest).or_failed()? + "\n";
     write_atomic(&args.output.join("run.json"), text.as_bytes()).or_failed()
 }
 
 /// Writes `frames.csv` for all existing frames.
-fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Failure> {
+fn write_table(args: &ApplyArgs, set: &FrameSet, files: &FrameFiles) -> Result<(), Failure> {
     let _lock = Lock::take(&args.output)?;
     let there: Vec<u64> = (0..set.entries().len() as u64)
         .filter(|&index| files.exist(args.frame_number.saturating_add(index)))
@@ -310,7 +313,12 @@ fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Fa
 }
 
 /// Columns `frame,stamp_ns,from_color,from_depth`, then the files of each frame; empty if there is none.
-fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -> Result<Vec<u8>, Failure> {
+fn frames_csv(
+    args: &ApplyArgs,
+    set: &FrameSet,
+    files: &FrameFiles,
+    frames: &[u64],
+) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let (columns, names) = (["frame", "stamp_ns", "from_color", "from_depth"], files.names(0));
     writer
@@ -333,7 +341,7 @@ fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -
 }
 
 fn render(
-    args: &Args,
+    args: &ApplyArgs,
     spec: &CameraSpec,
     set: &FrameSet,
     vignette: Option<&GrayImage>,
@@ -346,7 +354,7 @@ fn render(
     let writer = FrameWriter::new(files, 1);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let mut no_source = NoSourceCounts::default();
-    let mut told = Vec::new();
+    let mut printed_kinds = Vec::new();
     for &index in todo {
         if watch.is_asked() {
             break;
@@ -357,9 +365,9 @@ fn render(
             let (file, what) = note.split_once(": ").unwrap_or(("", note));
             let kind =
                 what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
-            if !told.contains(&kind) {
+            if !printed_kinds.contains(&kind) {
                 console.warn(format_args!("{file}: {what} (similar notes are not shown)"));
-                told.push(kind);
+                printed_kinds.push(kind);
             }
         }
         let settings = settings(args, &file, index);

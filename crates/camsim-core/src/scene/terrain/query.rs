@@ -21,6 +21,8 @@ pub struct TerrainHit {
     pub chunk: u32,
     /// Cell in the chunk, from the west and from the north.
     pub cell: [u32; 2],
+    /// Triangle of the cell: 0 = north-east, 1 = south-west.
+    pub half: u32,
 }
 
 impl Terrain {
@@ -131,7 +133,7 @@ impl Terrain {
         let chunk = &self.chunks[chunk_index as usize];
         let mut best = None;
         let mut limit = t_max;
-        for corners in cell_triangles(cell) {
+        for (half, corners) in (0..).zip(cell_triangles(cell)) {
             let point = |k: usize| self.position_ned_m(chunk_index, corners[k][0], corners[k][1]);
             let points = [point(0), point(1), point(2)];
             let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
@@ -141,7 +143,7 @@ impl Terrain {
             let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
             let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
             let normal_ned = if normal.z > 0.0 { -normal } else { normal };
-            best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell });
+            best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell, half });
         }
         best
     }

@@ -307,3 +307,43 @@ fn border_parts_match_a_test_of_all_sides() {
     }
     assert!(counts[0] > 150 && counts[1] > 300, "{counts:?}");
 }
+
+#[test]
+fn a_walk_to_the_next_pixel_ends_where_its_ray_hits_the_same_patch() {
+    let terrain = hills(140, 135, 10.0, 40.0);
+    let camera = forward(DVec3::new(-500.0, 30.0, -90.0), 0.3);
+    let ray =
+        |x: i32, y: i32| camera.ned_from_camera * DVec3::new(f64::from(x) / 160.0, f64::from(y) / 160.0, 1.0);
+    let first = |x, y| terrain.intersect(camera.position_ned_m, ray(x, y), f64::INFINITY);
+    let (mut same, mut given_up, mut astray, mut hidden, mut lost) = (0, 0, 0, 0, 0);
+    for (x, y) in (-80..80).flat_map(|y| (-100..100).map(move |x| (x, y))) {
+        for (to_x, to_y) in [(x + 1, y), (x, y + 1)] {
+            let (Some(here), Some(next)) = (first(x, y), first(to_x, to_y)) else { continue };
+            let to = ray(to_x, to_y);
+            match terrain.walk(here.triangle_of(&terrain), camera.position_ned_m, to) {
+                Some((triangle, t)) if (t - next.t).abs() <= 1e-9 * t => {
+                    same += 1;
+                    // Where a silhouette ends, a walk may pass round it to the other sheet or to a triangle
+                    // that faces away.
+                    match terrain.walk(triangle, camera.position_ned_m, ray(x, y)) {
+                        Some((_, t)) => astray += usize::from((t - here.t).abs() > 1e-9 * t),
+                        None => given_up += 1,
+                    }
+                }
+                // A root behind the first surface.
+                Some((_, t)) => {
+                    hidden += 1;
+                    assert!(t > next.t, "{t} {next:?}");
+                    let start = camera.position_ned_m + (1.0 - 1e-6) * t * to;
+                    let again = terrain.intersect(start, to, 2e-6 * t).unwrap();
+                    assert!((again.t - 1e-6 * t).abs() <= 1e-9 * t);
+                }
+                None => lost += 1,
+            }
+        }
+    }
+    // Most neighbours are on one patch; at ridges one hides the other.
+    assert!(same > 40_000 && given_up < same / 100, "{same} {given_up}");
+    assert!(astray < same / 10_000, "{astray} of {same}");
+    assert!(hidden > 20 && lost > 200, "{hidden} {lost}");
+}

@@ -1,10 +1,10 @@
-//! Separators, quotes, missing values, columns and whole files.
+//! Separators, quotes, missing values, columns, and files of other formats.
 
 use super::*;
 
 #[test]
-fn tables() {
-    let _all = AllFaults;
+fn separators_quotes_and_missing_values_are_read_or_refused() {
+    let _report = FaultReport;
     let lla = "t,lat,lon,alt,roll,pitch,yaw";
     let row = "T,LAT,LON,H,0,0,30";
     let usual = log(lla, row);
@@ -101,7 +101,7 @@ fn tables() {
         "{}",
         log_of_gaps.report
     );
-    // An attitude that is missing altogether is interpolated; half of one is a fault.
+    // A completely missing attitude is interpolated; a partial one counts as faulty.
     assert_eq!(
         read_with(usual.replace(",509,0,0,30", ",509,0,None,").as_bytes(), &auto())
             .unwrap()
@@ -119,104 +119,107 @@ fn tables() {
 }
 
 #[test]
-fn several_columns_and_axes() {
-    let _all = AllFaults;
-    let of = |header: &str, pattern: &str| log(header, pattern);
+fn ambiguous_columns_are_refused() {
+    let _report = FaultReport;
     assert_refused(
         "two latitudes",
-        of("t,lat,latitude,lon,alt", "T,LAT,LAT,LON,H").as_bytes(),
+        log("t,lat,latitude,lon,alt", "T,LAT,LAT,LON,H").as_bytes(),
         &track(),
         &["2 (`lat`) and 3 (`latitude`)"],
     );
     assert_refused(
         "two heights",
-        of("t,lat,lon,alt,elevation", "T,LAT,LON,0,H").as_bytes(),
+        log("t,lat,lon,alt,elevation", "T,LAT,LON,0,H").as_bytes(),
         &track(),
         &["`alt`", "`elevation`"],
     );
     assert_flies(
         "two datums",
-        &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,0,H"),
+        &log("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,0,H"),
         &track(),
         "`alt_hae` counts",
     );
     let msl = FlightSpec { height: HeightReference::Msl, ..track() };
     assert_flies(
         "two datums, the other one",
-        &of("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,H,0"),
+        &log("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,H,0"),
         &msl,
         "`alt_msl` counts",
     );
     assert_refused(
         "two of one datum",
-        of("t,lat,lon,alt_msl,amsl", "T,LAT,LON,H,0").as_bytes(),
+        log("t,lat,lon,alt_msl,amsl", "T,LAT,LON,H,0").as_bytes(),
         &msl,
         &["one quantity"],
     );
-    assert_flies("by air pressure too", &of("t,lat,lon,baro_alt,alt", "T,LAT,LON,0,H"), &track(), "");
-    assert_flies("by air pressure only", &of("t,lat,lon,baro_alt", "T,LAT,LON,H"), &track(), "air pressure");
+    assert_flies("by air pressure too", &log("t,lat,lon,baro_alt,alt", "T,LAT,LON,0,H"), &track(), "");
+    assert_flies("by air pressure only", &log("t,lat,lon,baro_alt", "T,LAT,LON,H"), &track(), "air pressure");
     assert_refused(
         "two rolls",
-        of("t,lat,lon,alt,roll,roll,pitch,yaw", "T,LAT,LON,H,1,2,3,30").as_bytes(),
+        log("t,lat,lon,alt,roll,roll,pitch,yaw", "T,LAT,LON,H,1,2,3,30").as_bytes(),
         &auto(),
         &["`roll`"],
     );
     assert_flies(
         "angles and a quaternion",
-        &of("t,lat,lon,alt,roll,pitch,yaw,qw,qx,qy,qz", "T,LAT,LON,H,9,9,30,1,0,0,0"),
+        &log("t,lat,lon,alt,roll,pitch,yaw,qw,qx,qy,qz", "T,LAT,LON,H,9,9,30,1,0,0,0"),
         &auto(),
         "quaternion counts",
     );
     assert_flies(
         "a gimbal",
-        &of("t,lat,lon,alt,roll,pitch,yaw,gimbal_pitch", "T,LAT,LON,H,9,9,30,-90"),
+        &log("t,lat,lon,alt,roll,pitch,yaw,gimbal_pitch", "T,LAT,LON,H,9,9,30,-90"),
         &auto(),
         "camera.mount",
     );
     assert_flies(
         "magnetic",
-        &of("t,lat,lon,alt,roll,pitch,heading [deg magnetic]", "T,LAT,LON,H,9,9,30"),
+        &log("t,lat,lon,alt,roll,pitch,heading [deg magnetic]", "T,LAT,LON,H,9,9,30"),
         &auto(),
         "declination",
     );
     assert_refused(
         "half of an attitude",
-        of("t,lat,lon,alt,heading", "T,LAT,LON,H,30").as_bytes(),
+        log("t,lat,lon,alt,heading", "T,LAT,LON,H,30").as_bytes(),
         &auto(),
         &["flight.attitude"],
     );
     assert_refused(
         "course for heading",
-        of("t,lat,lon,alt,roll,pitch,course", "T,LAT,LON,H,1,2,30").as_bytes(),
+        log("t,lat,lon,alt,roll,pitch,course", "T,LAT,LON,H,1,2,30").as_bytes(),
         &auto(),
         &["flight.attitude"],
     );
-    // Axes.
+}
+
+#[test]
+fn unknown_axes_are_refused_unless_the_format_states_them() {
+    let _report = FaultReport;
     for (header, format) in
         [("t,tx,ty,tz,roll,pitch,yaw", LogFormat::Auto), ("t,x,y,z,roll,pitch,yaw", LogFormat::Tum)]
     {
         assert_refused(
             header,
-            of(header, "T,0,N,H,9,9,30").as_bytes(),
+            log(header, "T,0,N,H,9,9,30").as_bytes(),
             &spec(format),
             &["quaternion", "csv-xya"],
         );
     }
     assert_flies(
         "angles by the key",
-        &of("t,x,y,z,roll,pitch,yaw", "T,N,0,H,9,9,30"),
+        &log("t,x,y,z,roll,pitch,yaw", "T,N,0,H,9,9,30"),
         &spec(LogFormat::CsvXya),
         "",
     );
     assert_flies(
         "a quaternion in a world of heights",
-        &of("t,north,east,alt,qw,qx,qy,qz", "T,N,0,H,1,0,0,0"),
+        &log("t,north,east,alt,qw,qx,qy,qz", "T,N,0,H,1,0,0,0"),
         &auto(),
         "PX4",
     );
     let own = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
     let row = "T,N,0,-H,0,0,0,0,0,0,1,0,0,0,0,0,0,0,0,0";
-    assert_flies("what `camsim track` writes", &of(own, row), &auto(), "");
+    assert_flies("what `camsim track` writes", &log(own, row), &auto(), "");
     for header in [
         "t,x,y,z,qx,qy,qz,qw",
         "t,x,y,z,qw,qx,qy,qz",
@@ -225,72 +228,77 @@ fn several_columns_and_axes() {
     ] {
         assert_refused(
             header,
-            of(header, "T,N,0,H,0,0,0,1").as_bytes(),
+            log(header, "T,N,0,H,0,0,0,1").as_bytes(),
             &auto(),
             &["flight.format", "csv-ned", "tum"],
         );
     }
     assert_refused(
         "UTM under other names",
-        of("t,x,y,alt", "T,N,0,H").as_bytes(),
+        log("t,x,y,alt", "T,N,0,H").as_bytes(),
         &track(),
         &["csv-xya", "north, east"],
     );
     assert_flies(
         "north is x by the key",
-        &of("t,x,y,alt", "T,N,0,H"),
+        &log("t,x,y,alt", "T,N,0,H"),
         &FlightSpec { format: LogFormat::CsvXya, ..track() },
         "",
     );
     assert_flies(
         "ROS by the key",
-        &of(
-            "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
+        &log(
+            "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,\
+             field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
             "T,0,N,H,0,0,0,1",
         ),
         &spec(LogFormat::Tum),
         "",
     );
-    assert_flies("both kinds of positions", &of("t,lat,lon,alt,x,y,z", "T,LAT,LON,H,0,0,0"), &track(), "");
+    assert_flies("both kinds of positions", &log("t,lat,lon,alt,x,y,z", "T,LAT,LON,H,0,0,0"), &track(), "");
     assert_flies(
         "both kinds, by the key",
-        &of("t,lat,lon,north,east,down,alt", "T,0,0,N,0,H,H").replace("500,500", "-500,500"),
+        &log("t,lat,lon,north,east,down,alt", "T,0,0,N,0,H,H").replace("500,500", "-500,500"),
         &FlightSpec { format: LogFormat::CsvXya, ..track() },
         "",
     );
     let ned = FlightSpec { format: LogFormat::CsvNed, ..track() };
     assert_refused(
         "up and down",
-        of("t,north,east,alt", "T,N,0,H").as_bytes(),
+        log("t,north,east,alt", "T,N,0,H").as_bytes(),
         &ned,
         &["csv-ned", "named otherwise"],
     );
-    // Prose before the names.
+}
+
+#[test]
+fn prose_before_the_names_of_a_header_is_skipped() {
+    let _report = FaultReport;
     for header in [
         "# columns: t tx ty tz qx qy qz qw",
         "# The columns are t tx ty tz qx qy qz qw",
         "# ground truth\n% timestamp(s) tx ty tz qx qy qz qw\n# of today",
         "# fields = t x y z qx qy qz qw",
     ] {
-        assert_flies(header, &of(header, "T 0 N H 0 0 0 1"), &auto(), "");
+        assert_flies(header, &log(header, "T 0 N H 0 0 0 1"), &auto(), "");
     }
     assert_refused(
         "too many names",
-        of("# t tx ty tz qx qy qz qw cov", "T 0 N H 0 0 0 1").as_bytes(),
+        log("# t tx ty tz qx qy qz qw cov", "T 0 N H 0 0 0 1").as_bytes(),
         &auto(),
         &["9 columns, but the rows have 8"],
     );
     assert_refused(
         "a name is lost",
-        of("# t tx ty tz qx qy qz", "T 0 N H 0 0 0 1").as_bytes(),
+        log("# t tx ty tz qx qy qz", "T 0 N H 0 0 0 1").as_bytes(),
         &auto(),
         &["7 columns, but the rows have 8"],
     );
 }
 
 #[test]
-fn other_files() {
-    let _all = AllFaults;
+fn other_formats_are_refused() {
+    let _report = FaultReport;
     for (content, words) in [
         (&b"ULog\x01\x12\x35\x01\0\0"[..], &["PX4", "ulog2csv"][..]),
         (b"\xa3\x95\x80\x80", &["ArduPilot", "mavlogdump"]),
@@ -308,13 +316,26 @@ fn other_files() {
         (b"<svg/>", &["XML other than GPX"]),
         (b"<gpx><trk>", &["not valid XML"]),
         (b"<gpx><wpt lat=\"1\" lon=\"2\"/></gpx>", &["no track points"]),
-        (b"<gpx><trk><trkseg><trkpt lat=\"1\" lon=\"2\"><ele>3</ele></trkpt></trkseg></trk></gpx>", &["`time`"]),
-        (b"<gpx><trk><trkseg><trkpt lat=\"1\" lon=\"2\"><time>2023-05-01T10:00:00Z</time></trkpt></trkseg></trk></gpx>", &["`ele`"]),
         (
-            b"<gpx><trk><trkseg><trkpt lat=\"91\" lon=\"2\"><ele>3</ele><time>2023-05-01T10:00:00Z</time></trkpt></trkseg></trk></gpx>",
+            b"<gpx><trk><trkseg><trkpt lat=\"1\" \
+            lon=\"2\"><ele>3</ele></trkpt></trkseg></trk></gpx>",
+            &["`time`"],
+        ),
+        (
+            b"<gpx><trk><trkseg><trkpt lat=\"1\" \
+            lon=\"2\"><time>2023-05-01T10:00:00Z</time></trkpt></trkseg></trk></gpx>",
+            &["`ele`"],
+        ),
+        (
+            b"<gpx><trk><trkseg><trkpt lat=\"91\" \
+                lon=\"2\"><ele>3</ele><time>2023-05-01T10:00:00Z</time></trkpt></trkseg></trk></gpx>",
             &["91"],
         ),
-        (b"<gpx><trk><trkseg><trkpt lat=\"1\" lon=\"2\"><ele>3</ele><time>yesterday</time></trkpt></trkseg></trk></gpx>", &["yesterday"]),
+        (
+            b"<gpx><trk><trkseg><trkpt lat=\"1\" \
+            lon=\"2\"><ele>3</ele><time>yesterday</time></trkpt></trkseg></trk></gpx>",
+            &["yesterday"],
+        ),
     ] {
         assert_refused(&String::from_utf8_lossy(content), content, &track(), words);
     }
@@ -324,13 +345,27 @@ fn other_files() {
         &FlightSpec { format: LogFormat::Gpx, ..track() },
         &["no XML"],
     );
+}
+
+#[test]
+fn gpx_tracks_are_read() {
+    let _report = FaultReport;
     let gpx = |points: &str| {
         format!(
-            "<?xml version=\"1.0\"?>\n<gpx xmlns=\"http://www.topografix.com/GPX/1/1\"><trk><trkseg>{points}</trkseg></trk></gpx>"
+            "<?xml version=\"1.0\"?>\n<gpx \
+                xmlns=\"http://www.topografix.com/GPX/1/1\"><trk><trkseg>{points}</trkseg></trk></gpx>"
         )
     };
     let points: String = (0..21)
-        .map(|i| format!("<trkpt lat=\"{:.9}\" lon=\"8\"><ele>{}</ele><time>2023-05-01T10:00:{i:02}Z</time><extensions><course>30</course></extensions></trkpt>\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
+        .map(|i| {
+            format!(
+                "<trkpt lat=\"{:.9}\" \
+            lon=\"8\"><ele>{}</ele><time>2023-05-01T10:00:{i:02}Z</time>\
+             <extensions><course>30</course></extensions></trkpt>\n",
+                47.0 + f64::from(i) * 8.994_6e-5,
+                500 + i
+            )
+        })
         .collect();
     let msl = FlightSpec { height: HeightReference::Msl, ..track() };
     assert_flies("GPX", &gpx(&points), &msl, "not used: course");
@@ -344,9 +379,9 @@ fn other_files() {
     assert_flies("GPX in segments", &two, &msl, "");
 }
 
-/// Whatever the text, there is an answer.
+/// Texts of random pieces never panic the reader.
 #[test]
-fn no_text_makes_it_panic() {
+fn random_texts_do_not_panic() {
     let pieces = [
         "0",
         "1",
@@ -387,10 +422,10 @@ fn no_text_makes_it_panic() {
             text += pieces[(state >> 33) as usize % pieces.len()];
         }
         for format in [LogFormat::Auto, LogFormat::CsvNed, LogFormat::Tum] {
-            let table = text::Table::new(&text);
+            let table = text_table::Table::new(&text);
             let spec = FlightSpec { format, ..track() };
             let mut notes = Vec::new();
-            if let Ok(layout) = Layout::find(Path::new("any"), &table, &spec, &mut notes) {
+            if let Ok(layout) = TableLayout::detect(Path::new("any"), &table, &spec, &mut notes) {
                 let _ = rows::read(Path::new("any"), &table, &layout);
             }
         }

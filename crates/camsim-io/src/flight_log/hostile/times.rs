@@ -1,20 +1,20 @@
-//! Clocks, dates, times in parts, gaps and places that are none.
+//! Clocks, dates, times in parts, gaps, and positions without a fix.
 
 use super::*;
 
 #[test]
-fn clocks_and_dates() {
-    let _all = AllFaults;
-    let at = |time: &dyn Fn(u32) -> String| {
+fn clock_times_and_dates_are_read_across_rollovers() {
+    let _report = FaultReport;
+    let log_with_times = |time: &dyn Fn(u32) -> String| {
         let rows: String = (0..21)
             .map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
             .collect();
         format!("time,lat,lon,alt\n{rows}")
     };
-    assert_flies("clock", &at(&|i| format!("10:00:{i:02}.5")), &track(), "");
+    assert_flies("clock", &log_with_times(&|i| format!("10:00:{i:02}.5")), &track(), "");
     assert_flies(
         "clock past midnight",
-        &at(&|i| {
+        &log_with_times(&|i| {
             format!(
                 "{:02}:{:02}:{:02}",
                 if i < 5 { 23 } else { 0 },
@@ -25,23 +25,25 @@ fn clocks_and_dates() {
         &track(),
         "midnight",
     );
-    assert_flies("half a clock", &at(&|i| format!("9:59:{i:02} AM")), &track(), "");
+    assert_flies("half a clock", &log_with_times(&|i| format!("9:59:{i:02} AM")), &track(), "");
     assert_flies(
         "noon",
-        &at(&|i| if i < 5 { format!("11:59:{} AM", 55 + i) } else { format!("12:00:{:02} PM", i - 5) }),
+        &log_with_times(&|i| {
+            if i < 5 { format!("11:59:{} AM", 55 + i) } else { format!("12:00:{:02} PM", i - 5) }
+        }),
         &track(),
         "",
     );
-    assert_flies("offset", &at(&|i| format!("2023-05-01T10:00:{i:02}+02:00")), &track(), "");
+    assert_flies("offset", &log_with_times(&|i| format!("2023-05-01T10:00:{i:02}+02:00")), &track(), "");
     assert_flies(
         "blank, quotes, slashes",
-        &at(&|i| format!("\"2023/05/01 10:00:{i:02}.250\"")),
+        &log_with_times(&|i| format!("\"2023/05/01 10:00:{i:02}.250\"")),
         &track(),
         "",
     );
     assert_flies(
         "over a leap day",
-        &at(&|i| {
+        &log_with_times(&|i| {
             if i < 10 {
                 format!("2024-02-28T23:59:{}Z", 50 + i)
             } else {
@@ -51,41 +53,46 @@ fn clocks_and_dates() {
         &track(),
         "",
     );
-    assert_flies("seconds of the week", &at(&|i| format!("{}", (604_790 + i) % 604_800)), &track(), "GPS");
+    assert_flies(
+        "seconds of the week",
+        &log_with_times(&|i| format!("{}", (604_790 + i) % 604_800)),
+        &track(),
+        "GPS",
+    );
     assert_flies(
         "a full counter",
-        &at(&|i| format!("{}", (4_294_960_000_u64 + u64::from(i) * 1_000_000) % 4_294_967_296))
+        &log_with_times(&|i| format!("{}", (4_294_960_000_u64 + u64::from(i) * 1_000_000) % 4_294_967_296))
             .replace("time", "time_us"),
         &track(),
         "counter",
     );
     assert_refused(
         "day first",
-        at(&|i| format!("01/05/2023 10:00:{i:02}")).as_bytes(),
+        log_with_times(&|i| format!("01/05/2023 10:00:{i:02}")).as_bytes(),
         &track(),
         &["line 2, column 1 (`time`)", "year-month-day"],
     );
     assert_refused(
         "minutes and seconds",
-        at(&|i| format!("0:{i:02}")).as_bytes(),
+        log_with_times(&|i| format!("0:{i:02}")).as_bytes(),
         &track(),
         &["hours:minutes:seconds"],
     );
     assert_refused(
         "a number among times",
-        at(&|i| if i == 7 { "7".into() } else { format!("10:00:{i:02}") }).as_bytes(),
+        log_with_times(&|i| if i == 7 { "7".into() } else { format!("10:00:{i:02}") }).as_bytes(),
         &track(),
         &["line 9, column 1 (`time`): `7`"],
     );
     assert_refused(
         "a time among numbers",
-        at(&|i| if i == 7 { "10:00:07".into() } else { format!("{i}") }).as_bytes(),
+        log_with_times(&|i| if i == 7 { "10:00:07".into() } else { format!("{i}") }).as_bytes(),
         &track(),
         &["line 9", "other rows have numbers"],
     );
-    // Only a clock falls by half a turn; rows that are out of order are sorted.
+    // Rows out of order are sorted: they do not fall by half of a rollover period.
     let log = read_with(
-        at(&|i| {
+        log_with_times(&|i| {
             format!(
                 "{}",
                 if i == 7 {
@@ -113,61 +120,72 @@ fn clocks_and_dates() {
         &["`47.0 8.0 500`", "column 3 (`GPS`)"],
     );
     let key = FlightSpec { time_unit: TimeUnit::Ms, ..track() };
-    assert_flies("a key without use", &at(&|i| format!("10:00:{i:02}")), &key, "not used");
+    assert_flies("a key without use", &log_with_times(&|i| format!("10:00:{i:02}")), &key, "not used");
 }
 
 #[test]
-fn parts_digits_and_others() {
-    let _all = AllFaults;
-    let at = |header: &str, time: &dyn Fn(u32) -> String| {
+fn times_in_parts_and_vehicles_are_read_or_refused() {
+    let _report = FaultReport;
+    let log_with_times = |header: &str, time: &dyn Fn(u32) -> String| {
         let rows: String = (0..21)
             .map(|i| format!("{},{:.9},8,{}\n", time(i), 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
             .collect();
         format!("{header},lat,lon,alt\n{rows}")
     };
-    let digits =
-        at("time", &|i| if i < 10 { format!("1541{}", 50 + i) } else { format!("1542{:02}", i - 10) });
+    let digits = log_with_times("time", &|i| {
+        if i < 10 { format!("1541{}", 50 + i) } else { format!("1542{:02}", i - 10) }
+    });
     assert_refused("digits of a clock", digits.as_bytes(), &track(), &["hhmmss", "flight.time_unit"]);
     assert_refused(
         "hours, minutes, seconds",
-        at("hour,min,sec", &|i| format!("10,{},{}", i / 10, i % 10)).as_bytes(),
+        log_with_times("hour,min,sec", &|i| format!("10,{},{}", i / 10, i % 10)).as_bytes(),
         &track(),
         &["several columns", "`sec`"],
     );
     assert_refused(
         "seconds and milliseconds",
-        at("time,ms", &|i| format!("10:00:{:02},500", i)).as_bytes(),
+        log_with_times("time,ms", &|i| format!("10:00:{:02},500", i)).as_bytes(),
         &track(),
         &["`time`", "`ms`"],
     );
-    assert_flies("an hour beside a time", &at("time_s,hour", &|i| format!("{i},10")), &track(), "");
+    assert_flies(
+        "an hour beside a time",
+        &log_with_times("time_s,hour", &|i| format!("{i},10")),
+        &track(),
+        "",
+    );
     assert_flies(
         "a date that never changes",
-        &at("date,time", &|i| format!("1.5.23,10:00:{i:02}")),
+        &log_with_times("date,time", &|i| format!("1.5.23,10:00:{i:02}")),
         &track(),
         "",
     );
     assert_refused(
         "dates day first",
-        at("date,time", &|i| format!("{}.5.2023,10:00:{i:02}", 1 + i / 10)).as_bytes(),
+        log_with_times("date,time", &|i| format!("{}.5.2023,10:00:{i:02}", 1 + i / 10)).as_bytes(),
         &track(),
         &["column 1 (`date`)", "year-month-day"],
     );
-    assert_flies("commas before fractions", &at("time", &|i| format!("\"10:00:{i:02},250\"")), &track(), "");
+    assert_flies(
+        "commas before fractions",
+        &log_with_times("time", &|i| format!("\"10:00:{i:02},250\"")),
+        &track(),
+        "",
+    );
     assert_refused(
         "two vehicles",
-        at("callsign,t", &|i| format!("{},{i}", if i % 2 == 0 { "A" } else { "B" })).as_bytes(),
+        log_with_times("callsign,t", &|i| format!("{},{i}", if i % 2 == 0 { "A" } else { "B" })).as_bytes(),
         &track(),
         &["line 3", "`B`", "one vehicle"],
     );
-    assert_flies("one vehicle", &at("Vehicle Name,t", &|i| format!("A,{i}")), &track(), "");
+    assert_flies("one vehicle", &log_with_times("Vehicle Name,t", &|i| format!("A,{i}")), &track(), "");
     assert_refused(
         "two flights",
-        at("t", &|i| format!("{}", i % 11)).as_bytes(),
+        log_with_times("t", &|i| format!("{}", i % 11)).as_bytes(),
         &track(),
         &["line 13", "several flights"],
     );
-    let named = at("timestamp [ns]", &|i| format!("{i}"));
+    let named = log_with_times("timestamp [ns]", &|i| format!("{i}"));
     let notes = read_with(named.as_bytes(), &track()).unwrap().notes;
     assert!(
         notes.iter().any(|note| note.is_warning && note.text.contains("the header's unit of time")),
@@ -175,23 +193,24 @@ fn parts_digits_and_others() {
     );
     assert_refused(
         "DJI's two heights",
-        at("t,OSD.height [ft]", &|i| format!("{i},9")).replace("alt", "rel_alt").as_bytes(),
+        log_with_times("t,OSD.height [ft]", &|i| format!("{i},9")).replace("alt", "rel_alt").as_bytes(),
         &track(),
         &["take-off"],
     );
-    let px4 = at("timestamp,time_utc_usec", &|i| {
+    let px4 = log_with_times("timestamp,time_utc_usec", &|i| {
         format!("{},{}", 112_574_307 + i * 1_000_000, 1_700_000_000_000_000_u64 + u64::from(i) * 1_000_000)
     });
     assert_flies("PX4's two times", &px4, &track(), "");
-    let ground_station = at("Timestamp,altitudeRelative", &|i| format!("2023-05-01 10:00:{i:02}.123,9"))
-        .replace(",alt\n", ",altitudeAMSL\n");
+    let ground_station =
+        log_with_times("Timestamp,altitudeRelative", &|i| format!("2023-05-01 10:00:{i:02}.123,9"))
+            .replace(",alt\n", ",altitudeAMSL\n");
     assert_flies(
         "a ground station",
         &ground_station,
         &FlightSpec { height: HeightReference::Msl, ..track() },
         "",
     );
-    // One stream after the other is one flight.
+    // Streams one after the other are one flight.
     let mut streams = "t,lat,lon,alt,roll,pitch,yaw\n".to_owned();
     streams
         .extend((0..21).map(|i| format!("{i},{:.9},8.0,{},,,\n", 47.0 + f64::from(i) * 8.994_6e-5, 500 + i)));
@@ -200,8 +219,8 @@ fn parts_digits_and_others() {
 }
 
 #[test]
-fn fixes_gaps_and_jumps() {
-    let _all = AllFaults;
+fn null_fixes_jumps_and_sparse_rows_are_handled() {
+    let _report = FaultReport;
     let header = "t,lat,lon,alt,roll,pitch,yaw";
     let usual = log(header, "T,LAT,LON,H,0,0,30");
     let nulls = usual
@@ -214,7 +233,7 @@ fn fixes_gaps_and_jumps() {
         .join("\n");
     let report = read_with(nulls.as_bytes(), &auto()).unwrap().report;
     assert_eq!((report.null_fixes.count, report.unusable.count), (3, 0), "{report}");
-    // Half of the flight at another place: no spike, but a jump.
+    // Half of the flight is elsewhere: that is a jump, not a spike.
     let away: String = usual
         .lines()
         .enumerate()
@@ -222,7 +241,7 @@ fn fixes_gaps_and_jumps() {
         .collect();
     let notes = read_with(away.as_bytes(), &auto()).unwrap().notes;
     assert!(notes.iter().any(|note| note.is_warning && note.text.contains("jumps by 76")), "{notes:?}");
-    // Streams of three rates: position, height, attitude.
+    // Streams of position, height and attitude at three rates.
     let mut rows = vec!["t,lat,lon,alt,roll,pitch,yaw".to_owned()];
     for i in 0..=60 {
         let t = f64::from(i) / 3.0;

@@ -1,10 +1,10 @@
-//! Units of lengths, angles and times, named and not.
+//! Units of lengths, angles and times, with and without a name in the header.
 
 use super::*;
 
 #[test]
-fn units_of_headers() {
-    let _all = AllFaults;
+fn header_units_are_applied_or_refused() {
+    let _report = FaultReport;
     let feet = |metres: f64| metres / 0.3048;
     let with_heights = |header: &str, scale: &dyn Fn(f64) -> f64| {
         let rows: Vec<String> = (0..21)
@@ -71,7 +71,11 @@ fn units_of_headers() {
         &track(),
         &["rel_alt", "take-off"],
     );
+}
 
+#[test]
+fn angles_of_positions_need_a_unit_unless_degrees() {
+    let _report = FaultReport;
     let e7: String = (0..21)
         .map(|i| format!("{i},{},80000000,{}\n", 470_000_000 + (f64::from(i) * 899.46) as i64, 500 + i))
         .collect();
@@ -103,7 +107,7 @@ fn units_of_headers() {
     assert_flies(
         "local feet",
         &(0..21)
-            .map(|i| format!("{i},{},0,{}\n", feet(10.0 * f64::from(i)), feet(f64::from(i))))
+            .map(|i| format!("{i},{},0,{}\n", 10.0 * f64::from(i) / 0.3048, f64::from(i) / 0.3048))
             .fold("t,north_ft,east_ft,alt_ft\n".to_owned(), |a, b| a + &b),
         &track(),
         "",
@@ -129,8 +133,8 @@ fn units_of_headers() {
 }
 
 #[test]
-fn units_of_time() {
-    let _all = AllFaults;
+fn stated_time_units_are_applied() {
+    let _report = FaultReport;
     let lla = "T,LAT,LON,H,0,0,30";
     let header = "time,lat,lon,alt,roll,pitch,yaw";
     for (name, per_second, unit) in [
@@ -160,6 +164,13 @@ fn units_of_time() {
     {
         assert_flies(name, &scaled(&header.replace("time", name), lla, 1e6), &auto(), "");
     }
+}
+
+#[test]
+fn unitless_times_are_inferred_or_refused() {
+    let _report = FaultReport;
+    let lla = "T,LAT,LON,H,0,0,30";
+    let header = "time,lat,lon,alt,roll,pitch,yaw";
     assert_flies("microseconds", &scaled(header, lla, 1e6), &auto(), "read as us");
     assert_flies("nanoseconds", &scaled(header, lla, 1e9), &auto(), "read as ns");
     assert_flies("hours", &scaled(header, lla, 1.0 / 3600.0), &auto(), "read as h");
@@ -209,6 +220,13 @@ fn units_of_time() {
     assert_flies("dates in s", &epoch(1.0), &auto(), "");
     assert_flies("dates in ms", &epoch(1e3), &auto(), "read as ms");
     assert_flies("dates in us", &epoch(1e6), &auto(), "(2023)");
+}
+
+#[test]
+fn several_time_columns_are_joined_or_refused() {
+    let _report = FaultReport;
+    let lla = "T,LAT,LON,H,0,0,30";
+    let header = "time,lat,lon,alt,roll,pitch,yaw";
     let unknown = header.replace("time", "time [fortnights]");
     assert_refused("fortnights", log(&unknown, lla).as_bytes(), &auto(), &["fortnights", "column 1"]);
     assert_refused(
@@ -246,7 +264,7 @@ fn units_of_time() {
         &track(),
         &["`nsecs`"],
     );
-    // Days as spreadsheets count them.
+    // Spreadsheets count times in days.
     let days: String = (0..21)
         .map(|i| {
             format!(
@@ -269,13 +287,19 @@ fn units_of_time() {
         &FlightSpec { time_unit: TimeUnit::S, ..track() },
         "",
     );
-    // EuRoC's stamps, small ones too, and its names without a unit.
+}
+
+#[test]
+fn units_of_euroc_and_tum_times_are_known() {
+    let _report = FaultReport;
+    // EuRoC stamps of small value, and EuRoC names without a unit.
     let euroc: String =
         (0..21).map(|i| format!("{},0,{},{},1,0,0,0\n", i * 1_000_000_000_i64, 10 * i, i)).collect();
     assert_flies(
         "EuRoC, with its unit",
         &format!(
-            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n{euroc}"
+            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z \
+                []\n{euroc}"
         ),
         &auto(),
         "",
@@ -305,8 +329,8 @@ fn units_of_time() {
 }
 
 #[test]
-fn columns_beside_a_quantity_are_not_passed_over() {
-    let _all = AllFaults;
+fn columns_that_qualify_a_quantity_are_refused_or_noted() {
+    let _report = FaultReport;
     let minutes = log("t,lat_deg,lat_min,lat_sec,lon_deg,lon_min,alt", "T,47,30,0,8,15,H");
     assert_refused(
         "minutes",
@@ -337,8 +361,8 @@ fn columns_beside_a_quantity_are_not_passed_over() {
 }
 
 #[test]
-fn angles_and_quaternions() {
-    let _all = AllFaults;
+fn angle_units_and_quaternion_norms_are_checked() {
+    let _report = FaultReport;
     let header = "t,lat,lon,alt,roll,pitch,yaw";
     let yaw_of = |content: &str, spec: &FlightSpec| {
         let log = read_with(content.as_bytes(), spec).unwrap();

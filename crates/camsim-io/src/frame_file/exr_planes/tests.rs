@@ -10,19 +10,19 @@ use exr::prelude::{
 use crate::frame_file::{FrameFile, read_frame};
 
 /// A part of 2x1 pixels: its name, where it begins, and channels of one value each.
-type Part<'a> = (&'a str, i32, &'a [(&'a str, f32)]);
+type ExrPart<'a> = (&'a str, i32, &'a [(&'a str, f32)]);
 
 /// Reads a FRAME.toml of `text` beside `a.exr` of these parts.
-fn read(parts: &[Part<'_>], text: &str) -> Result<FrameFile, String> {
+fn read(parts: &[ExrPart<'_>], text: &str) -> Result<FrameFile, String> {
     let folder = tempfile::tempdir().unwrap();
-    let layer = |(name, at, channels): &Part<'_>| {
+    let layer = |(name, x_px, channels): &ExrPart<'_>| {
         let list: SmallVec<[AnyChannel<FlatSamples>; 4]> = channels
             .iter()
             .map(|(name, value)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; 2])))
             .collect();
         let mut attributes =
             if name.is_empty() { LayerAttributes::default() } else { LayerAttributes::named(*name) };
-        attributes.layer_position = Vec2(*at, 0);
+        attributes.layer_position = Vec2(*x_px, 0);
         Layer::new(Vec2(2_usize, 1), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(list))
     };
     let layers: Vec<_> = parts.iter().map(layer).collect();
@@ -65,7 +65,7 @@ const BLENDER: &[(&str, f32)] = &[
 ];
 
 #[test]
-fn blenders_multilayer_files_need_no_names() {
+fn channels_of_blender_multilayer_files_are_found() {
     assert_eq!(first(&read(&[("", 0, BLENDER)], DEPTH).unwrap()), [0.25, 0.5, 0.75, 8.0]);
     let chosen = "color_layer = \"ViewLayer.DiffCol\"\ndepth_channel = \"Denoising Depth.Z\"\n";
     assert_eq!(
@@ -75,7 +75,7 @@ fn blenders_multilayer_files_need_no_names() {
 }
 
 #[test]
-fn mist_is_no_depth() {
+fn blender_mist_is_not_taken_for_depth() {
     let without_depth: Vec<(&str, f32)> =
         BLENDER.iter().copied().filter(|(name, _)| !name.contains("Depth")).collect();
     let error = read(&[("", 0, &without_depth)], DEPTH).unwrap_err();
@@ -85,21 +85,21 @@ fn mist_is_no_depth() {
 }
 
 #[test]
-fn the_optical_axis_is_in_the_middle_of_the_display() {
-    let axis_px = |at: i32, text: &str| {
+fn optical_axis_is_the_centre_of_the_display_window() {
+    let axis_px = |x_px: i32, text: &str| {
         let file =
-            read(&[("", at, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}"))
+            read(&[("", x_px, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}"))
                 .unwrap();
         file.frame.geometry.principal_px.to_array()
     };
-    // The display is pixels 0 and 1. Of it a crop that begins at 1, and more of it than is shown from -1 on.
+    // The display window is pixels 0 and 1. Data windows begin at 0, 1 (a crop) and -1 (overscan).
     assert_eq!([axis_px(0, ""), axis_px(1, ""), axis_px(-1, "")], [[0.5, 0.0], [-0.5, 0.0], [1.5, 0.0]]);
     assert_eq!(axis_px(1, "principal_point_px = [3, 4]\n"), [3.0, 4.0]);
 }
 
 #[test]
-fn every_part_is_read() {
-    let parts: [Part<'_>; 3] = [
+fn channels_of_all_parts_can_be_selected() {
+    let parts: [ExrPart<'_>; 3] = [
         ("rgba", 0, &[("B", 0.75), ("G", 0.5), ("R", 0.25)]),
         ("depth", 0, &[("Z", 4.0)]),
         ("eye", 0, &[("eye.B", 0.3), ("eye.G", 0.2), ("eye.R", 0.1), ("eye.Z", 5.0)]),
@@ -113,7 +113,8 @@ fn every_part_is_read() {
         first(&chosen("color_layer = \"eye\"\ndepth_channel = \"eye.Z\"\n").unwrap()),
         [0.1, 0.2, 0.3, 5.0]
     );
-    let mixed = "color_channels = [\"rgba.B\", \"eye.G\", \"rgba.R\"]\ndepth_channel = \"Z\"\ndepth_layer = \"eye\"\n";
+    let mixed = "color_channels = [\"rgba.B\", \"eye.G\", \"rgba.R\"]\ndepth_channel = \"Z\"\ndepth_layer = \
+        \"eye\"\n";
     assert_eq!(first(&chosen(mixed).unwrap()), [0.75, 0.2, 0.25, 5.0]);
     assert_eq!(
         first(&chosen("color_channels = [\"depth.Z\"]\ndepth_layer = \"depth\"\n").unwrap()),
@@ -122,15 +123,16 @@ fn every_part_is_read() {
 }
 
 #[test]
-fn what_cannot_be_told_apart_is_listed() {
-    let two: [Part<'_>; 2] = [
+fn ambiguous_channels_are_refused_with_a_list() {
+    let two: [ExrPart<'_>; 2] = [
         ("left", 0, &[("left.B", 0.0), ("left.G", 0.0), ("left.R", 0.0), ("left.Z", 1.0)]),
         ("right", 0, &[("right.B", 0.0), ("right.G", 0.0), ("right.R", 0.0), ("right.Z", 1.0)]),
     ];
-    let plain: [Part<'_>; 1] =
+    let plain: [ExrPart<'_>; 1] =
         [("", 0, &[("B", 0.0), ("G", 0.0), ("Normal.X", 0.0), ("Normal.Z", 0.0), ("R", 0.0), ("dist", 2.0)])];
-    let chroma: [Part<'_>; 1] = [("", 0, &[("BY", 0.0), ("RY", 0.0), ("Y", 0.5)])];
-    let shifted: [Part<'_>; 2] = [("a", 0, &[("B", 0.0), ("G", 0.0), ("R", 0.0)]), ("b", 5, &[("Z", 1.0)])];
+    let chroma: [ExrPart<'_>; 1] = [("", 0, &[("BY", 0.0), ("RY", 0.0), ("Y", 0.5)])];
+    let shifted: [ExrPart<'_>; 2] =
+        [("a", 0, &[("B", 0.0), ("G", 0.0), ("R", 0.0)]), ("b", 5, &[("Z", 1.0)])];
     for (parts, text, expected) in [
         (&two[..], "", "several layers with colour: left, right; choose one with color_layer"),
         (
@@ -153,7 +155,7 @@ fn what_cannot_be_told_apart_is_listed() {
 }
 
 #[test]
-fn files_that_are_none_are_told_from_files_that_are_not_there() {
+fn missing_and_damaged_files_have_different_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("FRAME.toml");
     fs::write(&path, "color = \"a.exr\"\nfocal_px = [2, 2]\n").unwrap();

@@ -8,7 +8,7 @@ use crate::frame_file::{FrameFile, read_frame};
 
 /// 3x2 metres, row by row from the top.
 const DEPTH_M: [f32; 6] = [1.0, 2.0, f32::NAN, 4.0, f32::INFINITY, 65_504.0];
-/// What they are read as.
+/// The inverse depth that is read from them.
 const INVERSE: [f32; 6] = [1.0, 0.5, 0.0, 0.25, 0.0, 1.0 / 65_504.0];
 
 /// A PFM of these rows, from the first that is stored.
@@ -31,7 +31,7 @@ fn inverse(name: &str, depth: &[u8], text: &str) -> Vec<f32> {
 }
 
 #[test]
-fn rows_of_a_pfm_come_in_the_order_that_is_said() {
+fn pfm_rows_follow_depth_rows() {
     let top_down = pfm("Pf\n3 2\n-1.000000\n", &DEPTH_M, f32::to_le_bytes);
     assert_eq!(inverse("d.pfm", &top_down, "depth_rows = \"top-down\"\n"), INVERSE);
     let turned = [&DEPTH_M[3..], &DEPTH_M[..3]].concat();
@@ -47,7 +47,7 @@ fn rows_of_a_pfm_come_in_the_order_that_is_said() {
 }
 
 #[test]
-fn what_stands_for_the_sky_is_said() {
+fn depth_max_m_marks_the_sky() {
     let file = |text: &str| {
         let text = format!("depth_rows = \"top-down\"\n{text}");
         read("d.pfm", &pfm("Pf\n3 2\n-1\n", &DEPTH_M, f32::to_le_bytes), &text).unwrap()
@@ -58,10 +58,10 @@ fn what_stands_for_the_sky_is_said() {
     );
     assert!(!file("depth_max_m = 65504.5\nholes = \"mark\"\n").frame.holes[5]);
     assert_eq!(file("depth_max_m = 4\n").frame.inverse_depth, [1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
-    // Blender's background, whatever is said.
+    // Blender's background is no depth even without the key.
     let blender = pfm("Pf\n3 2\n-1\n", &[1e10, 1e9, 9e8, 1.0, 1.0, 1.0], f32::to_le_bytes);
-    let found = inverse("d.pfm", &blender, "depth_rows = \"top-down\"\n");
-    assert_eq!((found[0], found[1], found[2] > 0.0), (0.0, 0.0, true));
+    let inverse_depth = inverse("d.pfm", &blender, "depth_rows = \"top-down\"\n");
+    assert_eq!((inverse_depth[0], inverse_depth[1], inverse_depth[2] > 0.0), (0.0, 0.0, true));
 }
 
 /// A TIFF of 3x2 samples.
@@ -75,37 +75,37 @@ where
 }
 
 #[test]
-fn tiffs_are_metres_or_whole_numbers() {
+fn tiff_depth_is_float_metres_or_scaled_integers() {
     assert_eq!(inverse("d.tiff", &tiff::<colortype::Gray32Float>(&DEPTH_M), ""), INVERSE);
     let millimetres = [1000, 2000, 0, 4000, 0, 65_535];
-    let found = inverse(
+    let inverse_depth = inverse(
         "d.tif",
         &tiff::<colortype::Gray16>(&millimetres),
         "depth_per_metre = 1000\ndepth_max_m = 65\n",
     );
-    assert_eq!(found, [1.0, 0.5, 0.0, 0.25, 0.0, 0.0]);
+    assert_eq!(inverse_depth, [1.0, 0.5, 0.0, 0.25, 0.0, 0.0]);
 }
 
 #[test]
-fn what_is_wrong_with_a_depth_is_said() {
+fn unusable_depth_files_are_refused() {
     let good = pfm("Pf\n3 2\n-1\n", &DEPTH_M, f32::to_le_bytes);
     let rows = "depth_rows = \"top-down\"\n";
     let floats = tiff::<colortype::Gray32Float>(&DEPTH_M);
-    let of = |head: &str| pfm(head, &DEPTH_M, f32::to_le_bytes);
+    let with_header = |head: &str| pfm(head, &DEPTH_M, f32::to_le_bytes);
     for (name, bytes, text, wanted) in [
         ("d.pfm", good.clone(), "", "depth_rows: is missing: a PFM begins with the bottom row"),
         ("d.pfm", good[..30].to_vec(), rows, "d.pfm: says 3x2 pixels and holds 20 bytes"),
         ("d.pfm", good[..8].to_vec(), rows, "d.pfm: is a PFM that ends within its header"),
-        ("d.pfm", of("PF\n1 2\n-1\n"), rows, "three channels"),
-        ("d.pfm", of("Pf\n3 -2\n-1\n"), rows, "`3` by `-2` pixels"),
+        ("d.pfm", with_header("PF\n1 2\n-1\n"), rows, "three channels"),
+        ("d.pfm", with_header("Pf\n3 -2\n-1\n"), rows, "`3` by `-2` pixels"),
         (
             "d.pfm",
-            of("Pf\n4294967295 4294967295\n-1\n"),
+            with_header("Pf\n4294967295 4294967295\n-1\n"),
             rows,
             "4294967295x4294967295 pixels and holds 24 bytes",
         ),
-        ("d.pfm", of("Pf\n3 2\n0\n"), rows, "scale `0`"),
-        ("d.pfm", of("Pf\n2 3\n-1\n"), rows, "is 2x3, but the colour is 3x2"),
+        ("d.pfm", with_header("Pf\n3 2\n0\n"), rows, "scale `0`"),
+        ("d.pfm", with_header("Pf\n2 3\n-1\n"), rows, "is 2x3, but the colour is 3x2"),
         ("d.pfm", good.clone(), "depth_rows = \"down\"\n", "top-down"),
         (
             "d.pfm",
@@ -160,7 +160,7 @@ fn with_items(value: f32, items: &str) -> Vec<u8> {
 }
 
 #[test]
-fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
+fn tiff_scale_offset_and_unit_are_applied_or_refused() {
     let scale = "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.001</Item>";
     let offset = "<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">1</Item>";
     let feet = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item>";
@@ -172,8 +172,8 @@ fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
         (10.0, feet.to_owned(), "", 3.048),
         (2000.0, px.to_owned(), "depth_per_metre = 1000\n", 2.0),
     ] {
-        let found = inverse("d.tif", &with_items(value, &items), text)[0];
-        assert!((f64::from(found) * depth_m - 1.0).abs() < 1e-6, "{items} {text}: {found}");
+        let inverse_depth = inverse("d.tif", &with_items(value, &items), text)[0];
+        assert!((f64::from(inverse_depth) * depth_m - 1.0).abs() < 1e-6, "{items} {text}: {inverse_depth}");
     }
     let notes = read("d.tif", &with_items(2000.0, scale), "").unwrap().notes;
     assert!(notes[0].contains("SCALE 0.001"), "{notes:?}");
@@ -182,11 +182,12 @@ fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
         (offset, "depth_per_metre = 1000\n", "OFFSET 1"),
         (px, "", "UNITTYPE `px`"),
         (feet, "depth_kind = \"inverse\"\ndepth_per_metre = 1\n", "depth_kind: is \"inverse\", but"),
-        // One distance throughout is as unsure as many.
+        // A constant depth is ambiguous too.
         (
             "",
             "",
-            "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole numbers from 2000",
+            "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole \
+                numbers from 2000",
         ),
     ] {
         let error = read("d.tif", &with_items(2000.0, items), text).unwrap_err();
@@ -195,7 +196,7 @@ fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
 }
 
 #[test]
-fn what_a_mask_beside_a_tiff_leaves_out_is_no_depth() {
+fn masked_pixels_of_a_tiff_have_no_depth() {
     let folder = tempfile::tempdir().unwrap();
     image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(folder.path().join("c.png")).unwrap();
     fs::write(folder.path().join("d.tif"), tiff::<colortype::Gray32Float>(&[2.0; 6])).unwrap();
@@ -207,24 +208,24 @@ fn what_a_mask_beside_a_tiff_leaves_out_is_no_depth() {
 }
 
 #[test]
-fn chunks_of_a_png_are_named_or_asked_about() {
+fn png_chunks_are_noted_or_require_color_space() {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(at("c.png")).unwrap();
+    let in_folder = |name: &str| folder.path().join(name);
+    image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(in_folder("c.png")).unwrap();
     image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, vec![2000_u16; 6])
         .unwrap()
-        .save(at("d.png"))
+        .save(in_folder("d.png"))
         .unwrap();
-    let [color, depth] = ["c.png", "d.png"].map(|name| fs::read(at(name)).unwrap());
+    let [color, depth] = ["c.png", "d.png"].map(|name| fs::read(in_folder(name)).unwrap());
     let with = |png: &[u8], kind: &[u8], data: &[u8]| {
         let chunk = [kind, data].concat();
         let crc = crc32fast::hash(&chunk).to_be_bytes();
         [&png[..33], &(data.len() as u32).to_be_bytes(), &chunk, &crc, &png[33..]].concat()
     };
-    let path = at("FRAME.toml");
+    let path = in_folder("FRAME.toml");
     let read = |color: &[u8], depth: &[u8], text: &str| {
-        fs::write(at("c.png"), color).unwrap();
-        fs::write(at("d.png"), depth).unwrap();
+        fs::write(in_folder("c.png"), color).unwrap();
+        fs::write(in_folder("d.png"), depth).unwrap();
         fs::write(
             &path,
             format!(
@@ -248,7 +249,7 @@ fn chunks_of_a_png_are_named_or_asked_about() {
     assert!(read(&with(&color, b"cHRM", &wide), &depth, "").unwrap()[0].contains("cHRM"));
     assert!(read(&color, &with(&depth, b"sBIT", &[12]), "").unwrap()[0].contains("its sBIT is not applied"));
     let twelve = image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(3, 2, image::Rgb([4095_u16, 9, 9]));
-    twelve.save(at("twelve.png")).unwrap();
-    let notes = read(&fs::read(at("twelve.png")).unwrap(), &depth, "").unwrap();
+    twelve.save(in_folder("twelve.png")).unwrap();
+    let notes = read(&fs::read(in_folder("twelve.png")).unwrap(), &depth, "").unwrap();
     assert!(notes[0].contains("end at 4095 of 65535") && notes[0].contains("If white is 4095"), "{notes:?}");
 }

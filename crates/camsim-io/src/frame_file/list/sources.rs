@@ -1,28 +1,31 @@
-//! Names with a *, lists and tables, read.
+//! Reads patterns, lists and tables of pictures.
 
 use std::path::{Path, PathBuf};
 
-use super::{Entry, key};
+use super::{FrameEntry, key_error};
 use crate::frame_file::{
     FrameFileError, NameUnit,
-    columns::{Column, column},
-    poses::words_of,
+    columns::{TableColumn, parse_column},
+    poses::split_words,
 };
 
-/// A picture with its time.
-pub(super) struct Item {
+/// A picture, with its time if it has one.
+pub(super) struct TimedPicture {
+    /// Path of the picture.
     pub(super) path: PathBuf,
-    /// What stands for the * in its name.
+    /// Text that stands for the * in its name.
     pub(super) star: String,
+    /// Time, nanoseconds.
     pub(super) stamp_ns: Option<i64>,
 }
 
-fn row(path: &Path, line: Option<u64>, message: impl Into<String>) -> FrameFileError {
+/// An error about a line of a table.
+fn row_error(path: &Path, line: Option<u64>, message: impl Into<String>) -> FrameFileError {
     FrameFileError::Poses { path: path.into(), line, message: message.into() }
 }
 
-/// The folder of a pattern, and its name before and after the *.
-pub(super) fn pattern_of(path: &Path) -> Result<(PathBuf, [String; 2]), String> {
+/// Splits a pattern into its folder and the name before and after the *.
+pub(super) fn split_pattern(path: &Path) -> Result<(PathBuf, [String; 2]), String> {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     match name.split('*').collect::<Vec<_>>()[..] {
@@ -35,23 +38,23 @@ pub(super) fn pattern_of(path: &Path) -> Result<(PathBuf, [String; 2]), String> 
     }
 }
 
-/// Every file that a pattern names: by number where all are numbers, else by name.
+/// All files that match a pattern: in the order of numbers if all texts for the * are numbers, else by name.
 pub(super) fn read_pattern(
     pattern: &Path,
     unit: Option<NameUnit>,
     frame_path: &Path,
     name: &'static str,
-) -> Result<Vec<Item>, FrameFileError> {
-    let fail = |message: String| key(frame_path, name, message);
-    let (folder, [before, after]) = pattern_of(pattern).map_err(fail)?;
+) -> Result<Vec<TimedPicture>, FrameFileError> {
+    let fail = |message: String| key_error(frame_path, name, message);
+    let (folder, [before, after]) = split_pattern(pattern).map_err(fail)?;
     // An empty folder name is the working directory.
-    let place: &Path = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
+    let readable_folder: &Path = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
     let unreadable = |error: std::io::Error| fail(format!("{} cannot be read: {error}", folder.display()));
     let mut items = Vec::new();
-    for file in std::fs::read_dir(place).map_err(unreadable)? {
+    for file in std::fs::read_dir(readable_folder).map_err(unreadable)? {
         let file = file.map_err(unreadable)?.file_name().to_string_lossy().into_owned();
         let star = file.strip_prefix(&before).and_then(|rest| rest.strip_suffix(&after));
-        // What begins with a dot is hidden, and may be a file that is just being written.
+        // Hidden files are skipped; they may be temporary.
         let Some(star) = star.filter(|star| !star.is_empty() && !file.starts_with('.')) else { continue };
         let stamp_ns = match unit {
             None => None,
@@ -62,14 +65,14 @@ pub(super) fn read_pattern(
                 ))
             })?),
         };
-        items.push(Item { path: folder.join(&file), star: star.to_owned(), stamp_ns });
+        items.push(TimedPicture { path: folder.join(&file), star: star.to_owned(), stamp_ns });
     }
     if items.is_empty() {
         return Err(fail(format!("no file is called {}", pattern.display())));
     }
     items.sort_by(|a, b| a.star.cmp(&b.star));
     if items.iter().all(|item| nanoseconds(&item.star, NameUnit::Ns).is_some()) {
-        // Large counts overflow as seconds; their whole part then decides.
+        // Integers that overflow as seconds are ordered as nanoseconds.
         items.sort_by_key(|item| {
             (nanoseconds(&item.star, NameUnit::S), nanoseconds(&item.star, NameUnit::Ns))
         });
@@ -82,34 +85,39 @@ pub(super) fn read_pattern(
     Ok(items)
 }
 
-/// `time file` a line; times ascend.
-pub(super) fn read_list(path: &Path) -> Result<Vec<Item>, FrameFileError> {
-    let mut items: Vec<Item> = Vec::new();
+/// Reads a list with a line `time file` per picture, by ascending time.
+pub(super) fn read_list(path: &Path) -> Result<Vec<TimedPicture>, FrameFileError> {
+    let mut items: Vec<TimedPicture> = Vec::new();
     for (line, words) in lines(path)? {
         let [time, file] = &words[..] else {
-            return Err(row(path, Some(line), "is not `time file`: correct it or leave it out"));
+            return Err(row_error(path, Some(line), "is not `time file`: correct it or leave it out"));
         };
         let stamp_ns = stamp(path, line, time, items.last().and_then(|item| item.stamp_ns))?;
-        items.push(Item { path: picture(path, line, file)?, star: String::new(), stamp_ns: Some(stamp_ns) });
+        items.push(TimedPicture {
+            path: picture(path, line, file)?,
+            star: String::new(),
+            stamp_ns: Some(stamp_ns),
+        });
     }
-    if items.is_empty() { Err(row(path, None, "names no picture")) } else { Ok(items) }
+    if items.is_empty() { Err(row_error(path, None, "names no picture")) } else { Ok(items) }
 }
 
-/// `frames.csv`, or a text of `time color` or `time color time depth`; with what there is to say about it.
-pub(super) fn read_table(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
-    let of_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("txt"));
-    let (entries, notes) = if of_text { (read_associations(path)?, Vec::new()) } else { read_csv(path)? };
-    if entries.is_empty() { Err(row(path, None, "names no frame")) } else { Ok((entries, notes)) }
+/// Reads a `frames.csv`, or a text of lines `time color` or `time color time depth`. Returns frames and
+/// notes.
+pub(super) fn read_table(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileError> {
+    let is_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("txt"));
+    let (entries, notes) = if is_text { (read_associations(path)?, Vec::new()) } else { read_csv(path)? };
+    if entries.is_empty() { Err(row_error(path, None, "names no frame")) } else { Ok((entries, notes)) }
 }
 
-fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
-    let mut entries: Vec<Entry> = Vec::new();
+fn read_associations(path: &Path) -> Result<Vec<FrameEntry>, FrameFileError> {
+    let mut entries: Vec<FrameEntry> = Vec::new();
     for (line, words) in lines(path)? {
         let (time, color, depth) = match &words[..] {
             [time, color] => (time, color, None),
             [time, color, _, depth] => (time, color, Some(depth)),
             _ => {
-                return Err(row(
+                return Err(row_error(
                     path,
                     Some(line),
                     "is neither `time color` nor `time color time depth`: correct it or leave it out",
@@ -118,39 +126,40 @@ fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
         };
         let stamp_ns = stamp(path, line, time, entries.last().and_then(|entry| entry.stamp_ns))?;
         let depth = depth.map(|depth| picture(path, line, depth)).transpose()?;
-        entries.push(Entry { color: picture(path, line, color)?, depth, stamp_ns: Some(stamp_ns) });
+        entries.push(FrameEntry { color: picture(path, line, color)?, depth, stamp_ns: Some(stamp_ns) });
     }
     Ok(entries)
 }
 
-/// Where the time is in a row of `frames.csv`, and its unit.
-fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, String> {
-    // camsim's own tables say it as exactly as they can, whatever else they say.
-    if let Some(at) =
+/// Index and unit of the time column of `frames.csv`; `None` if it has none.
+fn time_column(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, String> {
+    // stamp_ns, as in tables that camsim wrote, takes precedence over other times.
+    if let Some(index) =
         header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case("stamp_ns"))
     {
-        return Ok(Some((at, NameUnit::Ns)));
+        return Ok(Some((index, NameUnit::Ns)));
     }
     let is_time = |name: &str| name.trim_start_matches('\u{feff}').to_lowercase().starts_with('t');
-    let times = header.iter().enumerate().filter(|(_, cell)| match column(cell) {
-        Column::Time(_) => true,
-        Column::WrongUnit => is_time(cell),
+    let times = header.iter().enumerate().filter(|(_, cell)| match parse_column(cell) {
+        TableColumn::Time(_) => true,
+        TableColumn::WrongUnit => is_time(cell),
         _ => false,
     });
     let times: Vec<(usize, &str)> = times.collect();
     match times[..] {
         [] => Ok(None),
-        [(at, cell)] => match column(cell) {
-            Column::Time(Some(unit)) => {
+        [(index, cell)] => match parse_column(cell) {
+            TableColumn::Time(Some(unit)) => {
                 let known =
                     [(1.0, NameUnit::S), (1e-3, NameUnit::Ms), (1e-6, NameUnit::Us), (1e-9, NameUnit::Ns)];
                 let known = known.into_iter().find(|(factor, _)| *factor == unit.factor);
                 known
-                    .map(|(_, unit)| Some((at, unit)))
+                    .map(|(_, unit)| Some((index, unit)))
                     .ok_or_else(|| format!("the column `{cell}` is in minutes: give t_s"))
             }
             _ => Err(format!(
-                "the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, t_us or t_ns"
+                "the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, \
+                    t_us or t_ns"
             )),
         },
         [(_, a), (_, b), ..] => {
@@ -159,80 +168,97 @@ fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, Stri
     }
 }
 
-fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
+fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileError> {
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(
-            |error| row(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml")),
+            |error| {
+                row_error(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
+            },
         )?;
-    let header = reader.headers().map_err(|error| row(path, Some(1), error.to_string()))?.clone();
-    let place = |names: &[&str]| {
+    let header = reader.headers().map_err(|error| row_error(path, Some(1), error.to_string()))?.clone();
+    let index_of = |names: &[&str]| {
         names.iter().find_map(|name| {
             header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
         })
     };
-    let Some(color_at) = place(&["color", "color_exr", "color_png"]) else {
-        return Err(row(
+    let Some(color_index) = index_of(&["color", "color_exr", "color_png"]) else {
+        return Err(row_error(
             path,
             Some(1),
-            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, depth",
+            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, \
+                depth",
         ));
     };
-    let depth_at = place(&["depth"]);
-    let time_at = time_of(&header).map_err(|message| row(path, Some(1), message))?;
-    let twice = |name: &str| {
+    let depth_index = index_of(&["depth"]);
+    let time_index = time_column(&header).map_err(|message| row_error(path, Some(1), message))?;
+    let is_repeated = |name: &str| {
         header.iter().filter(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)).count()
             > 1
     };
     if let Some(name) =
-        ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| twice(name))
+        ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| is_repeated(name))
     {
-        return Err(row(path, Some(1), format!("the header names two columns {name}: leave one out")));
+        return Err(row_error(path, Some(1), format!("the header names two columns {name}: leave one out")));
     }
-    // camsim's own tables tell more than is needed here.
-    let is_own = place(&["frame"]).is_some() && place(&["stamp_ns"]).is_some();
-    let read = [Some(color_at), depth_at, time_at.map(|(at, _)| at), place(&["frame"])];
+    let notes = unread_columns_note(
+        path,
+        &header,
+        [Some(color_index), depth_index, time_index.map(|(index, _)| index)],
+    );
+    let mut entries: Vec<FrameEntry> = Vec::new();
+    for record in reader.records() {
+        let record = record
+            .map_err(|error| row_error(path, error.position().map(csv::Position::line), error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let cell = |index: usize| record.get(index).unwrap_or_default();
+        let before = entries.last().and_then(|entry| entry.stamp_ns);
+        let stamp_ns =
+            time_index.map(|(index, unit)| stamp_in(path, line, cell(index), unit, before)).transpose()?;
+        let depth = depth_index.map(|index| picture(path, line, cell(index))).transpose()?;
+        entries.push(FrameEntry { color: picture(path, line, cell(color_index))?, depth, stamp_ns });
+    }
+    Ok((entries, notes))
+}
+
+/// A note about the columns that are not read, unless camsim wrote the table. `read` are indices of columns.
+fn unread_columns_note(path: &Path, header: &csv::StringRecord, read: [Option<usize>; 3]) -> Vec<String> {
+    let is_named = |cell: &str, name: &str| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name);
+    let index_of = |name: &str| header.iter().position(|cell| is_named(cell, name));
+    let frame_index = index_of("frame");
+    if frame_index.is_some() && index_of("stamp_ns").is_some() {
+        return Vec::new();
+    }
     let unread: Vec<&str> = header
         .iter()
         .enumerate()
-        .filter(|(at, _)| !is_own && !read.contains(&Some(*at)))
+        .filter(|(index, _)| !read.contains(&Some(*index)) && frame_index != Some(*index))
         .map(|(_, cell)| cell)
         .collect();
-    let notes = match unread[..] {
+    match unread[..] {
         [] => Vec::new(),
         _ => vec![format!(
             "{}: the columns {} are not read: frames are of t_s, color and depth",
             path.display(),
             unread.join(", ")
         )],
-    };
-    let mut entries: Vec<Entry> = Vec::new();
-    for record in reader.records() {
-        let record = record
-            .map_err(|error| row(path, error.position().map(csv::Position::line), error.to_string()))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let cell = |at: usize| record.get(at).unwrap_or_default();
-        let before = entries.last().and_then(|entry| entry.stamp_ns);
-        let stamp_ns = time_at.map(|(at, unit)| stamp_in(path, line, cell(at), unit, before)).transpose()?;
-        let depth = depth_at.map(|at| picture(path, line, cell(at))).transpose()?;
-        entries.push(Entry { color: picture(path, line, cell(color_at))?, depth, stamp_ns });
     }
-    Ok((entries, notes))
 }
 
-/// Words of the lines that are no comments, with the line's number.
+/// Words of the lines that are no comments, each with its line number.
 fn lines(path: &Path) -> Result<Vec<(u64, Vec<String>)>, FrameFileError> {
     let text = std::fs::read_to_string(path).map_err(|error| {
-        row(path, None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml"))
+        row_error(path, None, format!("cannot be read as text: {error}; paths are relative to FRAME.toml"))
     })?;
-    let words = |line| words_of(line).map(|words| words.into_iter().map(str::to_owned).collect());
+    let words = |line| split_words(line).map(|words| words.into_iter().map(str::to_owned).collect());
     Ok((1..).zip(text.lines()).filter_map(|(number, line)| Some((number, words(line)?))).collect())
 }
 
+/// Parses a stamp in seconds, later than `before`.
 fn stamp(path: &Path, line: u64, text: &str, before: Option<i64>) -> Result<i64, FrameFileError> {
     stamp_in(path, line, text, NameUnit::S, before)
 }
 
-/// Later than the row before.
+/// Parses a stamp in a unit, later than `before`.
 fn stamp_in(
     path: &Path,
     line: u64,
@@ -246,9 +272,9 @@ fn stamp_in(
         ""
     };
     let stamp_ns = nanoseconds(text, unit)
-        .ok_or_else(|| row(path, Some(line), format!("`{text}` is no time{in_seconds}")))?;
+        .ok_or_else(|| row_error(path, Some(line), format!("`{text}` is no time{in_seconds}")))?;
     if before.is_some_and(|before| stamp_ns <= before) {
-        return Err(row(
+        return Err(row_error(
             path,
             Some(line),
             "is not later than the row before; sort by time and leave doubles out",
@@ -257,11 +283,11 @@ fn stamp_in(
     Ok(stamp_ns)
 }
 
-/// A file of a table, from the table's folder; it must be there before the work begins.
+/// Path of a picture that a table names, relative to its folder. The file must exist.
 fn picture(path: &Path, line: u64, name: &str) -> Result<PathBuf, FrameFileError> {
     let file = path.parent().unwrap_or(Path::new("")).join(name);
     if name.is_empty() || !file.is_file() {
-        return Err(row(
+        return Err(row_error(
             path,
             Some(line),
             format!("there is no picture `{}`; paths are relative to this table", file.display()),
@@ -270,7 +296,7 @@ fn picture(path: &Path, line: u64, name: &str) -> Result<PathBuf, FrameFileError
     Ok(file)
 }
 
-/// Exactly, digit by digit: a Unix time has more than an f64 holds.
+/// Parses a time exactly, digit by digit, as an f64 cannot hold Unix time in nanoseconds.
 fn nanoseconds(text: &str, unit: NameUnit) -> Option<i64> {
     let decimals = match unit {
         NameUnit::S => 9,
@@ -285,7 +311,7 @@ fn nanoseconds(text: &str, unit: NameUnit) -> Option<i64> {
         return None;
     }
     let whole: i64 = whole.parse().ok()?;
-    // Below a nanosecond nothing is kept.
+    // Fractions of a nanosecond are cut off.
     let part: String = part.chars().chain(std::iter::repeat('0')).take(decimals).collect();
     let part: i64 = if part.is_empty() { 0 } else { part.parse().ok()? };
     whole.checked_mul(10_i64.pow(decimals as u32))?.checked_add(part).map(|ns| sign * ns)
@@ -296,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_read_to_the_nanosecond() {
+    fn times_are_exact_to_the_nanosecond() {
         assert_eq!(nanoseconds("1305031452.791720", NameUnit::S), Some(1_305_031_452_791_720_000));
         assert_eq!(nanoseconds("1403715282262142976", NameUnit::Ns), Some(1_403_715_282_262_142_976));
         assert_eq!(nanoseconds("-1.5", NameUnit::Ms), Some(-1_500_000));

@@ -8,7 +8,7 @@ use crate::frame_file::{FrameSet, read_frame_set};
 fn set(text: &str) -> Result<Vec<(String, String, Option<i64>)>, String> {
     whole_set(text).map(|(_folder, set)| {
         let name = |path: &std::path::Path| path.file_name().unwrap().to_string_lossy().into_owned();
-        let entry = |entry: &super::Entry| {
+        let entry = |entry: &super::FrameEntry| {
             (name(&entry.color), entry.depth.as_deref().map(name).unwrap_or_default(), entry.stamp_ns)
         };
         assert!(set.is_several());
@@ -48,7 +48,7 @@ fn entry(color: &str, depth: &str, stamp_ns: impl Into<Option<i64>>) -> (String,
 }
 
 #[test]
-fn folders_are_paired_by_name_or_by_time() {
+fn pictures_are_paired_by_name_or_by_time() {
     let names = ["9.97.png", "10.00.png", "10.03.png", "10.50.png"];
     let by_name = set("color = \"rgb/*.png\"\ndepth = \"same/*.png\"\n").unwrap();
     assert_eq!(by_name, names.map(|name| entry(name, name, None)), "by number, not by letter");
@@ -84,7 +84,7 @@ fn lists_and_tables_are_read() {
 }
 
 #[test]
-fn each_frame_moves_about_its_own_stamp() {
+fn motion_is_relative_to_the_stamp_of_each_frame() {
     let text = "frames = \"pairs.txt\"\n[motion]\ntrajectory = \"poses.txt\"\ntrajectory_format = \"tum\"\n";
     let (_folder, set) = whole_set(text).unwrap();
     for (index, stamp_s) in [(0, 9.97), (1, 10.0)] {
@@ -101,7 +101,7 @@ fn each_frame_moves_about_its_own_stamp() {
 }
 
 #[test]
-fn what_does_not_go_together_is_one_clear_error() {
+fn contradictory_keys_are_refused() {
     for (text, expected) in [
         ("", "color: is missing, and has no default; add it, or frames"),
         ("color = \"rgb/*.png\"\ndepth = \"some/*.png\"\n", "10.03.png has none: there is no"),

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A file of version 1, as NumPy pads it.
+/// A `.npy` file of version 1, with the padding of NumPy.
 pub(in crate::frame_file) fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
     let order = if fortran { "True" } else { "False" };
     let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
@@ -13,51 +13,51 @@ pub(in crate::frame_file) fn npy(descr: &str, fortran: bool, shape: &str, data: 
     [b"\x93NUMPY\x01\x00".as_slice(), &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()
 }
 
-fn bytes<const N: usize, T: Copy>(values: &[T], of: fn(T) -> [u8; N]) -> Vec<u8> {
-    values.iter().flat_map(|value| of(*value)).collect()
+fn bytes<const N: usize, T: Copy>(values: &[T], to_bytes: fn(T) -> [u8; N]) -> Vec<u8> {
+    values.iter().flat_map(|value| to_bytes(*value)).collect()
 }
 
 #[test]
-fn every_kind_and_order_of_bytes_is_the_same_array() {
+fn element_types_byte_orders_and_axis_orders_are_read() {
     let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-    let whole: [u16; 6] = [1, 2, 3, 4, 5, 6];
+    let integers: [u16; 6] = [1, 2, 3, 4, 5, 6];
     for (descr, data, is_whole) in [
         ("<f4", bytes(&values, |v| (v as f32).to_le_bytes()), false),
         (">f4", bytes(&values, |v| (v as f32).to_be_bytes()), false),
         ("<f8", bytes(&values, f64::to_le_bytes), false),
         (">f8", bytes(&values, f64::to_be_bytes), false),
         ("<f2", bytes(&values, |v| f16::from_f64(v).to_le_bytes()), false),
-        ("<u2", bytes(&whole, u16::to_le_bytes), true),
-        (">u2", bytes(&whole, u16::to_be_bytes), true),
-        ("<i4", bytes(&whole, |v| i32::from(v).to_le_bytes()), true),
-        (">i8", bytes(&whole, |v| i64::from(v).to_be_bytes()), true),
+        ("<u2", bytes(&integers, u16::to_le_bytes), true),
+        (">u2", bytes(&integers, u16::to_be_bytes), true),
+        ("<i4", bytes(&integers, |v| i32::from(v).to_le_bytes()), true),
+        (">i8", bytes(&integers, |v| i64::from(v).to_be_bytes()), true),
     ] {
         let array = parse(&npy(descr, false, "(2, 3)", &data)).unwrap();
         assert_eq!(
-            (array.values, array.whole, &array.shape[..]),
+            (array.values, array.is_integer, &array.shape[..]),
             (values.to_vec(), is_whole, &[2, 3][..]),
             "{descr}"
         );
     }
-    // By columns: 1 4, 2 5, 3 6.
+    // Column-major order: 1 4, 2 5, 3 6.
     let by_columns = bytes(&[1.0, 4.0, 2.0, 5.0, 3.0, 6.0], f64::to_le_bytes);
     assert_eq!(parse(&npy("<f8", true, "(2, 3)", &by_columns)).unwrap().values, values);
     assert_eq!(parse(&npy("<f8", true, "(2, 3, 1)", &by_columns)).unwrap().values, values);
-    // Three axes, the first fastest.
+    // Column-major order of three axes.
     let cube: Vec<f64> = (0..24).map(f64::from).collect();
-    let found = parse(&npy("<f8", true, "(2, 3, 4)", &bytes(&cube, f64::to_le_bytes))).unwrap().values;
-    assert_eq!((found[0], found[1], found[4], found[12]), (0.0, 6.0, 2.0, 1.0));
+    let values = parse(&npy("<f8", true, "(2, 3, 4)", &bytes(&cube, f64::to_le_bytes))).unwrap().values;
+    assert_eq!((values[0], values[1], values[4], values[12]), (0.0, 6.0, 2.0, 1.0));
 }
 
 #[test]
-fn headers_of_other_versions_are_read() {
+fn headers_of_version_2_are_read() {
     let first = npy("<f4", false, "(1, 1)", &1.5_f32.to_le_bytes());
     let second = [b"\x93NUMPY\x02\x00".as_slice(), &(first[8..10]), &[0, 0], &first[10..]].concat();
     assert_eq!(parse(&second).unwrap().values, [1.5]);
 }
 
 #[test]
-fn what_is_no_picture_is_named() {
+fn unusable_arrays_are_refused() {
     let data = [0; 24];
     for (file, wanted) in [
         (npy("|O", false, "(2, 3)", &data), "elements `|O`"),
@@ -81,7 +81,8 @@ fn what_is_no_picture_is_named() {
     ]
     .concat();
     assert!(parse(&structured).unwrap_err().contains("has no descr"));
-    let plane = |shape: &[usize]| Array { shape: shape.to_vec(), values: Vec::new(), whole: false }.plane();
+    let plane =
+        |shape: &[usize]| NpyArray { shape: shape.to_vec(), values: Vec::new(), is_integer: false }.plane();
     assert_eq!([plane(&[4, 5]), plane(&[4, 5, 1]), plane(&[1, 4, 5])], [Ok([5, 4]), Ok([5, 4]), Ok([5, 4])]);
     assert!(plane(&[4, 5, 3]).unwrap_err().contains("shape [4, 5, 3]") && plane(&[20]).is_err());
 }

@@ -18,12 +18,12 @@ fn first(text: &str, format: TrajectoryFormat) -> [f64; 8] {
 
 const ROW: [f64; 8] = [2.5, 1.0, -2.0, 3.0, 0.5, -0.5, 0.5, 0.5];
 
-fn close(found: [f64; 8]) -> bool {
-    found.iter().zip(ROW).all(|(found, expected)| (found - expected).abs() < 1e-9)
+fn is_expected(values: [f64; 8]) -> bool {
+    values.iter().zip(ROW).all(|(value, expected)| (value - expected).abs() < 1e-9)
 }
 
 #[test]
-fn units_and_order_go_by_the_names_of_columns() {
+fn units_and_order_follow_the_column_names() {
     for text in [
         "t_s,x,y,z,qw,qx,qy,qz\n2.5,1,-2,3,0.5,-0.5,0.5,0.5\n",
         "t_ms,x_mm,y_mm,z_mm,qx,qy,qz,qw\n2500,1000,-2000,3000,-0.5,0.5,0.5,0.5\n",
@@ -31,7 +31,7 @@ fn units_and_order_go_by_the_names_of_columns() {
         "timestamp [us],tx [m],ty [m],tz [m],q_x,q_y,q_z,q_w\n2.5e6,1,-2,3,-0.5,0.5,0.5,0.5\n",
     ] {
         assert!(
-            close(first(text, TrajectoryFormat::Csv)),
+            is_expected(first(text, TrajectoryFormat::Csv)),
             "{text}: {:?}",
             first(text, TrajectoryFormat::Csv)
         );
@@ -44,7 +44,7 @@ fn units_and_order_go_by_the_names_of_columns() {
         "#t_ms, x_mm, y_mm, z_mm, qw, qx, qy, qz\n2500 1000 -2000 3000 0.5 -0.5 0.5 0.5\n",
     ] {
         assert!(
-            close(first(text, TrajectoryFormat::Tum)),
+            is_expected(first(text, TrajectoryFormat::Tum)),
             "{text}: {:?}",
             first(text, TrajectoryFormat::Tum)
         );
@@ -52,7 +52,7 @@ fn units_and_order_go_by_the_names_of_columns() {
 }
 
 #[test]
-fn what_a_table_does_not_say_is_asked_for() {
+fn missing_units_and_ambiguous_columns_are_refused() {
     let q = "qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n";
     for (text, wanted) in [
         (format!("t,x,y,z,{q}"), "p.csv:1: the column `t` does not say its unit: call it t_s, t_ms"),

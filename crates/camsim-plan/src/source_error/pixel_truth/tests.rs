@@ -96,12 +96,13 @@ fn pixel_truth_is_that_of_the_oracle() {
     for pixel in (0..60).flat_map(|y| (0..80).map(move |x| [x, y])) {
         for phase in [0.0, -0.5, 0.3] {
             let [mid, look] = [0.0, phase].map(|phase| view.sample(pixel, DVec2::ZERO, phase).unwrap());
-            let truth = planner.pixel_truth(&plan, pixel, look.uv, phase);
+            let truth = planner.frame_rays(&plan, phase).cast(pixel, look.uv);
             let off_px = truth.source_px.distance(key.source_px(&look));
             assert!(off_px < 1e-8, "{pixel:?} {phase}: {off_px:.1e} px");
             let off_m = match (truth.hit, mid.hit) {
-                (Some((point_m, depth_m)), Some(hit)) => {
-                    point_m.distance(hit.point_ned_m) + (depth_m - hit.depth_m).abs()
+                (Some(found), Some(hit)) => {
+                    assert_eq!(found.surface, hit.surface, "{pixel:?}");
+                    found.point_ned_m.distance(hit.point_ned_m) + (found.depth_m - hit.depth_m).abs()
                 }
                 (None, None) => 0.0,
                 (found, _) => panic!("{pixel:?}: {found:?}, not {:?}", mid.hit),

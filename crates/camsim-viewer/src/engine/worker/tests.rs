@@ -12,28 +12,28 @@ use camsim_io::scenario_file::read_scenario;
 use super::*;
 use crate::tests::harness::pattern;
 
-/// Debug builds on busy processors are slow.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Longest wait for a reply; debug builds are slow.
+const TIMEOUT: Duration = Duration::from_secs(120);
 
-fn wanted(frame: u64) -> Wanted {
+fn request(frame: u64) -> FrameRequest {
     let scenario = Arc::new(read_scenario(&pattern(), &[], None).expect("legal"));
-    Wanted {
+    FrameRequest {
         scenario,
-        reading: 0,
+        reload_count: 0,
         frame,
         stages: vec![Stage::Photometric],
         size: Size::Preview,
-        truth: false,
+        depth: false,
         errors: false,
         gain: None,
     }
 }
 
-/// The next picture, with the faults that were told before it.
-fn next(replies: &Receiver<Reply>) -> (FrameReply, Vec<String>) {
+/// The next frame, with the faults reported before it.
+fn next_frame(replies: &Receiver<Reply>) -> (FrameReply, Vec<String>) {
     let mut faults = Vec::new();
     loop {
-        match replies.recv_timeout(PATIENCE).expect("a reply") {
+        match replies.recv_timeout(TIMEOUT).expect("a reply") {
             Reply::Frame(reply) => return (*reply, faults),
             Reply::Failed(fault) => faults.push(fault),
             _ => {}
@@ -41,37 +41,36 @@ fn next(replies: &Receiver<Reply>) -> (FrameReply, Vec<String>) {
     }
 }
 
-/// A worker's thread on `open`, and what a window has of it.
+/// Runs a worker thread on the engines of `open`, and `test` with its mailbox and replies.
 fn with_worker(
     open: impl Fn() -> Result<Engine, GpuError> + Sync,
-    test: impl FnOnce(&Mailbox<Wanted>, &Receiver<Reply>),
+    test: impl FnOnce(&Mailbox<FrameRequest>, &Receiver<Reply>),
 ) {
     let (sender, replies) = channel();
-    let speaker = Speaker { replies: sender, repaint: Arc::new(|| {}) };
-    let (mailbox, library) = (Mailbox::default(), Library::default());
+    let reply_sender = ReplySender { sender, repaint: Arc::new(|| {}) };
+    let (mailbox, scenarios) = (Mailbox::default(), ScenarioCache::default());
     std::thread::scope(|scope| {
-        // Closed also where the test ends by a panic, or the scope would wait for ever.
-        struct Closing<'a>(&'a Mailbox<Wanted>);
-        impl Drop for Closing<'_> {
+        // Closes the mailbox also if the test panics; otherwise the scope would wait for ever.
+        struct CloseOnDrop<'a>(&'a Mailbox<FrameRequest>);
+        impl Drop for CloseOnDrop<'_> {
             fn drop(&mut self) {
                 self.0.close();
             }
         }
-        let closing = Closing(&mailbox);
-        let voice = speaker;
+        let guard = CloseOnDrop(&mailbox);
         scope.spawn({
-            let (mailbox, library, open) = (&mailbox, &library, &open);
-            move || run_on(open, mailbox, library, &voice)
+            let (mailbox, scenarios, open) = (&mailbox, &scenarios, &open);
+            move || run_on(open, mailbox, scenarios, &reply_sender)
         });
-        test(closing.0, &replies);
+        test(guard.0, &replies);
     });
 }
 
-/// Devices of which the first so many are lost before anything is made on them; counts them.
-fn losing(first: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuError> + Sync {
+/// Opens engines of which the first `lost` have a destroyed device; counts them in `opened`.
+fn with_lost_devices(lost: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuError> + Sync {
     move || {
         let engine = Engine::open(Backend::Gpu)?;
-        if opened.fetch_add(1, Ordering::Relaxed) < first {
+        if opened.fetch_add(1, Ordering::Relaxed) < lost {
             engine.gpu().expect("an adapter").device.destroy();
         }
         Ok(engine)
@@ -80,7 +79,7 @@ fn losing(first: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuErro
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
+fn a_lost_device_is_reported_and_opened_anew_and_the_frame_rendered() {
     let devices = Mutex::new(Vec::new());
     let open = || {
         let engine = Engine::open(Backend::Gpu)?;
@@ -88,17 +87,17 @@ fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
         Ok(engine)
     };
     with_worker(open, |mailbox, replies| {
-        mailbox.put(wanted(0));
-        let (before, faults) = next(replies);
+        mailbox.put(request(0));
+        let (before, faults) = next_frame(replies);
         assert!(faults.is_empty(), "{faults:?}");
         devices.lock().expect("one at a time")[0].destroy();
-        mailbox.put(wanted(1));
-        let (other, faults) = next(replies);
+        mailbox.put(request(1));
+        let (other, faults) = next_frame(replies);
         assert_eq!((other.frame, faults.len()), (1, 1), "{faults:?}");
         assert!(faults[0].contains("lost"), "{faults:?}");
         assert_eq!(devices.lock().expect("one at a time").len(), 2, "opened anew");
-        mailbox.put(wanted(0));
-        let (after, _) = next(replies);
+        mailbox.put(request(0));
+        let (after, _) = next_frame(replies);
         assert_eq!(
             after.pictures[0].frame.color_rgba, before.pictures[0].frame.color_rgba,
             "the same picture as before the loss"
@@ -108,14 +107,14 @@ fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_device_that_is_lost_while_its_session_is_made_is_told_and_the_frame_comes_from_another() {
+fn a_device_lost_during_session_setup_is_reported_and_the_frame_rendered_on_another() {
     let opened = AtomicU32::new(0);
-    with_worker(losing(1, &opened), |mailbox, replies| {
-        mailbox.put(wanted(1));
-        let (reply, faults) = next(replies);
+    with_worker(with_lost_devices(1, &opened), |mailbox, replies| {
+        mailbox.put(request(1));
+        let (reply, faults) = next_frame(replies);
         assert_eq!((reply.frame, opened.load(Ordering::Relaxed), faults.len()), (1, 2, 1), "{faults:?}");
-        match replies.recv_timeout(PATIENCE).expect("a word about it") {
-            Reply::Told(text) => assert!(text.contains("lost"), "{text}"),
+        match replies.recv_timeout(TIMEOUT).expect("a notice") {
+            Reply::Notice(text) => assert!(text.contains("lost"), "{text}"),
             other => panic!("{other:?}"),
         }
     });
@@ -123,31 +122,31 @@ fn a_device_that_is_lost_while_its_session_is_made_is_told_and_the_frame_comes_f
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_frame_that_loses_every_device_is_tried_twice_and_the_thread_goes_on() {
+fn a_frame_that_loses_every_device_is_tried_twice_and_the_thread_continues() {
     let opened = AtomicU32::new(0);
-    with_worker(losing(2, &opened), |mailbox, replies| {
-        mailbox.put(wanted(0));
+    with_worker(with_lost_devices(2, &opened), |mailbox, replies| {
+        mailbox.put(request(0));
         let mut faults = 0;
         while faults < 2 {
-            match replies.recv_timeout(PATIENCE).expect("a reply") {
+            match replies.recv_timeout(TIMEOUT).expect("a reply") {
                 Reply::Failed(_) => faults += 1,
-                Reply::Frame(reply) => panic!("from no device: {reply:?}"),
+                Reply::Frame(reply) => panic!("rendered on a lost device: {reply:?}"),
                 _ => {}
             }
         }
-        mailbox.put(wanted(1));
-        let (reply, more) = next(replies);
+        mailbox.put(request(1));
+        let (reply, more) = next_frame(replies);
         assert_eq!((reply.frame, more.len(), opened.load(Ordering::Relaxed)), (1, 0, 3), "{more:?}");
     });
 }
 
 #[test]
-fn without_an_adapter_every_request_is_told_what_is_missing() {
+fn without_an_adapter_every_request_reports_the_missing_driver() {
     let open = || Err(GpuError::NoAdapter(String::new()));
     with_worker(open, |mailbox, replies| {
         for frame in 0..2 {
-            mailbox.put(wanted(frame));
-            match replies.recv_timeout(PATIENCE).expect("a reply") {
+            mailbox.put(request(frame));
+            match replies.recv_timeout(TIMEOUT).expect("a reply") {
                 Reply::Failed(fault) => assert!(fault.contains("Vulkan"), "{fault}"),
                 other => panic!("{other:?}"),
             }

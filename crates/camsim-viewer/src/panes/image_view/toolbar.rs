@@ -1,44 +1,38 @@
-//! What is shown, and how.
+//! Controls above the picture: comparison, zoom, stages, overlays.
 
 use eframe::egui::{self, Rangef, Role, Ui};
 
-use super::canvas::{self, Placement};
+use super::viewport::{self, ImageViewport};
 use crate::{
     engine::Stage,
     message::{Message, Outbox},
     panes::{
-        numbers::{self, Field},
-        tips::{Aside, Explained},
+        number_field::{self, NumberField},
+        tooltips::{TooltipPlacement, WithTooltip},
         widgets::{choice, named},
     },
     state::State,
     view::{Compare, View},
 };
 
-/// Enlargement of differences.
+/// Range of the gain of differences.
 const GAIN: [f64; 2] = [1.0, 64.0];
 
-/// Lines above the picture.
+/// Draws the lines above the picture.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let mut view = state.view.clone();
-    // As high as it was in the last pass: explanations go below all of it.
+    // The height of the last pass: tooltips go below all lines.
     let top = ui.cursor().top();
     let height: f32 = ui.data(|data| data.get_temp(height())).unwrap_or_default();
-    Aside::Below(Rangef::new(top, top + height)).set(ui.ctx());
+    TooltipPlacement::Below(Rangef::new(top, top + height)).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
         for compare in Compare::ALL {
-            choice(
-                ui,
-                view.compare == compare,
-                compare.label(),
-                compare.label(),
-                "how A and B are held against each other",
-            )
-            .clicked()
-            .then(|| view.compare = compare);
+            choice(ui, view.compare == compare, compare.label(), compare.label(), "how A and B are compared")
+                .clicked()
+                .then(|| view.compare = compare);
         }
         if view.compare == Compare::Difference {
-            let field = Field {
+            let field = NumberField {
                 name: "gain",
                 label: "x",
                 unit: "",
@@ -46,15 +40,14 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
                 speed: 0.1,
                 decimals: 1,
                 whole: false,
-                tip: "of the difference",
+                tip: "gain of the difference",
             };
-            view.gain = numbers::slider(ui, &field, f64::from(view.gain), out) as f32;
+            view.gain = number_field::slider(ui, &field, f64::from(view.gain), out) as f32;
         }
         ui.separator();
         zoom(ui, &mut view);
     });
-    // One below the other, each stage of B below that of A. Overlays have a line of their own, so that the
-    // picture stays where it is.
+    // Stages of B are below those of A. Overlays have their own line, so that the picture does not move.
     ui.horizontal_wrapped(|ui| stages(ui, "A", &mut view.a));
     if view.compare != Compare::Single {
         ui.horizontal_wrapped(|ui| stages(ui, "B", &mut view.b));
@@ -66,72 +59,74 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     }
 }
 
-/// Under which the height of the last pass is found.
+/// egui's data has the height of the last pass under this id.
 fn height() -> egui::Id {
     egui::Id::unique("height of the lines above the picture")
 }
 
-fn stages(ui: &mut Ui, name: &str, of: &mut Stage) {
+/// One choice of stage.
+fn stages(ui: &mut Ui, name: &str, chosen: &mut Stage) {
     ui.strong(name);
     for stage in Stage::ALL {
         let full = format!("{name}: {}", stage.label());
-        if choice(ui, *of == stage, stage.label(), &full, stage.explanation()).clicked() {
-            *of = stage;
+        if choice(ui, *chosen == stage, stage.label(), &full, stage.tooltip()).clicked() {
+            *chosen = stage;
         }
     }
 }
 
-/// Under which the zoom of the last pass is found.
+/// egui's data has the zoom of the last pass under this id.
 fn shown_zoom() -> egui::Id {
     egui::Id::unique("zoom of the picture as it was shown")
 }
 
-/// How large the picture is in this pass, for the line above it in the next one: a fitted picture is as large
-/// as its pane has it.
-pub fn remember(ui: &Ui, placement: Option<&Placement>) {
-    if let Some(placement) = placement {
-        ui.data_mut(|data| data.insert_temp(shown_zoom(), placement.zoom()));
+/// Stores the zoom of this pass for the toolbar of the next one: that of a fitted picture depends on its
+/// pane.
+pub fn store_zoom(ui: &Ui, viewport: Option<&ImageViewport>) {
+    if let Some(viewport) = viewport {
+        ui.data_mut(|data| data.insert_temp(shown_zoom(), viewport.zoom()));
     }
 }
 
 fn zoom(ui: &mut Ui, view: &mut View) {
     let shown: Option<f32> = ui.data(|data| data.get_temp(shown_zoom()));
     let current = view.zoom.or(shown).unwrap_or(1.0);
-    if ui.selectable_label(view.zoom.is_none(), "fit").explained("the whole picture (F)").clicked() {
+    if ui.selectable_label(view.zoom.is_none(), "fit").with_tooltip("the whole picture (F)").clicked() {
         view.zoom = None;
     }
     if ui
         .selectable_label(view.zoom == Some(1.0), "1:1")
-        .explained("a pixel of the screen for each pixel of the picture, whatever the screen's scale (1)")
+        .with_tooltip("one screen pixel per camera pixel, whatever the screen's scale (1)")
         .clicked()
     {
-        *view = canvas::zoomed_in_place(view, 1.0, 1.0);
+        *view = viewport::zoomed_about_middle(view, 1.0, 1.0);
     }
     for (text, name, factor) in [("-", "zoom out", 0.5), ("+", "zoom in", 2.0)] {
-        let button = ui.small_button(text).explained(name);
+        let button = ui.small_button(text).with_tooltip(name);
         named(&button, Role::Button, name);
         if button.clicked() {
-            *view = canvas::zoomed_in_place(view, current, factor);
+            *view = viewport::zoomed_about_middle(view, current, factor);
         }
     }
     if view.zoom.is_some() || shown.is_some() {
         ui.weak(format!("{:.0} %", 100.0 * view.zoom.unwrap_or(current)))
-            .explained("100 %: a pixel of the screen for each pixel of the picture");
+            .with_tooltip("100 %: one screen pixel per camera pixel");
     }
 }
 
 fn overlays(ui: &mut Ui, view: &mut View) {
     let over = &mut view.overlays;
-    ui.weak("over it").explained("what is drawn over the pictures");
+    ui.weak("over it").with_tooltip("overlays of the pictures");
     ui.toggle_value(&mut over.invalid, "invalid")
-        .explained("pixels without a ray, or outside of every ideal frame, in the paper's red (I)");
+        .with_tooltip("pixels without a ray, or outside every ideal frame, in red as in the paper (I)");
     ui.toggle_value(&mut over.grid, "grid")
-        .explained("lines of equal ideal ray: what the lens does to a square grid (G)");
-    ui.toggle_value(&mut over.motion, "motion").explained(
-        "8 times as large: from where each place would be at the stamp to where it is at its row's time (eq. 16, blue), and its way over the exposure (orange) (M)",
+        .with_tooltip("distortion grid: lines of equal u or v of the ideal ray (G)");
+    ui.toggle_value(&mut over.motion, "motion").with_tooltip(
+        "magnified 8 times: displacement from the stamp to the row's time (eq. 16, blue), and path over the \
+         exposure (orange) (M)",
     );
-    ui.toggle_value(&mut over.rows, "row times").explained("mid-exposure of each row after the stamp");
+    ui.toggle_value(&mut over.rows, "row times").with_tooltip("mid-exposure of each row, after the stamp");
     ui.toggle_value(&mut over.error, "predicted error")
-        .explained("colours of the error of source coordinates that is predicted where the plan tried its methods: bright is large");
-    ui.toggle_value(&mut over.depth, "depth").explained("planar depth in place of colour: near is bright");
+        .with_tooltip("predicted source error at the planner's probes: bright is large");
+    ui.toggle_value(&mut over.depth, "depth").with_tooltip("planar depth in place of colour: near is bright");
 }

@@ -1,4 +1,4 @@
-//! What a camera sees of the ground, from above.
+//! Footprint of a camera: the outline of the ground that it sees.
 
 use camsim_core::{
     camera::CameraModel,
@@ -7,24 +7,24 @@ use camsim_core::{
 };
 use glam::{DVec2, DVec3};
 
-/// Directions from the middle of the picture.
+/// Directions from the middle of the picture in which the outline is searched.
 const DIRECTIONS: u32 = 48;
-/// Places along each, from the border inwards, where something is looked for.
-const PLACES: u32 = 12;
-/// Halvings of the way between two of them: to less than a pixel.
-const HALVINGS: u32 = 9;
-/// Surfaces of more triangles are no ground.
+/// Steps of the search along each direction, from the border inwards.
+const STEPS: u32 = 12;
+/// Bisections of a step, to less than a pixel.
+const BISECTIONS: u32 = 9;
+/// Triangles of a flat mesh (pattern or board), at most.
 const FLAT_TRIANGLES: usize = 2;
 
-/// The outermost ground that is seen in directions all around the picture, closed; `None` where there is none
-/// in a direction. Where a lens folds, the picture's corners have no rays, and beyond the horizon or beside
-/// the terrain rays meet nothing: then it is what is seen last.
+/// Outline of the visible ground in directions all around the picture, NED; one run if all directions see
+/// ground. Where outer pixels have no ray (beyond the fold of a lens) or hit nothing (beyond the horizon),
+/// the outline is at the last ground towards the border.
 pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec3>> {
-    let meets = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
+    let ground_point = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
     let mut runs: Vec<Vec<DVec3>> = vec![Vec::new()];
     for k in 0..=DIRECTIONS {
         let angle = std::f64::consts::TAU * f64::from(k % DIRECTIONS) / f64::from(DIRECTIONS);
-        match (outermost(camera, DVec2::from_angle(angle), meets), runs.last_mut()) {
+        match (outermost(camera, DVec2::from_angle(angle), ground_point), runs.last_mut()) {
             (Some(point), Some(run)) => run.push(point),
             (None, Some(run)) if !run.is_empty() => runs.push(Vec::new()),
             _ => {}
@@ -34,30 +34,34 @@ pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<
     runs
 }
 
-/// What `of` says of the ray of the outermost pixel for which it says anything, from the middle of the
-/// picture in a direction of it.
-pub fn outermost<T>(camera: &CameraModel, direction: DVec2, of: impl Fn(DVec2) -> Option<T>) -> Option<T> {
+/// The value of `evaluate` at the ray of the outermost pixel, in a direction from the middle of the picture,
+/// for which it has one.
+pub fn outermost<T>(
+    camera: &CameraModel,
+    direction: DVec2,
+    evaluate: impl Fn(DVec2) -> Option<T>,
+) -> Option<T> {
     let size_px = DVec2::new(f64::from(camera.size_px[0]), f64::from(camera.size_px[1]));
     let half_px = 0.5 * (size_px - 1.0);
     let to_border = (half_px / direction.abs().max(DVec2::splat(1e-12))).min_element();
-    let at = |share: f64| camera.unproject(half_px + share * to_border * direction).and_then(&of);
-    let share = |place: u32| f64::from(place) / f64::from(PLACES);
-    let (place, mut best) = (0..=PLACES).rev().find_map(|place| Some((place, at(share(place))?)))?;
-    if place == PLACES {
+    let value_at = |share: f64| camera.unproject(half_px + share * to_border * direction).and_then(&evaluate);
+    let share = |step: u32| f64::from(step) / f64::from(STEPS);
+    let (step, mut best) = (0..=STEPS).rev().find_map(|step| Some((step, value_at(share(step))?)))?;
+    if step == STEPS {
         return Some(best);
     }
-    let (mut low, mut high) = (share(place), share(place + 1));
-    for _ in 0..HALVINGS {
+    let (mut low, mut high) = (share(step), share(step + 1));
+    for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
-        match at(middle) {
-            Some(found) => (low, best) = (middle, found),
+        match value_at(middle) {
+            Some(value) => (low, best) = (middle, value),
             None => high = middle,
         }
     }
     Some(best)
 }
 
-/// The nearest of terrain, pattern and board along a ray.
+/// The first point of terrain, pattern or board along a ray, NED.
 pub fn ground(scene: &Scene, pose: &CameraPose, direction_ned: DVec3) -> Option<DVec3> {
     let origin = pose.position_ned_m;
     let terrain = scene
@@ -72,7 +76,7 @@ pub fn ground(scene: &Scene, pose: &CameraPose, direction_ned: DVec3) -> Option<
     Some(origin + t * direction_ned)
 }
 
-/// Patterns and boards are two triangles.
+/// Whether a mesh is a pattern or board: two triangles.
 pub fn is_flat(mesh: &Mesh) -> bool {
     mesh.shape.indices.len() <= 3 * FLAT_TRIANGLES
 }
@@ -84,8 +88,8 @@ mod tests {
 
     use super::*;
 
-    /// Straight down from 100 m above a wide level picture.
-    fn above() -> (Scene, CameraPose) {
+    /// A wide level picture, and a camera that looks straight down from 100 m above.
+    fn nadir_view() -> (Scene, CameraPose) {
         let texture = camsim_core::scene::Texture::uniform([255; 4], camsim_core::scene::Encoding::Srgb);
         let level = Mesh::level_picture(std::sync::Arc::new(texture), DVec3::ZERO, 1e4);
         let down =
@@ -104,12 +108,12 @@ mod tests {
     }
 
     #[test]
-    fn straight_down_it_is_the_picture_enlarged() {
-        let (scene, pose) = above();
+    fn nadir_footprint_is_the_scaled_picture() {
+        let (scene, pose) = nadir_view();
         let runs = footprint(&scene, &camera(&[]), &pose);
         let [run] = runs.as_slice() else { panic!("one run: {runs:?}") };
         assert_eq!(run.first(), run.last(), "closed");
-        // 100 m below, a pixel is a metre: half of the picture is 100 x 50 m.
+        // From 100 m a pixel covers 1 m: half the picture is 100 x 50 m.
         for point in run {
             let away = (point.truncate() - DVec2::new(10.0, 20.0)).abs() / DVec2::new(100.0, 50.0);
             assert!((away.max_element() - 1.0).abs() < 1e-9, "{point} on the border of the picture");
@@ -117,8 +121,8 @@ mod tests {
     }
 
     #[test]
-    fn where_a_lens_folds_it_is_what_the_lens_shows() {
-        let (scene, pose) = above();
+    fn footprint_ends_at_the_fold_of_the_lens() {
+        let (scene, pose) = nadir_view();
         // r (1 - r^2 / 4) grows up to r = sqrt(4/3), where it is 0.7698: 77 px of the 100 to the left border.
         let runs = footprint(&scene, &camera(&[-0.25, 0.0, 0.0, 0.0]), &pose);
         let widest = runs.iter().flatten().map(|point| (point.x - 10.0).abs()).fold(0.0, f64::max);
@@ -127,8 +131,8 @@ mod tests {
     }
 
     #[test]
-    fn beside_the_ground_it_is_what_is_seen_last() {
-        let (mut scene, pose) = above();
+    fn footprint_ends_at_the_border_of_the_ground() {
+        let (mut scene, pose) = nadir_view();
         // 60 x 60 m about the origin, the camera above (10, 20): all of it is in the picture, which shows 200
         // x 100 m.
         let texture = camsim_core::scene::Texture::uniform([255; 4], camsim_core::scene::Encoding::Srgb);
@@ -142,8 +146,8 @@ mod tests {
     }
 
     #[test]
-    fn what_looks_at_the_sky_has_none() {
-        let (scene, mut pose) = above();
+    fn a_camera_that_sees_only_sky_has_no_footprint() {
+        let (scene, mut pose) = nadir_view();
         pose.ned_from_camera = DQuat::from_rotation_y(std::f64::consts::PI);
         assert!(footprint(&scene, &camera(&[]), &pose).is_empty());
     }

@@ -1,15 +1,15 @@
-//! An editor for each kind of value.
+//! Editors of values, by kind.
 
-mod names;
+mod labels;
 
 use camsim_core::scenario::LightSpec;
-use camsim_io::scenario_file::Kind;
+use camsim_io::scenario_file::ValueKind;
 use eframe::egui::{self, Role, Ui};
 use toml::Value;
 
 use super::super::{
-    numbers::{Field, number as number_field},
-    tips::Explained,
+    number_field::{NumberField, drag_value},
+    tooltips::WithTooltip,
     widgets::named,
 };
 use crate::{
@@ -18,47 +18,50 @@ use crate::{
     params::Param,
 };
 
-/// What a pass over an editor asks for.
+/// The edit that a pass over an editor made.
 struct Edit {
+    /// The new value; `None` removes the key.
     value: Option<Value>,
-    ongoing: bool,
+    /// Whether a drag is in progress.
+    is_dragged: bool,
 }
 
-/// The editor of a key.
-pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+/// Draws the editor of a key.
+pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param: &Param, out: &mut Outbox) {
     let value = document.value(key);
     let edit = match kind {
-        Kind::Number => number(ui, key, value, param, false, out),
-        Kind::Whole | Kind::Within(..) => number(ui, key, value, param, true, out),
-        Kind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
-        Kind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
-        Kind::Numbers(count) => optional(ui, key, value, document, param, count, out),
-        Kind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
-        Kind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
-        Kind::NumberList => list(ui, document, key, value, param, out),
-        Kind::Path => path(ui, document, key, value),
-        Kind::Flag => flag(ui, key, value),
-        Kind::Word(words) => word(ui, key, value, words),
-        Kind::Words(words) => several(ui, key, value, words),
-        Kind::Text => text(ui, key, value, param),
-        // Lists of texts are of FRAME.toml alone.
-        Kind::Tables | Kind::Later | Kind::Texts => None,
+        ValueKind::Number => number(ui, key, value, param, false, out),
+        ValueKind::Whole | ValueKind::Within(..) => number(ui, key, value, param, true, out),
+        ValueKind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
+        ValueKind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
+        ValueKind::Numbers(count) => optional_numbers(ui, key, value, document, param, count, out),
+        ValueKind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
+        ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
+        ValueKind::NumberList => number_list(ui, document, key, value, param, out),
+        ValueKind::Path => path(ui, document, key, value),
+        ValueKind::Flag => flag(ui, key, value),
+        ValueKind::Word(words) => word(ui, key, value, words),
+        ValueKind::Words(words) => word_list(ui, key, value, words),
+        ValueKind::Text => text(ui, key, value, param),
+        // Lists of texts occur in FRAME.toml only.
+        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts => None,
     };
-    if let Some(Edit { value, ongoing }) = edit {
-        out.push(Message::Set(key.to_owned(), value, ongoing));
+    if let Some(Edit { value, is_dragged }) = edit {
+        out.push(Message::Set(key.to_owned(), value, is_dragged));
     }
 }
 
-fn once(value: Value) -> Option<Edit> {
-    Some(Edit { value: Some(value), ongoing: false })
+/// An edit without drag.
+fn single_edit(value: Value) -> Option<Edit> {
+    Some(Edit { value: Some(value), is_dragged: false })
 }
 
 fn as_f64(value: &Value) -> f64 {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).unwrap_or_default()
 }
 
-/// A value to drag or to type.
-fn drag(
+/// Draws a number field of a parameter.
+fn param_field(
     ui: &mut Ui,
     name: &str,
     label: &str,
@@ -68,7 +71,7 @@ fn drag(
     out: &mut Outbox,
 ) -> Option<(f64, bool)> {
     let Param { unit, range, speed, tip, .. } = *param;
-    number_field(ui, &Field { name, label, unit, range, speed, decimals: 7, whole, tip }, value, out)
+    drag_value(ui, &NumberField { name, label, unit, range, speed, decimals: 7, whole, tip }, value, out)
 }
 
 fn to_value(number: f64, whole: bool) -> Value {
@@ -84,21 +87,22 @@ fn number(
     out: &mut Outbox,
 ) -> Option<Edit> {
     let Some(value) = value else {
-        let add = ui.button("set").explained(param.tip);
+        let add = ui.button("set").with_tooltip(param.tip);
         named(&add, Role::Button, &format!("set {key}"));
-        return add.clicked().then(|| to_value(first_value(param), whole)).and_then(once);
+        return add.clicked().then(|| to_value(first_value(param), whole)).and_then(single_edit);
     };
-    let edit = drag(ui, key, "", as_f64(value), param, whole, out)
-        .map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
+    let edit = param_field(ui, key, "", as_f64(value), param, whole, out)
+        .map(|(number, is_dragged)| Edit { value: Some(to_value(number, whole)), is_dragged });
     let may_be_left_out =
         matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
             || key.starts_with("scene.light.");
     if may_be_left_out && remove(ui, key) {
-        return Some(Edit { value: None, ongoing: false });
+        return Some(Edit { value: None, is_dragged: false });
     }
     edit
 }
 
+/// The value of a key that is newly set.
 fn first_value(param: &Param) -> f64 {
     let light = LightSpec::default();
     match param.key {
@@ -112,13 +116,15 @@ fn first_value(param: &Param) -> f64 {
     }
 }
 
+/// Draws the button that removes a key; returns whether it was clicked.
 fn remove(ui: &mut Ui, key: &str) -> bool {
-    let name = format!("leave out {key}");
-    let button = ui.small_button("x").explained(&name);
+    let name = format!("remove {key}");
+    let button = ui.small_button("x").with_tooltip(&name);
     named(&button, Role::Button, &name);
     button.clicked()
 }
 
+/// A number, or one of the given words.
 fn number_or(
     ui: &mut Ui,
     key: &str,
@@ -131,19 +137,20 @@ fn number_or(
     let value = value?;
     for word in words {
         let is_word = value.as_str() == Some(word);
-        let response = ui.selectable_label(is_word, *word).explained(param.tip);
+        let response = ui.selectable_label(is_word, *word).with_tooltip(param.tip);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
             return if is_word {
-                once(to_value(first_value(param).max(1.0), whole))
+                single_edit(to_value(first_value(param).max(1.0), whole))
             } else {
-                once(Value::String((*word).into()))
+                single_edit(Value::String((*word).into()))
             };
         }
     }
     if value.is_str() { None } else { number(ui, key, Some(value), param, whole, out) }
 }
 
+/// A list of numbers with labels.
 fn numbers(
     ui: &mut Ui,
     document: &Document,
@@ -154,29 +161,29 @@ fn numbers(
     whole: bool,
     out: &mut Outbox,
 ) -> Option<Edit> {
-    let labels = names::of(key, document.scenario.camera.lens.model);
+    let labels = labels::element_labels(key, document.scenario.camera.lens.model);
     let array = value?.as_array()?;
     let mut edit = None;
-    for (at, element) in array.iter().take(count).enumerate() {
-        if let Some((number, ongoing)) = drag(
+    for (index, element) in array.iter().take(count).enumerate() {
+        if let Some((number, is_dragged)) = param_field(
             ui,
-            &format!("{key}[{at}]"),
-            labels.get(at).unwrap_or(&""),
+            &format!("{key}[{index}]"),
+            labels.get(index).unwrap_or(&""),
             as_f64(element),
             param,
             whole,
             out,
         ) {
             let mut changed = array.clone();
-            changed[at] = to_value(number, whole);
-            edit = Some(Edit { value: Some(Value::Array(changed)), ongoing });
+            changed[index] = to_value(number, whole);
+            edit = Some(Edit { value: Some(Value::Array(changed)), is_dragged });
         }
     }
     edit
 }
 
-/// Numbers that may be left out.
-fn optional(
+/// Numbers that may be absent.
+fn optional_numbers(
     ui: &mut Ui,
     key: &str,
     value: Option<&Value>,
@@ -189,12 +196,12 @@ fn optional(
     if value.is_some() {
         let edit = numbers(ui, document, key, value, param, count, false, out);
         return if may_be_left_out && remove(ui, key) {
-            Some(Edit { value: None, ongoing: false })
+            Some(Edit { value: None, is_dragged: false })
         } else {
             edit
         };
     }
-    let add = ui.button("set").explained(param.tip);
+    let add = ui.button("set").with_tooltip(param.tip);
     named(&add, Role::Button, &format!("set {key}"));
     let camera = &document.scenario.camera;
     let start = match key.rsplit('.').next() {
@@ -202,9 +209,10 @@ fn optional(
         Some("window_s") => vec![0.0, 10.0],
         _ => vec![0.0; count],
     };
-    add.clicked().then(|| Value::Array(start.into_iter().map(Value::Float).collect())).and_then(once)
+    add.clicked().then(|| Value::Array(start.into_iter().map(Value::Float).collect())).and_then(single_edit)
 }
 
+/// Numbers, or the given word.
 fn numbers_or(
     ui: &mut Ui,
     document: &Document,
@@ -216,10 +224,10 @@ fn numbers_or(
     out: &mut Outbox,
 ) -> Option<Edit> {
     let is_word = value.is_some_and(Value::is_str);
-    let response = ui.selectable_label(is_word, word).explained(param.tip);
+    let response = ui.selectable_label(is_word, word).with_tooltip(param.tip);
     named(&response, Role::Button, &format!("{key}: {word}"));
     if response.clicked() {
-        return once(if is_word {
+        return single_edit(if is_word {
             Value::Array(vec![Value::Float(0.0); count])
         } else {
             Value::String(word.into())
@@ -228,8 +236,8 @@ fn numbers_or(
     if is_word { None } else { numbers(ui, document, key, value, param, count, false, out) }
 }
 
-/// As many numbers as one likes.
-fn list(
+/// A list of any number of numbers.
+fn number_list(
     ui: &mut Ui,
     document: &Document,
     key: &str,
@@ -240,33 +248,32 @@ fn list(
     let array = value?.as_array()?;
     let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
     let (more, less) =
-        (ui.small_button("+").explained("one more"), ui.small_button("-").explained("one less"));
+        (ui.small_button("+").with_tooltip("one more"), ui.small_button("-").with_tooltip("one less"));
     named(&more, Role::Button, &format!("one more of {key}"));
     named(&less, Role::Button, &format!("one less of {key}"));
     let mut changed = array.clone();
     if more.clicked() {
         changed.push(Value::Float(0.0));
-        edit = once(Value::Array(changed));
+        edit = single_edit(Value::Array(changed));
     } else if less.clicked() && changed.pop().is_some() {
-        edit = once(Value::Array(changed));
+        edit = single_edit(Value::Array(changed));
     }
     edit
 }
 
-/// A path is taken when it has been typed to the end: half a path is no file. Files beside the scenario go by
-/// their names, as in its file.
+/// A path, taken when its field loses focus. Paths in the scenario's folder are shown relative to it.
 fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> Option<Edit> {
     let present = value.and_then(Value::as_str).unwrap_or_default();
     let id = egui::Id::unique(("path", key));
-    let (beside, elsewhere) = (document.beside(present), shortened(present));
-    let resting = if beside.len() < present.len() { beside.clone() } else { elsewhere };
+    let (relative_path, elsewhere) = (document.relative_path(present), shortened(present));
+    let resting = if relative_path.len() < present.len() { relative_path.clone() } else { elsewhere };
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or(resting);
     let response = ui
         .add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none"))
-        .explained(present);
+        .with_tooltip(present);
     named(&response, Role::TextInput, key);
     if response.gained_focus() {
-        ui.data_mut(|data| data.insert_temp(id, beside));
+        ui.data_mut(|data| data.insert_temp(id, relative_path));
         return None;
     }
     if response.has_focus() {
@@ -274,21 +281,24 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
         return None;
     }
     ui.data_mut(|data| data.remove_temp::<String>(id))?;
-    // A field that goes out of sight in the middle of it has not been typed to the end.
-    if !response.lost_focus() || text == beside {
+    // A field that is scrolled out of view is not finished.
+    if !response.lost_focus() || text == relative_path {
         return None;
     }
-    Some(Edit { value: (!text.is_empty()).then(|| Value::String(document.resolved(&text))), ongoing: false })
+    Some(Edit {
+        value: (!text.is_empty()).then(|| Value::String(document.resolved_path(&text))),
+        is_dragged: false,
+    })
 }
 
-/// A text that counts when its field is left; an empty one is left out.
+/// A text, taken when its field loses focus; an empty one removes the key.
 fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
     let present = value.and_then(Value::as_str).unwrap_or_default();
     let id = egui::Id::unique(("text", key));
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
     let response = ui
         .add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none"))
-        .explained(param.tip);
+        .with_tooltip(param.tip);
     named(&response, Role::TextInput, key);
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
@@ -298,22 +308,24 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
     if !response.lost_focus() || text == present {
         return None;
     }
-    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), ongoing: false })
+    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
 }
 
-/// The end of a path: it tells more than its beginning.
+/// A path shortened to its file name.
 fn shortened(path: &str) -> String {
     let name = std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned());
     name.filter(|name| name.len() < path.len()).map_or_else(|| path.to_owned(), |name| format!(".../{name}"))
 }
 
+/// A truth value.
 fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
     let mut on = value.and_then(Value::as_bool).unwrap_or_default();
     let response = ui.checkbox(&mut on, "");
     named(&response, Role::CheckBox, key);
-    response.changed().then_some(Value::Boolean(on)).and_then(once)
+    response.changed().then_some(Value::Boolean(on)).and_then(single_edit)
 }
 
+/// One of the given words.
 fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
     let mut chosen = value.and_then(Value::as_str).unwrap_or_default().to_owned();
     let before = chosen.clone();
@@ -323,10 +335,11 @@ fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option
         }
     });
     named(&combo.response, Role::ComboBox, key);
-    (chosen != before).then_some(Value::String(chosen)).and_then(once)
+    (chosen != before).then_some(Value::String(chosen)).and_then(single_edit)
 }
 
-fn several(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
+/// Several of the given words.
+fn word_list(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
     let array = value?.as_array()?;
     let mut edit = None;
     for word in words {
@@ -334,10 +347,10 @@ fn several(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Opt
         let response = ui.toggle_value(&mut on, *word);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
-            let kept = words.iter().filter(|other| {
+            let selected = words.iter().filter(|other| {
                 if *other == word { on } else { array.iter().any(|e| e.as_str() == Some(other)) }
             });
-            edit = once(Value::Array(kept.map(|word| Value::String((*word).into())).collect()));
+            edit = single_edit(Value::Array(selected.map(|word| Value::String((*word).into())).collect()));
         }
     }
     edit

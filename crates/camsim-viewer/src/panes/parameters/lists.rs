@@ -1,11 +1,11 @@
-//! Lists of tables: vibration, zoom calibrations.
+//! Editors of lists of tables: vibration, zoom calibrations, models.
 
 use camsim_io::scenario_file::keys;
 use eframe::egui::{Role, Ui};
 use toml::{Table, Value};
 
-use super::super::{tips::Explained, widgets::named};
-use super::row_at;
+use super::super::{tooltips::WithTooltip, widgets::named};
+use super::row_with_param;
 use crate::{
     document::Document,
     message::{Message, Outbox},
@@ -13,42 +13,42 @@ use crate::{
     state::State,
 };
 
-/// A list with its entries, one below the other.
+/// Draws a list with its entries, and a button to add one.
 pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mut Outbox) {
     let entries = document.value(key).and_then(Value::as_array).map_or(0, Vec::len);
     let leaf = key.rsplit('.').next().unwrap_or(key);
-    for at in 0..entries {
+    for index in 0..entries {
         ui.horizontal(|ui| {
-            ui.label(format!("{leaf} {}", at + 1));
-            let name = format!("remove {key} {}", at + 1);
-            let remove = ui.small_button("x").explained(&name);
+            ui.label(format!("{leaf} {}", index + 1));
+            let name = format!("remove {key} {}", index + 1);
+            let remove = ui.small_button("x").with_tooltip(&name);
             named(&remove, Role::Button, &name);
             if remove.clicked() {
-                out.push(Message::Set(format!("{key}.{at}"), None, false));
+                out.push(Message::Set(format!("{key}.{index}"), None, false));
             }
         });
-        ui.indent((key, at), |ui| {
+        ui.indent((key, index), |ui| {
             for (element, kind) in keys() {
                 let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else {
                     continue;
                 };
-                if let Some(param) = params::of(element) {
-                    row_at(ui, state, document, &format!("{key}.{at}.{field}"), *kind, param, out);
+                if let Some(param) = params::find(element) {
+                    row_with_param(ui, state, document, &format!("{key}.{index}.{field}"), *kind, param, out);
                 }
             }
         });
     }
-    let tip = params::of(key).map_or("", |param| param.tip);
-    let add = ui.button(format!("add {leaf}")).explained(tip);
+    let tip = params::find(key).map_or("", |param| param.tip);
+    let add = ui.button(format!("add {leaf}")).with_tooltip(tip);
     if add.clicked() {
         let mut list = document.value(key).and_then(Value::as_array).cloned().unwrap_or_default();
-        list.push(Value::Table(fresh(document, key)));
+        list.push(Value::Table(new_entry(document, key)));
         out.push(Message::Set(key.to_owned(), Some(Value::Array(list)), false));
     }
 }
 
-/// A new entry: a little shaking of the pitch, or the camera as it is one zoom further.
-fn fresh(document: &Document, key: &str) -> Table {
+/// A new entry: the present camera at the next zoom value, or slight vibration in pitch.
+fn new_entry(document: &Document, key: &str) -> Table {
     let mut table = Table::new();
     let mut put = |name: &str, value: Value| table.insert(name.to_owned(), value);
     if key == "camera.zoom" {

@@ -1,12 +1,12 @@
-//! Cameras by name.
+//! Camera presets.
 
 use camsim_core::scenario::{CameraSpec, LensModel, LensSpec, ShutterSpec};
 use eframe::egui::{self, Role, Ui};
 
-use super::super::{tips::Explained, widgets::named};
+use super::super::{tooltips::WithTooltip, widgets::named};
 use crate::message::{Message, Outbox};
 
-/// A calibration as its source publishes it.
+/// A published calibration.
 struct Preset {
     name: &'static str,
     source: &'static str,
@@ -33,7 +33,7 @@ const PRESETS: &[Preset] = &[
     },
     Preset {
         name: "small action camera",
-        source: "the built-in flight's: invented numbers of the size that real ones have",
+        source: "the camera of the built-in flight: invented, with realistic values",
         size_px: [640, 480],
         focal_px: [420.0, 421.0],
         principal_point_px: [318.3, 241.2],
@@ -55,7 +55,7 @@ const PRESETS: &[Preset] = &[
     },
     Preset {
         name: "EuRoC MAV cam0",
-        source: "MT9V034 with a global shutter, as the data set's own calibration has it",
+        source: "MT9V034 with a global shutter, by the calibration of the data set",
         size_px: [752, 480],
         focal_px: [458.654, 457.296],
         principal_point_px: [367.215, 248.375],
@@ -83,20 +83,21 @@ impl Preset {
     }
 }
 
-/// The choice; mount, frame rate and phase stay as they are.
+/// Draws the choice of a preset, which keeps mount, frame rate and phase.
 pub fn show(ui: &mut Ui, out: &mut Outbox) {
     let combo =
         egui::ComboBox::from_id_salt("camera preset").selected_text("camera preset").show_ui(ui, |ui| {
             for preset in PRESETS {
-                if ui.selectable_label(false, preset.name).explained(preset.source).clicked() {
+                if ui.selectable_label(false, preset.name).with_tooltip(preset.source).clicked() {
                     out.push(Message::Camera(Box::new(preset.camera())));
                 }
             }
         });
     named(&combo.response, Role::ComboBox, "camera preset");
-    combo
-        .response
-        .explained("a calibration file (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be dropped on the window too");
+    combo.response.with_tooltip(
+        "calibration files (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be \
+         dropped on the window",
+    );
 }
 
 #[cfg(test)]

@@ -1,0 +1,39 @@
+//! The scenarios of the tables.
+
+use std::{path::PathBuf, sync::Arc};
+
+use camsim::{
+    core::sequence::Sequence,
+    io::{load::load_sequence, scenario_file::read_scenario},
+};
+
+use crate::flight::Outcome;
+
+/// The scenario of most tables.
+pub const ALL_EFFECTS: &str = "benches/all_effects.toml";
+/// The terrain with 5000 houses.
+pub const HOUSES: &str = "benches/houses.toml";
+/// Frames of either scenario that are measured.
+pub const FRAMES: u64 = 96;
+
+/// Path of a file in the repository.
+pub fn in_repository(path: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// [`ALL_EFFECTS`] with changed keys.
+pub fn all_effects_with(sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
+    sequence_with(ALL_EFFECTS, sets)
+}
+
+/// A scenario of the repository with changed keys.
+pub fn sequence_with(path: &str, sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
+    let sets: Vec<(String, String)> =
+        sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    Ok(load_sequence(&read_scenario(&in_repository(path), &sets, None)?)?.sequence)
+}
+
+/// [`ALL_EFFECTS`] with the paper's preset.
+pub fn paper_preset() -> Outcome<Arc<Sequence>> {
+    all_effects_with(&[("quality.preset", "\"paper\"".to_owned())])
+}

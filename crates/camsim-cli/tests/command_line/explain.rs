@@ -1,0 +1,79 @@
+//! `camsim explain`.
+
+use super::{assets, camsim, text};
+
+#[test]
+fn explain_prints_the_frame_of_source_coordinates() {
+    let scenario = assets().join("pattern.toml");
+    let (code, out, err) = camsim(["explain", text(&scenario), "--frame", "3", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let (plan, source) = (&explained["plan"], &explained["source_frame"]);
+    assert_eq!(source["ideal_width_px"], plan["ideal_size_px"][0]);
+    assert_eq!(
+        (&source["ideal_fx_px"], &source["ideal_cy_px"]),
+        (&plan["ideal_focal_px"][0], &plan["ideal_principal_px"][1])
+    );
+    let q: Vec<f64> =
+        source["ideal_q_wxyz"].as_array().unwrap().iter().map(|q| q.as_f64().unwrap()).collect();
+    assert!((q.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-9 && source["ideal_t_ns"].is_i64());
+    let (_, out, _) = camsim(["explain", text(&scenario), "--frame", "3"]);
+    let width = &source["ideal_width_px"];
+    assert!(
+        out.contains(&format!("source coordinates (x, y of coords) are in a frame of {width}x"))
+            && out.contains("ned_from_camera w "),
+        "{out}"
+    );
+}
+
+#[test]
+fn predicted_error_is_listed_by_cause() {
+    let scenario = assets().join("pattern.toml");
+    let explain = |more: &[&str]| {
+        let (code, out, err) = camsim([&["explain", text(&scenario)][..], more].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    let out = explain(&[]);
+    assert!(
+        out.contains("predicted source error")
+            && out.contains("within the tolerance")
+            && out.contains("single precision"),
+        "{out}"
+    );
+    let plan_of = |more: &[&str]| {
+        serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"][..], more].concat())).unwrap()["plan"].clone()
+    };
+    let plan = plan_of(&[]);
+    let predicted = &plan["predicted"];
+    let total_px = predicted["total_px"].as_f64().unwrap();
+    assert!(
+        total_px > 0.0
+            && total_px <= 0.05
+            && predicted["source_error_kept"] == true
+            && predicted["source_error_obstacle"].is_null(),
+        "{predicted}"
+    );
+    // The paper's motion model is less accurate, and single precision has a floor: both are listed.
+    let [linear, exact] =
+        ["linear", "reproject"].map(|solver| plan_of(&["--set", &format!("quality.solver={solver}")]));
+    let temporal_px = |plan: &serde_json::Value| plan["predicted"]["temporal_px"].as_f64().unwrap();
+    assert!(temporal_px(&linear) > temporal_px(&exact), "{linear} {exact}");
+    // The picture error has its own tolerance.
+    assert!(
+        predicted["picture_error_kept"] == true && predicted["picture_error_obstacle"].is_null(),
+        "{predicted}"
+    );
+    let coarse = plan_of(&["--set", "quality.max_error_dn=1e-3"]);
+    assert!(
+        coarse["predicted"]["picture_error_kept"] == false
+            && coarse["predicted"]["picture_error_obstacle"].as_str().unwrap().contains("/255"),
+        "{coarse}"
+    );
+    let floor = plan_of(&["--set", "quality.max_error_px=1e-7"]);
+    assert!(
+        floor["predicted"]["source_error_kept"] == false
+            && floor["predicted"]["source_error_obstacle"].as_str().unwrap().contains("the lens inverse"),
+        "{floor}"
+    );
+}

@@ -1,0 +1,458 @@
+//! Where a frame shows a point of the world: projection with a shutter whose rows read at their own instants.
+//!
+//! A row `y` is read at `t(y)`, and a point `X` is seen where its projection at that instant lies in the row:
+//!
+//! ```text
+//! y = project(pose(t(y)), X).y
+//! ```
+//!
+//! This equation is implicit in `y`. It has one solution for a slow camera; none, where the point leaves the
+//! picture before its row is read; and several, where the picture moves faster than the readout. `t` is linear
+//! between the centres of rows and beyond the first and last one. With a sideways readout the same holds for
+//! `x`, and each field of an interlaced frame has an equation of its own.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    camera::CameraModel,
+    mount::CameraPath,
+    pose::CameraPose,
+    shutter::{RowAxis, Shutter},
+};
+
+/// Intervals of the readout in which a solution is looked for, one in each at most: for any camera, and for each
+/// period of its fastest vibration within the readout.
+const INTERVALS: usize = 4;
+const INTERVALS_A_PERIOD: f64 = 12.0;
+const MOST_INTERVALS: usize = 64;
+/// Evaluations that close in on a solution, at most: bisection alone needs 17 for the largest frame.
+const MOST_EVALUATIONS: usize = 40;
+
+/// A point that a camera may see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WorldPoint {
+    /// In NED, metres.
+    At(DVec3),
+    /// Infinitely far away in this direction, NED.
+    Towards(DVec3),
+}
+
+/// Where a frame shows a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImagePoint {
+    /// Pixel coordinates; 0 is the centre of the first pixel.
+    pub px: DVec2,
+    /// Instant at which it is seen, path time, seconds.
+    pub t_s: f64,
+    /// Camera at that instant.
+    pub pose: CameraPose,
+    /// Planar depth in that camera, metres; infinite for a direction.
+    pub depth_m: f64,
+    /// Whether the position is within the picture's outer border. Outside, it is where the camera of the row
+    /// that is read first or last shows the point.
+    pub is_inside: bool,
+    /// Number of positions at which the frame shows the point.
+    pub solutions: u32,
+}
+
+/// Camera of one frame, with the poses of all its rows.
+#[derive(Debug)]
+pub struct FrameCamera {
+    path: Arc<CameraPath>,
+    camera: Arc<CameraModel>,
+    axis: RowAxis,
+    fields: Vec<Field>,
+    intervals: usize,
+}
+
+/// Rows that are read one after the other; columns with a sideways readout.
+#[derive(Debug)]
+struct Field {
+    /// Pixel coordinate of the first row and distance to the next.
+    first_px: f64,
+    step_px: f64,
+    /// Parity of the image rows that belong to the field, where there are two fields.
+    parity: Option<u32>,
+    /// Mid-exposure of each row, path time, seconds.
+    times_s: Vec<f64>,
+    poses: Vec<CameraPose>,
+}
+
+/// A projection at the instant of a row of the readout.
+#[derive(Clone, Copy)]
+struct Projection {
+    px: DVec2,
+    depth_m: f64,
+}
+
+impl FrameCamera {
+    /// Camera of the frame with this stamp.
+    #[must_use]
+    pub fn new(path: Arc<CameraPath>, camera: Arc<CameraModel>, shutter: &Shutter, stamp_s: f64) -> Self {
+        let [columns, rows] = camera.size_px;
+        let axis = shutter.row_axis();
+        let is_interlaced = shutter.interlace_s() > 0.0 && rows > 1;
+        let parities: &[Option<u32>] = if is_interlaced { &[Some(0), Some(1)] } else { &[None] };
+        let field = |&parity: &Option<u32>| {
+            let pixels: Vec<[u32; 2]> = match (axis, parity) {
+                (RowAxis::Rows, Some(parity)) => (parity..rows).step_by(2).map(|y| [0, y]).collect(),
+                (RowAxis::Rows, None) => (0..rows).map(|y| [0, y]).collect(),
+                (RowAxis::Columns, _) => (0..columns).map(|x| [x, parity.unwrap_or(0)]).collect(),
+            };
+            let times_s: Vec<f64> = pixels.iter().map(|&[x, y]| stamp_s + shutter.dt_pixel_s(x, y)).collect();
+            let poses = times_s.iter().map(|&t_s| path.pose(t_s)).collect();
+            let (first_px, step_px) = match (axis, parity) {
+                (RowAxis::Rows, Some(parity)) => (f64::from(parity), 2.0),
+                _ => (0.0, 1.0),
+            };
+            Field { first_px, step_px, parity, times_s, poses }
+        };
+        let fields = parities.iter().map(field).collect();
+        let periods = path.highest_vibration_hz() * shutter.readout_s();
+        let intervals = (INTERVALS + (INTERVALS_A_PERIOD * periods) as usize).min(MOST_INTERVALS);
+        Self { path, camera, axis, fields, intervals }
+    }
+
+    /// Camera of a picture whose pixels all see the same instant.
+    #[must_use]
+    pub fn global(path: Arc<CameraPath>, camera: Arc<CameraModel>, t_s: f64) -> Self {
+        let pose = path.pose(t_s);
+        let field =
+            Field { first_px: 0.0, step_px: 1.0, parity: None, times_s: vec![t_s], poses: vec![pose] };
+        Self { path, camera, axis: RowAxis::Rows, fields: vec![field], intervals: 1 }
+    }
+
+    /// The camera's intrinsics.
+    #[must_use]
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// Where the frame shows a point. Of several positions the one nearest to `near_px` is returned. `None`
+    /// if the point is behind the camera or beyond the reach of its lens.
+    #[must_use]
+    pub fn find(&self, point: WorldPoint, near_px: DVec2) -> Option<ImagePoint> {
+        let seen = self.fields.iter().flat_map(|field| {
+            let solutions = self.solutions(field, point).into_iter();
+            let points = solutions.filter_map(|(row, slope)| self.image_point(field, point, row, slope));
+            points.filter(|seen| seen.is_inside).map(|seen| (field.has_row(seen.px.y), seen))
+        });
+        let seen: Vec<(bool, ImagePoint)> = seen.collect();
+        let on_own_rows = seen.iter().filter(|(is_own, _)| *is_own).count();
+        // A point may pass between the rows of both fields. It is then in the field that it is nearest to.
+        let counts = |is_own: bool| is_own || on_own_rows == 0;
+        let nearest = seen
+            .iter()
+            .filter(|(is_own, _)| counts(*is_own))
+            .map(|(_, seen)| seen)
+            .min_by(|a, b| a.px.distance_squared(near_px).total_cmp(&b.px.distance_squared(near_px)));
+        match nearest {
+            Some(nearest) => Some(ImagePoint { solutions: on_own_rows.max(1) as u32, ..*nearest }),
+            None => self.outside(point, near_px),
+        }
+    }
+
+    /// Fractional rows of a field at which it shows a point, with the movement of the projection from row to
+    /// row there.
+    fn solutions(&self, field: &Field, point: WorldPoint) -> Vec<(f64, DVec2)> {
+        let last = field.poses.len() - 1;
+        let at = |row: usize| self.project(&field.poses[row], point);
+        if last == 0 || field.is_global() {
+            let row = at(0).map(|seen| (field.row_of(self.along(seen.px)), DVec2::ZERO));
+            return row.into_iter().collect();
+        }
+        let mut rows = Vec::new();
+        let mut before: Option<(usize, Projection)> = None;
+        let miss = |row: usize, seen: &Projection| field.row_of(self.along(seen.px)) - row as f64;
+        for i in 0..=self.intervals {
+            let row = i * last / self.intervals;
+            let here = at(row).map(|seen| (row, seen));
+            if let (Some(low), Some(high)) = (before, here)
+                && low.0 < high.0
+                && (miss(low.0, &low.1) >= 0.0) != (miss(high.0, &high.1) >= 0.0)
+            {
+                rows.extend(self.between(field, point, low, high));
+            }
+            before = here;
+        }
+        // Half a row before the first and behind the last one belongs to these.
+        let beyond = |[inner, outer]: [usize; 2]| {
+            let (near, end) = (at(inner)?, at(outer)?);
+            let slope = if inner > outer { near.px - end.px } else { end.px - near.px };
+            let miss = miss(outer, &end);
+            let row = outer as f64 + miss / (1.0 - self.along(slope) / field.step_px);
+            let is_there = if outer == 0 {
+                (-0.5..0.0).contains(&row)
+            } else {
+                (0.0..0.5).contains(&(row - last as f64))
+            };
+            is_there.then_some((row, slope))
+        };
+        rows.extend(beyond([1, 0]));
+        rows.extend(beyond([last - 1, last]));
+        rows
+    }
+
+    /// The solution between two rows whose misses differ in sign.
+    fn between(
+        &self,
+        field: &Field,
+        point: WorldPoint,
+        mut low: (usize, Projection),
+        mut high: (usize, Projection),
+    ) -> Option<(f64, DVec2)> {
+        let miss = |(row, seen): &(usize, Projection)| field.row_of(self.along(seen.px)) - *row as f64;
+        for i in 0..MOST_EVALUATIONS {
+            let (below, above) = (miss(&low), miss(&high));
+            let share = if below == above { 0.5 } else { below / (below - above) };
+            if high.0 - low.0 == 1 {
+                return Some((low.0 as f64 + share, high.1.px - low.1.px));
+            }
+            // The secant, and the middle each third time.
+            let share = if i % 3 == 2 { 0.5 } else { share };
+            let row = low.0 + (share * (high.0 - low.0) as f64).round() as usize;
+            let row = row.clamp(low.0 + 1, high.0 - 1);
+            let middle = (row, self.project(&field.poses[row], point)?);
+            if (miss(&middle) >= 0.0) == (below >= 0.0) { low = middle } else { high = middle }
+        }
+        None
+    }
+
+    /// The point as it is seen at a fractional row, corrected once by the movement from row to row.
+    fn image_point(&self, field: &Field, point: WorldPoint, row: f64, slope: DVec2) -> Option<ImagePoint> {
+        let first = self.project(&self.path.pose(field.time_s(row)), point)?;
+        let miss = field.row_of(self.along(first.px)) - row;
+        let row = row + miss / (1.0 - self.along(slope) / field.step_px);
+        let t_s = field.time_s(row);
+        let pose = self.path.pose(t_s);
+        let seen = self.project(&pose, point)?;
+        Some(self.seen(t_s, pose, seen))
+    }
+
+    /// A point that no row shows, as the camera of the row nearest to it sees it.
+    fn outside(&self, point: WorldPoint, near_px: DVec2) -> Option<ImagePoint> {
+        let seen = self.fields.iter().flat_map(|field| {
+            [0, field.poses.len() - 1].into_iter().filter_map(move |row| {
+                let seen = self.project(&field.poses[row], point)?;
+                let found = self.seen(field.times_s[row], field.poses[row], seen);
+                let miss = (field.row_of(self.along(seen.px)) - row as f64).abs();
+                Some((miss, ImagePoint { is_inside: false, ..found }))
+            })
+        });
+        let key = |(miss, found): &(f64, ImagePoint)| (*miss, found.px.distance(near_px));
+        let nearest = seen.min_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        nearest.map(|(_, found)| found)
+    }
+
+    fn seen(&self, t_s: f64, pose: CameraPose, Projection { px, depth_m }: Projection) -> ImagePoint {
+        let [width, height] = self.camera.size_px.map(f64::from);
+        let is_inside = px.cmpge(DVec2::splat(-0.5)).all() && px.cmplt(DVec2::new(width, height) - 0.5).all();
+        ImagePoint { px, t_s, pose, depth_m, is_inside, solutions: 0 }
+    }
+
+    fn project(&self, pose: &CameraPose, point: WorldPoint) -> Option<Projection> {
+        let camera_from_ned = pose.ned_from_camera.conjugate();
+        let (ray, scale) = match point {
+            WorldPoint::At(point_ned_m) => (camera_from_ned * (point_ned_m - pose.position_ned_m), 1.0),
+            WorldPoint::Towards(direction_ned) => (camera_from_ned * direction_ned, f64::INFINITY),
+        };
+        if ray.z.is_nan() || ray.z <= 0.0 {
+            return None;
+        }
+        let uv = ray.truncate() / ray.z;
+        self.camera.lens.contains(uv).then(|| Projection {
+            px: self.camera.project(uv),
+            depth_m: if scale.is_finite() { ray.z } else { f64::INFINITY },
+        })
+    }
+
+    /// Pixel coordinate across the rows of the readout.
+    fn along(&self, px: DVec2) -> f64 {
+        match self.axis {
+            RowAxis::Rows => px.y,
+            RowAxis::Columns => px.x,
+        }
+    }
+}
+
+impl Field {
+    fn is_global(&self) -> bool {
+        self.times_s.first() == self.times_s.last()
+    }
+
+    /// Fractional row at a pixel coordinate.
+    fn row_of(&self, px: f64) -> f64 {
+        (px - self.first_px) / self.step_px
+    }
+
+    /// Instant of a fractional row.
+    fn time_s(&self, row: f64) -> f64 {
+        let [first, last] = [self.times_s[0], self.times_s[self.times_s.len() - 1]];
+        match self.times_s.len() {
+            1 => first,
+            count => first + (last - first) * row / (count - 1) as f64,
+        }
+    }
+
+    /// Whether the image row nearest to a pixel coordinate belongs to the field.
+    fn has_row(&self, y_px: f64) -> bool {
+        self.parity.is_none_or(|parity| (y_px.round() as i64).rem_euclid(2) == i64::from(parity))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use glam::DQuat;
+
+    use super::*;
+    use crate::{
+        pose::BodyState,
+        scenario::{Axis, FieldOr, LensModel, MountSpec, Readout, ShutterSpec, VibrationSpec},
+        trajectory::Trajectory,
+    };
+
+    const SIZE_PX: [u32; 2] = [64, 48];
+
+    fn path(vibration_deg: f64) -> Arc<CameraPath> {
+        let first = BodyState {
+            position_ned_m: DVec3::new(0.0, 0.0, -50.0),
+            velocity_ned_m_s: DVec3::new(20.0, 5.0, 1.0),
+            acceleration_ned_m_s2: DVec3::ZERO,
+            ned_from_body: DQuat::IDENTITY,
+            rate_body_rad_s: DVec3::new(0.2, -0.1, 0.3),
+            angular_acceleration_body_rad_s2: DVec3::ZERO,
+        };
+        let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
+        let vibration = VibrationSpec {
+            axis: Axis::Pitch,
+            amplitude_deg: vibration_deg,
+            amplitude_m: 0.0,
+            hz: 30.0,
+            phase_deg: 0.0,
+        };
+        let spec =
+            MountSpec { angles_deg: [0.0, -40.0, 0.0], vibration: vec![vibration], ..MountSpec::default() };
+        Arc::new(CameraPath::new(trajectory, &spec).unwrap())
+    }
+
+    fn camera() -> Arc<CameraModel> {
+        let coefficients = [-0.2, 0.05, 0.001, -0.002];
+        let camera =
+            CameraModel::new(SIZE_PX, [50.0, 52.0], None, LensModel::BrownConrady, &coefficients).unwrap();
+        Arc::new(camera)
+    }
+
+    fn shutter(spec: ShutterSpec) -> Shutter {
+        Shutter::from_spec(&spec, 30.0, SIZE_PX).unwrap()
+    }
+
+    fn points() -> impl Iterator<Item = WorldPoint> {
+        (0..400).map(|i| {
+            let (north, east) = (f64::from(i % 20) * 6.0 - 10.0, f64::from(i / 20) * 6.0 - 60.0);
+            if i % 7 == 0 {
+                WorldPoint::Towards(DVec3::new(60.0, east, f64::from(i % 5) * 20.0))
+            } else {
+                WorldPoint::At(DVec3::new(north + 30.0, east, 0.0))
+            }
+        })
+    }
+
+    /// All solutions on a grid of instants: rows at which the miss changes its sign.
+    fn search(frame: &FrameCamera, field: &Field, point: WorldPoint) -> Vec<DVec2> {
+        let last = field.poses.len() as f64 - 1.0;
+        let steps = 40 * field.poses.len();
+        let miss = |i: usize| {
+            let row = -0.5 + (last + 1.0) * i as f64 / steps as f64;
+            let seen = frame.project(&frame.path.pose(field.time_s(row)), point)?;
+            Some((field.row_of(frame.along(seen.px)) - row, seen.px))
+        };
+        let mut found = Vec::new();
+        for i in 0..steps {
+            if let (Some(a), Some(b)) = (miss(i), miss(i + 1))
+                && (a.0 >= 0.0) != (b.0 >= 0.0)
+            {
+                found.push(a.1.lerp(b.1, a.0 / (a.0 - b.0)));
+            }
+        }
+        let [width, height] = SIZE_PX.map(f64::from);
+        found.retain(|px| px.min_element() >= -0.5 && px.x < width - 0.5 && px.y < height - 0.5);
+        found
+    }
+
+    #[test]
+    fn points_are_found_where_a_search_of_all_instants_finds_them() {
+        let readouts =
+            [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft];
+        let mut inside = 0;
+        for (direction, vibration_deg) in readouts.into_iter().flat_map(|d| [(d, 0.0), (d, 0.4)]) {
+            let spec = ShutterSpec { readout_ms: 30.0, readout: direction, ..ShutterSpec::default() };
+            let frame = FrameCamera::new(path(vibration_deg), camera(), &shutter(spec), 0.5);
+            for point in points() {
+                let expected = search(&frame, &frame.fields[0], point);
+                let near_px = DVec2::new(30.0, 20.0);
+                let found = frame.find(point, near_px).filter(|found| found.is_inside);
+                assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{point:?}");
+                if let Some(found) = found {
+                    let off_px =
+                        expected.iter().map(|px| px.distance(found.px)).fold(f64::INFINITY, f64::min);
+                    assert!(off_px < 1e-4, "{direction:?} {point:?}: {off_px:.1e} px");
+                    inside += 1;
+                }
+            }
+        }
+        assert!(inside > 500, "{inside}");
+    }
+
+    #[test]
+    fn a_fast_picture_shows_a_point_several_times_or_never() {
+        // Fifteen degrees thirty times a second: the picture moves faster than the readout.
+        let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+        let frame = FrameCamera::new(path(15.0), camera(), &shutter(spec), 0.5);
+        let counts = points().filter_map(|point| {
+            let found = frame.find(point, DVec2::ZERO)?;
+            found.is_inside.then(|| (found.solutions as usize, search(&frame, &frame.fields[0], point)))
+        });
+        let counts: Vec<(usize, Vec<DVec2>)> = counts.collect();
+        let several = counts.iter().filter(|(_, expected)| expected.len() > 1).count();
+        let right = counts.iter().filter(|(found, expected)| *found == expected.len()).count();
+        assert!(several > 20 && right * 100 > 98 * counts.len(), "{several} {right} {}", counts.len());
+    }
+
+    #[test]
+    fn interlaced_rows_belong_to_their_own_field() {
+        let spec =
+            ShutterSpec { readout_ms: 10.0, interlace_ms: FieldOr::Ms(15.0), ..ShutterSpec::default() };
+        let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
+        let mut of_field = [0, 0];
+        for point in points() {
+            let Some(found) = frame.find(point, DVec2::ZERO).filter(|found| found.is_inside) else {
+                continue;
+            };
+            let field = frame.fields.iter().position(|field| {
+                let row = field.row_of(found.px.y);
+                (field.time_s(row) - found.t_s).abs() < 1e-9
+            });
+            let field = field.unwrap();
+            of_field[field] += usize::from(frame.fields[field].has_row(found.px.y));
+        }
+        assert!(of_field.iter().all(|&count| count > 30), "{of_field:?}");
+    }
+
+    #[test]
+    fn a_global_shutter_shows_a_point_where_its_camera_projects_it() {
+        let frame = FrameCamera::global(path(0.4), camera(), 0.5);
+        let pose = frame.path.pose(0.5);
+        for point in points() {
+            let expected = frame.project(&pose, point);
+            let found = frame.find(point, DVec2::ZERO);
+            assert_eq!(found.map(|found| found.px), expected.map(|seen| seen.px));
+        }
+    }
+}

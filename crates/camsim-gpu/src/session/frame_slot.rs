@@ -1,0 +1,91 @@
+//! Buffers of the frames in flight.
+
+use camsim_core::sequence::Sequence;
+
+use super::{FRAMES_IN_FLIGHT, readback::ReadbackBuffer};
+use crate::{
+    context::GpuContext,
+    ideal::{IdealSlot, IdealTarget},
+    layout::{FrameUniforms, Truth},
+    recorder::PassClock,
+    reverse::{ReverseBindGroups, list_size},
+    staging::Staging,
+};
+
+/// Textures of ideal frames, and the bind groups with which each frame in flight reads them.
+#[derive(Debug)]
+pub(super) struct SessionTarget {
+    pub ideal: IdealTarget,
+    pub groups: [ReverseBindGroups; FRAMES_IN_FLIGHT],
+}
+
+/// Buffers of one frame in flight.
+#[derive(Debug)]
+pub(super) struct FrameSlot {
+    /// Staging memory for the frame's uploads; created with the first frame.
+    pub staging: Option<Staging>,
+    /// One per ideal frame, as many as any frame has needed so far.
+    pub ideal: Vec<IdealSlot>,
+    pub frame: wgpu::Buffer,
+    pub poses: wgpu::Buffer,
+    pub color: ReadbackBuffer,
+    pub truth: Option<ReadbackBuffer>,
+    pub clock: Option<PassClock>,
+}
+
+impl FrameSlot {
+    pub fn new(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Self {
+        let [width, height] = sequence.scenario.camera.size_px.map(u64::from);
+        let frame = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camsim.frame"),
+            size: size_of::<FrameUniforms>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self {
+            staging: None,
+            ideal: Vec::new(),
+            frame,
+            poses: pose_buffer(gpu, 48 * width.max(height)),
+            color: ReadbackBuffer::new(gpu, "camsim.color", 16 * width * height),
+            truth: truth.then(|| {
+                ReadbackBuffer::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)
+            }),
+            clock: None,
+        }
+    }
+
+    /// To be called after submission: requests the mapping of the buffers that the CPU reads, the outputs
+    /// only if the frame has any, and of the staging memory.
+    pub fn request_mapping(&mut self, has_outputs: bool) {
+        let outputs = has_outputs
+            .then(|| std::iter::once(&self.color).chain(&self.truth))
+            .into_iter()
+            .flatten()
+            .map(|output| &output.cpu_buffer);
+        for cpu_buffer in outputs.chain(self.clock.as_ref().map(PassClock::cpu_buffer)) {
+            // A failed mapping shows when the range is read.
+            cpu_buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        self.staging.iter_mut().for_each(Staging::request_mapping);
+    }
+}
+
+/// Buffer of at least this size: a power of two, so that few frames need a larger one.
+pub(super) fn pose_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.poses"),
+        size: bytes.next_power_of_two(),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+pub(super) fn list_buffer(gpu: &GpuContext, label: &str, size_px: [u32; 2]) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: list_size(size_px),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}

@@ -1,0 +1,111 @@
+//! Copies of ideal frames in memory that the CPU reads.
+
+use camsim_core::temporal::IdealGeometry;
+
+use super::readback::TextureReadback;
+use crate::{
+    context::{GpuContext, GpuError},
+    ideal::IdealTarget,
+    recorder::Recorder,
+};
+
+/// Number of copies: one for the frame at work, one for the frame in flight after it.
+const COPY_COUNT: usize = 2;
+/// Size of a colour texel, four half floats, and of a depth texel, a float, bytes.
+const COLOR_BYTES: usize = 8;
+const DEPTH_BYTES: usize = 4;
+
+/// Handle of a copy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdealCopy(usize);
+
+/// An ideal frame in memory.
+#[derive(Clone, Copy, Debug)]
+pub struct CopiedIdeal<'a> {
+    /// Linear R G B A, half floats.
+    pub color: &'a [u16],
+    /// Texels from one row of `color` to the next.
+    pub color_stride: u32,
+    /// `near / z`, 0 = sky.
+    pub depth: &'a [f32],
+    /// Texels from one row of `depth` to the next.
+    pub depth_stride: u32,
+}
+
+#[derive(Debug)]
+struct CopyBuffers {
+    color: TextureReadback,
+    depth: TextureReadback,
+}
+
+/// Copies, mapped from their submission until they are reused.
+#[derive(Debug)]
+pub(super) struct IdealCopies {
+    copies: [CopyBuffers; COPY_COUNT],
+    last: usize,
+    /// Index of the copy that the current commands write.
+    recorded: Option<usize>,
+}
+
+impl IdealCopies {
+    pub fn new(gpu: &GpuContext) -> Self {
+        let copies = [(); COPY_COUNT].map(|()| CopyBuffers {
+            color: TextureReadback::empty(gpu, "camsim.ideal_color"),
+            depth: TextureReadback::empty(gpu, "camsim.ideal_depth"),
+        });
+        Self { copies, last: 0, recorded: None }
+    }
+
+    /// Drops the copy that was recorded but never submitted.
+    pub fn forget(&mut self) {
+        self.recorded = None;
+    }
+
+    /// Records the copy of an ideal frame.
+    pub fn record(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        target: &IdealTarget,
+        ideal: &IdealGeometry,
+    ) -> IdealCopy {
+        // The frame in flight may still read the other copy.
+        self.last = (self.last + 1) % COPY_COUNT;
+        let copy = &mut self.copies[self.last];
+        // Depth textures can only be copied whole.
+        let whole_px = [target.depth.width(), target.depth.height()];
+        for (rows, size_px, texture, texel_bytes) in [
+            (&mut copy.color, ideal.size_px, &target.color, COLOR_BYTES),
+            (&mut copy.depth, whole_px, &target.depth, DEPTH_BYTES),
+        ] {
+            rows.fit(gpu, size_px, texel_bytes);
+            rows.copy(recorder.encoder(), texture);
+        }
+        self.recorded = Some(self.last);
+        IdealCopy(self.last)
+    }
+
+    /// Requests the mapping of the copy in the submitted commands.
+    pub fn request_mapping(&mut self) {
+        if let Some(copy) = self.recorded.take().map(|copy| &mut self.copies[copy]) {
+            copy.color.request_mapping();
+            copy.depth.request_mapping();
+        }
+    }
+
+    pub fn read<R>(
+        &self,
+        IdealCopy(copy): IdealCopy,
+        read: impl FnOnce(CopiedIdeal<'_>) -> R,
+    ) -> Result<R, GpuError> {
+        let copy = &self.copies[copy];
+        let (color, depth) = (copy.color.view()?, copy.depth.view()?);
+        let to_error = |error: bytemuck::PodCastError| GpuError::Device(error.to_string());
+        Ok(read(CopiedIdeal {
+            color: bytemuck::try_cast_slice(&color).map_err(to_error)?,
+            color_stride: copy.color.stride_bytes / COLOR_BYTES as u32,
+            depth: bytemuck::try_cast_slice(&depth).map_err(to_error)?,
+            depth_stride: copy.depth.stride_bytes / DEPTH_BYTES as u32,
+        }))
+    }
+}

@@ -1,0 +1,91 @@
+//! Clock rollover: times that restart at midnight, at the end of the GPS week, or where a 32-bit counter
+//! overflows.
+
+use camsim_core::flight_log::Note;
+
+use super::rows::ParsedRow;
+
+const DAY_NS: i128 = 86_400_000_000_000;
+const MINUTE_NS: i128 = 60_000_000_000;
+
+/// Periods after which a clock rolls over, in nanoseconds, with their names in messages.
+const ROLLOVER_PERIODS: [(i128, &str); 4] = [
+    (DAY_NS, "a day: midnight"),
+    (7 * DAY_NS, "a week of GPS time"),
+    (4_294_967_296_000, "a counter of 32 bits for microseconds"),
+    (4_294_967_296_000_000, "a counter of 32 bits for milliseconds"),
+];
+
+/// Adds one rollover period wherever the clock restarts. Times are nanoseconds in the file's order. A clock
+/// time of day (`is_clock_of_day`) rolls over at midnight only.
+///
+/// A rollover is a fall by more than half a period, to a time that continues the clock within one minute or
+/// 20 median steps. Other falls are rows out of order, which are sorted later.
+pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, notes: &mut Vec<Note>) {
+    let times_ns: Vec<i128> = rows.iter().filter_map(|row| row.time).collect();
+    let (Some(&min_ns), Some(&max_ns)) = (times_ns.iter().min(), times_ns.iter().max()) else { return };
+    let mut steps_ns: Vec<i128> =
+        times_ns.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0).collect();
+    steps_ns.sort_unstable();
+    let median_step_ns = steps_ns.get(steps_ns.len() / 2).copied().unwrap_or(0);
+    let max_step_ns = MINUTE_NS.max(20 * median_step_ns);
+    let rolls_over = |before_ns: i128, after_ns: i128, period_ns: i128| {
+        let step_ns = after_ns + period_ns - before_ns;
+        before_ns - after_ns > period_ns / 2 && step_ns > 0 && (step_ns <= max_step_ns || is_clock_of_day)
+    };
+    let candidates = if is_clock_of_day { 1 } else { ROLLOVER_PERIODS.len() };
+    let period = ROLLOVER_PERIODS.into_iter().take(candidates).find(|&(period_ns, _)| {
+        min_ns >= 0
+            && max_ns <= period_ns
+            && times_ns.windows(2).any(|pair| rolls_over(pair[0], pair[1], period_ns))
+    });
+    let Some((period_ns, period_name)) = period else { return };
+    let (mut rollovers, mut before_ns, mut lines) = (0, None, Vec::new());
+    for row in rows.iter_mut() {
+        let Some(time_ns) = row.time else { continue };
+        if before_ns.is_some_and(|before_ns| rolls_over(before_ns, time_ns, period_ns)) {
+            rollovers += 1;
+            lines.push(row.line.to_string());
+        }
+        before_ns = Some(time_ns);
+        row.time = Some(time_ns + rollovers * period_ns);
+    }
+    lines.truncate(8);
+    notes.push(Note {
+        is_warning: true,
+        text: format!(
+            "the clock begins again at line {}, after {period_name}: the times go on from there",
+            lines.join(", ")
+        ),
+    });
+}
+
+/// With fewer rows than this before or after it, a fall of the times is an outlier, not a second flight.
+const MIN_FLIGHT_ROWS: usize = 3;
+/// With more falls than this the rows are unsorted, not several flights.
+const MAX_FALLS: usize = 3;
+
+/// Refuses a file with two flights, which sorting by time would interleave.
+///
+/// # Errors
+/// The times fall by more than half of their span, with enough rows that have a position on both sides.
+pub(super) fn check_single_flight(rows: &[ParsedRow]) -> Result<(), String> {
+    let timed: Vec<(i128, usize)> = rows
+        .iter()
+        .filter(|row| row.has_position())
+        .filter_map(|row| row.time.map(|time| (time, row.line)))
+        .collect();
+    let times = || timed.iter().map(|(time, _)| *time);
+    let (Some(min_ns), Some(max_ns)) = (times().min(), times().max()) else { return Ok(()) };
+    let falls: Vec<usize> =
+        (1..timed.len()).filter(|&row| timed[row - 1].0 - timed[row].0 > (max_ns - min_ns) / 2).collect();
+    let is_between = |&&fall: &&usize| fall >= MIN_FLIGHT_ROWS && timed.len() - fall >= MIN_FLIGHT_ROWS;
+    match falls.iter().find(is_between) {
+        Some(&fall) if falls.len() <= MAX_FALLS => Err(format!(
+            "the times begin again at line {}: if there are several flights in the file, keep one; if it is \
+                one, sort its rows by time",
+            timed[fall].1
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,395 @@
+//! Selection of the columns of a header that hold time, position and attitude.
+
+use camsim_core::{
+    flight_log::Note,
+    scenario::{AttitudeSource, FlightSpec, LogFormat},
+};
+
+use super::{
+    column_meaning::ColumnMeaning,
+    column_names,
+    columns::{AttitudeColumns, FieldSource, Frame, TimeColumns, format_name},
+    header::HeaderColumns,
+    height_column::{height_column, is_height},
+    text_table::{Separator, Table},
+};
+
+fn is_time(meaning: ColumnMeaning) -> bool {
+    matches!(meaning, ColumnMeaning::Time | ColumnMeaning::DateTime | ColumnMeaning::NanosecondsPart)
+}
+
+/// Whether the names include a time and a position, whatever else is wrong with them.
+pub(super) fn has_time_and_position(header: &HeaderColumns) -> bool {
+    use ColumnMeaning::*;
+    let any = |condition: &dyn Fn(ColumnMeaning) -> bool| !header.columns_where(condition).is_empty();
+    let has = |meaning: ColumnMeaning| any(&|other| other == meaning);
+    let has_horizontal = (has(Latitude) && has(Longitude))
+        || has(LatitudeLongitude)
+        || (has(North) && has(East))
+        || (has(X) && has(Y));
+    any(&is_time)
+        && ((has_horizontal && (any(&is_height) || has(Down) || has(Z))) || any(&|meaning| meaning == Grid))
+}
+
+/// Message for a header without a time or a position.
+pub(super) fn missing_columns_message(header: &HeaderColumns) -> String {
+    let names: Vec<&str> = header.0.iter().map(|column| column.name.as_str()).collect();
+    format!(
+        "the columns `{}` name no time and position; name t and lat, lon, alt, or t and north, east, down \
+            (or alt), or t and x, y, z",
+        names.join(", ")
+    )
+}
+
+/// Adds a note.
+pub(super) fn push_information(notes: &mut Vec<Note>, text: String) {
+    notes.push(Note { is_warning: false, text });
+}
+
+/// Adds a warning.
+pub(super) fn push_warning(notes: &mut Vec<Note>, text: String) {
+    notes.push(Note { is_warning: true, text });
+}
+
+/// The columns of the time.
+///
+/// # Errors
+/// There is no time, or several columns of it among which none can be preferred.
+// Long because it is one table of cases.
+pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Result<TimeColumns, String> {
+    let times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
+    let parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
+    let texts = header.columns_where(|meaning| meaning == ColumnMeaning::DateTime);
+    // `time, ms` are two parts of one time; `time, time_ms` are two times.
+    let is_bare_unit = |column: usize| header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
+    let with_unit: Vec<usize> = times
+        .iter()
+        .copied()
+        .filter(|&column| header.factor(column).is_some() && !is_bare_unit(column))
+        .collect();
+    let column = match (&times[..], &with_unit[..], &parts[..], &texts[..]) {
+        ([column], ..) => *column,
+        ([_, ..], [column], ..) => {
+            push_information(
+                notes,
+                format!(
+                    "of the times {} the one that names its unit counts: `{}`",
+                    header.describe(&times),
+                    header.name(*column)
+                ),
+            );
+            *column
+        }
+        ([_, ..], ..) => return Err(header.ambiguity_message(&times)),
+        ([], _, [column], _) | ([], _, [], [column]) => *column,
+        ([], _, [], []) => return Err(missing_columns_message(header)),
+        ([], _, [], _) => return Err(header.ambiguity_message(&texts)),
+        ([], _, _, _) => return Err(header.ambiguity_message(&parts)),
+    };
+    header.check_usable(column)?;
+    let unit_ns = if times.is_empty() && !parts.is_empty() {
+        Some(column_names::NANOSECONDS.factor)
+    } else {
+        header.factor(column)
+    };
+    let time_parts = header.columns_where(|meaning| meaning == ColumnMeaning::TimePart);
+    if is_bare_unit(column) && !time_parts.is_empty() {
+        return Err(format!(
+            "the time is in several columns ({}): write one, such as seconds since the start",
+            header.describe(&[&time_parts[..], &[column]].concat())
+        ));
+    }
+    // ROS stamps are split into seconds and nanoseconds.
+    let nanoseconds = match (&parts[..], times.is_empty()) {
+        ([], _) | (_, true) => None,
+        ([part], false) if header.stem(column).starts_with("sec") => Some(*part),
+        _ => return Err(header.ambiguity_message(&[&times[..], &parts[..]].concat())),
+    };
+    let date = header.unique(ColumnMeaning::Date)?;
+    Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
+}
+
+/// The columns of the attitude; [`AttitudeColumns::None`] where the header names no complete one.
+///
+/// # Errors
+/// Several columns hold the same quantity, or a unit makes no sense.
+// Long because every incomplete attitude gets its own note.
+pub(super) fn attitude_columns(
+    header: &HeaderColumns,
+    notes: &mut Vec<Note>,
+) -> Result<AttitudeColumns, String> {
+    use ColumnMeaning::{MagneticYaw, Pitch, Qw, Qx, Qy, Qz, Roll, Yaw};
+    let has = |meaning: ColumnMeaning| !header.columns_where(|other| other == meaning).is_empty();
+    let yaws = header.columns_where(|meaning| matches!(meaning, Yaw | MagneticYaw));
+    let has_angles = has(Roll) && has(Pitch) && !yaws.is_empty();
+    if let Some(columns) = header.unique_each([Qx, Qy, Qz, Qw])? {
+        if has_angles {
+            push_warning(notes, "of the attitude's quaternion and angles the quaternion counts".to_owned());
+        }
+        return Ok(AttitudeColumns::Quaternion(columns));
+    }
+    if !has_angles {
+        let incomplete: Vec<usize> = header
+            .columns_where(|meaning| matches!(meaning, Roll | Pitch | Yaw | MagneticYaw | Qx | Qy | Qz | Qw));
+        if !incomplete.is_empty() {
+            push_information(
+                notes,
+                format!(
+                    "an attitude needs roll, pitch and yaw, or qx, qy, qz and qw: {} alone is none",
+                    header.describe(&incomplete)
+                ),
+            );
+        }
+        let numbered = columns_by_name(header, |name| {
+            ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name)
+        });
+        if !numbered.is_empty() {
+            push_warning(
+                notes,
+                format!(
+                    "{} are no attitude, as their order is not known: rename them to qw, qx, qy, qz (PX4 \
+                        numbers them in this order)",
+                    header.describe(&numbered)
+                ),
+            );
+        }
+        return Ok(AttitudeColumns::None);
+    }
+    let &[yaw] = &yaws[..] else { return Err(header.ambiguity_message(&yaws)) };
+    header.check_usable(yaw)?;
+    if has(MagneticYaw) {
+        push_warning(
+            notes,
+            format!(
+                "`{}` is from magnetic north, but taken as from true north: add the declination",
+                header.name(yaw)
+            ),
+        );
+    }
+    let [roll, pitch] = header.unique_each([Roll, Pitch])?.unwrap_or_default();
+    Ok(AttitudeColumns::Euler(
+        [roll, pitch, yaw].map(|column| FieldSource::whole(column, header.factor(column))),
+    ))
+}
+
+/// The axes of the positions and their three columns.
+///
+/// # Errors
+/// There is no complete position, its axes are not known, or several columns hold the same quantity.
+// Long because the rules for geodetic, north-east and x-y columns take precedence over each other.
+pub(super) fn position_columns(
+    header: &HeaderColumns,
+    table: &Table<'_>,
+    spec: &FlightSpec,
+    time: usize,
+    notes: &mut Vec<Note>,
+) -> Result<(Frame, [FieldSource; 3]), String> {
+    use ColumnMeaning::{Down, East, Grid, Latitude, LatitudeLongitude, Longitude, North, X, Y, Z};
+    let format = spec.format;
+    let has = |meaning: ColumnMeaning| !header.columns_where(|other| other == meaning).is_empty();
+    let has_geodetic = (has(Latitude) && has(Longitude)) || has(LatitudeLongitude);
+    let has_height = !header.columns_where(is_height).is_empty();
+    let source = |column: usize| FieldSource::whole(column, header.factor(column));
+    if has_geodetic && has_height && matches!(format, LogFormat::Auto | LogFormat::CsvLla) {
+        let letters = header.columns_where(|meaning| meaning == ColumnMeaning::Hemisphere);
+        if !letters.is_empty() {
+            return Err(format!(
+                "{} say the hemisphere by letters: write signed degrees and remove these columns",
+                header.describe(&letters)
+            ));
+        }
+        let is_part = |name: &str| {
+            let part = name
+                .strip_prefix("latitude_")
+                .or(name.strip_prefix("longitude_"))
+                .or(name.strip_prefix("lat_"))
+                .or(name.strip_prefix("lon_"));
+            part.is_some_and(|part| {
+                ["min", "mins", "minute", "minutes", "sec", "secs", "second", "seconds"].contains(&part)
+            })
+        };
+        let parts = columns_by_name(header, is_part);
+        if !parts.is_empty() {
+            return Err(format!(
+                "{} are minutes and seconds of latitude and longitude: write degrees with decimals in one \
+                    column each, and remove these columns",
+                header.describe(&parts)
+            ));
+        }
+        let height = height_column(header, Some(spec.height), notes)?;
+        let horizontal = match (header.unique_each([Latitude, Longitude])?, header.unique(LatitudeLongitude)?)
+        {
+            (Some(pair), None) => pair.map(source),
+            (None, Some(column)) => [0, 1].map(|part| FieldSource { part: Some(part), ..source(column) }),
+            (Some([latitude, longitude]), Some(both)) => {
+                return Err(header.ambiguity_message(&[latitude, longitude, both]));
+            }
+            (None, None) => return Err(missing_columns_message(header)),
+        };
+        return Ok((Frame::Geodetic, [horizontal[0], horizontal[1], source(height)]));
+    }
+    let format_mismatch = || {
+        format!(
+            "flight.format is \"{}\" but the columns are named otherwise; remove the key or rename the \
+                columns",
+            format_name(format)
+        )
+    };
+    if format == LogFormat::CsvLla {
+        return Err(format_mismatch());
+    }
+    if has(North) && has(East) && (has(Down) || has_height) {
+        let Some([north, east]) = header.unique_each([North, East])? else {
+            return Err(missing_columns_message(header));
+        };
+        let (frame, vertical) = match header.unique(Down)? {
+            Some(_) if has_height && format == LogFormat::CsvXya => {
+                (Frame::NorthEastUp, height_column(header, None, notes)?)
+            }
+            Some(down) => (Frame::NorthEastDown, down),
+            None => (Frame::NorthEastUp, height_column(header, None, notes)?),
+        };
+        let fits = match format {
+            LogFormat::Auto => true,
+            LogFormat::CsvXya => frame == Frame::NorthEastUp,
+            LogFormat::CsvNed => frame == Frame::NorthEastDown,
+            _ => false,
+        };
+        return if fits { Ok((frame, [north, east, vertical].map(source))) } else { Err(format_mismatch()) };
+    }
+    if has(X) && has(Y) && (has(Z) || has_height) {
+        let Some([x, y]) = header.unique_each([X, Y])? else { return Err(missing_columns_message(header)) };
+        let z = header.unique(Z)?;
+        let frame = match format {
+            LogFormat::CsvXya => Frame::NorthEastUp,
+            LogFormat::CsvNed if z.is_some() => Frame::NorthEastDown,
+            LogFormat::Tum | LogFormat::Euroc if z.is_some() => Frame::EastNorthUp,
+            LogFormat::Auto if z.is_some_and(|z| has_known_axes(header, table, time, [x, y, z])) => {
+                Frame::EastNorthUp
+            }
+            LogFormat::Auto => return Err(unknown_axes_message(header, &[x, y])),
+            _ => return Err(format_mismatch()),
+        };
+        let has_angles = has(ColumnMeaning::Roll)
+            && has(ColumnMeaning::Pitch)
+            && has(ColumnMeaning::Yaw)
+            && !has(ColumnMeaning::Qw);
+        if frame == Frame::EastNorthUp && has_angles && spec.attitude == AttitudeSource::Log {
+            return Err("roll, pitch and yaw do not say what they turn where x is east and z is up: give a \
+                    quaternion (qx, qy, qz, qw), or set flight.format = \"csv-xya\" or \"csv-ned\" if x is \
+                    north"
+                .to_owned());
+        }
+        let vertical = match z {
+            Some(z) => z,
+            None => height_column(header, None, notes)?,
+        };
+        return Ok((frame, [x, y, vertical].map(source)));
+    }
+    if has(Grid) {
+        return Err(format!(
+            "{} are grid coordinates, whose north is not true north: convert them to latitude and longitude \
+                (cs2cs, gdaltransform) and name them lat and lon",
+            header.describe(&header.columns_where(|meaning| meaning == Grid))
+        ));
+    }
+    Err(if format == LogFormat::Auto { missing_columns_message(header) } else { format_mismatch() })
+}
+
+/// Columns whose name, in lower case, fulfils a condition.
+fn columns_by_name(header: &HeaderColumns, condition: impl Fn(&str) -> bool) -> Vec<usize> {
+    (0..header.0.len())
+        .filter(|&column| condition(&header.name(column).trim_matches(['"', ' ']).to_lowercase()))
+        .collect()
+}
+
+/// Whether x, y, z are known to be east, north, up: by the names of EuRoC or TUM, or by plain names in TUM's
+/// order, separated by blanks.
+fn has_known_axes(header: &HeaderColumns, table: &Table<'_>, time: usize, [x, y, z]: [usize; 3]) -> bool {
+    use ColumnMeaning::{Qw, Qx, Qy, Qz};
+    let quaternion = header.unique_each([Qx, Qy, Qz, Qw]).ok().flatten();
+    let in_tum_order = time == 0 && [x, y, z] == [1, 2, 3] && quaternion == Some([4, 5, 6, 7]);
+    match header.stem(x) {
+        "p_rs_r_x" | "tx" => true,
+        "x" | "px" | "p_x" => in_tum_order && table.separator == Separator::Space,
+        _ => false,
+    }
+}
+
+/// Message for columns x, y, z whose axes are not known.
+fn unknown_axes_message(header: &HeaderColumns, columns: &[usize]) -> String {
+    let has_quaternion = !header.columns_where(|meaning| meaning == ColumnMeaning::Qw).is_empty();
+    let choices = if has_quaternion {
+        "\"csv-ned\" (x north, y east, z down, body forward-right-down, as AirSim writes), \"csv-xya\" (x \
+            north, y east, z up) or \"tum\" (x east, y north, z up, body forward-left-up, as ROS writes)"
+    } else {
+        "\"csv-xya\" (x north, y east, z up) or \"csv-ned\" (z down)"
+    };
+    format!(
+        "the columns {}, z do not say where their axes point; set flight.format = {choices}, or name them \
+            north, east, alt or down",
+        header.describe(columns)
+    )
+}
+
+/// Notes columns that look relevant and are not used.
+pub(super) fn note_unused_columns(
+    header: &HeaderColumns,
+    frame: Frame,
+    attitude: AttitudeColumns,
+    notes: &mut Vec<Note>,
+) {
+    use ColumnMeaning::{Course, Gimbal};
+    let describes_another = |name: &str| {
+        let stem =
+            ["_unit", "_units", "_datum", "_frame"].iter().find_map(|suffix| name.strip_suffix(suffix));
+        stem.is_some_and(|stem| column_names::find(stem).is_some())
+    };
+    let descriptions = columns_by_name(header, describes_another);
+    if !descriptions.is_empty() {
+        push_warning(
+            notes,
+            format!(
+                "{} are not read: name units in the header (alt_ft), and say by flight.height what heights \
+                    are above",
+                header.describe(&descriptions)
+            ),
+        );
+    }
+    let declination = columns_by_name(header, |name| {
+        name.starts_with("declination") || name.starts_with("magnetic_declination")
+    });
+    if !declination.is_empty() && matches!(attitude, AttitudeColumns::Euler(_)) {
+        push_warning(
+            notes,
+            format!("{} is not applied: yaw is taken as from true north", header.describe(&declination)),
+        );
+    }
+    let gimbal = header.columns_where(|meaning| meaning == Gimbal);
+    if !gimbal.is_empty() {
+        push_warning(
+            notes,
+            format!("{} are not used: camera.mount says where the camera looks", header.describe(&gimbal)),
+        );
+    }
+    let course = header.columns_where(|meaning| meaning == Course);
+    if !course.is_empty() && attitude == AttitudeColumns::None {
+        push_information(
+            notes,
+            format!(
+                "{} is where the aircraft moves, not where its nose points: no part of an attitude",
+                header.describe(&course)
+            ),
+        );
+    }
+    if matches!(frame, Frame::Geodetic | Frame::NorthEastUp)
+        && matches!(attitude, AttitudeColumns::Quaternion(_))
+    {
+        push_warning(
+            notes,
+            "quaternions beside heights that count up are taken as turning forward-right-down bodies to \
+                north-east-down, as PX4 writes; ROS writes others"
+                .to_owned(),
+        );
+    }
+}

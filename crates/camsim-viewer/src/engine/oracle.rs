@@ -1,0 +1,133 @@
+//! The oracle's thread: prepares exact rays for single pixels, and renders whole frames strip by strip until
+//! a newer request arrives.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use camsim_core::{
+    reference::{Oracle, RenderOptions},
+    scenario::Channel,
+};
+
+use super::{
+    ReplySender,
+    mailbox::Mailbox,
+    messages::{OraclePicture, OracleRequest, Reply},
+    picture::{difference, srgb_image},
+};
+
+/// Rows rendered between two checks for a newer request.
+const STRIP_ROWS: usize = 4;
+/// Least time between two replies, each of which carries the whole picture.
+const REPLY_INTERVAL: Duration = Duration::from_millis(250);
+/// A pixel's standard error as a share of `quality.max_error_dn`, as for `camsim render --backend
+/// reference`.
+const SHARE_OF_TOLERANCE: f64 = 0.25;
+
+/// A frame with the rows rendered so far.
+struct PartialFrame {
+    frame: u64,
+    color_rgba: Vec<f32>,
+    rows: usize,
+}
+
+/// Serves requests until the mailbox is closed.
+pub fn run(mailbox: &Mailbox<OracleRequest>, replies: &ReplySender) {
+    // Half of the processor cores, so that window and renderer stay responsive.
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(2);
+    let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool,
+        Err(error) => {
+            return replies.send(Reply::Failed(format!(
+                "cannot start threads for exact rays: {error}; close other programs and try again"
+            )));
+        }
+    };
+    let mut cached: Option<Arc<Oracle>> = None;
+    let mut partial: Option<PartialFrame> = None;
+    while let Some(request) = mailbox.take() {
+        let oracle = match cached.take().filter(|oracle| Arc::ptr_eq(oracle.sequence(), &request.sequence)) {
+            Some(oracle) => oracle,
+            None => match Oracle::new(request.sequence.clone()) {
+                Ok(oracle) => {
+                    partial = None;
+                    Arc::new(oracle)
+                }
+                Err(error) => {
+                    replies.send(Reply::Failed(error.to_string()));
+                    continue;
+                }
+            },
+        };
+        cached = Some(oracle.clone());
+        replies.send(Reply::Oracle(oracle.clone()));
+        let Some(frame) = request.frame else { continue };
+        let [width, height] = request.sequence.scenario.camera.size_px.map(|side| side as usize);
+        let empty = || PartialFrame { frame, color_rgba: vec![0.0; 4 * width * height], rows: 0 };
+        let partial = partial.get_or_insert_with(empty);
+        if partial.frame != frame {
+            *partial = empty();
+        }
+        pool.install(|| render_rows(&oracle, &request, partial, mailbox, replies));
+    }
+}
+
+/// Renders the missing rows from the top, until a newer request arrives.
+fn render_rows(
+    oracle: &Oracle,
+    request: &OracleRequest,
+    partial: &mut PartialFrame,
+    mailbox: &Mailbox<OracleRequest>,
+    replies: &ReplySender,
+) {
+    let scenario = &request.sequence.scenario;
+    let size_px = scenario.camera.size_px;
+    let [width, height] = size_px.map(|side| side as usize);
+    let send = |partial: &PartialFrame| {
+        let difference = request.against.as_ref().and_then(|(picture, gain)| {
+            let against = &picture.frame;
+            (against.size_px == size_px)
+                .then(|| {
+                    difference(size_px, &against.color_rgba, &partial.color_rgba, *gain, partial.rows as u32)
+                })
+                .flatten()
+        });
+        replies.send(Reply::OraclePicture(Box::new(OraclePicture {
+            sequence: request.sequence.clone(),
+            frame: partial.frame,
+            image: Arc::new(srgb_image(size_px, &partial.color_rgba)),
+            color_rgba: Arc::new(partial.color_rgba.clone()),
+            difference: difference.map(Arc::new),
+            rows: partial.rows as u32,
+        })));
+    };
+    send(partial);
+    let mut last_reply = Instant::now();
+    while partial.rows < height {
+        if mailbox.has_newer() {
+            return;
+        }
+        let bottom = (partial.rows + STRIP_ROWS).min(height);
+        let rows = partial.rows..bottom;
+        let options = RenderOptions {
+            channels: vec![Channel::Color],
+            tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
+            only: Some((0..width * height).map(|pixel| rows.contains(&(pixel / width))).collect()),
+            ..RenderOptions::default()
+        };
+        let strip = oracle.render(partial.frame, &options);
+        let range = 4 * width * rows.start..4 * width * rows.end;
+        if let (Some(to), Some(from)) =
+            (partial.color_rgba.get_mut(range.clone()), strip.color_rgba.get(range))
+        {
+            to.copy_from_slice(from);
+        }
+        partial.rows = bottom;
+        if bottom == height || last_reply.elapsed() > REPLY_INTERVAL {
+            send(partial);
+            last_reply = Instant::now();
+        }
+    }
+}

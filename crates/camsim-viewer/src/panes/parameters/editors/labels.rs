@@ -1,0 +1,52 @@
+//! Labels of the elements of lists of numbers.
+
+use camsim_core::scenario::LensModel;
+
+/// Labels of a key's elements, in order; empty for keys without labels.
+pub fn element_labels(key: &str, lens: LensModel) -> &'static [&'static str] {
+    const BROWN_CONRADY: &[&str] = &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+    const KANNALA_BRANDT: &[&str] = &["k1", "k2", "k3", "k4"];
+    const NED: &[&str] = &["N", "E", "D"];
+    const GEODETIC: &[&str] = &["lat", "lon", "h"];
+    const ANGLES: &[&str] = &["roll", "pitch", "yaw"];
+    let leaf = key.rsplit('.').next().unwrap_or(key);
+    match (leaf, lens) {
+        ("coefficients", LensModel::BrownConrady) => BROWN_CONRADY,
+        ("coefficients", LensModel::KannalaBrandt) => KANNALA_BRANDT,
+        ("size_px", _) => &["W", "H"],
+        ("focal_px", _) => &["fx", "fy"],
+        ("principal_point_px", _) => &["cx", "cy"],
+        ("angles_deg", _) => ANGLES,
+        ("offset_m", _) => &["fwd", "right", "down"],
+        ("window_s", _) => &["from", "to"],
+        ("vignette_thresholds", _) => &["t1", "t2"],
+        ("sky", _) => &["R", "G", "B"],
+        ("origin" | "geodetic", _) => GEODETIC,
+        ("at", _) if key.starts_with("scene.") => NED,
+        _ => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use camsim_io::scenario_file::{ValueKind, keys};
+
+    use super::*;
+
+    #[test]
+    fn every_list_of_fixed_length_has_a_label_per_element() {
+        for (key, kind) in keys() {
+            let count = match kind {
+                ValueKind::Numbers(count) | ValueKind::NumbersOr(count, _) | ValueKind::Counts(count, _) => {
+                    *count
+                }
+                _ => continue,
+            };
+            assert_eq!(element_labels(key, LensModel::BrownConrady).len(), count, "{key}");
+        }
+        assert_eq!(
+            element_labels("camera.lens.coefficients", LensModel::KannalaBrandt),
+            ["k1", "k2", "k3", "k4"]
+        );
+    }
+}

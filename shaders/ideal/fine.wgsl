@@ -1,4 +1,0 @@
-// A supersampled ideal frame: `scale` fine pixels along a side of an ideal pixel, with 4 samples each at the
-// standard places (3, 1), (7, 3), (1, 5), (5, 7) eighths of a fine pixel from its top-left corner, one in
-// each quarter.
-const SAMPLES: i32 = 4;

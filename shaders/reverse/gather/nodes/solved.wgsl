@@ -1,8 +1,0 @@
-// Each node of the exposure is solved for itself.
-fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
-    return temporal_inverse(ray.uv, pose_of_step(pixel, 0u));
-}
-
-fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {
-    return temporal_inverse(ray.uv, pose);
-}
