@@ -20,7 +20,7 @@ pub(super) fn ortho_coverage_warning(sequence: &Sequence, summary: &TerrainSumma
     let terrain = sequence.scene.terrain.as_ref()?;
     let camera = CameraModel::from_spec(&sequence.scenario.camera).ok()?;
     let [width_px, height_px] = camera.size_px.map(f64::from);
-    let [min_uv, max_uv] = summary.picture_uv;
+    let [min_uv, max_uv] = summary.ortho_uv;
     let (mut all, mut beyond, mut worst) = (0_u32, 0_u32, (0, 0_u64));
     for frame in (0..sequence.frames).step_by(sequence.frames.div_ceil(FRAMES).max(1) as usize) {
         let pose = sequence.path.pose(sequence.start_s + frame as f64 / sequence.scenario.camera.fps);
