@@ -174,7 +174,7 @@ fn echoed_messages_are_imported() {
         "two that differ",
         "echo.yaml",
         &format!("{one}{}", one.replace("400.0", "390.0")),
-        &["several YAML documents", "keep the one"],
+        &["several different YAML documents", "keep one"],
     );
     let undistorted = one.replace("D: [0.1, 0.2, 0.003, 0.004, 0.0]", "D: []").replace("\"plumb_bob\"", "''");
     check("no distortion", &read("echo.yaml", &undistorted), &[Lens(Pinhole, &[])]);

@@ -72,7 +72,7 @@ fn bands_without_colour_are_reported() {
     assert!(loaded.notes[0].contains("its bands 4 are neither colours nor alpha"), "{:?}", loaded.notes);
     let loaded = assert_colors("unnamed_bands.tif", 0, |_| false);
     assert!(
-        loaded.notes[0].contains("does not say which of its bands are red, green and blue"),
+        loaded.notes[0].contains("does not state which of its bands are red, green and blue"),
         "{:?}",
         loaded.notes
     );
