@@ -212,8 +212,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
 ];
 
 /// Words that this version does not support.
-pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] =
-    &[("flight.format", "ulog")];
+pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[("flight.format", "ulog")];
 
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
