@@ -220,6 +220,3 @@ fn angle(value: DVec3, wanted: DVec3) -> f64 {
     }
     value.cross(wanted).length().atan2(value.dot(wanted))
 }
-
-#[cfg(test)]
-mod tests;

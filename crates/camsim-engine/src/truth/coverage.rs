@@ -6,7 +6,6 @@
 //! reach of a pixel is the way of its point in the picture during the exposure, plus 1 px.
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::{
     flow::moved_px,
@@ -20,11 +19,10 @@ const PHASES: i32 = 8;
 /// Longest reach, pixels. Beyond it a picture is all blur.
 const MOST_REACH_PX: f64 = 256.0;
 
-/// Place of ray i in its pixel and phase, each -0.5 to 0.5: a (0, 6, 2) net of Hammersley and van der Corput
-/// in area, in which each of the 64 strata of the pixel (of 8 x 8 and of any other shape) has one ray; and a
-/// Sobol coordinate for the phase, so that each half, quarter ... of the exposure and of the pixel have their
-/// share. The largest error for a straight border that crosses the pixel at any speed is 0.07; a share of 0 or
-/// 1 is exact.
+/// Place of ray i in its pixel and phase, each -0.5 to 0.5: the Hammersley set with the first two coordinates of
+/// Sobol's sequence, a (0, 6, 3) net in base 2. Every box with sides of 2^-a, 2^-b and 2^-c, a + b + c = 6,
+/// has one ray. For a straight border that crosses the pixel at any speed the error of a coverage is 0.015 RMS
+/// and 0.08 at most.
 fn ray(i: u32) -> (DVec2, f64) {
     let unit = |bits: u32| (f64::from(bits) + 0.5) / f64::from(RAYS) - 0.5;
     let place = DVec2::new(unit(i), unit(i.reverse_bits() >> 26));
