@@ -198,6 +198,7 @@ fn prepare(
     let folder_state = folder::folder_state(job, files, &manifest.inputs)?;
     if folder_state == FolderState::Replaced {
         files.remove(job.frames).or_failed()?;
+        tables::remove_objects(job.folder)?;
     }
     manifest.write(job.folder).or_failed()?;
     files.remove_temporaries(todo);

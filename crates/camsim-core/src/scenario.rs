@@ -21,7 +21,7 @@ pub use camera::{
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use scene::{
-    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
+    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
 pub use validate::{
@@ -377,6 +377,10 @@ pub struct OutputSpec {
     pub flow_step: u32,
     /// Instant of the picture that `flow-global` leads to.
     pub flow_instant: FlowInstant,
+    /// Whether `object` and `class` get pictures in colour, for people, in `object_palette` and
+    /// `class_palette`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub palette: bool,
 }
 
 impl Default for OutputSpec {
@@ -390,6 +394,7 @@ impl Default for OutputSpec {
             exr_compression: ExrCompression::Zip1,
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
+            palette: false,
         }
     }
 }

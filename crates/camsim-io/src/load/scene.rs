@@ -15,6 +15,7 @@ use glam::DVec3;
 
 use super::{
     LoadError, height_conversions,
+    objects::{ModelObjects, ObjectList, name_or},
     placements::{Placement, read_placements},
 };
 use crate::{
@@ -39,6 +40,7 @@ pub(super) fn load_scene(
         fog_visibility_m: spec.fog_visibility_m,
         ..Scene::default()
     };
+    let mut objects = ObjectList::default();
     let mut notes = Vec::new();
     let mut summary = None;
     if let Some(terrain) = &spec.terrain {
@@ -49,19 +51,22 @@ pub(super) fn load_scene(
         let shift = if shift_terrain { Some(&undulation_m as HeightShift<'_>) } else { None };
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
+        scene.terrain_object = objects.add(name_or(&terrain.name, "terrain"), terrain.class);
         summary = Some(loaded.summary);
         notes.extend(loaded.notes);
     }
     if let Some(pattern) = &spec.pattern {
         let picture_error = |source| LoadError::Picture { key: "scene.pattern.image", source };
         let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(picture_error)?;
-        scene.meshes.push(Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m));
+        let object = objects.add(name_or(&pattern.name, "pattern"), pattern.class);
+        let mesh = Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m);
+        scene.meshes.push(Mesh { object, ..mesh });
     }
     if let Some(spec) = &spec.board {
-        scene.meshes.push(
-            read_board(spec)?
-                .mesh(board_position_ned_m(scenario, spec, log)?, ned_from_board(spec.angles_deg)),
-        );
+        let object = objects.add(name_or(&spec.name, "board"), spec.class);
+        let mesh = read_board(spec)?
+            .mesh(board_position_ned_m(scenario, spec, log)?, ned_from_board(spec.angles_deg));
+        scene.meshes.push(Mesh { object, ..mesh });
     }
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
         notes.push(
@@ -71,8 +76,9 @@ pub(super) fn load_scene(
         );
     }
     for spec in &spec.gltf {
-        notes.extend(add_model(scenario, log, spec, &mut scene)?);
+        notes.extend(add_model(scenario, log, spec, &mut scene, &mut objects)?);
     }
+    scene.objects = objects.into_objects();
     notes.extend(blended_triangles_note(&scene));
     let remaining = split_intersecting_blended(&mut scene.meshes).remaining;
     notes.extend((remaining > 0).then(|| {
@@ -107,6 +113,7 @@ fn add_model(
     log: &FlightLog,
     spec: &GltfSpec,
     scene: &mut Scene,
+    objects: &mut ObjectList,
 ) -> Result<Vec<String>, LoadError> {
     let number = |n: Option<u32>| n.map(|n| n as usize);
     let options = GltfOptions {
@@ -116,12 +123,13 @@ fn add_model(
         normals: scenario.scene.light.is_some(),
     };
     let model = read_gltf(&spec.file, options)?;
+    let model_objects = ModelObjects::new(spec, &model)?;
     let placements = match &spec.placements {
         None => vec![Placement { position: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
         Some(path) => read_placements(path, spec.on_ground)?,
     };
     let (all, mut without_ground) = (placements.len(), 0);
-    for Placement { position: (local, geodetic), heading_deg, scale } in placements {
+    for (row, Placement { position: (local, geodetic), heading_deg, scale }) in (1..).zip(placements) {
         let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a place of scene.gltf")?;
         if spec.on_ground {
             let ground = scene
@@ -147,11 +155,10 @@ fn add_model(
         if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
             return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
-        scene.meshes.extend(model.place(
-            position_ned_m,
-            (spec.heading_deg + heading_deg).to_radians(),
-            spec.scale * scale,
-        ));
+        let placed =
+            model.place(position_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale);
+        let numbers = model_objects.of_copy(row, objects);
+        scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
     }
     let left_out = (without_ground > 0)
         .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));

@@ -111,6 +111,14 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
                 format!("a whole number, {min} to {max}"),
             )
         }
+        ValueKind::Numbered(min, max) => {
+            let range = i64::from(min)..=i64::from(max);
+            let is_number = |value: &Value| value.as_integer().is_some_and(|v| range.contains(&v));
+            (
+                value.as_table().is_some_and(|table| table.values().all(is_number)),
+                format!("a table of names with whole numbers, {min} to {max}, such as {{ roof = {min} }}"),
+            )
+        }
         ValueKind::CountOr(max, words) => {
             (count(value) || among(value, words), format!("a whole number up to {max} or {}", list(words)))
         }

@@ -63,6 +63,8 @@ pub enum ValueKind {
     Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
+    /// A table of names of the user's, each with a whole number from the first to the last.
+    Numbered(u32, u32),
     /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
     /// Reserved; not supported by this version.
@@ -71,7 +73,27 @@ pub enum ValueKind {
 
 use ValueKind::*;
 
+/// Class of an object.
+const CLASS: ValueKind = Within(1, u16::MAX as u32);
 const AUTO: &[&str] = &["auto"];
+const CHANNELS: &[&str] = &[
+    "color",
+    "depth",
+    "valid",
+    "rows",
+    "coords",
+    "range",
+    "normal",
+    "normal-world",
+    "object",
+    "class",
+    "coverage",
+    "flow",
+    "flow-back",
+    "flow-global",
+    "motion",
+    "blur-path",
+];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
 /// Keys of a scenario.
@@ -134,9 +156,13 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.terrain.height_unit", Word(&["m", "ft", "us-ft"])),
     ("scene.terrain.ortho_white", Number),
     ("scene.terrain.beyond", Word(&["grey", "edge", "void"])),
+    ("scene.terrain.name", Text),
+    ("scene.terrain.class", CLASS),
     ("scene.pattern.image", Path),
     ("scene.pattern.width_m", Number),
     ("scene.pattern.at", NumbersOr(3, "origin")),
+    ("scene.pattern.name", Text),
+    ("scene.pattern.class", CLASS),
     ("scene.board.target", Path),
     ("scene.board.kind", Word(&["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"])),
     ("scene.board.columns", Within(1, 80)),
@@ -152,6 +178,8 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.board.at", NumbersOr(3, "origin")),
     ("scene.board.geodetic", Numbers(3)),
     ("scene.board.angles_deg", Numbers(3)),
+    ("scene.board.name", Text),
+    ("scene.board.class", CLASS),
     ("scene.gltf", Tables),
     ("scene.gltf.file", Path),
     ("scene.gltf.at", NumbersOr(3, "origin")),
@@ -163,6 +191,10 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.gltf.scene", Within(0, u32::MAX)),
     ("scene.gltf.time_s", Number),
     ("scene.gltf.animation", Within(0, u32::MAX)),
+    ("scene.gltf.name", Text),
+    ("scene.gltf.class", CLASS),
+    ("scene.gltf.objects", Word(&["placement", "node", "material"])),
+    ("scene.gltf.classes", Numbered(1, u16::MAX as u32)),
     ("scene.sky", Numbers(3)),
     ("scene.fog_visibility_m", Number),
     ("scene.light.sun_azimuth_deg", Number),
@@ -182,33 +214,15 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
-    (
-        "output.channels",
-        Words(&[
-            "color",
-            "depth",
-            "valid",
-            "rows",
-            "coords",
-            "range",
-            "normal",
-            "normal-world",
-            "object",
-            "class",
-            "flow",
-            "flow-back",
-            "flow-global",
-            "motion",
-            "blur-path",
-        ]),
-    ),
+    ("output.channels", Words(CHANNELS)),
     ("output.format", Words(&["exr", "png"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
-    ("output.flow_step", Whole),
+    ("output.flow_step", Within(1, u32::MAX)),
     ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.palette", Flag),
 ];
 
 /// Words that this version does not support.

@@ -50,6 +50,7 @@ struct RayHit {
 /// drawn is within [`FramePlan::terrain_error_px`] of.
 #[derive(Debug)]
 pub struct FrameRays<'a> {
+    path: &'a CameraPath,
     surfaces: &'a Surfaces,
     plan: &'a FramePlan,
     /// Camera at mid-exposure of each row, or of each column in either field.
@@ -60,7 +61,7 @@ pub struct FrameRays<'a> {
 
 impl<'a> FrameRays<'a> {
     /// Rays whose coordinates are of exposure phase `phase`, -0.5 to 0.5.
-    pub(crate) fn new(path: &CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
+    pub(crate) fn new(path: &'a CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
         let [columns, rows] = plan.camera.size_px;
         let pixels: Vec<[u32; 2]> = match plan.shutter.row_axis() {
             RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
@@ -74,7 +75,7 @@ impl<'a> FrameRays<'a> {
         };
         let shift_s = phase * plan.shutter.exposure_s();
         let at_phase = if shift_s == 0.0 { Vec::new() } else { poses(shift_s) };
-        Self { surfaces, plan, mid: poses(0.0), at_phase }
+        Self { path, surfaces, plan, mid: poses(0.0), at_phase }
     }
 
     /// What the ray `uv` of a pixel meets.
@@ -125,6 +126,20 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
         self.ray(&self.mid, pixel, DVec2::ZERO).0
+    }
+
+    /// Camera of a pixel at an exposure phase, -0.5 (begin) to 0.5 (end).
+    #[must_use]
+    pub fn pose_at(&self, [x, y]: [u32; 2], phase: f64) -> CameraPose {
+        let FramePlan { shutter, stamp_s, .. } = self.plan;
+        self.path.pose(stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_s())
+    }
+
+    /// The surface (0 = terrain, 1 + i = mesh i of the scene) that the ray `uv` of a camera meets first.
+    #[must_use]
+    pub fn surface(&self, pose: &CameraPose, uv: DVec2) -> Option<u32> {
+        let hit = self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0));
+        hit.map(|hit| hit.surface as u32)
     }
 
     /// Whether a surface lies between a camera and what it sees along a ray at planar depth `depth_m`

@@ -43,6 +43,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Word(words) => word(ui, key, value, words),
         ValueKind::Words(words) => word_list(ui, key, value, words),
         ValueKind::Text => text(ui, key, value, param),
+        ValueKind::Numbered(..) => numbered(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
         ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts => None,
     };
@@ -309,6 +310,19 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
         return None;
     }
     Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
+}
+
+/// A table of names with numbers, written `roof = 3, wall = 4`.
+fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+    let pairs = value.and_then(Value::as_table).into_iter().flatten();
+    let quoted = |name: &str| Value::String(name.to_owned()).to_string();
+    let written: Vec<String> = pairs.map(|(name, value)| format!("{} = {value}", quoted(name))).collect();
+    let edit = text(ui, key, Some(&Value::String(written.join(", "))), param)?;
+    let Some(Value::String(text)) = edit.value else { return Some(edit) };
+    let parsed = toml::from_str::<toml::Table>(&format!("v = {{ {text} }}")).ok();
+    // A text that is no table stays a text, which the schema refuses with a message.
+    let value = parsed.and_then(|mut table| table.remove("v")).unwrap_or(Value::String(text));
+    Some(Edit { value: Some(value), ..edit })
 }
 
 /// A path shortened to its file name.
