@@ -359,6 +359,14 @@ pub const PARAMS: &[Param] = &[
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
+    param(
+        "output.tracks.points",
+        "",
+        ANY,
+        1.0,
+        "points whose pixel tracks.csv has for every frame: terrain, vertices, board, tables (.csv)",
+    ),
+    param("output.tracks.count", "", [1.0, 1e6], 10.0, "most points of terrain, vertices and board, each"),
 ];
 
 #[cfg(test)]

@@ -137,6 +137,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let resume_command = console.command_with("--resume");
     let job = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder: &folder,
         frames: &frames,
         shard: args.shard,

@@ -2,7 +2,10 @@
 //! `frame_file` has the schema of FRAME.toml.
 
 use camsim_core::{
-    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
+    scenario::{
+        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, PointSource,
+        TracksSpec,
+    },
     temporal::SAMPLES,
 };
 use camsim_plan::MAX_KEYS;
@@ -63,6 +66,8 @@ pub enum ValueKind {
     Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
+    /// One of these words or the path of a CSV table, or a list of them.
+    WordsOrTables(&'static [&'static str]),
     /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
     /// Reserved; not supported by this version.
@@ -188,6 +193,8 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+    ("output.tracks.points", WordsOrTables(&PointSource::WORDS)),
+    ("output.tracks.count", Within(1, TracksSpec::MOST_POINTS)),
 ];
 
 /// Words that this version does not support.
@@ -205,8 +212,21 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),
+    ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
 ];
+
+impl ValueKind {
+    /// Whether a text at a key of this kind is a path.
+    #[must_use]
+    pub fn is_path(self, text: &str) -> bool {
+        match self {
+            Path => true,
+            WordsOrTables(words) => !words.contains(&text),
+            _ => false,
+        }
+    }
+}
 
 impl Schema {
     /// The values that `key` takes; `None` if it is unknown.
