@@ -359,6 +359,8 @@ pub const PARAMS: &[Param] = &[
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
+    param("output.flow_step", "", [1.0, 1000.0], 0.1, "frames from one to the other of flow and flow-back"),
+    param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow-global leads to"),
     param(
         "output.tracks.points",
         "",
