@@ -9,6 +9,7 @@ use super::{
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
+mod tracks;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -45,6 +46,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_camera(&mut check, &scenario.camera);
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
+    tracks::check_tracks(&mut check, scenario);
     check.problems
 }
 
