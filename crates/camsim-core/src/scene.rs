@@ -27,8 +27,8 @@ pub use blend_split::{BlendSplit, split_intersecting_blended};
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use light::{Light, transformed_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
-pub use motion::{RigidMotion, RigidState};
 pub use mesh_lod::{LodTolerance, ModelLod, SceneLods, ShapeLod, ShapeLods};
+pub use motion::{RigidMotion, RigidState};
 pub use prefilter::{Prefilter, PrefilterTaps};
 pub use terrain::{
     Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail,

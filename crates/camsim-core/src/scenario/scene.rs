@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::MotionSpec;
+
 /// The scene: one of its parts, or several together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -209,12 +211,16 @@ pub struct GltfSpec {
     /// Index of the scene in the file; by default the file's own choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<u32>,
-    /// Time in the model's animations, seconds; by default nodes keep their static pose.
+    /// Time in the model's animations, seconds; by default nodes keep their static pose. With
+    /// `motion.animate`, the time at path time 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
     /// Index of the animation; by default all animations together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<u32>,
+    /// How it moves; by default it stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionSpec>,
 }
 
 fn one() -> f64 {

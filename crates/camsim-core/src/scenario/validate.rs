@@ -8,6 +8,7 @@ use super::{
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
+mod motion;
 mod scene;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
@@ -398,6 +399,7 @@ mod tests {
             scene: None,
             time_s: None,
             animation: None,
+            motion: None,
         }
     }
 

@@ -58,6 +58,12 @@ impl<V> Curve<V> {
         })
     }
 
+    /// The same at all times.
+    #[must_use]
+    pub fn constant(value: V) -> Self {
+        Self { times_s: vec![0.0], values: vec![value], between: Between::Step }
+    }
+
     /// Times of the first and last key, seconds.
     #[must_use]
     pub fn span_s(&self) -> [f64; 2] {
@@ -115,6 +121,15 @@ impl Curve<DVec3> {
         Self::new(times_s, values, Between::Cubic { arriving: derivatives.clone(), leaving: derivatives })
     }
 
+    /// Derivative at which key `k` is reached; zero without derivatives.
+    #[must_use]
+    pub fn rate_at_key(&self, k: usize) -> DVec3 {
+        match &self.between {
+            Between::Cubic { arriving, .. } => arriving.get(k).copied().unwrap_or(DVec3::ZERO),
+            _ => DVec3::ZERO,
+        }
+    }
+
     /// Value and derivative a second at a time; constant beyond the ends.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (DVec3, DVec3) {
@@ -153,9 +168,11 @@ impl Curve<DVec3> {
             from = to;
         }
         visit(self.at(to_s).0);
-        self.times_s.iter().zip(&self.values).filter(|(t_s, _)| (from_s..=to_s).contains(t_s)).for_each(
-            |(_, value)| visit(*value),
-        );
+        self.times_s
+            .iter()
+            .zip(&self.values)
+            .filter(|(t_s, _)| (from_s..=to_s).contains(t_s))
+            .for_each(|(_, value)| visit(*value));
     }
 
     /// Value and derivative just before a time.
@@ -207,6 +224,9 @@ impl Curve<DQuat> {
 
     /// An upper bound of the angle that the rotation passes through between two times, rad.
     pub(super) fn variation(&self, from_s: f64, to_s: f64) -> f64 {
+        if to_s <= from_s {
+            return 0.0;
+        }
         if matches!(self.between, Between::Cubic { .. }) && self.times_s.len() > 1 {
             return std::f64::consts::PI;
         }

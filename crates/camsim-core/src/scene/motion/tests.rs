@@ -8,7 +8,8 @@ use super::*;
 fn carriers() -> Vec<Track> {
     let points = [[0.0, 0.0, 0.0], [10.0, 2.0, -1.0], [14.0, 9.0, 0.5], [5.0, 20.0, 2.0]].map(DVec3::from);
     let times_s = vec![0.0, 0.8, 1.7, 3.1];
-    let turns = [0.0, 0.7, 2.9, -2.0].map(|yaw| DQuat::from_rotation_z(yaw) * DQuat::from_rotation_y(0.3 * yaw));
+    let turns =
+        [0.0, 0.7, 2.9, -2.0].map(|yaw| DQuat::from_rotation_z(yaw) * DQuat::from_rotation_y(0.3 * yaw));
     let turn = |between| Curve::new(times_s.clone(), turns.to_vec(), between).unwrap();
     let rates = vec![DQuat::from_xyzw(0.1, -0.2, 0.3, 0.05); 4];
     let cubic = Between::Cubic { arriving: rates.clone(), leaving: rates };
@@ -83,7 +84,8 @@ fn boxes_hold_what_moves() {
                 for corner in 0..8 {
                     let side = |axis: usize| corners[corner >> axis & 1][axis];
                     let at = state.point(DVec3::new(side(0), side(1), side(2)));
-                    let is_inside = (at - moved.min).min_element().min((moved.max - at).min_element()) > -1e-9;
+                    let is_inside =
+                        (at - moved.min).min_element().min((moved.max - at).min_element()) > -1e-9;
                     assert!(is_inside, "{i} {t_s} {length_s} {k}: {at} {moved:?}");
                 }
             }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DQuat, DVec3};
 
-use super::{Curve, curve::Between};
+use super::Curve;
 
 /// Pose of a joint in its frame at one instant, with rates in the frame's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,17 +61,6 @@ pub struct Repeat {
 }
 
 impl Track {
-    /// A thing that stands still relative to its frame.
-    #[must_use]
-    pub fn still(position_m: DVec3, rotation: DQuat) -> Option<Self> {
-        Some(Self::Keys(Keys {
-            position: Curve::new(vec![0.0], vec![position_m], Between::Step)?,
-            rotation: Curve::new(vec![0.0], vec![rotation], Between::Step)?,
-            start_s: 0.0,
-            repeat: None,
-        }))
-    }
-
     /// Pose and rates at path time `t_s`.
     #[must_use]
     pub fn state(&self, t_s: f64) -> TrackState {
