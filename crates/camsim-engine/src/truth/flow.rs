@@ -99,3 +99,6 @@ pub(super) fn blur_path(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 4] 
     let ([x0, y0], [x1, y1]) = (moved(-0.5), moved(0.5));
     [x0, y0, x1, y1]
 }
+
+#[cfg(test)]
+mod tests;

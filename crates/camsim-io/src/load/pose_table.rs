@@ -145,7 +145,9 @@ fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, Strin
         (true, false) if is_whole(&places[0]) => true,
         (false, true) if is_whole(&places[1]) => false,
         _ => {
-            return Err(format!("places are missing or not whole, or there are two kinds of them; {COLUMNS}"));
+            return Err(format!(
+                "places are missing or not whole, or there are two kinds of them; {COLUMNS}"
+            ));
         }
     };
     let begun: Vec<usize> = (0..ATTITUDES.len())

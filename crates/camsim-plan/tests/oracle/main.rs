@@ -11,4 +11,5 @@ mod disocclusion;
 mod fixtures;
 mod hostile;
 mod measuring;
+mod moving;
 mod planted_faults;
