@@ -517,7 +517,7 @@ fn what_moves_is_rendered_by_the_reference_renderer_alone() {
     let scenario = folder.join("s.toml");
     let text = "[flight]\nlog = \"log.csv\"\n[camera]\nsize_px = [32, 24]\nfocal_px = [30, 30]\n\
                 mount = { angles_deg = [0, -90, 0] }\n[[scene.gltf]]\nfile = \"model.gltf\"\n\
-                [[scene.gltf.motion.spin]]\naxis = [0, 0, 1]\nhz = 3\nnode = \"blade\"\n";
+                [[scene.gltf.motion.spin]]\naxis = [1, 0, 0]\nhz = 3\nphase_deg = -45\nnode = \"blade\"\n";
     fs::write(&scenario, text).unwrap();
     let render = |more: &[&str]| {
         let scenario = scenario.to_str().unwrap();

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Intervals of the readout in which a solution is looked for, one in each at most: for any camera, and for each
-/// period of its fastest vibration within the readout.
+/// period of its fastest vibration, and turn of a point that spins, within the readout.
 const INTERVALS: usize = 4;
 const INTERVALS_A_PERIOD: f64 = 12.0;
 const MOST_INTERVALS: usize = 64;
@@ -213,11 +213,12 @@ impl FrameCamera {
             let row = at(0).map(|seen| (field.row_of(self.along(seen.px)), DVec2::ZERO));
             return row.into_iter().collect();
         }
+        let intervals = self.intervals_for(field, point);
         let mut rows = Vec::new();
         let mut before: Option<(usize, Projection)> = None;
         let miss = |row: usize, seen: &Projection| field.row_of(self.along(seen.px)) - row as f64;
-        for i in 0..=self.intervals {
-            let row = i * last / self.intervals;
+        for i in 0..=intervals {
+            let row = i * last / intervals;
             let here = at(row).map(|seen| (row, seen));
             if let (Some(low), Some(high)) = (before, here)
                 && low.0 < high.0
@@ -243,6 +244,14 @@ impl FrameCamera {
         rows.extend(beyond([1, 0]));
         rows.extend(beyond([last - 1, last]));
         rows
+    }
+
+    /// Intervals in which solutions are looked for: more for a point that spins.
+    fn intervals_for(&self, field: &Field, point: WorldPoint<'_>) -> usize {
+        let WorldPoint::On { motion, .. } = point else { return self.intervals };
+        let readout_s = (field.times_s[field.times_s.len() - 1] - field.times_s[0]).abs();
+        let turns = motion.highest_spin_hz() * readout_s;
+        (self.intervals + (INTERVALS_A_PERIOD * turns) as usize).min(MOST_INTERVALS)
     }
 
     /// The solution between two rows whose misses differ in sign.
@@ -496,8 +505,8 @@ mod tests {
     fn a_point_that_moves_is_found_where_a_search_finds_it() {
         let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
         let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
-        // It turns about the place below the picture's middle, 12 times a second: several times as fast as rows
-        // are read.
+        // It turns about the place below the picture's middle, 12 times a second: half as fast as rows are
+        // read.
         let hub = DAffine3::from_translation(DVec3::new(65.0, 3.0, 0.0));
         let track = Track::Spin { axis: DVec3::Z, hz: 12.0, phase_rad: 0.3 };
         let joint = Joint::new(JointFrame::from_affine(&hub).unwrap(), track);

@@ -226,6 +226,16 @@ impl RigidMotion {
         outer.iter().rev().fold(last.state(t_s), |inner, joint| joint.state(t_s).carrying(&inner))
     }
 
+    /// Turns a second of its fastest spin; 0 without any.
+    #[must_use]
+    pub fn highest_spin_hz(&self) -> f64 {
+        let hz = |joint: &Joint| match joint.track {
+            Track::Spin { hz, .. } => hz.abs(),
+            Track::Keys(_) => 0.0,
+        };
+        self.joints.iter().map(hz).fold(0.0, f64::max)
+    }
+
     /// A box that holds, from `from_s` to `to_s`, all that is in `at_start` at t = 0. Not the smallest one.
     #[must_use]
     pub fn bounds(&self, at_start: &Aabb, from_s: f64, to_s: f64) -> Aabb {

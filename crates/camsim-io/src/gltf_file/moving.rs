@@ -69,7 +69,10 @@ pub(super) fn periods_s(asset: &Asset) -> Result<Vec<f64>, GltfError> {
             let times_s = accessor::numbers(asset, &channel.sampler().input())?;
             Ok(times_s.last().copied().unwrap_or(0.0))
         };
-        animation.channels().map(last_s).try_fold(0.0, |most, last| Ok(f64::max(most, last?)))
+        animation
+            .channels()
+            .map(last_s)
+            .try_fold(0.0_f64, |most, last| -> Result<f64, GltfError> { Ok(most.max(last?)) })
     };
     asset.document.animations().map(period).collect()
 }

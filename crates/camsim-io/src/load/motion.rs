@@ -174,7 +174,7 @@ mod tests {
             let state = track(MotionSpec { repeat, ..bent.clone() }).state(t_s);
             let nose = state.rotation * DVec3::X;
             [state.position_m, state.velocity_m_s, nose]
-                .map(|v| v.to_array().map(|x| (x * 1e9).round() * 1e-9))
+                .map(|v| v.to_array().map(|x| (x * 1e6).round() / 1e6))
         };
         let [north, east, still] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]];
         let times = |way: [f64; 3], speed: f64| way.map(|x| x * speed);

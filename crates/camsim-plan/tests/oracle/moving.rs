@@ -114,7 +114,7 @@ fn the_blur_of_an_edge_is_as_long_as_its_way() {
     let length_px = speed_px_s * 1e-3 * exposure_ms;
     let oracle = oracle(
         exposure_ms,
-        vec![moving(rectangle([-60.0, -60.0], [60.0, 0.0]), vec![straight(DVec3::Y * speed_m_s)])],
+        vec![moving(rectangle([-60.0, -200.0], [60.0, 0.0]), vec![straight(DVec3::Y * speed_m_s)])],
     );
     let only = (0..SIZE_PX[0] * SIZE_PX[1]).map(|i| i / SIZE_PX[0] == y).collect();
     let options = RenderOptions {
@@ -140,7 +140,7 @@ fn the_blur_of_an_edge_is_as_long_as_its_way() {
         assert!((value - expected).abs() < 4e-3, "{x}: {value} {expected}");
         in_ramp += usize::from(expected > 0.0 && expected < 1.0);
     }
-    assert!(in_ramp >= 8 && length_px > 9.0, "{in_ramp}");
+    assert!(in_ramp >= 7 && length_px > 9.0, "{in_ramp}");
 }
 
 #[test]
@@ -188,9 +188,12 @@ fn busy() -> Scene {
     let meshes = vec![
         moving(roof.clone(), vec![spin(DVec3::new(0.0, 5.0, -70.0), tilt, 1.7, 0.3)]),
         house.clone(),
-        moving(house, vec![car.clone(), spin(DVec3::new(-20.0, 15.0, 0.0), DVec3::Z, -0.9, 0.0)]),
+        moving(
+            Mesh { origin_ned_m: DVec3::new(-8.0, -5.0, -45.0), ..house },
+            vec![car.clone(), spin(DVec3::new(-20.0, 15.0, 0.0), DVec3::Z, -0.9, 0.0)],
+        ),
         moving(pane, vec![car]),
-        roof,
+        Mesh { origin_ned_m: DVec3::new(-15.0, -20.0, -62.0), ..roof },
     ];
     Scene {
         terrain: Some(hills(65, 10.0)),

@@ -171,7 +171,7 @@ impl Curve<DVec3> {
         self.times_s
             .iter()
             .zip(&self.values)
-            .filter(|(t_s, _)| (from_s..=to_s).contains(t_s))
+            .filter(|(t_s, _)| (from_s..=to_s).contains(*t_s))
             .for_each(|(_, value)| visit(*value));
     }
 
