@@ -44,9 +44,9 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
         let (mut same, mut all) = (0_u32, 0_u32);
         for &(place, phase) in &rays {
             let Some(uv) = pixels.plan.camera.unproject(from_px + place) else { continue };
-            let pose = pixels.rays.pose_at(pixel.position, if exposes { phase } else { 0.0 });
+            let (t_s, pose) = pixels.rays.camera_at(pixel.position, if exposes { phase } else { 0.0 });
             all += 1;
-            same += u32::from(Some(object_of(pixels, pixels.rays.surface(&pose, uv))) == objects[i]);
+            same += u32::from(Some(object_of(pixels, pixels.rays.surface(t_s, &pose, uv))) == objects[i]);
         }
         // Rays fail at the border of the lens's field only.
         if all == 0 { 1.0 } else { same as f32 / all as f32 }
