@@ -52,8 +52,9 @@ impl MovingMeshes {
     fn ray_at_start(&self, ray: &Ray, t_s: f64) -> Option<Ray> {
         let state = self.motion.state(t_s);
         let direction = state.rotation.conjugate() * ray.direction;
-        let back = Ray::new(state.point_at_start(ray.origin), direction)?;
-        Some(back.turned_by(state.rotation))
+        let mut back = Ray::new(state.point_at_start(ray.origin), direction)?;
+        back.ned_from_ray = Some(state.rotation);
+        Some(back)
     }
 }
 
