@@ -10,7 +10,7 @@ use camsim_core::{
 };
 use camsim_engine::{Engine, Finished, FrameTimes, Session};
 use camsim_io::write::WriteError;
-use camsim_plan::Planner;
+use camsim_plan::{PlanError, Planner};
 
 use crate::failure::{Failure, OrFail};
 
@@ -24,6 +24,13 @@ pub trait FrameSource {
 
     /// The planner of the sequence.
     fn planner(&self) -> &Planner;
+
+    /// A planner of another sequence with the same scene.
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError>;
+
+    /// Turns to another sequence, whose frames are those of a new source. What belongs to the scene is kept if
+    /// it is the same [`Arc`].
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure>;
 
     /// Renders frames in the given order and passes each to `sink`.
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure>;
@@ -58,6 +65,15 @@ impl FrameSource for EngineSource<'_> {
         self.session.planner()
     }
 
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError> {
+        self.session.planner().renewed(sequence.clone(), &sequence.scenario.output.channels)
+    }
+
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure> {
+        let channels = &sequence.scenario.output.channels;
+        Ok(self.session.renew::<WriteError>(sequence.clone(), channels)?)
+    }
+
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {
         Ok(self.session.render(frames.iter().copied(), sink)?)
     }
@@ -81,12 +97,15 @@ pub struct ReferenceSource {
 impl ReferenceSource {
     /// Builds the ray-casting structures.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, Failure> {
-        let scenario = &sequence.scenario;
-        let mut planned = Sequence::clone(sequence);
-        planned.scenario.quality.solver = Auto::Auto;
-        let planner = Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX)
+        let planned = planned(sequence);
+        let planner = Planner::new(planned, &sequence.scenario.output.channels, MAX_IDEAL_SIDE_PX)
             .or_bad_input()?
             .with_ideals_of_any_area();
+        Self::with_planner(sequence, planner)
+    }
+
+    fn with_planner(sequence: &Arc<Sequence>, planner: Planner) -> Result<Self, Failure> {
+        let scenario = &sequence.scenario;
         let options = RenderOptions {
             channels: scenario.output.channels.clone(),
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
@@ -96,6 +115,13 @@ impl ReferenceSource {
     }
 }
 
+/// The sequence as the engine would plan it.
+fn planned(sequence: &Sequence) -> Arc<Sequence> {
+    let mut planned = sequence.clone();
+    planned.scenario.quality.solver = Auto::Auto;
+    Arc::new(planned)
+}
+
 impl FrameSource for ReferenceSource {
     fn adapter(&self) -> String {
         Oracle::describe()
@@ -103,6 +129,16 @@ impl FrameSource for ReferenceSource {
 
     fn planner(&self) -> &Planner {
         &self.planner
+    }
+
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError> {
+        let planner = self.planner.renewed(planned(sequence), &sequence.scenario.output.channels)?;
+        Ok(planner.with_ideals_of_any_area())
+    }
+
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure> {
+        *self = Self::with_planner(sequence, self.planner_of(sequence).or_bad_input()?)?;
+        Ok(())
     }
 
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {

@@ -12,6 +12,7 @@ mod auto;
 mod camera;
 mod channel;
 mod scene;
+mod twin;
 mod validate;
 
 pub use auto::{Auto, FieldOr};
@@ -24,6 +25,7 @@ pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
+pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera,
@@ -377,6 +379,9 @@ pub struct OutputSpec {
     pub flow_step: u32,
     /// Instant of the picture that `flow-global` leads to.
     pub flow_instant: FlowInstant,
+    /// Twins of every frame, each in a folder of its own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub twin: Vec<TwinSpec>,
 }
 
 impl Default for OutputSpec {
@@ -390,6 +395,7 @@ impl Default for OutputSpec {
             exr_compression: ExrCompression::Zip1,
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
+            twin: Vec::new(),
         }
     }
 }

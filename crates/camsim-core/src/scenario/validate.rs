@@ -9,6 +9,7 @@ use super::{
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
+mod twins;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -45,6 +46,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_camera(&mut check, &scenario.camera);
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
+    twins::check_twins(&mut check, scenario);
     check.problems
 }
 
@@ -348,7 +350,7 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::path::PathBuf;
 
     use super::*;
@@ -356,7 +358,7 @@ mod tests {
         BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
     };
 
-    fn good() -> Scenario {
+    pub(crate) fn good() -> Scenario {
         Scenario {
             seed: 0,
             flight: FlightSpec {

@@ -2,7 +2,9 @@
 //! `frame_file` has the schema of FRAME.toml.
 
 use camsim_core::{
-    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
+    scenario::{
+        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS, MAX_SIDE_PX,
+    },
     temporal::SAMPLES,
 };
 use camsim_plan::MAX_KEYS;
@@ -73,6 +75,24 @@ use ValueKind::*;
 
 const AUTO: &[&str] = &["auto"];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
+/// Channels of a twin.
+const CHANNELS: &[&str] = &[
+    "color",
+    "depth",
+    "valid",
+    "rows",
+    "coords",
+    "range",
+    "normal",
+    "normal-world",
+    "object",
+    "class",
+    "flow",
+    "flow-back",
+    "flow-global",
+    "motion",
+    "blur-path",
+];
 
 /// Keys of a scenario.
 pub(super) const KEYS: &[(&str, ValueKind)] = &[
@@ -188,6 +208,18 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+    ("output.twin", Tables),
+    ("output.twin.name", Text),
+    ("output.twin.exposure", Flag),
+    ("output.twin.shutter", Word(&["global"])),
+    ("output.twin.instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.twin.lens", Flag),
+    ("output.twin.noise", Flag),
+    ("output.twin.vignette", Flag),
+    ("output.twin.ideal", Flag),
+    ("output.twin.instants", Within(1, MAX_INSTANTS)),
+    ("output.twin.over", Word(&["exposure", "readout"])),
+    ("output.twin.channels", Words(CHANNELS)),
 ];
 
 /// Words that this version does not support.
@@ -206,6 +238,7 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),
     ("camera.zoom.focal_px", "camera.zoom"),
+    ("output.twin.name", "output.twin"),
 ];
 
 impl Schema {
