@@ -359,6 +359,8 @@ pub const PARAMS: &[Param] = &[
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
+    param("output.flow_step", "", [1.0, 1000.0], 0.1, "frames from one to the other of flow and flow-back"),
+    param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow-global leads to"),
     param("output.twin", "", ANY, 1.0, "the same frames by a better camera, each twin in a folder of its own"),
     param("output.twin.name", "", ANY, 1.0, "name of the twin's folder"),
     param("output.twin.exposure", "", ANY, 1.0, "off: an instant in place of the exposure, no motion blur"),

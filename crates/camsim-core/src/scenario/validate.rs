@@ -297,6 +297,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
     });
+    check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
+        "must be at least 1: flow leads from frame i to frame i + flow_step".into()
+    });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
     });
@@ -561,6 +564,7 @@ pub(crate) mod tests {
                 s.quality.solver = Auto::Value(Solver::Rk2);
             }),
             ("output.channels", |s| s.output.channels.clear()),
+            ("output.flow_step", |s| s.output.flow_step = 0),
         ];
         for (key, edit) in cases {
             let mut scenario = good();

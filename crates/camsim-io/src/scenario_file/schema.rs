@@ -75,7 +75,7 @@ use ValueKind::*;
 
 const AUTO: &[&str] = &["auto"];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
-/// Channels of a twin.
+/// Channels of frames and of their twins.
 const CHANNELS: &[&str] = &[
     "color",
     "depth",
@@ -202,12 +202,14 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
-    ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
+    ("output.channels", Words(CHANNELS)),
     ("output.format", Words(&["exr", "png"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+    ("output.flow_step", Whole),
+    ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
     ("output.twin", Tables),
     ("output.twin.name", Text),
     ("output.twin.exposure", Flag),
@@ -223,8 +225,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
 ];
 
 /// Words that this version does not support.
-pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] =
-    &[("flight.format", "ulog"), ("output.channels", "flow")];
+pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[("flight.format", "ulog")];
 
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
