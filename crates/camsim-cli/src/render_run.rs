@@ -32,8 +32,8 @@ mod pictures;
 mod tables;
 
 use folder::FolderState;
-use pictures::{Pictures, Series};
 pub use folder::{Lock, refuse_others, refuse_unknown};
+use pictures::{Pictures, Series};
 pub use tables::{body_at, camera_at, source_frame};
 
 /// A rendering job.
@@ -117,7 +117,8 @@ pub fn run(
         folder::check(job, pictures, &adapter, console)?;
     }
     // Planning errors are reported before anything is written.
-    let mut outcome = Outcome { first_plan: plan_first(job, &frames, source, console)?, ..Outcome::default() };
+    let mut outcome =
+        Outcome { first_plan: plan_first(job, &frames, source, console)?, ..Outcome::default() };
     for twin in &twins {
         plan_first(job, twin, source, console)?;
     }
@@ -142,9 +143,7 @@ fn plan_first(
 ) -> Result<Duration, Failure> {
     let begin = Instant::now();
     let first = |series: &Series| todo(job, series).first().copied();
-    if let Some((series, frame)) =
-        pictures.series.iter().find_map(|series| Some((series, first(series)?)))
-    {
+    if let Some((series, frame)) = pictures.series.iter().find_map(|series| Some((series, first(series)?))) {
         let waiting = waiting("planning the first frame", console.is_quiet());
         let planned = match pictures.twin {
             None => source.planner().plan(frame),

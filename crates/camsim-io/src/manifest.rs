@@ -185,9 +185,11 @@ pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Resu
         (value_of(&run, "scenario", &path)?.clone(), value_of(&run, "inputs", &path)?);
     let mut new = through_text(&portable_scenario(scenario, folder).map_err(parse)?).map_err(parse)?;
     // Each twin has a folder and a `run.json` of its own.
-    [&mut old, &mut new].into_iter().filter_map(|tree| tree.get_mut("output")?.as_object_mut()).for_each(|output| {
-        output.remove("twin");
-    });
+    [&mut old, &mut new].into_iter().filter_map(|tree| tree.get_mut("output")?.as_object_mut()).for_each(
+        |output| {
+            output.remove("twin");
+        },
+    );
     let new_inputs = portable_inputs(inputs, folder);
     let moved = MovedFiles::between(&mut old, old_inputs, &mut new, &new_inputs);
     check_equal(&path, BY_OTHER_SCENARIO, &old, &new)?;
@@ -204,13 +206,19 @@ pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Resu
 pub fn check_burst(folder: &Path, twin: Option<&TwinRecord>) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let Some(run) = read_run(&path)? else { return Ok(false) };
-    let parse = |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
+    let parse =
+        |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
     let new = through_text(&twin).map_err(parse)?;
     let burst = |twin: Option<&Value>| {
         let fields = ["instants", "over"].map(|key| (key, twin.and_then(|twin| twin.get(key)).cloned()));
         fields.into_iter().filter_map(|(key, value)| Some((format!("twin.{key}"), value?))).collect()
     };
-    check_equal(&path, BY_OTHER_SCENARIO, &Value::Object(burst(run.get("twin"))), &Value::Object(burst(Some(&new))))?;
+    check_equal(
+        &path,
+        BY_OTHER_SCENARIO,
+        &Value::Object(burst(run.get("twin"))),
+        &Value::Object(burst(Some(&new))),
+    )?;
     Ok(true)
 }
 

@@ -9,13 +9,16 @@ use camsim_core::{
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord,
-        camera_trajectory_csv, frames_path, trajectory_csv, write_atomic,
+        CameraRecord, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, camera_trajectory_csv,
+        frames_path, trajectory_csv, write_atomic,
     },
 };
 use camsim_plan::{FramePlan, Planner};
 
-use super::{Job, pictures::{Pictures, Series}};
+use super::{
+    Job,
+    pictures::{Pictures, Series},
+};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -90,7 +93,8 @@ pub fn end_frames(
             table.insert(&record(series, planner, frame, source_frame(sequence, &plan)));
         }
     }
-    table.retain_existing(&pictures.folder, &|frame, instant| !writes && made.contains_key(&(frame, instant)));
+    table
+        .retain_existing(&pictures.folder, &|frame, instant| !writes && made.contains_key(&(frame, instant)));
     table.write(&path).or_failed()
 }
 

@@ -135,7 +135,8 @@ fn every_key_of_the_structs_is_in_the_schema() {
 
 #[test]
 fn twins_are_read_and_their_problems_named_by_line() {
-    let with = |twin: &str| parse(&format!("{GOOD}[camera.shutter]\nexposure_ms = 8\n[[output.twin]]\n{twin}\n"));
+    let with =
+        |twin: &str| parse(&format!("{GOOD}[camera.shutter]\nexposure_ms = 8\n[[output.twin]]\n{twin}\n"));
     let scenario = with("name = \"burst\"\ninstants = 9\nchannels = [\"color\", \"flow-global\"]").unwrap();
     let [twin] = scenario.output.twin.as_slice() else { panic!("one twin") };
     assert_eq!((twin.name.as_str(), twin.instants), ("burst", Some(9)));
@@ -145,7 +146,10 @@ fn twins_are_read_and_their_problems_named_by_line() {
         ("name = \"a\"\nexposre = false", "s.toml:10: output.twin.0.exposre: unknown key; did you mean"),
         ("name = \"a\"\nshutter = \"globl\"", "s.toml:10: output.twin.0.shutter: expected one of \"global\""),
         ("name = \"a/b\"\nlens = false", "s.toml:9: output.twin.0.name: is the name of a folder"),
-        ("name = \"a\"\ninstant = \"last-row\"\nlens = false", "s.toml:10: output.twin.0.instant: is that of"),
+        (
+            "name = \"a\"\ninstant = \"last-row\"\nlens = false",
+            "s.toml:10: output.twin.0.instant: is that of",
+        ),
     ] {
         let error = with(twin).unwrap_err().to_string();
         assert!(error.contains(wanted), "{error}");

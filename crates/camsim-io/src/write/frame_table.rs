@@ -103,7 +103,8 @@ impl FrameTable {
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
         let files = lines.next()?.strip_prefix(FRAMES_COLUMNS)?;
-        let burst = files.strip_prefix(INSTANT_COLUMN).filter(|rest| rest.is_empty() || rest.starts_with(','));
+        let burst =
+            files.strip_prefix(INSTANT_COLUMN).filter(|rest| rest.is_empty() || rest.starts_with(','));
         let columns: Vec<String> = burst.unwrap_or(files).split(',').skip(1).map(str::to_owned).collect();
         let has_instants = burst.is_some();
         let value_columns = FRAMES_COLUMNS.split(',').count() + usize::from(has_instants);
@@ -310,9 +311,13 @@ mod tests {
         }
         let text = table.to_csv();
         assert_eq!(FrameTable::parse(&text).unwrap(), table);
-        let ends: Vec<&str> = text.lines().map(|line| line.rsplit_once(",0,").map_or(line, |(_, end)| end)).collect();
+        let ends: Vec<&str> =
+            text.lines().map(|line| line.rsplit_once(",0,").map_or(line, |(_, end)| end)).collect();
         assert!(ends[0].ends_with("ideal_qz,instant,color_png"), "{text}");
-        assert_eq!(ends[1..], ["0,color_png/2", "9,color_png/2", "10,color_png/2", "0,color_png/4", "1,color_png/4"]);
+        assert_eq!(
+            ends[1..],
+            ["0,color_png/2", "9,color_png/2", "10,color_png/2", "0,color_png/4", "1,color_png/4"]
+        );
         let folder = tempfile::tempdir().unwrap();
         let path = frames_path(folder.path());
         table.write(&path).unwrap();

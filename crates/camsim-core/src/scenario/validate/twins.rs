@@ -61,7 +61,10 @@ fn check_keys(check: &mut Check, i: usize, twin: &TwinSpec) {
         ("vignette", twin.vignette),
     ];
     for (name, _) in flags.iter().filter(|(_, flag)| twin.ideal && *flag == Some(true)) {
-        check.fail(key(name), "is left out by ideal = true; write false, or what is to be left out instead of ideal");
+        check.fail(
+            key(name),
+            "is left out by ideal = true; write false, or what is to be left out instead of ideal",
+        );
     }
     check.require(twin.exposure != Some(true) || twin.instants.is_none(), key("exposure"), || {
         "cannot be true for a burst, whose pictures are instants; leave it out, or leave instants out".into()
@@ -69,7 +72,9 @@ fn check_keys(check: &mut Check, i: usize, twin: &TwinSpec) {
     let is_over_readout = twin.over == Some(BurstOver::Readout);
     check.require(twin.instant.is_none() || (twin.is_global() && !is_over_readout), key("instant"), || {
         match is_over_readout {
-            true => "cannot be chosen for a burst over the readout, which has all instants; leave it out".into(),
+            true => {
+                "cannot be chosen for a burst over the readout, which has all instants; leave it out".into()
+            }
             false => "is that of a global shutter; write shutter = \"global\" too, or leave it out".into(),
         }
     });
@@ -92,9 +97,7 @@ fn check_burst(check: &mut Check, i: usize, twin: &TwinSpec, scenario: &Scenario
     let shutter = &scenario.camera.shutter;
     let is_instant = match twin.over.unwrap_or_default() {
         BurstOver::Exposure => shutter.exposure_ms == 0.0,
-        BurstOver::Readout => {
-            shutter.readout_ms == 0.0 && shutter.interlace_ms == super::FieldOr::Ms(0.0)
-        }
+        BurstOver::Readout => shutter.readout_ms == 0.0 && shutter.interlace_ms == super::FieldOr::Ms(0.0),
     };
     check.require(count == 1 || !is_instant, key("instants"), || match twin.over.unwrap_or_default() {
         BurstOver::Exposure => "are all the same, as camera.shutter.exposure_ms is 0; give it, or leave the \
@@ -156,7 +159,10 @@ mod tests {
             (vec![twin("inputs")], "output.twin.0.name"),
             (vec![TwinSpec { noise: Some(true), ..twin("a") }], "output.twin.0"),
             (vec![TwinSpec { ideal: true, lens: Some(true), ..twin("a") }], "output.twin.0.lens"),
-            (vec![TwinSpec { instants: Some(3), exposure: Some(true), ..twin("a") }], "output.twin.0.exposure"),
+            (
+                vec![TwinSpec { instants: Some(3), exposure: Some(true), ..twin("a") }],
+                "output.twin.0.exposure",
+            ),
             (vec![TwinSpec { instant: Some(FlowInstant::Centre), ..twin("a") }], "output.twin.0.instant"),
             (vec![TwinSpec { channels: Some(vec![]), ..twin("a") }], "output.twin.0.channels"),
             (vec![readout.clone()], "output.twin.0.over"),

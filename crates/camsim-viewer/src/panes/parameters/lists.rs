@@ -60,7 +60,8 @@ fn new_entry(document: &Document, key: &str) -> Table {
         put("coefficients", floats(&camera.lens.coefficients));
     } else if key == "output.twin" {
         let twins = &document.scenario.output.twin;
-        let names = (1..).map(|number: usize| if number == 1 { "sharp".into() } else { format!("sharp{number}") });
+        let names =
+            (1..).map(|number: usize| if number == 1 { "sharp".into() } else { format!("sharp{number}") });
         let is_free = |name: &String| twins.iter().all(|twin| !twin.name.eq_ignore_ascii_case(name));
         put("name", Value::String(names.into_iter().find(is_free).unwrap_or_default()));
         put("exposure", Value::Boolean(false));
