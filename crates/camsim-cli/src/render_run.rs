@@ -9,7 +9,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::{frame::RenderedFrame, scenario::QualitySpec, sequence::Sequence};
+use camsim_core::sequence::Sequence;
 use camsim_engine::Finished;
 use camsim_io::{
     manifest::{RunManifest, in_shard},
@@ -24,13 +24,14 @@ use crate::{
     frame_source::FrameSource,
     interrupt,
     progress::{frames_bar, waiting},
-    tolerances::{OverlapCycles, Tolerances},
 };
 
+mod findings;
 mod folder;
 mod pictures;
 mod tables;
 
+use findings::Findings;
 use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
 use pictures::{Pictures, Series};
@@ -366,59 +367,6 @@ fn finish(
     let _lock = Lock::take(&pictures.folder)?;
     tables::end_frames(pictures, series, source.planner(), made)?;
     manifest.write(&pictures.folder).or_failed()
-}
-
-/// What was found about rendered pictures.
-#[derive(Default)]
-struct Findings {
-    pictures: usize,
-    sky_only: u64,
-    empty: u64,
-    cycles: OverlapCycles,
-    tolerances: Option<Tolerances>,
-}
-
-impl Findings {
-    fn new(quality: &QualitySpec) -> Self {
-        Self { tolerances: Tolerances::new(quality), ..Self::default() }
-    }
-
-    fn add(&mut self, finished: &Finished) {
-        self.pictures += 1;
-        self.sky_only += u64::from(finished.plan.motion.nearest_m.is_infinite());
-        self.empty += u64::from(is_empty(&finished.frame));
-        self.cycles.add(finished.plan.frame, finished.out_of_order);
-        self.tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
-    }
-
-    fn warnings(&self) -> impl Iterator<Item = String> {
-        validity_warnings(self.sky_only, self.empty, self.pictures)
-            .chain(self.cycles.warning(self.pictures))
-            .chain(self.tolerances.iter().flat_map(Tolerances::warnings))
-    }
-}
-
-/// Warns of frames that see only sky, and of frames without a valid pixel.
-fn validity_warnings(sky_only: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
-    let sky_only = (sky_only > 0).then(|| {
-        format!(
-            "{sky_only} of {frames} frames see only sky: check camera.mount, flight.height and the position \
-                 of the scene"
-        )
-    });
-    let empty = (empty > 0).then(|| {
-        format!(
-            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, \
-             or the lens has none; check camera.principal_point_px and camera.focal_px against \
-             camera.size_px, and see `camsim explain SCENARIO.toml`"
-        )
-    });
-    sky_only.into_iter().chain(empty)
-}
-
-/// Whether no pixel of a frame's colour is valid; false for a frame without colour.
-fn is_empty(frame: &RenderedFrame) -> bool {
-    !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
 }
 
 /// Command that renders the missing frames of a folder's scenario.
