@@ -48,7 +48,9 @@ fn objects_are_numbered_named_and_coloured() {
         let table = fs::read_to_string(folder.join("objects.csv")).unwrap();
         assert_eq!(table, "number,name,class\n1,\"a \"\"grid\"\", white\",4\n");
         let listed = fs::read_to_string(folder.join("frames.csv")).unwrap();
-        for file in ["object/", "object_palette/", "class/", "class_palette/", "coverage/", "range/", "normal/"] {
+        for file in
+            ["object/", "object_palette/", "class/", "class_palette/", "coverage/", "range/", "normal/"]
+        {
             assert!(listed.contains(&format!("{file}frame_000002.")), "{backend}: {listed}");
         }
         let (objects, classes) = (numbers(folder, "object"), numbers(folder, "class"));
@@ -64,7 +66,8 @@ fn objects_are_numbered_named_and_coloured() {
             assert_eq!(pixel.0, camsim_io::write::palette_rgb8(object.into()));
         }
     }
-    let differ = numbers(&cpu, "object").iter().zip(numbers(&reference, "object")).filter(|(a, b)| **a != *b).count();
+    let differ =
+        numbers(&cpu, "object").iter().zip(numbers(&reference, "object")).filter(|(a, b)| **a != *b).count();
     assert!(differ <= 2, "{differ} of 3072 pixels have another object");
 
     // Another scenario without numbers has no table of them.
@@ -96,7 +99,10 @@ fn verify_compares_the_channels_that_a_scenario_asks_for() {
     }
     assert!(planes[1]["p99"].as_f64() < Some(1e-3), "{}", planes[1]);
     let (code, out, err) = verify(&["--set", channels]);
-    assert!(code == 0 && out.contains("object wrong: ") && out.contains("near the pixel's ray: kept"), "{out}{err}");
+    assert!(
+        code == 0 && out.contains("object wrong: ") && out.contains("near the pixel's ray: kept"),
+        "{out}{err}"
+    );
     let (_, out, _) = verify(&["--json"]);
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(report["frames"][0]["planes"].as_array().map(Vec::len), Some(0));

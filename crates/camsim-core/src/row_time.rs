@@ -457,7 +457,7 @@ mod tests {
                 (field.time_s(row) - found.t_s).abs() < 1e-9
             });
             let field = field.unwrap();
-            of_field[field] += usize::from(frame.fields[field].has_row(found.px.y));
+            of_field[field] += usize::from(frame.fields[field].distance_to_rows_px(found.px.y) <= 0.5);
         }
         assert!(of_field.iter().all(|&count| count > 30), "{of_field:?}");
     }

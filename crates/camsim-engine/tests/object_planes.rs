@@ -108,7 +108,8 @@ fn wrong_values_are_found() {
             PlaneValues::Index(numbers) => numbers[i] += 1,
             PlaneValues::Float(values) if plane.channel == Channel::Range => values[i] *= 1.002,
             PlaneValues::Float(values) => {
-                let normal = DVec3::new(values[3 * i].into(), values[3 * i + 1].into(), values[3 * i + 2].into());
+                let normal =
+                    DVec3::new(values[3 * i].into(), values[3 * i + 1].into(), values[3 * i + 2].into());
                 let turned = glam::DQuat::from_rotation_x(0.01) * normal;
                 let turned = if turned.distance(normal) > 2e-3 { turned } else { -normal };
                 values[3 * i..3 * i + 3].copy_from_slice(&turned.as_vec3().to_array());
