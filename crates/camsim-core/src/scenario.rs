@@ -14,6 +14,7 @@ mod channel;
 mod motion;
 mod scene;
 mod tracks;
+mod twin;
 mod validate;
 
 pub use auto::{Auto, FieldOr};
@@ -28,6 +29,7 @@ pub use scene::{
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
 pub use tracks::{PointSource, TracksSpec};
+pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera,
@@ -388,6 +390,9 @@ pub struct OutputSpec {
     /// Points whose pixel is written for every frame that sees them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracks: Option<TracksSpec>,
+    /// Twins of every frame, each in a folder of its own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub twin: Vec<TwinSpec>,
 }
 
 impl Default for OutputSpec {
@@ -403,6 +408,7 @@ impl Default for OutputSpec {
             flow_instant: FlowInstant::Centre,
             palette: false,
             tracks: None,
+            twin: Vec::new(),
         }
     }
 }
@@ -419,6 +425,14 @@ pub enum Stamps {
 }
 
 impl OutputSpec {
+    /// Channels of the frames and of their twins, some of them twice.
+    pub fn all_channels(&self) -> impl Iterator<Item = Channel> {
+        self.channels
+            .iter()
+            .chain(self.twin.iter().filter_map(|twin| twin.channels.as_ref()).flatten())
+            .copied()
+    }
+
     /// Time of the written clock at path time 0, nanoseconds. The log's clock shows `log_epoch_ns` there, and
     /// the window begins at `start_s` of path time.
     #[must_use]

@@ -258,8 +258,8 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }
     };
     let numbers_objects =
-        |channel: &Channel| matches!(channel, Channel::Object | Channel::Class | Channel::Coverage);
-    if scene.objects.len() > MAX_OBJECTS && scenario.output.channels.iter().any(numbers_objects) {
+        |channel: Channel| matches!(channel, Channel::Object | Channel::Class | Channel::Coverage);
+    if scene.objects.len() > MAX_OBJECTS && scenario.output.all_channels().any(numbers_objects) {
         return Err(LoadError::TooManyObjects(scene.objects.len()));
     }
     let vignette_path = &scenario.camera.photometric.vignette;

@@ -14,6 +14,8 @@
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
 //! OUT/coords/frame_000123.exr     u v x y dt n e d; n e d is the direction where depth is 0 (sky)
 //! OUT/rows/frame_000123.csv       time, pose and velocity of each row
+//! OUT/sharp/...                   a twin of every frame: run.json, camera.toml, frames.csv and channels of its own
+//! OUT/burst/color/frame_000123_7.png   a burst of each frame
 //! ```
 //!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
@@ -38,7 +40,7 @@ mod tracks;
 pub use atomic::write_atomic;
 pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, frames_path};
-pub use frames::{FrameFiles, FrameWriter, WriteSummary};
+pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
 pub use picture::write_picture;
 pub use png_file::{contact_sheet, palette_rgb8};
 pub use tables::{

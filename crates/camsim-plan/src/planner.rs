@@ -249,14 +249,7 @@ impl Planner {
     /// As [`Planner::frame_camera`].
     pub fn global_camera(&self, frame: i64, instant: FlowInstant) -> Result<FrameCamera, PlanError> {
         let (path, camera, stamp_s) = self.camera_at(frame)?;
-        let shutter = &self.inputs.shutter;
-        let last = shutter.lines() - 1;
-        let [first_s, last_s] = [shutter.dt_row_s(0), shutter.dt_row_s(last)];
-        let dt_s = match instant {
-            FlowInstant::FirstRow => first_s.min(last_s),
-            FlowInstant::Centre => 0.5 * (first_s + last_s),
-            FlowInstant::LastRow => first_s.max(last_s),
-        };
+        let dt_s = self.inputs.shutter.dt_instant_s(instant);
         Ok(FrameCamera::global(path, camera, stamp_s + dt_s))
     }
 

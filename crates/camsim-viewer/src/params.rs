@@ -407,6 +407,24 @@ pub const PARAMS: &[Param] = &[
         "points whose pixel tracks.csv has for every frame: terrain, vertices, board, tables (.csv)",
     ),
     param("output.tracks.count", "", [1.0, 1e6], 10.0, "most points of terrain, vertices and board, each"),
+    param(
+        "output.twin",
+        "",
+        ANY,
+        1.0,
+        "the same frames by a better camera, each twin in a folder of its own",
+    ),
+    param("output.twin.name", "", ANY, 1.0, "name of the twin's folder"),
+    param("output.twin.exposure", "", ANY, 1.0, "off: an instant in place of the exposure, no motion blur"),
+    param("output.twin.shutter", "", ANY, 1.0, "global: all pixels at one instant"),
+    param("output.twin.instant", "", ANY, 1.0, "mid-exposure that a global shutter shows"),
+    param("output.twin.lens", "", ANY, 1.0, "off: a pinhole with the same focal length and principal point"),
+    param("output.twin.noise", "", ANY, 1.0, "off: no noise"),
+    param("output.twin.vignette", "", ANY, 1.0, "off: no vignette"),
+    param("output.twin.ideal", "", ANY, 1.0, "no exposure, rolling shutter, lens, noise or vignette"),
+    param("output.twin.instants", "", [1.0, 1000.0], 0.1, "pictures in a burst for each frame"),
+    param("output.twin.over", "", ANY, 1.0, "what the instants of a burst are spread over"),
+    param("output.twin.channels", "", ANY, 1.0, "channels of the twin; those of the frame if none is chosen"),
 ];
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The tables of tracked points beside the frames.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::Path};
 
 use anyhow::anyhow;
 use camsim_io::write::{TrackFiles, WriteError, points_csv, tracks_rows};
@@ -76,8 +76,8 @@ impl<'a> JobTracks<'a> {
 }
 
 /// Refuses a folder with tables of these names that something else has made.
-pub fn check_folder(job: &Job<'_>, writes_tracks: bool) -> Result<(), Failure> {
-    let foreign = if writes_tracks { TrackFiles::new(job.folder).foreign().or_failed()? } else { None };
+pub fn check_folder(folder: &Path, writes_tracks: bool) -> Result<(), Failure> {
+    let foreign = if writes_tracks { TrackFiles::new(folder).foreign().or_failed()? } else { None };
     let Some(path) = foreign else { return Ok(()) };
     Err(Failure::bad_input(anyhow!(
         "{} is no table of tracks that camsim made, and would be replaced: choose another folder with -o, or \
@@ -87,7 +87,7 @@ pub fn check_folder(job: &Job<'_>, writes_tracks: bool) -> Result<(), Failure> {
 }
 
 /// Removes the tables of another scenario, but none that something else has made.
-pub fn remove(job: &Job<'_>) -> Result<(), Failure> {
-    let files = TrackFiles::new(job.folder);
+pub fn remove(folder: &Path) -> Result<(), Failure> {
+    let files = TrackFiles::new(folder);
     if files.foreign().or_failed()?.is_some() { Ok(()) } else { files.remove().or_failed() }
 }

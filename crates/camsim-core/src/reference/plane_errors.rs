@@ -93,6 +93,9 @@ enum Value {
     Number(u32),
 }
 
+/// Error of a value, and whether it is beyond the tolerance, so away from borders, and a fault.
+type Judged = (f64, bool, bool, bool);
+
 impl Compared<'_> {
     fn errors(&self, plane: &Plane) -> Option<PlaneErrors> {
         let components = match plane.channel {
@@ -128,9 +131,8 @@ impl Compared<'_> {
             let last = sorted.len().saturating_sub(1);
             sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
         };
-        let number = |counts: &dyn Fn(&(f64, bool, bool, bool)) -> bool| {
-            pixels.iter().filter(|pixel| counts(pixel)).count() as u64
-        };
+        let number =
+            |counts: &dyn Fn(&Judged) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
             channel: plane.channel,
             pixels: pixels.len() as u64,

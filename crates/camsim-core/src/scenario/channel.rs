@@ -150,7 +150,7 @@ impl Channel {
     }
 }
 
-/// Instant of the picture that `flow-global` leads to.
+/// Instant of a picture with a global shutter: that `flow-global` leads to, or a twin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FlowInstant {

@@ -11,6 +11,7 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 mod motion;
 mod scene;
 mod tracks;
+mod twins;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -48,6 +49,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
     tracks::check_tracks(&mut check, scenario);
+    twins::check_twins(&mut check, scenario);
     check.problems
 }
 
@@ -301,8 +303,7 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
         "must be at least 1: flow leads from frame i to frame i + flow_step".into()
     });
-    let has_indices =
-        scenario.output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+    let has_indices = scenario.output.all_channels().any(|channel| channel.plane() == Some(PlaneKind::Index));
     check.require(!scenario.output.palette || has_indices, "output.palette", || {
         "colours the channels object and class: add one of them to output.channels, or leave it out".into()
     });
@@ -359,7 +360,7 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::path::PathBuf;
 
     use super::*;
@@ -368,7 +369,7 @@ mod tests {
         VibrationSpec, ZoomSpec,
     };
 
-    fn good() -> Scenario {
+    pub(crate) fn good() -> Scenario {
         Scenario {
             seed: 0,
             flight: FlightSpec {

@@ -112,11 +112,6 @@ impl Asset {
         self.json.pointer(&pointer).and_then(Value::as_bool).unwrap_or(true)
     }
 
-    /// Name of a node.
-    pub fn node_name(&self, node: usize) -> Option<&str> {
-        self.json.pointer(&format!("/nodes/{node}/name")).and_then(Value::as_str)
-    }
-
     /// The first four nodes that `KHR_node_visibility` hides, as messages name them.
     pub fn hidden_nodes(&self) -> Vec<String> {
         let hidden = self.document.nodes().map(|node| node.index()).filter(|&node| !self.is_visible(node));

@@ -3,8 +3,8 @@
 
 use camsim_core::{
     scenario::{
-        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, PointSource,
-        TracksSpec,
+        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
+        MAX_SIDE_PX, PointSource, TracksSpec,
     },
     temporal::SAMPLES,
 };
@@ -83,6 +83,7 @@ use ValueKind::*;
 /// Class of an object.
 const CLASS: ValueKind = Within(1, u16::MAX as u32);
 const AUTO: &[&str] = &["auto"];
+/// Channels of frames and of their twins.
 const CHANNELS: &[&str] = &[
     "color",
     "depth",
@@ -244,6 +245,18 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.palette", Flag),
     ("output.tracks.points", WordsOrTables(&PointSource::WORDS)),
     ("output.tracks.count", Within(1, TracksSpec::MOST_POINTS)),
+    ("output.twin", Tables),
+    ("output.twin.name", Text),
+    ("output.twin.exposure", Flag),
+    ("output.twin.shutter", Word(&["global"])),
+    ("output.twin.instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.twin.lens", Flag),
+    ("output.twin.noise", Flag),
+    ("output.twin.vignette", Flag),
+    ("output.twin.ideal", Flag),
+    ("output.twin.instants", Within(1, MAX_INSTANTS)),
+    ("output.twin.over", Word(&["exposure", "readout"])),
+    ("output.twin.channels", Words(CHANNELS)),
 ];
 
 /// Words that this version does not support.
@@ -264,6 +277,7 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.zoom.at", "camera.zoom"),
     ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
+    ("output.twin.name", "output.twin"),
 ];
 
 impl ValueKind {

@@ -23,6 +23,7 @@ pub struct FrameFiles {
     folder: PathBuf,
     output: OutputSpec,
     encoding: OutputEncoding,
+    instant: Option<u32>,
 }
 
 /// One of the files of a frame.
@@ -43,12 +44,25 @@ impl FrameFiles {
     /// Files below `folder` for the channels and formats of `output`; `encoding` is
     /// `camera.photometric.output`.
     pub fn new(folder: &Path, output: &OutputSpec, encoding: OutputEncoding) -> Self {
-        Self { folder: folder.into(), output: output.clone(), encoding }
+        Self { folder: folder.into(), output: output.clone(), encoding, instant: None }
+    }
+
+    /// The files of a picture of each frame's burst: `frame_000123_7.png`.
+    #[must_use]
+    pub fn of_instant(self, instant: Option<u32>) -> Self {
+        Self { instant, ..self }
+    }
+
+    /// Number within the burst.
+    #[must_use]
+    pub fn instant(&self) -> Option<u32> {
+        self.instant
     }
 
     /// Column of `frames.csv` and path below the folder of each file of frame `index`.
     pub fn names(&self, index: u64) -> Vec<(String, String)> {
-        self.files().into_iter().map(|file| (column_name(file).to_owned(), file_name(file, index))).collect()
+        let name = |file| (column_name(file).to_owned(), file_name(file, index, self.instant));
+        self.files().into_iter().map(name).collect()
     }
 
     /// Whether all files of frame `index` exist. `--resume` skips such frames, as files are never incomplete.
@@ -74,31 +88,9 @@ impl FrameFiles {
         Ok(())
     }
 
-    /// Sorted paths, below the folder, of the files of frames of any channel that do not belong to `frames`.
-    pub fn unlisted_frame_files(&self, frames: &[u64]) -> Vec<String> {
-        let listed: std::collections::HashSet<String> =
-            frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
-        let mut unlisted = Vec::new();
-        // Folders that cannot be read count as empty.
-        for channel in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
-            let channel_name = channel.file_name().to_string_lossy().into_owned();
-            for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
-                let name = file.file_name().to_string_lossy().into_owned();
-                let number = name
-                    .strip_prefix("frame_")
-                    .and_then(|rest| rest.split_once('.'))
-                    .map(|(number, _)| number);
-                let is_frame = number.is_some_and(|number| {
-                    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
-                });
-                let path = format!("{channel_name}/{name}");
-                if is_frame && !listed.contains(&path) {
-                    unlisted.push(path);
-                }
-            }
-        }
-        unlisted.sort();
-        unlisted
+    /// Paths, below the folder, of the files of these frames.
+    pub fn paths(&self, frames: &[u64]) -> Vec<String> {
+        frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect()
     }
 
     /// Removes the temporary files that a killed run left for these frames.
@@ -147,7 +139,7 @@ impl FrameFiles {
         check_sizes(frame, &files)?;
         let mut written = 0;
         for file in files {
-            let path = self.folder.join(file_name(file, frame.index));
+            let path = self.folder.join(file_name(file, frame.index, self.instant));
             let exr = |names: &[&str], samples: &[f32], pixel| {
                 exr_file::encode(&path, frame.size_px, names, samples, pixel, self.output.exr_compression)
             };
@@ -186,6 +178,35 @@ impl FrameFiles {
     }
 }
 
+/// Sorted paths, below `folder`, of the files of frames and of bursts of any channel, without those of `listed`.
+#[must_use]
+pub fn unlisted_frame_files(folder: &Path, listed: &[String]) -> Vec<String> {
+    let listed: std::collections::HashSet<&str> = listed.iter().map(String::as_str).collect();
+    let mut unlisted = Vec::new();
+    // Folders that cannot be read count as empty.
+    for channel in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let channel_name = channel.file_name().to_string_lossy().into_owned();
+        for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
+            let name = file.file_name().to_string_lossy().into_owned();
+            let path = format!("{channel_name}/{name}");
+            if is_frame_file(&name) && !listed.contains(path.as_str()) {
+                unlisted.push(path);
+            }
+        }
+    }
+    unlisted.sort();
+    unlisted
+}
+
+/// Whether a name is that of a file of a frame, or of a picture of its burst.
+fn is_frame_file(name: &str) -> bool {
+    let Some((number, _)) = name.strip_prefix("frame_").and_then(|rest| rest.split_once('.')) else {
+        return false;
+    };
+    let mut parts = number.splitn(2, '_');
+    parts.all(|part| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 /// Column of `frames.csv`.
 fn column_name(file: OutputFile) -> &'static str {
     match file {
@@ -202,7 +223,7 @@ fn column_name(file: OutputFile) -> &'static str {
 }
 
 /// Path below the output folder.
-fn file_name(file: OutputFile, index: u64) -> String {
+fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
     let (folder, ending) = match file {
         OutputFile::Color(ImageFormat::Exr) => ("color", "exr"),
         OutputFile::Color(ImageFormat::Png) => ("color", "png"),
@@ -214,7 +235,8 @@ fn file_name(file: OutputFile, index: u64) -> String {
         OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
         OutputFile::Palette(_) => (column_name(file), "png"),
     };
-    format!("{folder}/frame_{index:06}.{ending}")
+    let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
+    format!("{folder}/frame_{index:06}{instant}.{ending}")
 }
 
 /// Checks that all planes have the size of the frame, which the encoders assume.

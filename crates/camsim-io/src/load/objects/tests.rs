@@ -36,7 +36,9 @@ fn load(folder: &Path, scene: &str) -> Result<Loaded, String> {
 }
 
 /// Name and class of the objects, and the object of each mesh.
-fn objects(scene: &str) -> Result<(Vec<(String, u16)>, Vec<u32>), String> {
+type Objects = (Vec<(String, u16)>, Vec<u32>);
+
+fn objects(scene: &str) -> Result<Objects, String> {
     let folder = tempfile::tempdir().unwrap();
     let scene = load(folder.path(), scene)?.sequence.scene.clone();
     let objects = scene.objects.iter().map(|object| (object.name.clone(), object.class)).collect();

@@ -18,6 +18,9 @@ use crate::{
     params::Param,
 };
 
+/// Keys of twins, all of which but the name may be left out.
+const TWINS: &str = "output.twin.";
+
 /// The edit that a pass over an editor made.
 struct Edit {
     /// The new value; `None` removes the key.
@@ -40,8 +43,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::NumberList => number_list(ui, document, key, value, param, out),
         ValueKind::Path => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
-        ValueKind::Word(words) => word(ui, key, value, words),
-        ValueKind::Words(words) => word_list(ui, key, value, words),
+        ValueKind::Word(words) => word(ui, key, value, words).or_else(|| removal(ui, key, value)),
+        ValueKind::Words(words) => word_list(ui, key, value, words).or_else(|| removal(ui, key, value)),
         ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
         ValueKind::Numbered(..) => numbered(ui, key, value, param),
@@ -97,7 +100,8 @@ fn number(
         .map(|(number, is_dragged)| Edit { value: Some(to_value(number, whole)), is_dragged });
     let may_be_left_out =
         matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
-            || key.starts_with("scene.light.");
+            || key.starts_with("scene.light.")
+            || key.starts_with(TWINS);
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, is_dragged: false });
     }
@@ -110,6 +114,7 @@ fn first_value(param: &Param) -> f64 {
     match param.key {
         "scene.fog_visibility_m" => 10_000.0,
         "scene.terrain.ortho_white" => 2047.0,
+        "output.twin.instants" => 9.0,
         "scene.light.sun_azimuth_deg" => light.sun_azimuth_deg,
         "scene.light.sun_elevation_deg" => light.sun_elevation_deg,
         "scene.light.sun" => light.sun,
@@ -124,6 +129,12 @@ fn remove(ui: &mut Ui, key: &str) -> bool {
     let button = ui.small_button("x").with_tooltip(&name);
     named(&button, Role::Button, &name);
     button.clicked()
+}
+
+/// The removal of a key of a twin that is set.
+fn removal(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
+    let is_asked = key.starts_with(TWINS) && value.is_some() && remove(ui, key);
+    is_asked.then_some(Edit { value: None, is_dragged: false })
 }
 
 /// A number, or one of the given words.
@@ -359,7 +370,9 @@ fn shortened(path: &str) -> String {
 
 /// A truth value.
 fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
-    let mut on = value.and_then(Value::as_bool).unwrap_or_default();
+    // What a twin does not leave out is as in the frame.
+    let is_on_by_default = key.starts_with(TWINS) && !key.ends_with(".ideal");
+    let mut on = value.and_then(Value::as_bool).unwrap_or(is_on_by_default);
     let response = ui.checkbox(&mut on, "");
     named(&response, Role::CheckBox, key);
     response.changed().then_some(Value::Boolean(on)).and_then(single_edit)
@@ -380,7 +393,8 @@ fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option
 
 /// Several of the given words.
 fn word_list(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
-    let array = value?.as_array()?;
+    let none = Vec::new();
+    let array = value.and_then(Value::as_array).unwrap_or(&none);
     let mut edit = None;
     for word in words {
         let mut on = array.iter().any(|element| element.as_str() == Some(word));
