@@ -26,6 +26,11 @@ pub trait FrameSource {
     /// The planner of the sequence.
     fn planner(&self) -> &Planner;
 
+    /// A planner that knows what moves, too.
+    fn scene_planner(&self) -> &Planner {
+        self.planner()
+    }
+
     /// A planner of another sequence with the same scene.
     fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError>;
 
@@ -64,6 +69,10 @@ impl FrameSource for EngineSource<'_> {
 
     fn planner(&self) -> &Planner {
         self.session.planner()
+    }
+
+    fn scene_planner(&self) -> &Planner {
+        self.session.scene_planner()
     }
 
     fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError> {

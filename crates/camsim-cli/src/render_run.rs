@@ -129,7 +129,7 @@ pub fn run(
     for twin in &twins {
         plan_first(job, twin, source, console)?;
     }
-    let tracks = JobTracks::new(job, source.planner(), console)?;
+    let tracks = JobTracks::new(job, source.scene_planner(), console)?;
     let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
     let mut manifest = run.render(&frames, twins.is_empty(), source)?;
     for twin in &twins {

@@ -47,11 +47,6 @@ impl Ray {
         Some(Self { origin, direction, inverse, axes, shear, ned_from_ray: None })
     }
 
-    /// The same ray, whose axes such a rotation takes to NED.
-    pub(super) fn turned_by(self, ned_from_ray: DQuat) -> Self {
-        Self { ned_from_ray: Some(ned_from_ray), ..self }
-    }
-
     /// A point in the sheared space of the ray (Woop, Benthin & Wald 2013). Equal points give equal results,
     /// so triangles that share an edge agree on which side of it the ray passes.
     pub(super) fn shear(&self, point: DVec3) -> ShearedPoint {
