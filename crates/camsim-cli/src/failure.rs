@@ -80,7 +80,7 @@ impl From<io::Error> for Failure {
 impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
         let code = match error {
-            GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
+            GpuError::NotBuilt | GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
             GpuError::TooLarge { .. } => BAD_INPUT,
             _ => FAILED,
         };

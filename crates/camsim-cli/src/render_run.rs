@@ -13,6 +13,7 @@ use camsim_core::{frame::RenderedFrame, sequence::Sequence};
 use camsim_engine::Finished;
 use camsim_io::{
     inputs,
+    load::TrackInputs,
     manifest::{RunManifest, in_shard},
     write::{FrameFiles, FrameWriter, WriteError},
 };
@@ -29,10 +30,12 @@ use crate::{
 
 mod folder;
 mod tables;
+mod tracks;
 
 use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
 pub use tables::{body_at, camera_at, source_frame};
+use tracks::JobTracks;
 
 /// A rendering job.
 #[derive(Debug)]
@@ -45,6 +48,8 @@ pub struct Job<'a> {
     pub frames: &'a [u64],
     /// Frames of this run's shard.
     pub shard: Option<Shard>,
+    /// Points of `[output.tracks]` that files and keys give.
+    pub tracks: &'a TrackInputs,
     /// Whether existing frames are kept.
     pub resume: bool,
     /// Warnings of loading, stored in `run.json`.
@@ -107,6 +112,7 @@ pub fn run(
         planned.or_bad_input()?;
     }
     let first_plan = begin.elapsed();
+    let tracks = JobTracks::new(job, source.planner(), console)?;
     let mut manifest = RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         adapter,
@@ -119,9 +125,11 @@ pub fn run(
         written: 0,
         skipped: (shard_frames.len() - todo.len()) as u64,
         finished: false,
+        tracked_points: tracks.as_ref().map(JobTracks::points),
         warnings: job.warnings.to_vec(),
     };
-    prepare(job, &files, &todo, &manifest, source, console)?;
+    manifest.warnings.extend(tracks.iter().flat_map(|tracks| tracks.notes().iter().cloned()));
+    prepare(job, &files, &todo, &manifest, tracks.as_ref(), source, console)?;
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files.clone(), threads()));
@@ -141,6 +149,7 @@ pub fn run(
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
         made.insert(finished.plan.frame, source_frame(job.sequence, &finished.plan));
         bar.inc(1);
+        tracks.as_ref().map_or(Ok(()), |tracks| tracks.write(finished.plan.frame))?;
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))?;
         if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
     });
@@ -163,7 +172,7 @@ pub fn run(
     manifest.warnings.extend(run_warnings);
     manifest.written = made.keys().filter(|&&frame| !writes_frames || files.exist(frame)).count() as u64;
     manifest.finished = rendered.is_ok() && written.is_ok();
-    let tables_written = finish(job, &files, &made, &manifest, source);
+    let tables_written = finish(job, &files, &made, &manifest, tracks.as_ref(), source);
     if is_stopped && written.is_ok() {
         tables_written?;
         let done = if writes_frames {
@@ -190,19 +199,22 @@ fn prepare(
     files: &FrameFiles,
     todo: &[u64],
     manifest: &RunManifest,
+    tracks: Option<&JobTracks<'_>>,
     source: &mut dyn FrameSource,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
     let _lock = Lock::take(job.folder)?;
     // Checked again under the lock.
     let folder_state = folder::folder_state(job, files, &manifest.inputs)?;
+    tracks::check_folder(job, tracks.is_some())?;
     if folder_state == FolderState::Replaced {
         files.remove(job.frames).or_failed()?;
-        tables::remove_objects(job.folder)?;
+        tracks::remove(job)?;
     }
     manifest.write(job.folder).or_failed()?;
     files.remove_temporaries(todo);
     tables::write_fixed(job, source.planner(), console)?;
+    tracks.map_or(Ok(()), JobTracks::begin)?;
     tables::begin_frames(job, folder_state == FolderState::Ours)
 }
 
@@ -212,10 +224,12 @@ fn finish(
     files: &FrameFiles,
     made: &BTreeMap<u64, camsim_io::write::SourceFrame>,
     manifest: &RunManifest,
+    tracks: Option<&JobTracks<'_>>,
     source: &mut dyn FrameSource,
 ) -> Result<(), Failure> {
     let _lock = Lock::take(job.folder)?;
-    tables::end_frames(job, files, source.planner(), made)?;
+    let frames = tables::end_frames(job, files, source.planner(), made)?;
+    tracks.map_or(Ok(()), |tracks| tracks.finish(&frames))?;
     manifest.write(job.folder).or_failed()
 }
 

@@ -12,6 +12,7 @@ mod auto;
 mod camera;
 mod channel;
 mod scene;
+mod tracks;
 mod validate;
 
 pub use auto::{Auto, FieldOr};
@@ -24,6 +25,7 @@ pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
+pub use tracks::{PointSource, TracksSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera,
@@ -381,6 +383,9 @@ pub struct OutputSpec {
     /// `class_palette`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub palette: bool,
+    /// Points whose pixel is written for every frame that sees them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracks: Option<TracksSpec>,
 }
 
 impl Default for OutputSpec {
@@ -395,6 +400,7 @@ impl Default for OutputSpec {
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
             palette: false,
+            tracks: None,
         }
     }
 }

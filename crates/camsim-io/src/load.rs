@@ -28,11 +28,13 @@ mod optics;
 mod ortho_coverage;
 mod placements;
 mod scene;
+mod track_points;
 
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_position_ned_m;
 use scene::load_scene;
+pub use track_points::TrackInputs;
 
 /// Maximum number of frames of a sequence: four days at 30 per second. More is a mistake in `camera.fps`.
 const MAX_FRAMES: f64 = 10e6;
@@ -95,6 +97,14 @@ pub enum LoadError {
     /// A table of placements cannot be read.
     #[error("{path}: {problem}")]
     Placements {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A table of points to track cannot be read.
+    #[error("{path}: {problem}")]
+    TrackPoints {
         /// The file.
         path: PathBuf,
         /// What is wrong, where, and what to do.
@@ -179,6 +189,8 @@ pub struct Loaded {
     pub tracked: Arc<TrackResult>,
     /// Extent and resolution of the terrain.
     pub terrain: Option<TerrainSummary>,
+    /// Points of `[output.tracks]` that files and keys give.
+    pub tracks: TrackInputs,
     /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The part of [`Self::warnings`] that concerns the scene.
@@ -243,6 +255,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }
     };
     let zoom_track = load_zoom_track(scenario, &log)?;
+    let tracks = TrackInputs::load(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
     let sequence = Sequence {
@@ -264,7 +277,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
             "output.palette colours nothing: output.channels has neither object nor class".to_owned()
         }),
     );
-    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
+    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
 }
 
 /// Whether two scenarios read and track the same log in the same way. The window may differ, as the whole log

@@ -50,6 +50,9 @@ pub struct RunManifest {
     pub skipped: u64,
     /// Whether the run is finished; `false` is written at its start.
     pub finished: bool,
+    /// Number of tracked points, if the scenario has `[output.tracks]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracked_points: Option<u64>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
@@ -310,6 +313,7 @@ mod tests {
             written: 3,
             skipped: 0,
             finished: true,
+            tracked_points: None,
             warnings: vec![],
         }
     }
@@ -463,6 +467,8 @@ mod tests {
             pattern = { image = "x/6", width_m = 1.0 }
             board = { target = "x/7" }
             gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10" }]
+            [output.tracks]
+            points = ["terrain", "x/11.csv"]
         "#;
         let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
         let mut tree = serde_json::to_value(&scenario).unwrap();
@@ -471,7 +477,8 @@ mod tests {
         for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
             assert!(visited.iter().any(|visited| visited == key), "{key}");
         }
-        assert_eq!(visited.len(), 10);
+        assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");
+        assert_eq!(visited.len(), 11);
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! OUT/trajectory.csv              motion of the platform
 //! OUT/camera_trajectory.csv       motion of the camera, with mount and vibration
 //! OUT/frames.csv                  stamp, pose, ideal frame and files of every written frame
+//! OUT/points.csv                  tracked points, if asked for
+//! OUT/tracks.csv                  where every written frame shows them
 //! OUT/color/frame_000123.exr      R G B A, linear   (.png: in the encoding of camera.photometric.output)
 //! OUT/depth/frame_000123.exr      Z, metres, 0 = nothing
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
@@ -31,6 +33,7 @@ mod frames;
 mod picture;
 mod png_file;
 mod tables;
+mod tracks;
 
 pub use atomic::write_atomic;
 pub use encode::{luminance, srgb_from_linear, srgb8};
@@ -42,6 +45,7 @@ pub use tables::{
     CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
+pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
 
 /// Why a file was not written.
 #[derive(Debug, Error)]

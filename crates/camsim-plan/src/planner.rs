@@ -8,6 +8,7 @@ use camsim_core::{
     camera::{CameraModel, ZoomTable},
     frame::RowRecord,
     mount::CameraPath,
+    pose::CameraPose,
     row_time::FrameCamera,
     scenario::{Channel, FlowInstant, Preset},
     sequence::Sequence,
@@ -34,6 +35,7 @@ use crate::{
         pixel_truth::FrameRays,
         temporal_method::{TemporalMethod, is_of_twist},
     },
+    view::surfaces::Surfaces,
 };
 use steps::Draft;
 
@@ -217,6 +219,18 @@ impl Planner {
     #[must_use]
     pub fn frame_rays<'a>(&'a self, plan: &'a FramePlan, phase: f64) -> FrameRays<'a> {
         FrameRays::new(self.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
+    }
+
+    /// The surfaces of the scene.
+    pub(crate) fn surfaces(&self) -> &Surfaces {
+        &self.inputs.scene.surfaces
+    }
+
+    /// The camera of a frame at the mid-exposure of its centre.
+    pub(crate) fn middle_view(&self, frame: u64) -> Result<(Arc<CameraModel>, CameraPose), PlanError> {
+        let (path, camera, stamp_s) = self.camera_at(frame as i64)?;
+        let (first_s, last_s) = self.inputs.shutter.window_s();
+        Ok((camera, path.pose(stamp_s + 0.5 * (first_s + last_s))))
     }
 
     /// The camera of a frame with the poses of its rows, for frames of any number.

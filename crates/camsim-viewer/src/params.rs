@@ -381,6 +381,14 @@ pub const PARAMS: &[Param] = &[
     ),
     param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow-global leads to"),
     param("output.palette", "", ANY, 1.0, "pictures of object and class in colour"),
+    param(
+        "output.tracks.points",
+        "",
+        ANY,
+        1.0,
+        "points whose pixel tracks.csv has for every frame: terrain, vertices, board, tables (.csv)",
+    ),
+    param("output.tracks.count", "", [1.0, 1e6], 10.0, "most points of terrain, vertices and board, each"),
 ];
 
 #[cfg(test)]

@@ -54,6 +54,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let warnings = &loaded.warnings;
     let job = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder,
         frames: &frames,
         shard: None,

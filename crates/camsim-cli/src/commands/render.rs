@@ -26,7 +26,8 @@ use crate::{
 ///
 /// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv
 /// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json,
-/// which repeats the run: `camsim render DIR/run.json`. Paths in these files are relative to them, so a
+/// which repeats the run: `camsim render DIR/run.json`; with [output.tracks], points.csv and tracks.csv (the
+/// exact pixel of points of the scene in each frame). Paths in these files are relative to them, so a
 /// folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
 /// command that resumes the run.
 #[derive(Debug, clap::Args)]
@@ -137,6 +138,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let resume_command = console.command_with("--resume");
     let job = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder: &folder,
         frames: &frames,
         shard: args.shard,

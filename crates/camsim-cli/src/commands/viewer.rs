@@ -42,6 +42,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let warnings = &loaded.warnings;
     let run = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder,
         frames: &frames,
         shard: None,

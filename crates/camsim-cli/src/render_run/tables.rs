@@ -1,6 +1,9 @@
 //! Tables beside the frames: `camera.toml`, the trajectories, `frames.csv`.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use anyhow::anyhow;
 use camsim_core::{
@@ -13,7 +16,7 @@ use camsim_core::{
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, WriteError,
+        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord,
         camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic,
     },
 };
@@ -35,17 +38,6 @@ const OBJECTS_CSV: &str = "objects.csv";
 fn numbers_objects(scenario: &Scenario) -> bool {
     let of_objects = |channel: &Channel| matches!(channel, Channel::Object | Channel::Class);
     scenario.output.channels.iter().any(of_objects) && !scenario.output.format.is_empty()
-}
-
-/// Removes the table of objects of another scenario.
-pub fn remove_objects(folder: &Path) -> Result<(), Failure> {
-    let path = folder.join(OBJECTS_CSV);
-    match std::fs::remove_file(&path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-            Err(WriteError::Io { path, source }).or_failed()
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Writes `camera.toml`, the trajectories, and `objects.csv` if numbers of objects or classes are written.
@@ -96,13 +88,13 @@ pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
 
 /// Updates `frames.csv`: rows of other runs stay with their files, `made` are those of this run, and frames
 /// whose run did not write its rows get them from their plans. Without frame files (`format = []`) the rows
-/// are those of the rendered frames.
+/// are those of the rendered frames. Returns the frames that it lists.
 pub fn end_frames(
     job: &Job<'_>,
     files: &FrameFiles,
     planner: &Planner,
     made: &BTreeMap<u64, SourceFrame>,
-) -> Result<(), Failure> {
+) -> Result<BTreeSet<u64>, Failure> {
     let path = frames_path(job.folder);
     let mut table = FrameTable::read(&path);
     let writes = !job.sequence.scenario.output.format.is_empty();
@@ -118,7 +110,8 @@ pub fn end_frames(
         }
     }
     table.retain_existing(job.folder, &|frame| !writes && made.contains_key(&frame));
-    table.write(&path).or_failed()
+    table.write(&path).or_failed()?;
+    Ok(table.frames().collect())
 }
 
 /// The frame to which the source coordinates of a plan refer.

@@ -9,6 +9,7 @@ use super::{
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
+mod tracks;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -45,6 +46,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_camera(&mut check, &scenario.camera);
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
+    tracks::check_tracks(&mut check, scenario);
     check.problems
 }
 
@@ -294,6 +296,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     );
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
+    });
+    check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
+        "must be at least 1: flow leads from frame i to frame i + flow_step".into()
     });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
@@ -577,6 +582,7 @@ mod tests {
                 s.quality.solver = Auto::Value(Solver::Rk2);
             }),
             ("output.channels", |s| s.output.channels.clear()),
+            ("output.flow_step", |s| s.output.flow_step = 0),
         ];
         for (key, edit) in cases {
             let mut scenario = good();

@@ -55,6 +55,7 @@ pub(super) fn load_scene(
         summary = Some(loaded.summary);
         notes.extend(loaded.notes);
     }
+    // Pattern and board come before the models: the choice of tracked corners counts on it.
     if let Some(pattern) = &spec.pattern {
         let picture_error = |source| LoadError::Picture { key: "scene.pattern.image", source };
         let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(picture_error)?;
@@ -184,7 +185,7 @@ pub fn board_position_ned_m(
 }
 
 /// Local position of an object that is placed locally or geodetically. `key` names it in the error.
-fn position_ned_m(
+pub(super) fn position_ned_m(
     scenario: &Scenario,
     log: &FlightLog,
     at: PatternCentre,
@@ -214,7 +215,7 @@ fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
 
 /// Height of the geoid above the ellipsoid, metres. A sum of harmonics per vertex would take minutes, so each
 /// thread that reads terrain interpolates in a cached grid.
-fn undulation_m(lat_rad: f64, lon_rad: f64) -> f64 {
+pub(super) fn undulation_m(lat_rad: f64, lon_rad: f64) -> f64 {
     thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
     GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
 }

@@ -2,7 +2,10 @@
 //! `frame_file` has the schema of FRAME.toml.
 
 use camsim_core::{
-    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
+    scenario::{
+        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, PointSource,
+        TracksSpec,
+    },
     temporal::SAMPLES,
 };
 use camsim_plan::MAX_KEYS;
@@ -65,6 +68,8 @@ pub enum ValueKind {
     Words(&'static [&'static str]),
     /// A table of names of the user's, each with a whole number from the first to the last.
     Numbered(u32, u32),
+    /// One of these words or the path of a CSV table, or a list of them.
+    WordsOrTables(&'static [&'static str]),
     /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
     /// Reserved; not supported by this version.
@@ -223,6 +228,8 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.flow_step", Within(1, u32::MAX)),
     ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
     ("output.palette", Flag),
+    ("output.tracks.points", WordsOrTables(&PointSource::WORDS)),
+    ("output.tracks.count", Within(1, TracksSpec::MOST_POINTS)),
 ];
 
 /// Words that this version does not support.
@@ -239,8 +246,21 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),
+    ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
 ];
+
+impl ValueKind {
+    /// Whether a text at a key of this kind is a path.
+    #[must_use]
+    pub fn is_path(self, text: &str) -> bool {
+        match self {
+            Path => true,
+            WordsOrTables(words) => !words.contains(&text),
+            _ => false,
+        }
+    }
+}
 
 impl Schema {
     /// The values that `key` takes; `None` if it is unknown.

@@ -150,6 +150,11 @@ impl FrameTable {
         self.rows.contains_key(&index)
     }
 
+    /// Numbers of the frames that have a row, ascending.
+    pub fn frames(&self) -> impl Iterator<Item = u64> {
+        self.rows.keys().copied()
+    }
+
     /// Whether frame `index` has a row with all of these files.
     #[must_use]
     pub fn has_files(&self, index: u64, files: &[(String, String)]) -> bool {

@@ -12,3 +12,4 @@ mod fixtures;
 mod hostile;
 mod measuring;
 mod planted_faults;
+mod tracks;

@@ -42,6 +42,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Flag => flag(ui, key, value),
         ValueKind::Word(words) => word(ui, key, value, words),
         ValueKind::Words(words) => word_list(ui, key, value, words),
+        ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
         ValueKind::Numbered(..) => numbered(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
@@ -294,7 +295,35 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
 
 /// A text, taken when its field loses focus; an empty one removes the key.
 fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
-    let present = value.and_then(Value::as_str).unwrap_or_default();
+    let text = finished_text(ui, key, value.and_then(Value::as_str).unwrap_or_default(), param)?;
+    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
+}
+
+/// Words and paths of tables, separated by commas.
+fn words_or_tables(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    value: Option<&Value>,
+    kind: ValueKind,
+    param: &Param,
+) -> Option<Edit> {
+    let list = value
+        .and_then(Value::as_array)
+        .map_or_else(|| value.into_iter().collect(), |list| list.iter().collect::<Vec<_>>());
+    let present: Vec<String> =
+        list.into_iter().filter_map(Value::as_str).map(|text| document.relative_path(text)).collect();
+    let text = finished_text(ui, key, &present.join(", "), param)?;
+    let element = |text: &str| {
+        Value::String(if kind.is_path(text) { document.resolved_path(text) } else { text.to_owned() })
+    };
+    let elements: Vec<Value> =
+        text.split(',').map(str::trim).filter(|text| !text.is_empty()).map(element).collect();
+    Some(Edit { value: (!elements.is_empty()).then_some(Value::Array(elements)), is_dragged: false })
+}
+
+/// A field of text; its text when it loses focus and differs from `present`.
+fn finished_text(ui: &mut Ui, key: &str, present: &str, param: &Param) -> Option<String> {
     let id = egui::Id::unique(("text", key));
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
     let response = ui
@@ -306,10 +335,7 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
         return None;
     }
     ui.data_mut(|data| data.remove_temp::<String>(id))?;
-    if !response.lost_focus() || text == present {
-        return None;
-    }
-    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
+    (response.lost_focus() && text != present).then_some(text)
 }
 
 /// A table of names with numbers, written `roof = 3, wall = 4`.
