@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 mod auto;
 mod camera;
 mod channel;
+mod motion;
 mod scene;
 mod tracks;
 mod validate;
@@ -21,6 +22,7 @@ pub use camera::{
     ShutterSpec, VibrationSpec, ZoomSpec,
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
+pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,

@@ -89,6 +89,10 @@ impl<'a> Session<'a> {
         sequence: Arc<Sequence>,
         channels: &[Channel],
     ) -> Result<Self, RenderErrorBase> {
+        let moving = sequence.scene.meshes.iter().filter(|mesh| mesh.motion.is_some()).count();
+        if moving > 0 {
+            return Err(RenderError::Moving(moving));
+        }
         let planner = Planner::new(sequence.clone(), channels, engine.max_side_px())?;
         let planner = Arc::new(planner.with_capabilities(engine.capabilities()));
         let meshes = Arc::new(SceneBatches::new(&sequence.scene));

@@ -23,10 +23,12 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod motion;
 mod objects;
 mod optics;
 mod ortho_coverage;
 mod placements;
+mod pose_table;
 mod scene;
 mod track_points;
 
@@ -109,6 +111,20 @@ pub enum LoadError {
         path: PathBuf,
         /// What is wrong, where, and what to do.
         problem: String,
+    },
+    /// A table of poses cannot be read.
+    #[error("{path}: {problem}")]
+    Poses {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A path without length.
+    #[error("scene.gltf: the path of {file} has no length: give motion.path two different points")]
+    Path {
+        /// The model.
+        file: PathBuf,
     },
     /// Models are to stand on the ground where there is none.
     #[error(
@@ -231,6 +247,8 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         old.scene == scenario.scene
             && old.flight.height == scenario.flight.height
             && before.log.frame == log.frame
+            && (!has_pose_table(scenario)
+                || (before.log.epoch_ns == log.epoch_ns && old.flight.speed == scenario.flight.speed))
     };
     let (scene, terrain, scene_notes) = match reusable.filter(|(before, old)| has_same_scene(before, old)) {
         Some((before, _)) => {
@@ -278,6 +296,12 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }),
     );
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
+}
+
+/// Whether anything moves by a table of poses, whose times are on the log's clock.
+fn has_pose_table(scenario: &Scenario) -> bool {
+    let motions = scenario.scene.gltf.iter().filter_map(|model| model.motion.as_ref());
+    motions.into_iter().any(|motion| motion.poses.is_some())
 }
 
 /// Whether two scenarios read and track the same log in the same way. The window may differ, as the whole log

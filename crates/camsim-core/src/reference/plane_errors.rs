@@ -136,9 +136,8 @@ impl Compared<'_> {
             let last = sorted.len().saturating_sub(1);
             sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
         };
-        let number = |counts: &dyn Fn(&PixelError) -> bool| {
-            pixels.iter().filter(|pixel| counts(pixel)).count() as u64
-        };
+        let number =
+            |counts: &dyn Fn(&PixelError) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
             channel: plane.channel,
             pixels: pixels.len() as u64,

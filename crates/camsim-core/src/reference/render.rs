@@ -242,8 +242,8 @@ impl FrameJob<'_> {
                 );
                 // At the border of the lens's field, the mean is over the part of the pixel that has rays.
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
-                let pose = instants.pose(x, i);
-                part += self.oracle.radiance(&pose, uv);
+                let (t_s, pose) = instants.pose(x, i);
+                part += self.oracle.radiance_at(t_s, &pose, uv);
                 count += 1;
             }
             if count == 0 {
@@ -320,7 +320,7 @@ struct SamplePoses<'a> {
     y: u32,
     exposure_s: f64,
     shift: f64,
-    shared: Option<Vec<CameraPose>>,
+    shared: Option<Vec<(f64, CameraPose)>>,
 }
 
 impl<'a> SamplePoses<'a> {
@@ -330,12 +330,13 @@ impl<'a> SamplePoses<'a> {
         Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
     }
 
-    /// Pose at sample `i` of pixel `x`.
-    fn pose(&mut self, x: u32, i: u32) -> CameraPose {
+    /// Path time and pose at sample `i` of pixel `x`.
+    fn pose(&mut self, x: u32, i: u32) -> (f64, CameraPose) {
         let pose = |i: u32, shift: f64| {
             let phase =
                 if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
-            self.job.oracle.sequence.path.pose(self.job.view.mid_s([x, self.y]) + phase * self.exposure_s)
+            let t_s = self.job.view.mid_s([x, self.y]) + phase * self.exposure_s;
+            (t_s, self.job.oracle.sequence.path.pose(t_s))
         };
         let Some(shared) = &mut self.shared else { return pose(i, self.shift) };
         let i = if self.exposure_s > 0.0 { i } else { 0 };

@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::MotionSpec;
+
 /// The scene: one of its parts, or several together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -227,7 +229,8 @@ pub struct GltfSpec {
     /// Index of the scene in the file; by default the file's own choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<u32>,
-    /// Time in the model's animations, seconds; by default nodes keep their static pose.
+    /// Time in the model's animations, seconds; by default nodes keep their static pose. With
+    /// `motion.animate`, the time at path time 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
     /// Index of the animation; by default all animations together.
@@ -246,6 +249,9 @@ pub struct GltfSpec {
     /// Classes, 1 to 65535, of nodes (and all below them) or of materials, by name, in place of `class`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub classes: BTreeMap<String, u16>,
+    /// How it moves; by default it stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionSpec>,
 }
 
 /// What an object of a model is.

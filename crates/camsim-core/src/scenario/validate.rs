@@ -8,6 +8,7 @@ use super::{
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
+mod motion;
 mod scene;
 mod tracks;
 
@@ -410,6 +411,7 @@ mod tests {
             class: None,
             objects: Default::default(),
             classes: Default::default(),
+            motion: None,
         }
     }
 

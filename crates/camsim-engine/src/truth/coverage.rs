@@ -39,29 +39,30 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
     let objects = pixels.map(&None, |pixel| Some(object(pixels, pixel)));
     let near = near_borders(pixels, &objects);
     let rays: Vec<(DVec2, f64)> = (0..RAYS).map(ray).collect();
-    let poses = LinePoses::new(pixels, &near, &rays);
+    let cameras = LineCameras::new(pixels, &near, &rays);
     pixels.map(&0.0, |pixel| {
         let Some(i) = index(pixels, pixel.position.map(i64::from)).filter(|&i| near[i]) else { return 1.0 };
         let from_px = DVec2::from_array(pixel.position.map(f64::from));
         let (mut same, mut all) = (0_u32, 0_u32);
-        for ((place, _), pose) in rays.iter().zip(poses.of(pixel.position)) {
+        for ((place, _), (t_s, pose)) in rays.iter().zip(cameras.of(pixel.position)) {
             let Some(uv) = pixels.plan.camera.unproject(from_px + *place) else { continue };
             all += 1;
-            same += u32::from(Some(object_of(pixels, pixels.rays.surface(pose, uv))) == objects[i]);
+            same += u32::from(Some(object_of(pixels, pixels.rays.surface(*t_s, pose, uv))) == objects[i]);
         }
         // Rays fail at the border of the lens's field only.
         if all == 0 { 1.0 } else { same as f32 / all as f32 }
     })
 }
 
-/// Cameras at the instants of the rays. Pixels of a line of the readout (and field) share them.
-struct LinePoses {
+/// Instants of the rays (path time, seconds) and cameras. Pixels of a line of the readout (and field) share
+/// them.
+struct LineCameras {
     axis: RowAxis,
     /// By line; empty for lines without a pixel near a border.
-    of_line: Vec<Vec<CameraPose>>,
+    of_line: Vec<Vec<(f64, CameraPose)>>,
 }
 
-impl LinePoses {
+impl LineCameras {
     fn new(pixels: &FramePixels<'_>, near: &[bool], rays: &[(DVec2, f64)]) -> Self {
         let [width, height] = pixels.plan.camera.size_px;
         let axis = pixels.plan.shutter.row_axis();
@@ -72,15 +73,15 @@ impl LinePoses {
             first[line(axis, pixel)].get_or_insert(pixel);
         }
         let exposes = pixels.plan.shutter.exposure_s() > 0.0;
-        let pose = |pixel, phase| pixels.rays.pose_at(pixel, if exposes { phase } else { 0.0 });
-        let of_pixel = |pixel: [u32; 2]| rays.iter().map(|&(_, phase)| pose(pixel, phase)).collect();
+        let camera = |pixel, phase| pixels.rays.camera_at(pixel, if exposes { phase } else { 0.0 });
+        let of_pixel = |pixel: [u32; 2]| rays.iter().map(|&(_, phase)| camera(pixel, phase)).collect();
         Self {
             axis,
             of_line: first.into_par_iter().map(|pixel| pixel.map_or_else(Vec::new, of_pixel)).collect(),
         }
     }
 
-    fn of(&self, pixel: [u32; 2]) -> &[CameraPose] {
+    fn of(&self, pixel: [u32; 2]) -> &[(f64, CameraPose)] {
         &self.of_line[line(self.axis, pixel)]
     }
 }

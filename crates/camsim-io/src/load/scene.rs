@@ -15,12 +15,13 @@ use glam::DVec3;
 
 use super::{
     LoadError, height_conversions,
+    motion::{carrier, model_motion},
     objects::{ModelObjects, ObjectList, name_or},
     placements::{Placement, read_placements},
 };
 use crate::{
     board_file::read_board,
-    gltf_file::{GltfOptions, MAX_RADIUS_M, read_gltf},
+    gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
     pictures::read_texture,
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
 };
@@ -123,8 +124,21 @@ fn add_model(
         animation: number(spec.animation),
         normals: scenario.scene.light.is_some(),
     };
-    let model = read_gltf(&spec.file, options)?;
+    let model = read_moving_gltf(&spec.file, options, &model_motion(spec))?;
+    let notes_of = |left_out: Option<String>| -> Vec<String> {
+        let notes = model.notes.iter().cloned().chain(left_out);
+        notes.map(|note| format!("{}: {note}", spec.file.display())).collect()
+    };
     let model_objects = ModelObjects::new(spec, &model)?;
+    if let Some(carrier) = carrier(scenario, log, spec, scene.terrain.as_ref())? {
+        let position_ned_m = carrier.start().position_m;
+        check_reach(spec, position_ned_m, model.radius_m * spec.scale)?;
+        let heading_rad = spec.heading_deg.to_radians();
+        let placed = model.place_on(Some(&carrier), position_ned_m, heading_rad, spec.scale);
+        let numbers = model_objects.of_copy(1, objects);
+        scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
+        return Ok(notes_of(None));
+    }
     let placements = match &spec.placements {
         None => vec![Placement { position: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
         Some(path) => read_placements(path, spec.on_ground)?,
@@ -152,10 +166,7 @@ fn add_model(
             };
             position_ned_m.z = ground_down_m;
         }
-        let reach_m = position_ned_m.length() + model.radius_m * spec.scale * scale;
-        if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
-            return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
-        }
+        check_reach(spec, position_ned_m, model.radius_m * spec.scale * scale)?;
         let placed =
             model.place(position_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale);
         let numbers = model_objects.of_copy(row, objects);
@@ -163,13 +174,16 @@ fn add_model(
     }
     let left_out = (without_ground > 0)
         .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
-    Ok(model
-        .notes
-        .iter()
-        .cloned()
-        .chain(left_out)
-        .map(|note| format!("{}: {note}", spec.file.display()))
-        .collect())
+    Ok(notes_of(left_out))
+}
+
+/// Refuses a model that is farther away than [`MAX_RADIUS_M`].
+fn check_reach(spec: &GltfSpec, position_ned_m: DVec3, radius_m: f64) -> Result<(), LoadError> {
+    let reach_m = position_ned_m.length() + radius_m;
+    if reach_m.is_nan() || reach_m > MAX_RADIUS_M {
+        return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
+    }
+    Ok(())
 }
 
 /// Position of the centre of a board, local north-east-down, metres.

@@ -152,6 +152,10 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
             (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {max}"))
         }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
+        ValueKind::Points(n) => (
+            all(value, None, &|point| all(point, Some(n), &number)),
+            format!("a list of lists of {n} numbers"),
+        ),
         ValueKind::Path => (false, "a path in quotes".to_owned()),
         ValueKind::Text => (value.is_str(), "a text in quotes".to_owned()),
         ValueKind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),

@@ -56,6 +56,8 @@ pub enum ValueKind {
     Counts(usize, u32),
     /// A list of any number of numbers.
     NumberList,
+    /// A list of any number of lists of this many numbers.
+    Points(usize),
     /// A path, resolved against the folder of the file that names it.
     Path,
     /// One of these words.
@@ -200,6 +202,18 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.gltf.class", CLASS),
     ("scene.gltf.objects", Word(&["placement", "node", "material"])),
     ("scene.gltf.classes", Numbered(1, u16::MAX as u32)),
+    ("scene.gltf.motion.poses", Path),
+    ("scene.gltf.motion.path", Points(3)),
+    ("scene.gltf.motion.speed_m_s", Number),
+    ("scene.gltf.motion.start_s", Number),
+    ("scene.gltf.motion.loop", Word(&["once", "repeat", "back-and-forth"])),
+    ("scene.gltf.motion.orient", Flag),
+    ("scene.gltf.motion.spin", Tables),
+    ("scene.gltf.motion.spin.axis", Numbers(3)),
+    ("scene.gltf.motion.spin.hz", Number),
+    ("scene.gltf.motion.spin.phase_deg", Number),
+    ("scene.gltf.motion.spin.node", Text),
+    ("scene.gltf.motion.animate", Flag),
     ("scene.sky", Numbers(3)),
     ("scene.fog_visibility_m", Number),
     ("scene.light.sun_azimuth_deg", Number),
@@ -243,6 +257,8 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("scene.pattern.image", "scene.pattern"),
     ("scene.pattern.width_m", "scene.pattern"),
     ("scene.gltf.file", "scene.gltf"),
+    ("scene.gltf.motion.spin.axis", "scene.gltf.motion.spin"),
+    ("scene.gltf.motion.spin.hz", "scene.gltf.motion.spin"),
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),

@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, ObjectsOf, OutputSpec,
-    QualitySpec, Readout, TrackerSpec,
+    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, LoopKind, MotionSpec,
+    ObjectsOf, OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -118,6 +118,16 @@ fn every_key_of_the_structs_is_in_the_schema() {
     model.classes = [("roof".to_owned(), 8)].into();
     (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
     (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
+    model.motion = Some(MotionSpec {
+        poses: Some("poses.csv".into()),
+        path: vec![[0.0, 1.0, 2.0]; 2],
+        speed_m_s: Some(1.0),
+        start_s: Some(1.0),
+        repeat: Some(LoopKind::BackAndForth),
+        orient: Some(true),
+        spin: vec![SpinSpec { axis: [1.0; 3], hz: 1.0, phase_deg: 1.0, node: Some("a".into()) }],
+        animate: true,
+    });
     let saved = toml::to_string(&scenario).unwrap();
     let mut visited = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut visited);

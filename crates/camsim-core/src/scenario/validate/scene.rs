@@ -1,6 +1,6 @@
 //! Range checks of `[scene]`.
 
-use super::Check;
+use super::{Check, motion::check_motion};
 use crate::{
     scenario::{BoardSpec, LightSpec, ObjectsOf, PatternCentre, SceneSpec, TerrainSpec},
     scene::{Board, BoardError},
@@ -31,6 +31,9 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
             "needs a terrain: give scene.terrain, or heights in the placements".into()
         });
+        if let Some(motion) = &model.motion {
+            check_motion(check, &table, model, motion);
+        }
         let twice =
             model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
         check.require(!twice, format!("{table}.placements"), || {

@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Text => text(ui, key, value, param),
         ValueKind::Numbered(..) => numbered(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
-        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts => None,
+        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
     };
     if let Some(Edit { value, is_dragged }) = edit {
         out.push(Message::Set(key.to_owned(), value, is_dragged));
