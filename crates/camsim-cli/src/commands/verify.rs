@@ -398,7 +398,7 @@ fn planes(
     oracle: &Oracle,
     tolerance_px: f64,
 ) -> Result<Vec<PlaneTruth>, Failure> {
-    let sequence = session.planner().sequence().clone();
+    let sequence = session.scene_planner().sequence().clone();
     let asked = sequence.scenario.output.channels.iter().copied().filter(|&channel| is_compared(channel));
     let asked: Vec<Channel> = asked.collect();
     if asked.is_empty() {

@@ -105,7 +105,8 @@ impl<'a> FrameRays<'a> {
         let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let terrain = self.surfaces.terrain()?;
         let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
-        let in_front_m = window * depth_m;
+        // What moves is not in the picture that was looked up.
+        let in_front_m = if self.surfaces.moves() { depth_m } else { window * depth_m };
         let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
         let is_hidden = self.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
         let normal_ned = terrain.normal_ned(triangle);
