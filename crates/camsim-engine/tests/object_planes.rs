@@ -42,10 +42,13 @@ fn hills_and_roofs() -> Scene {
         .collect();
     let texture = Arc::new(Texture::uniform([120, 130, 90, 255], Encoding::Srgb));
     let terrain = Terrain::from_heights(65, 65, 8.0, &heights, Some(texture)).expect("heights");
-    let raised = |object: u32, height_m: f64, half_m: f64| Mesh { object, ..roof(height_m, half_m) };
+    let raised = |object: u32, north_m: f64, east_m: f64, height_m: f64, half_m: f64| {
+        let origin_ned_m = DVec3::new(north_m, east_m, -height_m);
+        Mesh { object, origin_ned_m, ..roof(height_m, half_m) }
+    };
     Scene {
         terrain: Some(terrain),
-        meshes: vec![raised(2, 40.0, 14.0), raised(3, 75.0, 5.0)],
+        meshes: vec![raised(2, 70.0, 0.0, 40.0, 18.0), raised(3, 40.0, 8.0, 75.0, 5.0)],
         objects: vec![object("terrain", 0), object("low", 7), object("high", 9)],
         terrain_object: 1,
         ..Scene::default()
@@ -141,7 +144,7 @@ fn share(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
 
 #[test]
 fn coverage_is_the_share_of_rays_that_see_the_object() {
-    // 30 ms at 36 m/s from 45 m above the upper roof: it moves by two pixels.
+    // 30 ms at 36 m/s, 60 m from the upper roof: it moves by two pixels.
     let sequence = over_hills(|scenario| scenario.camera.shutter = rolling(33.0, 30.0));
     let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
     let frame = render(&Engine::cpu(), &sequence, &[Channel::Coverage], 0).frame;
@@ -159,7 +162,7 @@ fn coverage_is_the_share_of_rays_that_see_the_object() {
     }
     let rms = (squares / mixed).sqrt();
     eprintln!("{mixed} pixels with several objects: {most:.4} at most, {rms:.4} RMS");
-    assert!(mixed > 300.0 && most < 0.08 + 0.02 && rms < 0.025, "{mixed} {most} {rms}");
+    assert!(mixed > 300.0 && most < 0.1 + 0.02 && rms < 0.025, "{mixed} {most} {rms}");
 }
 
 /// Area of the part of a convex polygon within the pixel around `pixel`: clipped side by side.

@@ -6,7 +6,9 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
+    scenario::{
+        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Scenario, TrackerKind,
+    },
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{TrackResult, TrackerError, track},
@@ -286,6 +288,13 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(scene_notes.iter().cloned());
+    let output = &scenario.output;
+    let has_numbers = output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+    warnings.extend(
+        (output.palette && !has_numbers).then(|| {
+            "output.palette colours nothing: output.channels has neither object nor class".to_owned()
+        }),
+    );
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
 }
 

@@ -85,6 +85,14 @@ struct Compared<'a> {
     near_px: f64,
 }
 
+/// Error of one pixel.
+struct PixelError {
+    error: f64,
+    is_beyond: bool,
+    is_away: bool,
+    is_fault: bool,
+}
+
 /// A value of a plane.
 #[derive(Clone, Copy)]
 enum Value {
@@ -122,23 +130,23 @@ impl Compared<'_> {
             let error = self.error(plane.channel, value(i), sample);
             let is_beyond = is_beyond(plane.channel, error);
             let is_fault = is_beyond && !self.has_beside(plane.channel, i, value(i));
-            Some((error, is_beyond, is_beyond && self.is_away(i), is_fault))
+            Some(PixelError { error, is_beyond, is_away: is_beyond && self.is_away(i), is_fault })
         };
-        let pixels: Vec<_> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
-        let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.0).collect();
+        let pixels: Vec<PixelError> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
+        let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.error).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| {
             let last = sorted.len().saturating_sub(1);
             sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
         };
         let number =
-            |counts: &dyn Fn(&Judged) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
+            |counts: &dyn Fn(&PixelError) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
             channel: plane.channel,
             pixels: pixels.len() as u64,
-            beyond: number(&|pixel| pixel.1),
-            beyond_away: number(&|pixel| pixel.2),
-            faults: number(&|pixel| pixel.3),
+            beyond: number(&|pixel| pixel.is_beyond),
+            beyond_away: number(&|pixel| pixel.is_away),
+            faults: number(&|pixel| pixel.is_fault),
             p99: at(0.99),
             max: at(1.0),
         })

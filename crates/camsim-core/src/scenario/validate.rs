@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::{
-    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PlaneKind, Preset, QualitySpec, Scenario,
-    Silhouettes, Solver, Stamps, TrackerSpec,
+    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver,
+    Stamps, TrackerSpec,
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
@@ -303,10 +303,6 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
         "must be at least 1: flow leads from frame i to frame i + flow_step".into()
     });
-    let has_indices = scenario.output.all_channels().any(|channel| channel.plane() == Some(PlaneKind::Index));
-    check.require(!scenario.output.palette || has_indices, "output.palette", || {
-        "colours the channels object and class: add one of them to output.channels, or leave it out".into()
-    });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
     });
@@ -521,7 +517,6 @@ pub(crate) mod tests {
                 let classes = [("roof".into(), 0)].into();
                 s.scene.gltf = vec![GltfSpec { classes, objects: ObjectsOf::Node, ..model() }];
             }),
-            ("output.palette", |s| s.output.palette = true),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("scene.light.sun_azimuth_deg", |s| {

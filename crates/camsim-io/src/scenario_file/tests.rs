@@ -292,6 +292,7 @@ fn errors_name_file_line_and_key() {
             "[quality]\npreset = \"paper\"\nsolver = \"linear\"",
             "dir/s.toml:8: quality.solver: is rk2 with quality.preset",
         ),
+        ("[output]\nchannels = [\"color\", \"flaw\"]", "did you mean \"flow\"?"),
         ("[camera]\nfps = nan", "dir/s.toml:7: camera.fps: must be a finite number above 0"),
         (
             "[camera]\nmount = { vibration = [{ axis = \"roll\" }] }",
