@@ -42,8 +42,9 @@ fn write_scenario(folder: &Path, board: &str, tracks: &str) {
     fs::write(folder.join("s.toml"), scenario).unwrap();
 }
 
-const CHESSBOARD: &str = "kind = \"chessboard\"\ncolumns = 8\nrows = 5\nsize_m = 0.26";
-const APRILGRID: &str = "kind = \"aprilgrid\"\ncolumns = 5\nrows = 3\nsize_m = 0.36\nspacing = 0.3";
+const CHESSBOARD: &str =
+    "kind = \"chessboard\"\ncolumns = 8\nrows = 5\nsize_m = 0.26\nangles_deg = [0.0, 90.0, 0.0]";
+const APRILGRID: &str = "kind = \"aprilgrid\"\ncolumns = 5\nrows = 3\nsize_m = 0.36\nspacing = 0.3\nangles_deg = [0.0, 90.0, 0.0]";
 
 fn render(folder: &Path, out: &str, more: &[&str]) -> (u8, String) {
     let [scenario, out] = ["s.toml", out].map(|name| folder.join(name).to_str().unwrap().to_owned());
@@ -207,7 +208,7 @@ fn parts_and_resumed_runs_give_the_table_of_one_run() {
     // Without tracks nothing is written, and what belongs to another scenario goes.
     run("parts", &["--frames", "0..6", "--set", "camera.fps=11", "--set", "output={format=[\"png\"]}"]);
     assert!(!base.join("parts/points.csv").exists() && !base.join("parts/tracks.csv").exists());
-    assert!(!fs::read_to_string(base.join("parts/run.json")).unwrap().contains("track"));
+    assert!(!fs::read_to_string(base.join("parts/run.json")).unwrap().contains("tracked_points"));
 }
 
 #[test]
