@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use anyhow::anyhow;
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{Oracle, RenderOptions, is_rendered},
     scenario::Auto,
     scene::LodSelection,
     sequence::Sequence,
@@ -82,6 +83,13 @@ impl ReferenceSource {
     /// Builds the ray-casting structures.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, Failure> {
         let scenario = &sequence.scenario;
+        if let Some(channel) = scenario.output.channels.iter().find(|channel| !is_rendered(**channel)) {
+            return Err(Failure::bad_input(anyhow!(
+                "output.channels: the reference renderer has no {}: leave it out, or render with another \
+                 --backend and quality.solver",
+                channel.name()
+            )));
+        }
         let mut planned = Sequence::clone(sequence);
         planned.scenario.quality.solver = Auto::Auto;
         let planner = Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX)

@@ -209,6 +209,7 @@ fn prepare(
     tracks::check_folder(job, tracks.is_some())?;
     if folder_state == FolderState::Replaced {
         files.remove(job.frames).or_failed()?;
+        tables::remove_objects(job.folder)?;
         tracks::remove(job)?;
     }
     manifest.write(job.folder).or_failed()?;

@@ -496,3 +496,43 @@ fn verify_prints_the_terrain_level_of_detail() {
         "{out}{err}"
     );
 }
+
+/// A triangle, with its positions in a data URI.
+const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }],
+    "nodes": [{ "mesh": 0, "name": "blade", "scale": [40, 40, 40] }],
+  "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+  "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0],
+      "max": [0.5, 0.5, 0] }],
+  "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+  "buffers": [{ "byteLength": 36,
+      "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAPwAAAAAAAAAAAAAAAAAAAD8AAAAA" }] }"#;
+
+#[test]
+fn what_moves_is_rendered_by_the_reference_renderer_alone() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    fs::write(folder.join("model.gltf"), MODEL).unwrap();
+    let log = "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n0,0,0,-50,0,0,0\n1,0,0,-50,0,0,0\n";
+    fs::write(folder.join("log.csv"), log).unwrap();
+    let scenario = folder.join("s.toml");
+    let text = "[flight]\nlog = \"log.csv\"\n[camera]\nsize_px = [32, 24]\nfocal_px = [30, 30]\n\
+                mount = { angles_deg = [0, -90, 0] }\n[[scene.gltf]]\nfile = \"model.gltf\"\n\
+                [[scene.gltf.motion.spin]]\naxis = [1, 0, 0]\nhz = 3\nphase_deg = -45\nnode = \"blade\"\n";
+    fs::write(&scenario, text).unwrap();
+    let render = |more: &[&str]| {
+        let scenario = scenario.to_str().unwrap();
+        camsim(
+            &[&["render", scenario, "-o", folder.join("out").to_str().unwrap(), "--frames", "0..2"], more]
+                .concat(),
+        )
+    };
+    let (code, out, err) = render(&["--backend", "cpu"]);
+    assert!(
+        code != 0 && err.contains("--backend reference") && err.contains("scene.gltf.motion"),
+        "{out}{err}"
+    );
+    let (code, out, err) = render(&["--backend", "reference"]);
+    assert!(code == 0 && out.starts_with("2 frames in"), "{out}{err}");
+    let frames = [0, 1].map(|i| bytes(folder, &format!("out/color/frame_00000{i}.exr")));
+    assert_ne!(frames[0], frames[1], "the blade has turned");
+}

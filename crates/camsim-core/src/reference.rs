@@ -1,9 +1,9 @@
 //! The oracle: a reference renderer that casts every ray in f64, at the instant of its own row, from the
 //! trajectory into the scene. It is slow, exact and independent of the other renderers.
 //!
-//! It shares with them the scenario, the trajectory (with the mount) and the forward model of the lens, and
-//! nothing else. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
-//! `terrain_pyramid`, `mesh_bvh`), colour (`shading`) and integration (`render`) are implementations
+//! It shares with them the scenario, the trajectory (with the mount), the motions of what moves and the forward
+//! model of the lens, and nothing else. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
+//! `terrain_pyramid`, `mesh_bvh`, `moving`), colour (`shading`) and integration (`render`) are implementations
 //! of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
 //! The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these measurements and by the
 //! predictions of the planner.
@@ -25,6 +25,9 @@ mod disocclusion;
 mod lens_inverse;
 mod measure;
 mod mesh_bvh;
+mod moving;
+mod plane_errors;
+mod planes;
 mod ray;
 mod render;
 mod shading;
@@ -39,6 +42,9 @@ pub use measure::{
     image_errors, silhouettes,
 };
 use mesh_bvh::MeshBvh;
+use moving::{MovingMeshes, moving_meshes};
+pub use plane_errors::{NORMAL_TOLERANCE_RAD, PlaneErrors, is_compared, plane_errors};
+pub use planes::is_rendered;
 use ray::Ray;
 pub use render::{Convergence, IdealView, RenderOptions};
 use shading::Shading;
@@ -69,7 +75,9 @@ pub struct Oracle {
     fixed: Option<LensInverse>,
     zoomed: Mutex<Vec<(u64, Arc<LensInverse>)>>,
     terrain_pyramid: Option<TerrainPyramid>,
+    /// What stands still.
     mesh_bvh: MeshBvh,
+    moving: Vec<MovingMeshes>,
     shading: Shading,
     /// Whether the scene has blended surfaces.
     blends: bool,
@@ -99,6 +107,8 @@ pub struct Hit {
     pub texture_uv: [f64; 2],
     /// Factor on the texture's colour at the point.
     pub tint: [f64; 3],
+    /// Unit normal of the triangle, NED, on the side that the ray comes from; 0 for a triangle without area.
+    pub normal_ned: DVec3,
     /// 0 = terrain, 1 + i = mesh i of the scene.
     pub surface: u32,
 }
@@ -145,7 +155,8 @@ impl Oracle {
             fixed,
             zoomed: Mutex::default(),
             terrain_pyramid: scene.terrain.as_ref().map(TerrainPyramid::new),
-            mesh_bvh: MeshBvh::new(&scene.meshes, scene.light),
+            mesh_bvh: MeshBvh::new(&scene.meshes, scene.light, |mesh| mesh.motion.is_none()),
+            moving: moving_meshes(&scene.meshes, scene.light),
             shading: Shading::new(scene),
             blends: scene.has_blended(),
             sequence,
@@ -191,15 +202,28 @@ impl Oracle {
         self.view(frame).sample(pixel, offset_px, phase)
     }
 
-    /// First intersection of the ray `origin + t direction` with t > 0. Blended surfaces count where their
-    /// alpha reaches the cut-off. [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in
-    /// the camera. Surfaces are hit from both sides. `None` also for numbers that are not finite.
+    /// As [`Oracle::cast_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn cast(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
+        self.cast_at(0.0, origin_ned_m, direction_ned)
+    }
+
+    /// First intersection of the ray `origin + t direction` with t > 0, with everything where it is at path
+    /// time `t_s`. Blended surfaces count where their alpha reaches the cut-off. [`Hit::depth_m`] is t, which
+    /// is planar depth for a direction with z = 1 in the camera. Surfaces are hit from both sides. `None` also
+    /// for numbers that are not finite.
+    #[must_use]
+    pub fn cast_at(&self, t_s: f64, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
         let ray = Ray::new(origin_ned_m, direction_ned)?;
         let terrain_hit = self.cast_terrain(&ray);
-        let limit = terrain_hit.map_or(f64::INFINITY, |hit| hit.depth_m);
-        self.mesh_bvh.first(&ray, limit).or(terrain_hit)
+        let limit = limit_of(terrain_hit);
+        let still = self.mesh_bvh.first(&ray, limit).or(terrain_hit);
+        self.nearer_moving(&ray, t_s, still, false)
+    }
+
+    /// `hit`, or what moves in front of it; opaque surfaces only if `solid`.
+    fn nearer_moving(&self, ray: &Ray, t_s: f64, hit: Option<Hit>, solid: bool) -> Option<Hit> {
+        self.moving.iter().fold(hit, |hit, meshes| meshes.first(ray, t_s, limit_of(hit), solid).or(hit))
     }
 
     fn cast_terrain(&self, ray: &Ray) -> Option<Hit> {
@@ -216,22 +240,30 @@ impl Oracle {
         self.shading.color(hit, uv.extend(1.0).length())
     }
 
-    /// Linear light along the ray `uv` of a camera: of the first opaque surface and of every blended layer in
-    /// front of it, composited by alpha.
+    /// As [`Oracle::radiance_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn radiance(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
+        self.radiance_at(0.0, pose, uv)
+    }
+
+    /// Linear light along the ray `uv` of a camera at path time `t_s`: of the first opaque surface and of every
+    /// blended layer in front of it, composited by alpha.
+    #[must_use]
+    pub fn radiance_at(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> DVec3 {
         let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
         let direction = pose.ned_from_camera * way;
         if !self.blends {
-            return self.shading.color(self.cast(pose.position_ned_m, direction).as_ref(), range_per_depth);
+            let hit = self.cast_at(t_s, pose.position_ned_m, direction);
+            return self.shading.color(hit.as_ref(), range_per_depth);
         }
         let Some(ray) = Ray::new(pose.position_ned_m, direction) else {
             return self.shading.color(None, range_per_depth);
         };
         let terrain_hit = self.cast_terrain(&ray);
-        let limit = terrain_hit.map_or(f64::INFINITY, |hit| hit.depth_m);
-        let solid = self.mesh_bvh.first_solid(&ray, limit).or(terrain_hit);
-        let mut layers = self.mesh_bvh.layers(&ray, solid.map_or(f64::INFINITY, |hit| hit.depth_m));
+        let solid = self.mesh_bvh.first_solid(&ray, limit_of(terrain_hit)).or(terrain_hit);
+        let solid = self.nearer_moving(&ray, t_s, solid, true);
+        let mut layers = self.mesh_bvh.layers(&ray, limit_of(solid));
+        layers.extend(self.moving.iter().flat_map(|meshes| meshes.layers(&ray, t_s, limit_of(solid))));
         // Front to back: each layer attenuates the light from behind.
         layers.sort_by(|a, b| a.hit.depth_m.total_cmp(&b.hit.depth_m));
         let (mut sum, mut left) = (DVec3::ZERO, 1.0);
@@ -243,10 +275,17 @@ impl Oracle {
         sum + left * self.shading.color(solid.as_ref(), range_per_depth)
     }
 
-    /// Whether a surface lies between two points, leaving out the last millionth of the segment.
+    /// As [`Oracle::is_occluded_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn is_occluded(&self, from_ned_m: DVec3, to_ned_m: DVec3) -> bool {
-        self.cast(from_ned_m, to_ned_m - from_ned_m).is_some_and(|hit| hit.depth_m < 1.0 - 1e-6)
+        self.is_occluded_at(0.0, from_ned_m, to_ned_m)
+    }
+
+    /// Whether a surface lies between two points at path time `t_s`, leaving out the last millionth of the
+    /// segment.
+    #[must_use]
+    pub fn is_occluded_at(&self, t_s: f64, from_ned_m: DVec3, to_ned_m: DVec3) -> bool {
+        self.cast_at(t_s, from_ned_m, to_ned_m - from_ned_m).is_some_and(|hit| hit.depth_m < 1.0 - 1e-6)
     }
 
     fn zoomed_lens(&self, zoom: f64) -> Option<Arc<LensInverse>> {
@@ -273,7 +312,7 @@ impl FrameView<'_> {
         let uv = self.ray(pixel, offset_px)?;
         let t_s = self.mid_s(pixel) + phase * self.oracle.timing.exposure_s();
         let pose = self.oracle.sequence.path.pose(t_s);
-        Some(RaySample { t_s, pose, uv, hit: self.hit(&pose, uv) })
+        Some(RaySample { t_s, pose, uv, hit: self.hit(t_s, &pose, uv) })
     }
 
     /// Ideal ray (u, v) of an image position.
@@ -293,9 +332,14 @@ impl FrameView<'_> {
         self.stamp_s + self.oracle.timing.dt_s(pixel)
     }
 
-    fn hit(&self, pose: &CameraPose, uv: DVec2) -> Option<Hit> {
-        self.oracle.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
+    fn hit(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> Option<Hit> {
+        self.oracle.cast_at(t_s, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
     }
+}
+
+/// Where a ray ends.
+fn limit_of(hit: Option<Hit>) -> f64 {
+    hit.map_or(f64::INFINITY, |hit| hit.depth_m)
 }
 
 fn lens_inverse(

@@ -19,11 +19,12 @@ use crate::{
     camera::CameraModel,
     mount::CameraPath,
     pose::CameraPose,
+    scene::RigidMotion,
     shutter::{RowAxis, Shutter},
 };
 
 /// Intervals of the readout in which a solution is looked for, one in each at most: for any camera, and for each
-/// period of its fastest vibration within the readout.
+/// period of its fastest vibration, and turn of a point that spins, within the readout.
 const INTERVALS: usize = 4;
 const INTERVALS_A_PERIOD: f64 = 12.0;
 const MOST_INTERVALS: usize = 64;
@@ -32,11 +33,39 @@ const MOST_EVALUATIONS: usize = 40;
 
 /// A point that a camera may see.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WorldPoint {
+pub enum WorldPoint<'a> {
     /// In NED, metres.
     At(DVec3),
     /// Infinitely far away in this direction, NED.
     Towards(DVec3),
+    /// On something that moves.
+    On {
+        /// How that moves.
+        motion: &'a RigidMotion,
+        /// Where the point is at path time 0, NED, metres.
+        at_start_ned_m: DVec3,
+    },
+}
+
+impl<'a> WorldPoint<'a> {
+    /// A point that is at `point_ned_m` at path time `t_s`, on something that moves or stands still.
+    #[must_use]
+    pub fn on(motion: Option<&'a RigidMotion>, point_ned_m: DVec3, t_s: f64) -> Self {
+        motion.map_or(Self::At(point_ned_m), |motion| {
+            let at_start_ned_m = motion.state(t_s).point_at_start(point_ned_m);
+            Self::On { motion, at_start_ned_m }
+        })
+    }
+
+    /// Where the point is at path time `t_s`, NED, metres; `None` if it is infinitely far away.
+    #[must_use]
+    pub fn position_ned_m(&self, t_s: f64) -> Option<DVec3> {
+        match self {
+            Self::At(point_ned_m) => Some(*point_ned_m),
+            Self::Towards(_) => None,
+            Self::On { motion, at_start_ned_m } => Some(motion.state(t_s).point(*at_start_ned_m)),
+        }
+    }
 }
 
 /// Where a frame shows a point.
@@ -88,14 +117,17 @@ struct Projection {
 }
 
 impl CameraModel {
-    /// Pixel coordinates at which a camera shows a point, and its planar depth (infinite for a direction);
-    /// `None` if it is behind the camera or beyond the reach of the lens.
+    /// Pixel coordinates at which a camera shows a point at path time `t_s`, and its planar depth (infinite for
+    /// a direction); `None` if it is behind the camera or beyond the reach of the lens. Only a point on something
+    /// that moves depends on the time.
     #[must_use]
-    pub fn show(&self, pose: &CameraPose, point: WorldPoint) -> Option<(DVec2, f64)> {
+    pub fn show(&self, pose: &CameraPose, t_s: f64, point: WorldPoint<'_>) -> Option<(DVec2, f64)> {
         let camera_from_ned = pose.ned_from_camera.conjugate();
+        let from_camera = |point_ned_m: DVec3| (camera_from_ned * (point_ned_m - pose.position_ned_m), false);
         let (ray, is_far) = match point {
-            WorldPoint::At(point_ned_m) => (camera_from_ned * (point_ned_m - pose.position_ned_m), false),
+            WorldPoint::At(point_ned_m) => from_camera(point_ned_m),
             WorldPoint::Towards(direction_ned) => (camera_from_ned * direction_ned, true),
+            WorldPoint::On { motion, at_start_ned_m } => from_camera(motion.state(t_s).point(at_start_ned_m)),
         };
         if ray.z.is_nan() || ray.z <= 0.0 {
             return None;
@@ -151,7 +183,7 @@ impl FrameCamera {
     /// Where the frame shows a point. Of several positions the one nearest to `near_px` is returned. `None`
     /// if the point is behind the camera or beyond the reach of its lens.
     #[must_use]
-    pub fn find(&self, point: WorldPoint, near_px: DVec2) -> Option<ImagePoint> {
+    pub fn find(&self, point: WorldPoint<'_>, near_px: DVec2) -> Option<ImagePoint> {
         let seen = self.find_all(point);
         let nearest = seen
             .iter()
@@ -162,7 +194,7 @@ impl FrameCamera {
     /// All positions within the picture at which the frame shows a point, in the order of its fields and rows;
     /// each has their number.
     #[must_use]
-    pub fn find_all(&self, point: WorldPoint) -> Vec<ImagePoint> {
+    pub fn find_all(&self, point: WorldPoint<'_>) -> Vec<ImagePoint> {
         let seen = self.fields.iter().flat_map(|field| {
             let solutions = self.solutions(field, point).into_iter();
             let points = solutions.filter_map(|(row, slope)| self.image_point(field, point, row, slope));
@@ -183,18 +215,19 @@ impl FrameCamera {
 
     /// Fractional rows of a field at which it shows a point, with the movement of the projection from row to
     /// row there.
-    fn solutions(&self, field: &Field, point: WorldPoint) -> Vec<(f64, DVec2)> {
+    fn solutions(&self, field: &Field, point: WorldPoint<'_>) -> Vec<(f64, DVec2)> {
         let last = field.poses.len() - 1;
-        let at = |row: usize| self.project(&field.poses[row], point);
+        let at = |row: usize| self.project(&field.poses[row], field.times_s[row], point);
         if last == 0 || field.is_global() {
             let row = at(0).map(|seen| (field.row_of(self.along(seen.px)), DVec2::ZERO));
             return row.into_iter().collect();
         }
+        let intervals = self.intervals_for(field, point);
         let mut rows = Vec::new();
         let mut before: Option<(usize, Projection)> = None;
         let miss = |row: usize, seen: &Projection| field.row_of(self.along(seen.px)) - row as f64;
-        for i in 0..=self.intervals {
-            let row = i * last / self.intervals;
+        for i in 0..=intervals {
+            let row = i * last / intervals;
             let here = at(row).map(|seen| (row, seen));
             if let (Some(low), Some(high)) = (before, here)
                 && low.0 < high.0
@@ -222,11 +255,19 @@ impl FrameCamera {
         rows
     }
 
+    /// Intervals in which solutions are looked for: more for a point that spins.
+    fn intervals_for(&self, field: &Field, point: WorldPoint<'_>) -> usize {
+        let WorldPoint::On { motion, .. } = point else { return self.intervals };
+        let readout_s = (field.times_s[field.times_s.len() - 1] - field.times_s[0]).abs();
+        let turns = motion.highest_spin_hz() * readout_s;
+        (self.intervals + (INTERVALS_A_PERIOD * turns) as usize).min(MOST_INTERVALS)
+    }
+
     /// The solution between two rows whose misses differ in sign.
     fn between(
         &self,
         field: &Field,
-        point: WorldPoint,
+        point: WorldPoint<'_>,
         mut low: (usize, Projection),
         mut high: (usize, Projection),
     ) -> Option<(f64, DVec2)> {
@@ -241,28 +282,35 @@ impl FrameCamera {
             let share = if i % 3 == 2 { 0.5 } else { share };
             let row = low.0 + (share * (high.0 - low.0) as f64).round() as usize;
             let row = row.clamp(low.0 + 1, high.0 - 1);
-            let middle = (row, self.project(&field.poses[row], point)?);
+            let middle = (row, self.project(&field.poses[row], field.times_s[row], point)?);
             if (miss(&middle) >= 0.0) == (below >= 0.0) { low = middle } else { high = middle }
         }
         None
     }
 
     /// The point as it is seen at a fractional row, corrected once by the movement from row to row.
-    fn image_point(&self, field: &Field, point: WorldPoint, row: f64, slope: DVec2) -> Option<ImagePoint> {
-        let first = self.project(&self.path.pose(field.time_s(row)), point)?;
+    fn image_point(
+        &self,
+        field: &Field,
+        point: WorldPoint<'_>,
+        row: f64,
+        slope: DVec2,
+    ) -> Option<ImagePoint> {
+        let first_s = field.time_s(row);
+        let first = self.project(&self.path.pose(first_s), first_s, point)?;
         let miss = field.row_of(self.along(first.px)) - row;
         let row = row + miss / (1.0 - self.along(slope) / field.step_px);
         let t_s = field.time_s(row);
         let pose = self.path.pose(t_s);
-        let seen = self.project(&pose, point)?;
+        let seen = self.project(&pose, t_s, point)?;
         Some(self.seen(t_s, pose, seen))
     }
 
     /// A point that no row shows, as the camera of the row nearest to it sees it.
-    fn outside(&self, point: WorldPoint, near_px: DVec2) -> Option<ImagePoint> {
+    fn outside(&self, point: WorldPoint<'_>, near_px: DVec2) -> Option<ImagePoint> {
         let seen = self.fields.iter().flat_map(|field| {
             [0, field.poses.len() - 1].into_iter().filter_map(move |row| {
-                let seen = self.project(&field.poses[row], point)?;
+                let seen = self.project(&field.poses[row], field.times_s[row], point)?;
                 let found = self.seen(field.times_s[row], field.poses[row], seen);
                 let miss = (field.row_of(self.along(seen.px)) - row as f64).abs();
                 Some((miss, ImagePoint { is_inside: false, ..found }))
@@ -282,8 +330,8 @@ impl FrameCamera {
         ImagePoint { px, t_s, pose, depth_m, is_inside, solutions: 0 }
     }
 
-    fn project(&self, pose: &CameraPose, point: WorldPoint) -> Option<Projection> {
-        self.camera.show(pose, point).map(|(px, depth_m)| Projection { px, depth_m })
+    fn project(&self, pose: &CameraPose, t_s: f64, point: WorldPoint<'_>) -> Option<Projection> {
+        self.camera.show(pose, t_s, point).map(|(px, depth_m)| Projection { px, depth_m })
     }
 
     /// Pixel coordinate across the rows of the readout.
@@ -326,12 +374,13 @@ impl Field {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use glam::DQuat;
+    use glam::{DAffine3, DQuat};
 
     use super::*;
     use crate::{
         pose::BodyState,
         scenario::{Axis, FieldOr, LensModel, MountSpec, Readout, ShutterSpec, VibrationSpec},
+        scene::motion::{Joint, JointFrame, Track},
         trajectory::Trajectory,
     };
 
@@ -370,7 +419,7 @@ mod tests {
         Shutter::from_spec(&spec, 30.0, SIZE_PX).unwrap()
     }
 
-    fn points() -> impl Iterator<Item = WorldPoint> {
+    fn points() -> impl Iterator<Item = WorldPoint<'static>> {
         (0..400).map(|i| {
             let (north, east) = (f64::from(i % 20) * 6.0 - 10.0, f64::from(i / 20) * 6.0 - 60.0);
             if i % 7 == 0 {
@@ -382,12 +431,13 @@ mod tests {
     }
 
     /// All solutions on a grid of instants: rows at which the miss changes its sign.
-    fn search(frame: &FrameCamera, field: &Field, point: WorldPoint) -> Vec<DVec2> {
+    fn search(frame: &FrameCamera, field: &Field, point: WorldPoint<'_>) -> Vec<DVec2> {
         let last = field.poses.len() as f64 - 1.0;
         let steps = 40 * field.poses.len();
         let miss = |i: usize| {
             let row = -0.5 + (last + 1.0) * i as f64 / steps as f64;
-            let seen = frame.project(&frame.path.pose(field.time_s(row)), point)?;
+            let t_s = field.time_s(row);
+            let seen = frame.project(&frame.path.pose(t_s), t_s, point)?;
             Some((field.row_of(frame.along(seen.px)) - row, seen.px))
         };
         let mut found = Vec::new();
@@ -474,11 +524,39 @@ mod tests {
     }
 
     #[test]
+    fn a_point_that_moves_is_found_where_a_search_finds_it() {
+        let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+        let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
+        // It turns about the place below the picture's middle, 12 times a second: half as fast as rows are
+        // read.
+        let hub = DAffine3::from_translation(DVec3::new(65.0, 3.0, 0.0));
+        let track = Track::Spin { axis: DVec3::Z, hz: 12.0, phase_rad: 0.3 };
+        let joint = Joint::new(JointFrame::from_affine(&hub).unwrap(), track);
+        let motion = RigidMotion::new(vec![joint]);
+        let mut inside = 0;
+        for k in 0..60 {
+            let at = DVec3::new(50.0 + 2.0 * f64::from(k % 8), -15.0 + 4.0 * f64::from(k / 8), 0.0);
+            let point = WorldPoint::On { motion: &motion, at_start_ned_m: at };
+            let expected = search(&frame, &frame.fields[0], point);
+            let found = frame.find(point, DVec2::new(30.0, 20.0)).filter(|found| found.is_inside);
+            assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{at}");
+            if let Some(found) = found {
+                let off_px = expected.iter().map(|px| px.distance(found.px)).fold(f64::INFINITY, f64::min);
+                assert!(off_px < 1e-3, "{at}: {off_px:.1e} px");
+                let again = WorldPoint::on(Some(&motion), point.position_ned_m(0.7).unwrap(), 0.7);
+                assert!(again.position_ned_m(0.0).unwrap().distance(at) < 1e-12);
+                inside += 1;
+            }
+        }
+        assert!(inside > 20, "{inside}");
+    }
+
+    #[test]
     fn a_global_shutter_shows_a_point_where_its_camera_projects_it() {
         let frame = FrameCamera::global(path(0.4), camera(), 0.5);
         let pose = frame.path.pose(0.5);
         for point in points() {
-            let expected = frame.project(&pose, point);
+            let expected = frame.project(&pose, 0.5, point);
             let found = frame.find(point, DVec2::ZERO);
             assert_eq!(found.map(|found| found.px), expected.map(|seen| seen.px));
         }

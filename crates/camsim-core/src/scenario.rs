@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 mod auto;
 mod camera;
 mod channel;
+mod motion;
 mod scene;
 mod tracks;
 mod validate;
@@ -21,8 +22,9 @@ pub use camera::{
     ShutterSpec, VibrationSpec, ZoomSpec,
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
+pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use scene::{
-    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
+    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
 pub use tracks::{PointSource, TracksSpec};
@@ -379,6 +381,10 @@ pub struct OutputSpec {
     pub flow_step: u32,
     /// Instant of the picture that `flow-global` leads to.
     pub flow_instant: FlowInstant,
+    /// Whether `object` and `class` get pictures in colour, for people, in `object_palette` and
+    /// `class_palette`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub palette: bool,
     /// Points whose pixel is written for every frame that sees them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracks: Option<TracksSpec>,
@@ -395,6 +401,7 @@ impl Default for OutputSpec {
             exr_compression: ExrCompression::Zip1,
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
+            palette: false,
             tracks: None,
         }
     }

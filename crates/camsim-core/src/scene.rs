@@ -14,6 +14,7 @@ pub mod depth_sort;
 pub mod light;
 pub mod mesh;
 pub mod mesh_lod;
+pub mod motion;
 mod prefilter;
 pub mod proximity_bvh;
 pub mod ray_bvh;
@@ -27,6 +28,7 @@ pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use light::{Light, transformed_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use mesh_lod::{LodTolerance, ModelLod, SceneLods, ShapeLod, ShapeLods};
+pub use motion::{RigidMotion, RigidState};
 pub use prefilter::{Prefilter, PrefilterTaps};
 pub use terrain::{
     Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail,
@@ -95,7 +97,20 @@ impl Scene {
         self.meshes.iter().all(|mesh| !mesh.material.blends && mesh.material.cutoff.is_none())
     }
 
-    /// Bounding boxes of all meshes, NED.
+    /// Whether anything in it moves.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.meshes.iter().any(|mesh| mesh.motion.is_some())
+    }
+
+    /// Motion of a surface (0 = terrain, 1 + i = mesh i); `None` if it stands still.
+    #[must_use]
+    pub fn motion_of_surface(&self, surface: u32) -> Option<&RigidMotion> {
+        let mesh = surface.checked_sub(1).and_then(|mesh| self.meshes.get(mesh as usize))?;
+        mesh.motion.as_deref()
+    }
+
+    /// Bounding boxes of all meshes, NED; of what moves, at path time 0.
     #[must_use]
     pub fn mesh_bounds(&self) -> Vec<Aabb> {
         self.meshes.iter().map(Mesh::bounds).collect()

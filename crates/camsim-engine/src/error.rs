@@ -15,6 +15,12 @@ pub enum RenderError<E: std::error::Error + 'static> {
     /// The shader files are invalid.
     #[error(transparent)]
     Shader(#[from] camsim_gpu::shaders::ComposeError),
+    /// The paper's methods do not show things that move.
+    #[error(
+        "scene.gltf.motion: quality.preset = \"paper\" has no method for things that move: write preset = \
+         \"default\", or leave motion out"
+    )]
+    Moving,
     /// The sink failed.
     #[error(transparent)]
     Sink(E),
@@ -39,6 +45,7 @@ impl<E: std::error::Error + 'static> RenderError<E> {
             RenderError::Gpu(error) => Self::Gpu(error),
             RenderError::Plan(error) => Self::Plan(error),
             RenderError::Shader(error) => Self::Shader(error),
+            RenderError::Moving => RenderError::Moving,
             RenderError::Sink(never) => match never {},
         }
     }

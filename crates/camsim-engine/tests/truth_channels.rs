@@ -19,6 +19,9 @@ use common::{render, roof, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
 const SIZE_PX: [u32; 2] = [120, 90];
+/// The frame that is looked at, and the step of its flow.
+const FRAME: u64 = 20;
+const FLOW_STEP: u32 = 15;
 
 /// Steep hills with a roof over them and the sky above.
 fn hills() -> Scene {
@@ -41,6 +44,7 @@ fn camera(change: fn(&mut Scenario)) -> Arc<Sequence> {
     scenario.camera.mount =
         MountSpec { angles_deg: [1.0, -35.0, 0.0], vibration: vec![vibration], ..MountSpec::default() };
     scenario.camera.shutter = ShutterSpec { readout_ms: 30.0, exposure_ms: 8.0, ..ShutterSpec::default() };
+    scenario.output.flow_step = FLOW_STEP;
     change(&mut scenario);
     sequence(scenario, steady(120.0, 0.0, DVec3::new(25.0, 30.0, -3.0), DVec3::new(0.2, -0.3, 0.4)), hills())
 }
@@ -76,11 +80,11 @@ fn pixels() -> impl Iterator<Item = (usize, [u32; 2])> {
 
 impl Case {
     fn render(&self, channels: &[Channel]) -> Finished {
-        render(&Engine::cpu(), &self.sequence, channels, 2)
+        render(&Engine::cpu(), &self.sequence, channels, FRAME)
     }
 
     fn sample(&self, pixel: [u32; 2]) -> Option<RaySample> {
-        self.oracle.sample(2, pixel, DVec2::ZERO, 0.0)
+        self.oracle.sample(FRAME, pixel, DVec2::ZERO, 0.0)
     }
 
     /// Where the camera of an instant shows what a ray has met.
@@ -142,7 +146,7 @@ fn range_and_normal_are_those_of_rays() {
             let expected_m = hit.point_ned_m.distance(seen.pose.position_ned_m);
             // Two further points of the surface, a thousandth of a pixel away, make a plane.
             let beside = |offset| {
-                let beside = case.oracle.sample(2, pixel, offset, 0.0)?.hit?;
+                let beside = case.oracle.sample(FRAME, pixel, offset, 0.0)?.hit?;
                 (beside.surface == hit.surface).then_some(beside.point_ned_m - hit.point_ned_m)
             };
             let sides = beside(DVec2::new(1e-3, 0.0)).zip(beside(DVec2::new(0.0, 1e-3)));
@@ -165,7 +169,7 @@ fn range_and_normal_are_those_of_rays() {
 #[test]
 fn flow_leads_to_where_the_other_frame_shows_the_point() {
     for case in cases() {
-        for (channel, frame) in [(Channel::Flow, 3), (Channel::FlowBack, 1)] {
+        for (channel, frame) in [(Channel::Flow, FRAME + 15), (Channel::FlowBack, FRAME - 15)] {
             let done = case.render(&[channel]);
             let flow = done.frame.floats(channel).expect("a plane");
             let (mut shown, mut hidden, mut wrong_state, mut outside, mut largest_px) = (0, 0, 0, 0, 0.0_f64);
@@ -196,7 +200,7 @@ fn flow_leads_to_where_the_other_frame_shows_the_point() {
             eprintln!(
                 "{name} {channel:?}: {shown} shown, {hidden} hidden, {outside} outside, {largest_px:.1e} px"
             );
-            assert!(shown > 5000 && hidden > 10 && outside > 100, "{name}: {shown} {hidden} {outside}");
+            assert!(shown > 5000 && hidden > 5 && outside > 100, "{name}: {shown} {hidden} {outside}");
             assert!(largest_px < 2e-3, "{name}: {largest_px} px");
             assert!(wrong_state * 1000 < shown, "{name}: {wrong_state} of {shown}");
         }
@@ -239,8 +243,9 @@ fn motion_and_blur_path_are_those_of_projections_at_other_instants() {
 
 /// Whether surfaces of other depths are within a twentieth of a pixel.
 fn is_at_silhouette(case: &Case, pixel: [u32; 2]) -> bool {
-    let depth =
-        |offset| case.oracle.sample(2, pixel, offset, 0.0).and_then(|seen| seen.hit).map(|hit| hit.depth_m);
+    let depth = |offset| {
+        case.oracle.sample(FRAME, pixel, offset, 0.0).and_then(|seen| seen.hit).map(|hit| hit.depth_m)
+    };
     let offsets = [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y];
     let here = depth(DVec2::ZERO);
     offsets.into_iter().any(|offset| match (here, depth(0.05 * offset)) {

@@ -12,7 +12,10 @@ use std::{
     sync::Arc,
 };
 
-use camsim_core::scene::{Material, Mesh, Shape, Texture, Wrap};
+use camsim_core::scene::{
+    Material, Mesh, RigidMotion, Shape, Texture, Wrap,
+    motion::{Joint, JointFrame},
+};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
@@ -20,6 +23,7 @@ mod asset;
 mod bake;
 mod emissive;
 mod material;
+mod moving;
 mod normals;
 mod pose;
 mod preprocess;
@@ -31,6 +35,8 @@ use asset::Asset;
 pub(crate) use asset::referenced_files;
 use bake::{BakeInput, Baked};
 use material::{Materials, VertexRule};
+use moving::{Chain, Moving};
+pub use moving::{ModelMotion, NodeSpin};
 use pose::Pose;
 use primitive::{ShapeReader, TriangleMode};
 
@@ -94,6 +100,22 @@ struct Part {
     shape: Arc<Shape>,
     material: Material,
     model_from_shape: DAffine3,
+    labels: PartLabels,
+    /// In the model's axes; `None` if it stands still in them.
+    motion: Option<Arc<RigidMotion>>,
+}
+
+/// What a part of a model is called in its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartLabels {
+    /// Index of its node.
+    pub node: usize,
+    /// Names of its node and of those above it, from the root; `nodes.3` for a node without a name.
+    pub node_names: Arc<[String]>,
+    /// Index of its material; `None` for the default material.
+    pub material: Option<usize>,
+    /// Name of its material; `materials.3` without one, `default` for the default material.
+    pub material_name: String,
 }
 
 /// Rotation from the model's axes (x left, y up, z forward) to forward, right, down.
@@ -110,16 +132,51 @@ pub(crate) const MAX_RADIUS_M: f64 = 1e9;
 const MAX_NODE_DEPTH: usize = 1024;
 
 impl Model {
+    /// What each mesh that [`Model::place`] returns is called in the file, in the same order.
+    pub fn labels(&self) -> impl Iterator<Item = &PartLabels> {
+        self.parts.iter().map(|part| &part.labels)
+    }
+
     /// Meshes of the model with its origin at `origin_ned_m`, its z axis `heading_rad` clockwise from north,
     /// and its lengths times `scale`.
     pub fn place(&self, origin_ned_m: DVec3, heading_rad: f64, scale: f64) -> impl Iterator<Item = Mesh> {
-        let ned_from_model = DMat3::from_rotation_z(heading_rad) * BODY_FROM_MODEL * scale;
-        self.parts.iter().map(move |part| Mesh {
-            shape: part.shape.clone(),
-            material: part.material.clone(),
-            origin_ned_m: origin_ned_m + ned_from_model * part.model_from_shape.translation,
-            ned_from_shape: ned_from_model * part.model_from_shape.matrix3,
-            object: 0,
+        self.place_on(None, origin_ned_m, heading_rad, scale)
+    }
+
+    /// As [`Model::place`], on something that moves: origin and heading are where that has them at path time
+    /// 0.
+    pub fn place_on(
+        &self,
+        carrier: Option<&Joint>,
+        origin_ned_m: DVec3,
+        heading_rad: f64,
+        scale: f64,
+    ) -> impl Iterator<Item = Mesh> {
+        let ned_from_body = carrier.map_or(DMat3::IDENTITY, |joint| DMat3::from_quat(joint.start().rotation));
+        let ned_from_model = ned_from_body * (DMat3::from_rotation_z(heading_rad) * BODY_FROM_MODEL * scale);
+        let affine = DAffine3 { matrix3: ned_from_model, translation: origin_ned_m };
+        // A model is placed without stretching it.
+        let frame = JointFrame::from_affine(&affine).unwrap_or(JointFrame::IDENTITY);
+        let mut known: HashMap<Option<*const RigidMotion>, Arc<RigidMotion>> = HashMap::new();
+        let carrier = carrier.cloned();
+        self.parts.iter().map(move |part| {
+            let motion = (carrier.is_some() || part.motion.is_some()).then(|| {
+                let own = part.motion.as_ref();
+                let placed = || {
+                    let joints = own.map_or(&[][..], |motion| motion.joints());
+                    let joints = joints.iter().map(|joint| joint.within(&frame));
+                    Arc::new(RigidMotion::new(carrier.iter().cloned().chain(joints).collect()))
+                };
+                known.entry(own.map(Arc::as_ptr)).or_insert_with(placed).clone()
+            });
+            Mesh {
+                shape: part.shape.clone(),
+                material: part.material.clone(),
+                origin_ned_m: origin_ned_m + ned_from_model * part.model_from_shape.translation,
+                ned_from_shape: ned_from_model * part.model_from_shape.matrix3,
+                object: 0,
+                motion,
+            }
         })
     }
 
@@ -135,13 +192,24 @@ impl Model {
 /// # Errors
 /// [`GltfError`] names the file and the place in it, or the extension that it needs.
 pub fn read_gltf(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
-    // The glTF crate panics on some damaged files. No state outlives the call.
-    let damaged = |_| Err(GltfError::Broken { path: path.into(), message: "is damaged".into() });
-    std::panic::catch_unwind(|| read(path, options)).unwrap_or_else(damaged)
+    read_moving_gltf(path, options, &ModelMotion::default())
 }
 
-fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
+/// As [`read_gltf`], with parts that move.
+///
+/// # Errors
+/// As [`read_gltf`]; also for a node to spin that the file has not, and for one that moves in uneven axes.
+pub fn read_moving_gltf(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model, GltfError> {
+    // The glTF crate panics on some damaged files. No state outlives the call.
+    let damaged = |_| Err(GltfError::Broken { path: path.into(), message: "is damaged".into() });
+    std::panic::catch_unwind(|| read(path, options, motion)).unwrap_or_else(damaged)
+}
+
+// Long because it is the list of what a file consists of and of what is said about it.
+fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model, GltfError> {
     let asset = Asset::read(path)?;
+    let periods_s = if motion.animate { moving::periods_s(&asset)? } else { Vec::new() };
+    let options = GltfOptions { time_s: options.time_s.or(motion.animate.then_some(0.0)), ..options };
     let broken = |message: String| GltfError::Broken { path: path.into(), message };
     let document = &asset.document;
     let Some(scene) = options
@@ -160,8 +228,11 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
             }),
         };
     };
+    let moving = Moving::new(&asset, options, motion, &periods_s)?;
     let mut reader = Reader {
-        pose: Pose::new(&asset, options)?,
+        pose: Pose::new(&asset, options, &periods_s)?,
+        root: moving.root(),
+        moving,
         materials: Materials::new(&asset),
         asset: &asset,
         options,
@@ -170,13 +241,17 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         texels_left: MAX_BAKED_TEXELS,
         parts: Vec::new(),
         visited: HashSet::new(),
+        node_names: Vec::new(),
         notes: Vec::new(),
         radius_m: 0.0,
     };
+    let (model_from_root, chain) = reader.root.clone();
     for node in scene.nodes() {
-        reader.node(&node, DAffine3::IDENTITY, false, 0)?;
+        reader.node(&node, model_from_root, &chain, false, 0)?;
     }
-    let Reader { parts, mut notes, materials, radius_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
+    reader.moving.check_names(&asset)?;
+    let Reader { parts, mut notes, materials, radius_m, pose, moving, .. } = reader;
+    let pose_notes = pose.note;
     if parts.is_empty() {
         notes.push(match &asset.hidden_nodes()[..] {
             [] => "has no triangles: nothing of it is shown".into(),
@@ -187,7 +262,8 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         });
     }
     if options.time_s.is_some() && document.animations().next().is_none() {
-        notes.push("has no animation for time_s: its nodes keep their static transforms".into());
+        let key = if motion.animate { "motion.animate" } else { "time_s" };
+        notes.push(format!("has no animation for {key}: its nodes keep their static transforms"));
     }
     if options.time_s.is_none() && options.animation.is_some() {
         notes.push(
@@ -199,6 +275,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     }
     notes.extend(asset.notes.iter().cloned());
     notes.extend(pose_notes);
+    notes.extend(moving.notes);
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();
@@ -216,6 +293,9 @@ struct Reader<'a> {
     asset: &'a Asset,
     options: GltfOptions,
     pose: Pose,
+    moving: Moving<'a>,
+    /// Axes and joints of the whole model.
+    root: (DAffine3, Chain),
     materials: Materials<'a>,
     /// Shapes without skin and morph targets.
     shapes: HashMap<ShapeKey, Arc<Shape>>,
@@ -226,6 +306,8 @@ struct Reader<'a> {
     parts: Vec<Part>,
     /// Indices of visited nodes: a valid tree visits each once.
     visited: HashSet<usize>,
+    /// Names of the node that is read and of those above it, from the root.
+    node_names: Vec<String>,
     notes: Vec<String>,
     /// Radius about the model's origin that contains all points so far, metres.
     radius_m: f64,
@@ -237,6 +319,7 @@ impl Reader<'_> {
         &mut self,
         node: &gltf::Node<'_>,
         model_from_parent: DAffine3,
+        chain: &Chain,
         is_hidden: bool,
         depth: usize,
     ) -> Result<(), GltfError> {
@@ -250,14 +333,19 @@ impl Reader<'_> {
         }
         // Hidden nodes are walked too, so that malformed trees are refused.
         let is_hidden = is_hidden || !self.asset.is_visible(node.index());
-        let model_from_node = model_from_parent * self.pose.parent_from_node(node);
+        let (model_from_node, chain) =
+            self.moving.node(self.asset, &self.pose, node, model_from_parent, chain)?;
+        self.node_names.push(self.asset.name_of("nodes", node.index()));
         if let Some(mesh) = node.mesh().filter(|_| !is_hidden) {
             let instances = self.asset.instances(node.index())?;
             for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
-                self.mesh(node, &mesh, model_from_node * node_from_instance)?;
+                self.mesh(node, &mesh, model_from_node * node_from_instance, &chain)?;
             }
         }
-        node.children().try_for_each(|child| self.node(&child, model_from_node, is_hidden, depth + 1))
+        node.children()
+            .try_for_each(|child| self.node(&child, model_from_node, &chain, is_hidden, depth + 1))?;
+        self.node_names.pop();
+        Ok(())
     }
 
     /// Adds the primitives of a node's mesh.
@@ -266,13 +354,14 @@ impl Reader<'_> {
         node: &gltf::Node<'_>,
         mesh: &gltf::Mesh<'_>,
         model_from_node: DAffine3,
+        chain: &Chain,
     ) -> Result<(), GltfError> {
         for primitive in mesh.primitives() {
             if self.parts.len() >= MAX_PARTS {
                 return Err(self.asset.error(format!("has more than {MAX_PARTS} parts")));
             }
             match primitive::triangle_mode(primitive.mode()) {
-                Some(mode) => self.primitive((node, mesh), &primitive, mode, model_from_node)?,
+                Some(mode) => self.primitive((node, mesh), &primitive, mode, model_from_node, chain)?,
                 None => self.notes.push("points and lines are not shown".into()),
             }
         }
@@ -286,11 +375,21 @@ impl Reader<'_> {
         primitive: &gltf::Primitive<'_>,
         triangle_mode: TriangleMode,
         model_from_node: DAffine3,
+        chain: &Chain,
     ) -> Result<(), GltfError> {
         let weights = self.pose.weights(node, mesh);
         let joints = node.skin().map(|skin| self.pose.joints(self.asset, &skin)).transpose()?;
         // Joint matrices already transform to the model's axes.
-        let model_from_shape = if joints.is_some() { DAffine3::IDENTITY } else { model_from_node };
+        let model_from_shape = if joints.is_some() { self.root.0 } else { model_from_node };
+        // A skin hangs on several nodes.
+        let motion = if joints.is_some() { self.root.1.motion.clone() } else { chain.motion.clone() };
+        if joints.is_some() && self.moving.is_any() {
+            self.notes.push(
+                "scene.gltf.motion moves and turns nodes: skins stay as they are at time_s, and move with the \
+                 whole model only"
+                    .into(),
+            );
+        }
         let is_mirrored = model_from_shape.matrix3.determinant() < 0.0;
         let is_deformed = joints.is_some() || primitive.morph_targets().next().is_some();
         let key = Some((mesh.index(), primitive.index(), is_mirrored)).filter(|_| !is_deformed);
@@ -320,7 +419,16 @@ impl Reader<'_> {
         self.extend_radius(node, mesh, &shape, &model_from_shape)?;
         if !shape.indices.is_empty() {
             let material = self.materials.for_shape(&shape, material);
-            self.parts.push(Part { shape, material, model_from_shape });
+            let of = primitive.material();
+            let labels = PartLabels {
+                node: node.index(),
+                node_names: self.node_names.as_slice().into(),
+                material: of.index(),
+                material_name: of
+                    .index()
+                    .map_or_else(|| "default".to_owned(), |index| self.asset.name_of("materials", index)),
+            };
+            self.parts.push(Part { shape, material, model_from_shape, motion, labels });
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{Auto, CameraSpec, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
+    scenario::{Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{TrackResult, TrackerError, track},
@@ -21,9 +21,12 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod motion;
+mod objects;
 mod optics;
 mod ortho_coverage;
 mod placements;
+mod pose_table;
 mod scene;
 mod track_points;
 
@@ -73,6 +76,24 @@ pub enum LoadError {
     /// A model cannot be read.
     #[error("scene.gltf: {0}")]
     Gltf(#[from] GltfError),
+    /// `scene.gltf.classes` names nothing of its model.
+    #[error("scene.gltf.classes: {}: has no {kind} `{name}`; its {kind}s are {}", file.display(), listed(known))]
+    NoSuchPart {
+        /// The model.
+        file: PathBuf,
+        /// `node` or `material`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// All names of that kind.
+        known: Vec<String>,
+    },
+    /// More objects than `object` can number.
+    #[error(
+        "the scene has {0} objects, and output.channels object, class and coverage number at most \
+            {MAX_OBJECTS}: set objects = \"placement\" for models, place fewer, or leave these channels out"
+    )]
+    TooManyObjects(usize),
     /// A table of placements cannot be read.
     #[error("{path}: {problem}")]
     Placements {
@@ -88,6 +109,20 @@ pub enum LoadError {
         path: PathBuf,
         /// What is wrong, where, and what to do.
         problem: String,
+    },
+    /// A table of poses cannot be read.
+    #[error("{path}: {problem}")]
+    Poses {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A path without length.
+    #[error("scene.gltf: the path of {file} has no length: give motion.path two different points")]
+    Path {
+        /// The model.
+        file: PathBuf,
     },
     /// Models are to stand on the ground where there is none.
     #[error(
@@ -146,6 +181,17 @@ pub enum LoadError {
     ZoomPair,
 }
 
+/// Largest number of an object: `object` is a picture of 16 bits.
+pub const MAX_OBJECTS: usize = 65_535;
+
+/// Names for a message, at most twenty.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 20;
+    let shown: Vec<String> = names.iter().take(MOST).map(|name| format!("`{name}`")).collect();
+    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    if names.is_empty() { "none".to_owned() } else { shown.join(", ") + &more }
+}
+
 /// A loaded scenario, with warnings.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -199,6 +245,8 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         old.scene == scenario.scene
             && old.flight.height == scenario.flight.height
             && before.log.frame == log.frame
+            && (!has_pose_table(scenario)
+                || (before.log.epoch_ns == log.epoch_ns && old.flight.speed == scenario.flight.speed))
     };
     let (scene, terrain, scene_notes) = match reusable.filter(|(before, old)| has_same_scene(before, old)) {
         Some((before, _)) => {
@@ -209,6 +257,11 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
             (Arc::new(scene), terrain, notes)
         }
     };
+    let numbers_objects =
+        |channel: &Channel| matches!(channel, Channel::Object | Channel::Class | Channel::Coverage);
+    if scene.objects.len() > MAX_OBJECTS && scenario.output.channels.iter().any(numbers_objects) {
+        return Err(LoadError::TooManyObjects(scene.objects.len()));
+    }
     let vignette_path = &scenario.camera.photometric.vignette;
     let vignette_error = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
     let vignette = match reusable.filter(|(_, old)| old.camera.photometric.vignette == *vignette_path) {
@@ -234,6 +287,12 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(scene_notes.iter().cloned());
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
+}
+
+/// Whether anything moves by a table of poses, whose times are on the log's clock.
+fn has_pose_table(scenario: &Scenario) -> bool {
+    let motions = scenario.scene.gltf.iter().filter_map(|model| model.motion.as_ref());
+    motions.into_iter().any(|motion| motion.poses.is_some())
 }
 
 /// Whether two scenarios read and track the same log in the same way. The window may differ, as the whole log

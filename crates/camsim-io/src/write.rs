@@ -40,10 +40,10 @@ pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, frames_path};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary};
 pub use picture::write_picture;
-pub use png_file::contact_sheet;
+pub use png_file::{contact_sheet, palette_rgb8};
 pub use tables::{
-    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, ROWS_COLUMNS, TRAJECTORY_COLUMNS, TrajectoryRecord,
-    camera_trajectory_csv, rows_csv, trajectory_csv,
+    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
+    TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
 pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
 

@@ -93,3 +93,54 @@ fn invalid_placements_and_files_are_refused_by_name() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+/// Where a model's second vertex, half a metre to its left, is at a path time.
+fn left(mesh: &camsim_core::scene::Mesh, t_s: f64) -> DVec3 {
+    mesh.at(t_s).position_ned_m(1)
+}
+
+#[test]
+fn models_move_along_paths_and_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = "gltf = [{ file = \"model.gltf\", heading_deg = 90, motion = { path = [[1, 2, 3], [1, 22, 3]], \
+                speed_m_s = 4, start_s = 1 } }]";
+    let mesh = &load(folder.path(), LOCAL, path).unwrap()[0];
+    // Its way is east and its front 90 degrees to the right of that: south, so that its left is east.
+    for (t_s, east_m) in [(0.0, 2.5), (1.0, 2.5), (2.5, 8.5), (99.0, 22.5)] {
+        assert!(left(mesh, t_s).distance(DVec3::new(1.0, east_m, 3.0)) < 1e-9, "{t_s}: {}", left(mesh, t_s));
+    }
+    let table = "gltf = [{ file = \"model.gltf\", motion = { poses = \"poses.csv\" } }]";
+    let with_table = |rows: &str, log: &str| {
+        std::fs::write(folder.path().join("poses.csv"), rows).unwrap();
+        load(folder.path(), log, table)
+    };
+    // Times of the log's clock, which begins at 100 s.
+    let late = LOCAL.replace("\n0,0", "\n100,0").replace("\n1,1", "\n101,1");
+    let meshes =
+        with_table("t_ms,n_m,e_m,d_m,heading_deg\n100500,0,0,0,350\n101500,0,10,0,10\n", &late).unwrap();
+    let at = |t_s: f64, east_m: f64, heading_deg: f64| {
+        let (sin, cos) = heading_deg.to_radians().sin_cos();
+        let expected = DVec3::new(0.5 * sin, east_m - 0.5 * cos, 0.0);
+        assert!(
+            left(&meshes[0], t_s).distance(expected) < 1e-9,
+            "{t_s}: {} {expected}",
+            left(&meshes[0], t_s)
+        );
+    };
+    at(-1.0, 0.0, -10.0);
+    at(1.0, 5.0, 0.0);
+    at(1.25, 7.5, 5.0);
+    at(9.0, 10.0, 10.0);
+    // Without attitudes it looks where it goes.
+    let meshes = with_table("t_s,n_m,e_m,d_m\n100,0,0,0\n101,0,10,0\n", &late).unwrap();
+    assert!(left(&meshes[0], 0.5).distance(DVec3::new(0.5, 5.0, 0.0)) < 1e-9);
+    for (rows, wanted) in [
+        ("t_s,n_m,e_m,d_m\n1,0,0,0\n1,0,0,0\n", "poses.csv: line 3: its time is not later"),
+        ("t_s,n_m,e_m,d_m\n", "has no row"),
+        ("t_s,n_m,e_m,d_m\n1,a,0,0\n", "line 2: `a` is no finite number"),
+        ("t_s,lat_deg,lon_deg,height_m\n1,147,0,0\n", "no place on Earth"),
+    ] {
+        let error = with_table(rows, LOCAL).unwrap_err();
+        assert!(error.contains(wanted), "{error}");
+    }
+}

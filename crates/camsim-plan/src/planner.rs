@@ -227,10 +227,11 @@ impl Planner {
     }
 
     /// The camera of a frame at the mid-exposure of its centre.
-    pub(crate) fn middle_view(&self, frame: u64) -> Result<(Arc<CameraModel>, CameraPose), PlanError> {
+    pub(crate) fn middle_view(&self, frame: u64) -> Result<(Arc<CameraModel>, f64, CameraPose), PlanError> {
         let (path, camera, stamp_s) = self.camera_at(frame as i64)?;
         let (first_s, last_s) = self.inputs.shutter.window_s();
-        Ok((camera, path.pose(stamp_s + 0.5 * (first_s + last_s))))
+        let t_s = stamp_s + 0.5 * (first_s + last_s);
+        Ok((camera, t_s, path.pose(t_s)))
     }
 
     /// The camera of a frame with the poses of its rows, for frames of any number.

@@ -77,7 +77,7 @@ impl Tracks {
             found.map(move |seen| Sighting {
                 point,
                 seen,
-                is_visible: !is_hidden(surfaces, seen.pose.position_ned_m, at_ned_m),
+                is_visible: !is_hidden(surfaces, seen.t_s, seen.pose.position_ned_m, at_ned_m),
             })
         };
         let points = self.points.par_iter().enumerate().with_min_len(POINTS_AT_ONCE);

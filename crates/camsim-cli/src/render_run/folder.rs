@@ -77,7 +77,7 @@ pub fn folder_state(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Resul
 
 /// Whether a key only selects files, without changing their contents.
 fn is_of_files(difference: &str) -> bool {
-    ["output.channels was ", "output.format was ", "output.tracks"]
+    ["output.channels was ", "output.format was ", "output.palette was ", "output.tracks"]
         .iter()
         .any(|key| difference.starts_with(key))
 }

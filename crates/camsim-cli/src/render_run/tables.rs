@@ -1,16 +1,23 @@
 //! Tables beside the frames: `camera.toml`, the trajectories, `frames.csv`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use anyhow::anyhow;
 use camsim_core::{
-    mount::CameraPath, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory,
+    mount::CameraPath,
+    scenario::{Channel, Scenario},
+    sequence::Sequence,
+    shutter::Shutter,
+    trajectory::Trajectory,
 };
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord,
-        camera_trajectory_csv, frames_path, trajectory_csv, write_atomic,
+        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, WriteError,
+        camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -24,7 +31,28 @@ use crate::{
 /// Most rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
 const MOST_TRAJECTORY_ROWS: f64 = 10e6;
 
-/// Writes `camera.toml` and the trajectories, which depend on the scenario only.
+/// The table of objects.
+const OBJECTS_CSV: &str = "objects.csv";
+
+/// Whether a scenario writes numbers of objects or classes.
+fn numbers_objects(scenario: &Scenario) -> bool {
+    let of_objects = |channel: &Channel| matches!(channel, Channel::Object | Channel::Class);
+    scenario.output.channels.iter().any(of_objects) && !scenario.output.format.is_empty()
+}
+
+/// Removes the table of objects of another scenario.
+pub fn remove_objects(folder: &Path) -> Result<(), Failure> {
+    let path = folder.join(OBJECTS_CSV);
+    match std::fs::remove_file(&path) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::Io { path, source }).or_failed()
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes `camera.toml`, the trajectories, and `objects.csv` if numbers of objects or classes are written.
+/// They depend on the scenario only.
 pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
     let sequence = job.sequence;
     let Scenario { camera, tracker, .. } = &sequence.scenario;
@@ -45,6 +73,10 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     write_atomic(&job.folder.join("trajectory.csv"), body.as_bytes()).or_failed()?;
     let optical = camera_trajectory_csv(ticks().map(|t_s| camera_at(&sequence.path, sequence.epoch_ns, t_s)));
     write_atomic(&job.folder.join("camera_trajectory.csv"), optical.as_bytes()).or_failed()?;
+    if numbers_objects(&sequence.scenario) {
+        let objects = objects_csv(&sequence.scene.objects);
+        write_atomic(&job.folder.join(OBJECTS_CSV), objects.as_bytes()).or_failed()?;
+    }
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(

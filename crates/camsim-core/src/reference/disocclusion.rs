@@ -33,7 +33,8 @@ pub fn disocclusion(oracle: &Oracle, frame: u64, keys: &[CameraPose], phases: &[
         let samples = (0..width).flat_map(|x| phases.iter().map(move |&phase| (x, phase)));
         let mut row = Disocclusion::default();
         for sample in samples.filter_map(|(x, phase)| view.sample([x, y], DVec2::ZERO, phase)) {
-            let hidden = |point| keys.iter().all(|key| oracle.is_occluded(key.position_ned_m, point));
+            let hidden =
+                |point| keys.iter().all(|key| oracle.is_occluded_at(sample.t_s, key.position_ned_m, point));
             row.rays += 1;
             row.hidden += u64::from(sample.hit.is_some_and(|hit| hidden(hit.point_ned_m)));
         }

@@ -193,9 +193,9 @@ fn compared(
             (Some(sample), true) => {
                 let source_px = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
                 let unseen = ideal.in_key(sample).z <= 0.0
-                    || sample
-                        .hit
-                        .is_some_and(|hit| oracle.is_occluded(ideal.pose.position_ned_m, hit.point_ned_m));
+                    || sample.hit.is_some_and(|hit| {
+                        oracle.is_occluded_at(sample.t_s, ideal.pose.position_ned_m, hit.point_ned_m)
+                    });
                 ComparedPixel::Error {
                     px: source_px.distance(ideal.source_px(sample)),
                     at_silhouette: near[i] || unseen,
@@ -322,7 +322,7 @@ fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
         }
         let towards = |other: &RaySample, share: f64| {
             let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
-            oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
+            oracle.cast_at(here.t_s, here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
         let [a, c] = [before, after].map(|other| towards(other, 1.0));
         bends([a, here_w, c], CREASE)

@@ -58,7 +58,7 @@ struct MeshBvhNode {
     count: u32,
 }
 
-/// All meshes of a scene.
+/// Meshes of a scene that stand still relative to each other.
 #[derive(Debug, Default)]
 pub(super) struct MeshBvh {
     triangles: Vec<MeshTriangle>,
@@ -69,9 +69,10 @@ pub(super) struct MeshBvh {
 }
 
 impl MeshBvh {
-    pub(super) fn new(meshes: &[Mesh], light: Option<Light>) -> Self {
+    /// The meshes of a scene that `belongs` chooses.
+    pub(super) fn new(meshes: &[Mesh], light: Option<Light>, belongs: impl Fn(&Mesh) -> bool) -> Self {
         let mut triangles = Vec::new();
-        for (surface, mesh) in (1..).zip(meshes) {
+        for (surface, mesh) in (1..).zip(meshes).filter(|(_, mesh)| belongs(mesh)) {
             let Shape { vertices, indices, .. } = &*mesh.shape;
             for (first, indices) in (0..).step_by(3).zip(indices.chunks_exact(3)) {
                 let indices = [indices[0], indices[1], indices[2]];
@@ -87,14 +88,15 @@ impl MeshBvh {
                 }
             }
         }
+        // Of the others too, as surfaces are counted over all.
         let cover = |mesh: &Mesh| MeshSurface {
             shape: mesh.shape.clone(),
             one_sided: mesh.material.one_sided,
-            holes: has_alpha(mesh).then(|| {
+            holes: (belongs(mesh) && has_alpha(mesh)).then(|| {
                 (SurfaceTexture::new(&mesh.material), f64::from(mesh.material.cutoff.unwrap_or(0.0)))
             }),
             blends: mesh.material.blends,
-            normals: if light.is_some() { standing_normals(mesh) } else { Vec::new() },
+            normals: if light.is_some() && belongs(mesh) { standing_normals(mesh) } else { Vec::new() },
         };
         let mesh_surfaces = meshes.iter().map(cover).collect();
         let mut nodes = Vec::new();
@@ -213,9 +215,10 @@ impl MeshBvh {
             .map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
         let [red, green, blue, alpha]: [f64; 4] = [0, 1, 2, 3]
             .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].tint[k])).sum());
-        let hit = hit_at(ray, t, weights, vertices.map(|vertex| vertex.uv), triangle.surface);
+        let uv = vertices.map(|vertex| vertex.uv);
+        let hit = hit_at(ray, t, weights, uv, triangle.corners, triangle.surface);
         let alpha = cover.holes.as_ref().map_or(1.0, |(coat, _)| coat.alpha_at(hit.texture_uv) * alpha);
-        let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray.direction));
+        let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray));
         Some((Hit { tint: [red, green, blue].map(|part| part * lit), ..hit }, alpha))
     }
 }
@@ -226,21 +229,16 @@ fn has_alpha(mesh: &Mesh) -> bool {
 
 /// Factor of the light reflected at a point of a triangle towards the ray's origin (Lambert): the sun by the
 /// cosine of its angle, the sky by the share of it that the surface faces.
-fn lit(
-    light: &Light,
-    cover: &MeshSurface,
-    triangle: &MeshTriangle,
-    weights: [f64; 3],
-    direction: DVec3,
-) -> f64 {
+fn lit(light: &Light, cover: &MeshSurface, triangle: &MeshTriangle, weights: [f64; 3], ray: &Ray) -> f64 {
     if cover.normals.is_empty() {
         return 1.0;
     }
     let [a, b, c] = triangle.corners;
-    let from_behind = (b - a).cross(c - a).dot(direction) >= 0.0;
+    let from_behind = (b - a).cross(c - a).dot(ray.direction) >= 0.0;
     let corner =
         |k: usize| weights[k] * cover.normals[cover.shape.indices[triangle.first as usize + k] as usize];
     let normal = (corner(0) + corner(1) + corner(2)) * if from_behind { -1.0 } else { 1.0 };
+    let normal = ray.ned_from_ray.map_or(normal, |turn| turn * normal);
     let of_sun = light.to_sun_ned.dot(normal).max(0.0);
     let of_sky = 0.5 + 0.5 * -normal.z;
     light.sun * of_sun + light.sky * of_sky
@@ -263,11 +261,27 @@ fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
     mesh.shape.normals.iter().map(standing).collect()
 }
 
-/// The hit of a ray on a triangle.
-pub(super) fn hit_at(ray: &Ray, t: f64, weights: [f64; 3], uv: [[f32; 2]; 3], surface: u32) -> Hit {
+/// The hit of a ray on a triangle with these corners.
+pub(super) fn hit_at(
+    ray: &Ray,
+    t: f64,
+    weights: [f64; 3],
+    uv: [[f32; 2]; 3],
+    [a, b, c]: [DVec3; 3],
+    surface: u32,
+) -> Hit {
+    let normal = (b - a).cross(c - b).normalize_or_zero();
+    let normal_ned = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
     let texture_uv =
         [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
-    Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, tint: [1.0; 3], surface }
+    Hit {
+        point_ned_m: ray.origin + t * ray.direction,
+        depth_m: t,
+        texture_uv,
+        tint: [1.0; 3],
+        normal_ned,
+        surface,
+    }
 }
 
 /// Splits at the median triangle along the longest side of the box around the triangles' centres.

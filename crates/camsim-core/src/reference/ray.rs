@@ -1,6 +1,6 @@
 //! Intersections of rays with triangles and boxes.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// A ray with the precomputed values of its intersection tests.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +12,8 @@ pub(super) struct Ray {
     axes: [usize; 3],
     /// Shear that aligns the direction with that axis, and its scale.
     shear: [f64; 3],
+    /// Rotation from the axes of the ray to NED; `None` for a ray in NED.
+    pub(super) ned_from_ray: Option<DQuat>,
 }
 
 /// A point in the sheared space of a ray: offset across it, and scaled ray parameter.
@@ -42,7 +44,12 @@ impl Ray {
         // A zero component would give 0/0 for a box whose face contains the ray; a tiny one does not.
         let tiny = 1e-200 * size.max_element();
         let inverse = direction.map(|d| 1.0 / if d.abs() < tiny { tiny.copysign(d) } else { d });
-        Some(Self { origin, direction, inverse, axes, shear })
+        Some(Self { origin, direction, inverse, axes, shear, ned_from_ray: None })
+    }
+
+    /// The same ray, whose axes such a rotation takes to NED.
+    pub(super) fn turned_by(self, ned_from_ray: DQuat) -> Self {
+        Self { ned_from_ray: Some(ned_from_ray), ..self }
     }
 
     /// A point in the sheared space of the ray (Woop, Benthin & Wald 2013). Equal points give equal results,

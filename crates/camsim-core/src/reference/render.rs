@@ -17,7 +17,8 @@ use crate::{
 
 /// Steps of the additive low-discrepancy sequences in 3 and 2 dimensions: powers of 1/g with `g^4 = g + 1`,
 /// and of 1/g with `g^3 = g + 1` (Roberts, the R sequences).
-const EVEN_3D: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
+pub(super) const EVEN_3D: [f64; 3] =
+    [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
 const EVEN_2D: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 /// Samples per batch; the error is estimated from the means of batches.
 const BATCH: u32 = 8;
@@ -27,8 +28,8 @@ const BATCHES_A_CHECK: u32 = 4;
 /// Channels of a frame of the oracle, and the accuracy to which it is refined.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel; the others
-    /// are always present.
+    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel, those of
+    /// [`super::is_rendered`] another one, and [`Channel::Coverage`] 256; the others are always present.
     pub channels: Vec<Channel>,
     /// Least number of samples of each pixel; rounded up to 32.
     pub min_samples: u32,
@@ -161,7 +162,7 @@ impl Oracle {
             depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
             coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
             rows: self.row_records(frame),
-            planes: Vec::new(),
+            planes: self.planes(frame, options),
         };
         (rendered, convergence)
     }
@@ -241,8 +242,8 @@ impl FrameJob<'_> {
                 );
                 // At the border of the lens's field, the mean is over the part of the pixel that has rays.
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
-                let pose = instants.pose(x, i);
-                part += self.oracle.radiance(&pose, uv);
+                let (t_s, pose) = instants.pose(x, i);
+                part += self.oracle.radiance_at(t_s, &pose, uv);
                 count += 1;
             }
             if count == 0 {
@@ -319,7 +320,7 @@ struct SamplePoses<'a> {
     y: u32,
     exposure_s: f64,
     shift: f64,
-    shared: Option<Vec<CameraPose>>,
+    shared: Option<Vec<(f64, CameraPose)>>,
 }
 
 impl<'a> SamplePoses<'a> {
@@ -329,12 +330,13 @@ impl<'a> SamplePoses<'a> {
         Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
     }
 
-    /// Pose at sample `i` of pixel `x`.
-    fn pose(&mut self, x: u32, i: u32) -> CameraPose {
+    /// Path time and pose at sample `i` of pixel `x`.
+    fn pose(&mut self, x: u32, i: u32) -> (f64, CameraPose) {
         let pose = |i: u32, shift: f64| {
             let phase =
                 if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
-            self.job.oracle.sequence.path.pose(self.job.view.mid_s([x, self.y]) + phase * self.exposure_s)
+            let t_s = self.job.view.mid_s([x, self.y]) + phase * self.exposure_s;
+            (t_s, self.job.oracle.sequence.path.pose(t_s))
         };
         let Some(shared) = &mut self.shared else { return pose(i, self.shift) };
         let i = if self.exposure_s > 0.0 { i } else { 0 };
@@ -347,7 +349,7 @@ impl<'a> SamplePoses<'a> {
 }
 
 /// Three pseudo-random numbers in 0..1 (splitmix64).
-fn shifts(key: u64) -> [f64; 3] {
+pub(super) fn shifts(key: u64) -> [f64; 3] {
     let mut state = key;
     std::array::from_fn(|_| {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);

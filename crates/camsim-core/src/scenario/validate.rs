@@ -3,11 +3,12 @@
 use std::fmt;
 
 use super::{
-    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver,
-    Stamps, TrackerSpec,
+    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PlaneKind, Preset, QualitySpec, Scenario,
+    Silhouettes, Solver, Stamps, TrackerSpec,
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
+mod motion;
 mod scene;
 mod tracks;
 
@@ -300,6 +301,11 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
         "must be at least 1: flow leads from frame i to frame i + flow_step".into()
     });
+    let has_indices =
+        scenario.output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+    check.require(!scenario.output.palette || has_indices, "output.palette", || {
+        "colours the channels object and class: add one of them to output.channels, or leave it out".into()
+    });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
     });
@@ -358,7 +364,8 @@ mod tests {
 
     use super::*;
     use crate::scenario::{
-        BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
+        BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, ObjectsOf, PatternSpec, SceneSpec,
+        VibrationSpec, ZoomSpec,
     };
 
     fn good() -> Scenario {
@@ -383,6 +390,8 @@ mod tests {
                     image: "grid.png".into(),
                     width_m: 100.0,
                     at: Default::default(),
+                    name: None,
+                    class: None,
                 }),
                 ..Default::default()
             },
@@ -403,6 +412,11 @@ mod tests {
             scene: None,
             time_s: None,
             animation: None,
+            name: None,
+            class: None,
+            objects: Default::default(),
+            classes: Default::default(),
+            motion: None,
         }
     }
 
@@ -495,6 +509,18 @@ mod tests {
                 s.scene.board =
                     Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
             }),
+            ("scene.pattern.class", |s| s.scene.pattern.iter_mut().for_each(|p| p.class = Some(0))),
+            ("scene.gltf.0.name", |s| {
+                s.scene.gltf = vec![GltfSpec { name: Some(String::new()), ..model() }];
+            }),
+            ("scene.gltf.0.classes", |s| {
+                s.scene.gltf = vec![GltfSpec { classes: [("roof".into(), 1)].into(), ..model() }];
+            }),
+            ("scene.gltf.0.classes.roof", |s| {
+                let classes = [("roof".into(), 0)].into();
+                s.scene.gltf = vec![GltfSpec { classes, objects: ObjectsOf::Node, ..model() }];
+            }),
+            ("output.palette", |s| s.output.palette = true),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("scene.light.sun_azimuth_deg", |s| {

@@ -70,7 +70,9 @@ pub fn split_intersecting_blended(meshes: &mut [Mesh]) -> BlendSplit {
     };
     let all: Vec<PlacedTriangle> =
         meshes.iter().enumerate().filter(|(_, mesh)| mesh.material.blends).flat_map(of_mesh).collect();
-    let intersecting_triangles = intersecting_triangles(&all, |a, b| a.mesh != b.mesh);
+    // Those that move apart are mixed by their distance alone.
+    let intersecting_triangles =
+        intersecting_triangles(&all, |a, b| a.mesh != b.mesh && meshes[a.mesh].moves_with(&meshes[b.mesh]));
     let concerned: HashSet<usize> = all
         .iter()
         .zip(&intersecting_triangles)

@@ -4,7 +4,10 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::{DMat3, DVec3};
 
-use super::{Aabb, Light, Texture, light::transformed_normal, terrain::intersect_triangle, texture::Wrap};
+use super::{
+    Aabb, Light, RigidMotion, RigidState, Texture, light::transformed_normal, terrain::intersect_triangle,
+    texture::Wrap,
+};
 
 /// A vertex of a [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,6 +149,8 @@ pub struct Mesh {
     pub ned_from_shape: DMat3,
     /// Number of the object that it belongs to ([`super::Scene::objects`]), counted from 1; 0 = none.
     pub object: u32,
+    /// How it moves; `None` if it stands still. The placement above is that of path time 0.
+    pub motion: Option<Arc<RigidMotion>>,
 }
 
 impl Mesh {
@@ -164,7 +169,44 @@ impl Mesh {
             origin_ned_m,
             ned_from_shape: DMat3::IDENTITY,
             object: 0,
+            motion: None,
         }
+    }
+
+    /// Its motion at path time `t_s`.
+    #[must_use]
+    pub fn motion_at(&self, t_s: f64) -> RigidState {
+        self.motion.as_ref().map_or(RigidState::STILL, |motion| motion.state(t_s))
+    }
+
+    /// The mesh as it stands at path time `t_s`, without its motion.
+    #[must_use]
+    pub fn at(&self, t_s: f64) -> Self {
+        let Some(motion) = &self.motion else { return self.clone() };
+        let state = motion.state(t_s);
+        Self {
+            origin_ned_m: state.point(self.origin_ned_m),
+            ned_from_shape: DMat3::from_quat(state.rotation) * self.ned_from_shape,
+            motion: None,
+            ..self.clone()
+        }
+    }
+
+    /// Whether it moves together with another mesh, or both stand still.
+    #[must_use]
+    pub fn moves_with(&self, other: &Self) -> bool {
+        match (&self.motion, &other.motion) {
+            (None, None) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    /// A box that holds it from path time `from_s` to `to_s`, NED.
+    #[must_use]
+    pub fn bounds_between(&self, from_s: f64, to_s: f64) -> Aabb {
+        let bounds = self.bounds();
+        self.motion.as_ref().map_or(bounds, |motion| motion.bounds(&bounds, from_s, to_s))
     }
 
     /// A level image on the ground, with its top to the north and its left to the west. `width_m` is its
@@ -208,7 +250,7 @@ impl Mesh {
         best
     }
 
-    /// Bounding box in NED; for a rotated shape, that of the rotated box.
+    /// Bounding box in NED (at path time 0); for a rotated shape, that of the rotated box.
     pub fn bounds(&self) -> Aabb {
         self.shape.bounds().turned(self.ned_from_shape, self.origin_ned_m)
     }

@@ -19,10 +19,13 @@ impl FlowTarget {
     }
 }
 
-/// What a pixel sees, as a point of the world; the sky is infinitely far away.
-fn world_point(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint {
+/// What a pixel sees, as a point of the world that follows what it is on; the sky is infinitely far away.
+fn world_point<'a>(pixels: &'a FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint<'a> {
     match pixel.hit {
-        Some(hit) => WorldPoint::At(hit.point_ned_m),
+        Some(hit) => {
+            let motion = pixels.planner.sequence().scene.motion_of_surface(hit.surface);
+            WorldPoint::on(motion, hit.point_ned_m, pixels.rays.mid_s(pixel.position))
+        }
         None => WorldPoint::Towards(pixels.rays.pose(pixel.position).ned_from_camera * pixel.uv.extend(1.0)),
     }
 }
@@ -37,11 +40,12 @@ pub(super) fn flow(pixels: &FramePixels<'_>, target: &FlowTarget) -> Vec<[f32; 3
         let state = if !seen.is_inside {
             FlowState::Outside
         } else {
-            let ray_ned = match point {
-                WorldPoint::At(point_ned_m) => (point_ned_m - seen.pose.position_ned_m) / seen.depth_m,
-                WorldPoint::Towards(direction_ned) => direction_ned,
+            let ray_ned = match (point, point.position_ned_m(seen.t_s)) {
+                (WorldPoint::Towards(direction_ned), _) => direction_ned,
+                (_, Some(point_ned_m)) => (point_ned_m - seen.pose.position_ned_m) / seen.depth_m,
+                (_, None) => return [0.0; 3],
             };
-            match pixels.rays.is_hidden(seen.pose.position_ned_m, ray_ned, seen.depth_m) {
+            match pixels.rays.is_hidden(seen.t_s, seen.pose.position_ned_m, ray_ned, seen.depth_m) {
                 true => FlowState::Occluded,
                 false if seen.solutions > 1 => FlowState::Several,
                 false => FlowState::Visible,
@@ -54,10 +58,11 @@ pub(super) fn flow(pixels: &FramePixels<'_>, target: &FlowTarget) -> Vec<[f32; 3
 /// Velocity of the image of the point that a pixel sees, pixels a second, at the pixel's own instant:
 ///
 /// ```text
-/// X' = -w x X - v,   (u, v)' = (X'.xy - (u, v) X'.z) / X.z,   px' = f J_lens (u, v)'
+/// X' = -w x X - v + v_surface,   (u, v)' = (X'.xy - (u, v) X'.z) / X.z,   px' = f J_lens (u, v)'
 /// ```
 ///
-/// with the camera's angular rate w and velocity v in its own axes; points of the sky have v / X.z = 0.
+/// with the camera's angular rate w and velocity v and that of the surface in the camera's axes; points of the
+/// sky have v / X.z = 0.
 pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
     let plan = pixels.plan;
     let path = &pixels.planner.sequence().path;
@@ -66,7 +71,11 @@ pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
     let camera_from_ned = pixels.rays.pose(pixel.position).ned_from_camera.conjugate();
     let inverse_depth = pixel.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
     let ray = pixel.uv.extend(1.0);
-    let velocity: DVec3 = camera_from_ned * path.velocity_ned(t_s);
+    let of_surface = pixel.hit.and_then(|hit| {
+        let motion = pixels.planner.sequence().scene.motion_of_surface(hit.surface)?;
+        Some(motion.state(t_s).velocity(hit.point_ned_m))
+    });
+    let velocity: DVec3 = camera_from_ned * (path.velocity_ned(t_s) - of_surface.unwrap_or(DVec3::ZERO));
     let ray_rate = -path.rate_camera(t_s).cross(ray) - velocity * inverse_depth;
     let uv_rate = ray_rate.truncate() - pixel.uv * ray_rate.z;
     let px_rate = plan.camera.focal_px * (plan.camera.lens.jacobian(pixel.uv) * uv_rate);
@@ -76,17 +85,19 @@ pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
 /// Displacement of the point that a pixel sees at the begin and at the end of its exposure, pixels; 0 where
 /// the camera of that instant does not show it.
 pub(super) fn blur_path(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 4] {
-    let plan = pixels.plan;
-    let path = &pixels.planner.sequence().path;
-    let [x, y] = pixel.position;
-    let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-    let from_px = DVec2::from_array(pixel.position.map(f64::from));
-    let point = world_point(pixels, pixel);
-    let moved = |phase: f64| {
-        let pose = path.pose(mid_s + phase * plan.shutter.exposure_s());
-        let shown = plan.camera.show(&pose, point);
-        shown.map_or(DVec2::ZERO, |(px, _)| px - from_px).as_vec2().to_array()
-    };
+    let moved = |phase| moved_px(pixels, pixel, phase).unwrap_or_default().as_vec2().to_array();
     let ([x0, y0], [x1, y1]) = (moved(-0.5), moved(0.5));
     [x0, y0, x1, y1]
 }
+
+/// Displacement of the point that a pixel sees at an exposure phase, -0.5 to 0.5, pixels; `None` where the
+/// camera of that instant does not show it.
+pub(super) fn moved_px(pixels: &FramePixels<'_>, pixel: Pixel<'_>, phase: f64) -> Option<DVec2> {
+    let from_px = DVec2::from_array(pixel.position.map(f64::from));
+    let (t_s, pose) = pixels.rays.camera_at(pixel.position, phase);
+    let shown = pixels.plan.camera.show(&pose, t_s, world_point(pixels, pixel));
+    shown.map(|(px, _)| px - from_px)
+}
+
+#[cfg(test)]
+mod tests;

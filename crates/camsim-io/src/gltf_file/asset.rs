@@ -135,6 +135,17 @@ impl Asset {
         }
     }
 
+    /// The name that the file gives to a node or material; `nodes.3` without one.
+    pub fn name_of(&self, list: &str, index: usize) -> String {
+        self.given_name(list, index).map_or_else(|| format!("{list}.{index}"), str::to_owned)
+    }
+
+    /// The name that the file gives to a node or material, if it gives one.
+    pub fn given_name(&self, list: &str, index: usize) -> Option<&str> {
+        let name = self.json.pointer(&format!("/{list}/{index}/name")).and_then(Value::as_str);
+        name.filter(|name| !name.trim().is_empty())
+    }
+
     /// Transforms of a node's instances by `EXT_mesh_gpu_instancing`; `None` without the extension.
     pub fn instances(&self, node: usize) -> Result<Option<Vec<DAffine3>>, GltfError> {
         let pointer = format!("/nodes/{node}/extensions/EXT_mesh_gpu_instancing/attributes");

@@ -21,7 +21,8 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    pub fn new(asset: &Asset, options: GltfOptions) -> Result<Self, GltfError> {
+    /// `periods_s` are those of the animations that are played again and again; empty to hold the last key.
+    pub fn new(asset: &Asset, options: GltfOptions, periods_s: &[f64]) -> Result<Self, GltfError> {
         let mut pose = Self::default();
         if let Some(n) = options.animation.filter(|&n| n >= asset.document.animations().count()) {
             return Err(
@@ -49,6 +50,8 @@ impl Pose {
                          choose one with scene.gltf.animation"
                     ));
                 }
+                let period_s = periods_s.get(animation).copied().filter(|period_s| *period_s > 0.0);
+                let time_s = period_s.map_or(time_s, |period_s| time_s.rem_euclid(period_s));
                 pose.apply_channel(asset, &channel, time_s)?;
             }
         }
@@ -98,13 +101,22 @@ impl Pose {
                 let translation =
                     self.translations.get(&i).map_or(translation.map(f64::from), |&[x, y, z, _]| [x, y, z]);
                 let rotation = self.rotations.get(&i).copied().unwrap_or(rotation.map(f64::from));
-                let rotation = DQuat::from_array(rotation).normalize();
+                let rotation = unit(rotation);
                 let scale = self.scales.get(&i).map_or(scale.map(f64::from), |&[x, y, z, _]| [x, y, z]);
-                let rotation = if rotation.is_finite() { rotation } else { DQuat::IDENTITY };
                 let matrix3 = DMat3::from_quat(rotation) * DMat3::from_diagonal(DVec3::from_array(scale));
                 DAffine3 { matrix3, translation: DVec3::from_array(translation) }
             }
         }
+    }
+
+    /// Origin and rotation of a node, without its scale.
+    pub fn turn_of(&self, node: &gltf::Node<'_>) -> (DVec3, DQuat) {
+        let i = node.index();
+        let (translation, rotation, _) = node.transform().decomposed();
+        let translation =
+            self.translations.get(&i).map_or(translation.map(f64::from), |&[x, y, z, _]| [x, y, z]);
+        let rotation = self.rotations.get(&i).copied().unwrap_or(rotation.map(f64::from));
+        (DVec3::from_array(translation), unit(rotation))
     }
 
     /// Weights of a mesh's morph targets at a node.
@@ -149,6 +161,12 @@ impl Pose {
         }
         Ok(())
     }
+}
+
+/// A rotation as stored; none if it has no direction.
+pub(super) fn unit(rotation: [f64; 4]) -> DQuat {
+    let rotation = DQuat::from_array(rotation).normalize();
+    if rotation.is_finite() { rotation } else { DQuat::IDENTITY }
 }
 
 /// Value of a channel's sampler at a time, seconds; `None` without key frames. Interpolation by glTF 2.0,

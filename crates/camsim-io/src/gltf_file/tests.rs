@@ -10,11 +10,21 @@ mod emissive;
 mod extensions;
 mod malformed;
 mod materials;
+mod moving;
 mod normals;
 mod published;
 
 /// Reads a file with one buffer; `rest` is the JSON after `"buffers"`.
 fn model(bytes: &[u8], rest: &str, options: GltfOptions) -> Result<Model, String> {
+    moving_model(bytes, rest, options, &ModelMotion::default())
+}
+
+fn moving_model(
+    bytes: &[u8],
+    rest: &str,
+    options: GltfOptions,
+    motion: &ModelMotion,
+) -> Result<Model, String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a b.bin"), bytes).unwrap();
     let path = folder.path().join("model.gltf");
@@ -24,7 +34,7 @@ fn model(bytes: &[u8], rest: &str, options: GltfOptions) -> Result<Model, String
         format!("{{ \"asset\": {{ \"version\": \"2.0\" }}, \"scene\": 0, {buffers}, {rest} }}"),
     )
     .unwrap();
-    read_gltf(&path, options).map_err(|error| error.to_string())
+    read_moving_gltf(&path, options, motion).map_err(|error| error.to_string())
 }
 
 fn floats(values: &[f32]) -> Vec<u8> {

@@ -131,6 +131,14 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
                 format!("a whole number, {min} to {max}"),
             )
         }
+        ValueKind::Numbered(min, max) => {
+            let range = i64::from(min)..=i64::from(max);
+            let is_number = |value: &Value| value.as_integer().is_some_and(|v| range.contains(&v));
+            (
+                value.as_table().is_some_and(|table| table.values().all(is_number)),
+                format!("a table of names with whole numbers, {min} to {max}, such as {{ roof = {min} }}"),
+            )
+        }
         ValueKind::CountOr(max, words) => {
             (count(value) || among(value, words), format!("a whole number up to {max} or {}", list(words)))
         }
@@ -144,6 +152,10 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
             (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {max}"))
         }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
+        ValueKind::Points(n) => (
+            all(value, None, &|point| all(point, Some(n), &number)),
+            format!("a list of lists of {n} numbers"),
+        ),
         ValueKind::Path => (false, "a path in quotes".to_owned()),
         ValueKind::Text => (value.is_str(), "a text in quotes".to_owned()),
         ValueKind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),

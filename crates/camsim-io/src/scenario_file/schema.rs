@@ -56,6 +56,8 @@ pub enum ValueKind {
     Counts(usize, u32),
     /// A list of any number of numbers.
     NumberList,
+    /// A list of any number of lists of this many numbers.
+    Points(usize),
     /// A path, resolved against the folder of the file that names it.
     Path,
     /// One of these words.
@@ -66,6 +68,8 @@ pub enum ValueKind {
     Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
+    /// A table of names of the user's, each with a whole number from the first to the last.
+    Numbered(u32, u32),
     /// One of these words or the path of a CSV table, or a list of them.
     WordsOrTables(&'static [&'static str]),
     /// An array of tables, whose keys are listed below the same dotted name.
@@ -76,7 +80,27 @@ pub enum ValueKind {
 
 use ValueKind::*;
 
+/// Class of an object.
+const CLASS: ValueKind = Within(1, u16::MAX as u32);
 const AUTO: &[&str] = &["auto"];
+const CHANNELS: &[&str] = &[
+    "color",
+    "depth",
+    "valid",
+    "rows",
+    "coords",
+    "range",
+    "normal",
+    "normal-world",
+    "object",
+    "class",
+    "coverage",
+    "flow",
+    "flow-back",
+    "flow-global",
+    "motion",
+    "blur-path",
+];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
 /// Keys of a scenario.
@@ -139,9 +163,13 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.terrain.height_unit", Word(&["m", "ft", "us-ft"])),
     ("scene.terrain.ortho_white", Number),
     ("scene.terrain.beyond", Word(&["grey", "edge", "void"])),
+    ("scene.terrain.name", Text),
+    ("scene.terrain.class", CLASS),
     ("scene.pattern.image", Path),
     ("scene.pattern.width_m", Number),
     ("scene.pattern.at", NumbersOr(3, "origin")),
+    ("scene.pattern.name", Text),
+    ("scene.pattern.class", CLASS),
     ("scene.board.target", Path),
     ("scene.board.kind", Word(&["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"])),
     ("scene.board.columns", Within(1, 80)),
@@ -157,6 +185,8 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.board.at", NumbersOr(3, "origin")),
     ("scene.board.geodetic", Numbers(3)),
     ("scene.board.angles_deg", Numbers(3)),
+    ("scene.board.name", Text),
+    ("scene.board.class", CLASS),
     ("scene.gltf", Tables),
     ("scene.gltf.file", Path),
     ("scene.gltf.at", NumbersOr(3, "origin")),
@@ -168,6 +198,22 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.gltf.scene", Within(0, u32::MAX)),
     ("scene.gltf.time_s", Number),
     ("scene.gltf.animation", Within(0, u32::MAX)),
+    ("scene.gltf.name", Text),
+    ("scene.gltf.class", CLASS),
+    ("scene.gltf.objects", Word(&["placement", "node", "material"])),
+    ("scene.gltf.classes", Numbered(1, u16::MAX as u32)),
+    ("scene.gltf.motion.poses", Path),
+    ("scene.gltf.motion.path", Points(3)),
+    ("scene.gltf.motion.speed_m_s", Number),
+    ("scene.gltf.motion.start_s", Number),
+    ("scene.gltf.motion.loop", Word(&["once", "repeat", "back-and-forth"])),
+    ("scene.gltf.motion.orient", Flag),
+    ("scene.gltf.motion.spin", Tables),
+    ("scene.gltf.motion.spin.axis", Numbers(3)),
+    ("scene.gltf.motion.spin.hz", Number),
+    ("scene.gltf.motion.spin.phase_deg", Number),
+    ("scene.gltf.motion.spin.node", Text),
+    ("scene.gltf.motion.animate", Flag),
     ("scene.sky", Numbers(3)),
     ("scene.fog_visibility_m", Number),
     ("scene.light.sun_azimuth_deg", Number),
@@ -187,33 +233,15 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
-    (
-        "output.channels",
-        Words(&[
-            "color",
-            "depth",
-            "valid",
-            "rows",
-            "coords",
-            "range",
-            "normal",
-            "normal-world",
-            "object",
-            "class",
-            "flow",
-            "flow-back",
-            "flow-global",
-            "motion",
-            "blur-path",
-        ]),
-    ),
+    ("output.channels", Words(CHANNELS)),
     ("output.format", Words(&["exr", "png"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
-    ("output.flow_step", Whole),
+    ("output.flow_step", Within(1, u32::MAX)),
     ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.palette", Flag),
     ("output.tracks.points", WordsOrTables(&PointSource::WORDS)),
     ("output.tracks.count", Within(1, TracksSpec::MOST_POINTS)),
 ];
@@ -229,6 +257,8 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("scene.pattern.image", "scene.pattern"),
     ("scene.pattern.width_m", "scene.pattern"),
     ("scene.gltf.file", "scene.gltf"),
+    ("scene.gltf.motion.spin.axis", "scene.gltf.motion.spin"),
+    ("scene.gltf.motion.spin.hz", "scene.gltf.motion.spin"),
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),

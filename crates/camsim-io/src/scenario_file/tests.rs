@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, OutputSpec, QualitySpec,
-    Readout, TrackerSpec,
+    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, LoopKind, MotionSpec,
+    ObjectsOf, OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -103,11 +103,31 @@ fn every_key_of_the_structs_is_in_the_schema() {
         first_id: Some(1),
         margin_m: Some(1.0),
         geodetic: Some([47.0, 8.0, 400.0]),
+        name: Some("target".into()),
+        class: Some(9),
         ..board(1, 1, 1.0)
     });
+    scenario.output.palette = true;
+    scenario.output.channels.push(camsim_core::scenario::Channel::Object);
+    let terrain = scenario.scene.terrain.as_mut().unwrap();
+    (terrain.name, terrain.class) = (Some("ground".into()), Some(2));
+    let pattern = scenario.scene.pattern.as_mut().unwrap();
+    (pattern.name, pattern.class) = (Some("marks".into()), Some(3));
     let model = &mut scenario.scene.gltf[0];
+    (model.name, model.class, model.objects) = (Some("house".into()), Some(7), ObjectsOf::Node);
+    model.classes = [("roof".to_owned(), 8)].into();
     (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
     (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
+    model.motion = Some(MotionSpec {
+        poses: Some("poses.csv".into()),
+        path: vec![[0.0, 1.0, 2.0]; 2],
+        speed_m_s: Some(1.0),
+        start_s: Some(1.0),
+        repeat: Some(LoopKind::BackAndForth),
+        orient: Some(true),
+        spin: vec![SpinSpec { axis: [1.0; 3], hz: 1.0, phase_deg: 1.0, node: Some("a".into()) }],
+        animate: true,
+    });
     let saved = toml::to_string(&scenario).unwrap();
     let mut visited = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut visited);

@@ -35,6 +35,8 @@ enum OutputFile {
     Rows,
     /// A channel of [`RenderedFrame::planes`].
     Plane(Channel, PlaneKind),
+    /// A channel of numbers in colour.
+    Palette(Channel),
 }
 
 impl FrameFiles {
@@ -119,7 +121,16 @@ impl FrameFiles {
                 Channel::Valid => vec![OutputFile::Valid],
                 Channel::Coords => vec![OutputFile::Coords],
                 Channel::Rows => vec![OutputFile::Rows],
-                plane => plane.plane().map(|kind| OutputFile::Plane(plane, kind)).into_iter().collect(),
+                plane => {
+                    let palette = (self.output.palette && plane.plane() == Some(PlaneKind::Index))
+                        .then_some(OutputFile::Palette(plane));
+                    plane
+                        .plane()
+                        .map(|kind| OutputFile::Plane(plane, kind))
+                        .into_iter()
+                        .chain(palette)
+                        .collect()
+                }
             };
             // A channel or format that is listed twice gives one file.
             channel_files.into_iter().for_each(|file| {
@@ -162,6 +173,11 @@ impl FrameFiles {
                     frame.size_px,
                     frame.indices(channel).unwrap_or_default(),
                 )?,
+                OutputFile::Palette(channel) => png_file::encode_palette(
+                    &path,
+                    frame.size_px,
+                    frame.indices(channel).unwrap_or_default(),
+                )?,
             };
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
@@ -180,6 +196,8 @@ fn column_name(file: OutputFile) -> &'static str {
         OutputFile::Coords => "coords",
         OutputFile::Rows => "rows",
         OutputFile::Plane(channel, _) => channel.name(),
+        OutputFile::Palette(Channel::Class) => "class_palette",
+        OutputFile::Palette(_) => "object_palette",
     }
 }
 
@@ -194,6 +212,7 @@ fn file_name(file: OutputFile, index: u64) -> String {
         OutputFile::Rows => ("rows", "csv"),
         OutputFile::Plane(channel, PlaneKind::Float(_)) => (channel.name(), "exr"),
         OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
+        OutputFile::Palette(_) => (column_name(file), "png"),
     };
     format!("{folder}/frame_{index:06}.{ending}")
 }
@@ -211,7 +230,7 @@ fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteE
         OutputFile::Plane(channel, PlaneKind::Float(names)) => {
             (channel.name(), frame.floats(channel).map_or(0, <[f32]>::len), pixels * names.len())
         }
-        OutputFile::Plane(channel, PlaneKind::Index) => {
+        OutputFile::Plane(channel, PlaneKind::Index) | OutputFile::Palette(channel) => {
             (channel.name(), frame.indices(channel).map_or(0, <[u32]>::len), pixels)
         }
     };

@@ -26,7 +26,7 @@ pub struct PixelTruth {
 /// The surface that the centre of a pixel sees at mid-exposure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelHit {
-    /// The point, NED, metres.
+    /// The point at the pixel's own instant, NED, metres.
     pub point_ned_m: DVec3,
     /// Planar depth in the row's own camera, metres.
     pub depth_m: f64,
@@ -46,42 +46,49 @@ struct RayHit {
     triangle: Option<TerrainTriangle>,
 }
 
+/// Camera at one instant.
+#[derive(Clone, Copy, Debug)]
+struct RowCamera {
+    /// Path time, seconds.
+    t_s: f64,
+    pose: CameraPose,
+}
+
 /// Rays of the pixels of a frame, each at its own instant. The terrain is met at full detail, which what was
 /// drawn is within [`FramePlan::terrain_error_px`] of.
 #[derive(Debug)]
 pub struct FrameRays<'a> {
+    path: &'a CameraPath,
     surfaces: &'a Surfaces,
     plan: &'a FramePlan,
     /// Camera at mid-exposure of each row, or of each column in either field.
-    mid: Vec<CameraPose>,
+    mid: Vec<RowCamera>,
     /// Camera at the exposure phase of the coordinates; empty where that is mid-exposure.
-    at_phase: Vec<CameraPose>,
+    at_phase: Vec<RowCamera>,
 }
 
 impl<'a> FrameRays<'a> {
     /// Rays whose coordinates are of exposure phase `phase`, -0.5 to 0.5.
-    pub(crate) fn new(path: &CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
+    pub(crate) fn new(path: &'a CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
         let [columns, rows] = plan.camera.size_px;
         let pixels: Vec<[u32; 2]> = match plan.shutter.row_axis() {
             RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
             RowAxis::Columns => (0..columns).flat_map(|x| [[x, 0], [x, 1]]).collect(),
         };
-        let poses = |shift_s: f64| {
-            pixels
-                .iter()
-                .map(|&[x, y]| path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + shift_s))
-                .collect()
+        let cameras = |shift_s: f64| {
+            let times = pixels.iter().map(|&[x, y]| plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + shift_s);
+            times.map(|t_s| RowCamera { t_s, pose: path.pose(t_s) }).collect()
         };
         let shift_s = phase * plan.shutter.exposure_s();
-        let at_phase = if shift_s == 0.0 { Vec::new() } else { poses(shift_s) };
-        Self { surfaces, plan, mid: poses(0.0), at_phase }
+        let at_phase = if shift_s == 0.0 { Vec::new() } else { cameras(shift_s) };
+        Self { path, surfaces, plan, mid: cameras(0.0), at_phase }
     }
 
     /// What the ray `uv` of a pixel meets.
     #[must_use]
     pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {
-        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned).map(|hit| RayHit {
+        let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let hit = self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned).map(|hit| RayHit {
             depth_m: hit.depth_m,
             normal_ned: hit.normal_ned,
             surface: hit.surface as u32,
@@ -95,12 +102,13 @@ impl<'a> FrameRays<'a> {
     /// its depth in front of it.
     #[must_use]
     pub fn walk(&self, from: TerrainTriangle, pixel: [u32; 2], uv: DVec2, window: f64) -> Option<PixelTruth> {
-        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let terrain = self.surfaces.terrain()?;
         let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
-        let in_front_m = window * depth_m;
+        // What moves is not in the picture that was looked up.
+        let in_front_m = if self.surfaces.moves() { depth_m } else { window * depth_m };
         let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
-        let is_hidden = self.surfaces.model_hit(start_ned_m, ray_ned, in_front_m).is_some();
+        let is_hidden = self.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
         let normal_ned = terrain.normal_ned(triangle);
         let hit = RayHit { depth_m, normal_ned, surface: 0, triangle: Some(triangle) };
         (!is_hidden).then(|| self.truth(pixel, uv, Some(hit)))
@@ -113,7 +121,7 @@ impl<'a> FrameRays<'a> {
         if from == to {
             return true;
         }
-        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let walk = |from| self.surfaces.terrain()?.walk(from, pose.position_ned_m, ray_ned);
         // A ray on an edge hits both of its triangles.
         walk(from).is_some_and(|(triangle, depth_m)| {
@@ -124,32 +132,55 @@ impl<'a> FrameRays<'a> {
     /// Camera of a pixel at mid-exposure.
     #[must_use]
     pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
-        self.ray(&self.mid, pixel, DVec2::ZERO).0
+        &self.ray(&self.mid, pixel, DVec2::ZERO).0.pose
     }
 
-    /// Whether a surface lies between a camera and what it sees along a ray at planar depth `depth_m`
-    /// (infinite for the sky), leaving out the last millionth of the way.
+    /// Instant and camera of a pixel at an exposure phase, -0.5 (begin) to 0.5 (end).
     #[must_use]
-    pub fn is_hidden(&self, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
-        let hit = self.surfaces.first_hit(position_ned_m, ray_ned);
+    pub fn camera_at(&self, [x, y]: [u32; 2], phase: f64) -> (f64, CameraPose) {
+        let FramePlan { shutter, stamp_s, .. } = self.plan;
+        let t_s = stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_s();
+        (t_s, self.path.pose(t_s))
+    }
+
+    /// The surface (0 = terrain, 1 + i = mesh i of the scene) that the ray `uv` of a camera meets first at path
+    /// time `t_s`.
+    #[must_use]
+    pub fn surface(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> Option<u32> {
+        let ray_ned = pose.ned_from_camera * uv.extend(1.0);
+        let hit = self.surfaces.first_hit_at(t_s, pose.position_ned_m, ray_ned);
+        hit.map(|hit| hit.surface as u32)
+    }
+
+    /// Mid-exposure of a pixel, path time, seconds.
+    #[must_use]
+    pub fn mid_s(&self, pixel: [u32; 2]) -> f64 {
+        self.ray(&self.mid, pixel, DVec2::ZERO).0.t_s
+    }
+
+    /// Whether at path time `t_s` a surface lies between a camera and what it sees along a ray at planar depth
+    /// `depth_m` (infinite for the sky), leaving out the last millionth of the way.
+    #[must_use]
+    pub fn is_hidden(&self, t_s: f64, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
+        let hit = self.surfaces.first_hit_at(t_s, position_ned_m, ray_ned);
         hit.is_some_and(|hit| hit.depth_m < (1.0 - LAST_PART) * depth_m)
     }
 
-    fn ray<'b>(&self, poses: &'b [CameraPose], [x, y]: [u32; 2], uv: DVec2) -> (&'b CameraPose, DVec3) {
-        let pose = match self.plan.shutter.row_axis() {
-            RowAxis::Rows => &poses[y as usize],
-            RowAxis::Columns => &poses[2 * x as usize + (y % 2) as usize],
+    fn ray<'b>(&self, rows: &'b [RowCamera], [x, y]: [u32; 2], uv: DVec2) -> (&'b RowCamera, DVec3) {
+        let row = match self.plan.shutter.row_axis() {
+            RowAxis::Rows => &rows[y as usize],
+            RowAxis::Columns => &rows[2 * x as usize + (y % 2) as usize],
         };
-        (pose, pose.ned_from_camera * uv.extend(1.0))
+        (row, row.pose.ned_from_camera * uv.extend(1.0))
     }
 
     fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>) -> PixelTruth {
-        let (pose, ray_ned) = self.ray(&self.mid, pixel, uv);
+        let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let source_px = if self.at_phase.is_empty() {
             self.source_px(pose, ray_ned, hit.as_ref().map(|hit| hit.depth_m))
         } else {
-            let (pose, ray_ned) = self.ray(&self.at_phase, pixel, uv);
-            let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned);
+            let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.at_phase, pixel, uv);
+            let hit = self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned);
             self.source_px(pose, ray_ned, hit.map(|hit| hit.depth_m))
         };
         let hit = hit.map(|RayHit { depth_m, normal_ned, surface, triangle }| PixelHit {

@@ -70,7 +70,7 @@ pub(super) fn corners(planner: &Planner, views: &Views, count: usize, seed: u64)
 /// Bounds of the cells that rays of the frames meet, an eighth larger on each side.
 fn seen_part(surfaces: &Surfaces, terrain: &Terrain, views: &Views) -> Option<Part> {
     let mut part: Option<Part> = None;
-    for (camera, pose) in &views.cameras {
+    for (camera, _, pose) in &views.cameras {
         let last_px = DVec2::from_array(camera.size_px.map(|size| f64::from(size) - 1.0));
         for ray in 0..RAYS[0] * RAYS[1] {
             let share = DVec2::new(

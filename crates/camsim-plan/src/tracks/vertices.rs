@@ -58,11 +58,15 @@ pub(super) fn corners(planner: &Planner, views: &Views, count: usize, seed: u64)
     thinned(along_curve(seen), count, seed).into_iter().map(point).collect()
 }
 
-/// Vertices that triangles use, by mesh from `first` on; meshes of one shape share the list.
+/// Vertices that triangles use, by mesh from `first` on; meshes of one shape share the list. Points of things
+/// that move are not tracked.
 fn used_vertices(scene: &Scene, first: usize) -> Vec<Arc<Vec<u32>>> {
     let mut known: HashMap<*const Shape, Arc<Vec<u32>>> = HashMap::new();
     let used = |shape: &Shape| shape.indices.iter().copied().collect::<BTreeSet<u32>>().into_iter().collect();
     let of_mesh = |mesh: &Mesh| {
+        if mesh.motion.is_some() {
+            return Arc::default();
+        }
         known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| Arc::new(used(&mesh.shape))).clone()
     };
     scene.meshes.iter().skip(first).map(of_mesh).collect()

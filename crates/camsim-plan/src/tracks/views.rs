@@ -17,7 +17,7 @@ const POINTS_AT_ONCE: usize = 16;
 /// Cameras of some frames at the mid-exposure of their centre.
 #[derive(Debug, Default)]
 pub(super) struct Views {
-    pub cameras: Vec<(Arc<CameraModel>, CameraPose)>,
+    pub cameras: Vec<(Arc<CameraModel>, f64, CameraPose)>,
 }
 
 impl Views {
@@ -31,14 +31,14 @@ impl Views {
 
     /// Whether any of them shows a point that nothing hides.
     fn see(&self, surfaces: &Surfaces, point_ned_m: DVec3) -> bool {
-        self.cameras.iter().any(|(camera, pose)| {
+        self.cameras.iter().any(|(camera, t_s, pose)| {
             let [width, height] = camera.size_px.map(f64::from);
             let is_inside = |px: DVec2| {
                 px.cmpge(DVec2::splat(-0.5)).all() && px.cmplt(DVec2::new(width, height) - 0.5).all()
             };
-            let shown = camera.show(pose, WorldPoint::At(point_ned_m));
+            let shown = camera.show(pose, *t_s, WorldPoint::At(point_ned_m));
             shown.is_some_and(|(px, _)| is_inside(px))
-                && !is_hidden(surfaces, pose.position_ned_m, point_ned_m)
+                && !is_hidden(surfaces, *t_s, pose.position_ned_m, point_ned_m)
         })
     }
 

@@ -1,5 +1,9 @@
 //! What the planner's rays meet: the terrain at full detail and every mesh.
+//!
+//! What moves is met where it is at the instant of the ray ([`Surfaces::first_hit_at`]). Rays without an instant,
+//! and all bounds, have it where it is at path time 0.
 
+mod moving;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +19,7 @@ use camsim_core::{
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::ir::limits::NEAR_M;
+use moving::{MovingMeshes, moving_meshes};
 
 /// The surfaces of a scene, prepared for rays.
 #[derive(Debug)]
@@ -28,6 +33,10 @@ pub(crate) struct Surfaces {
     deep: RayBvh,
     pub solid: RayBvh,
     pub mixed: RayBvh,
+    /// Meshes that move; these trees hold them at path time 0.
+    moving: Vec<MovingMeshes>,
+    /// `deep` without them; `None` if nothing moves.
+    deep_still: Option<RayBvh>,
     /// Trees of each mesh's shape: meshes that share a shape share its tree.
     pub shapes: Vec<Arc<ShapeTrees>>,
     /// From NED to the axes of each mesh's shape.
@@ -107,14 +116,31 @@ impl Surfaces {
             RayBvh::new(&counted.collect::<Vec<_>>())
         };
         let of_pictures = RefCell::new(HashMap::new());
-        let deep =
-            tree_if(&|mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut()));
+        let is_deep =
+            |mesh: &Mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut());
+        let deep = tree_if(&is_deep);
+        let deep_still =
+            scene.moves().then(|| tree_if(&|mesh: &Mesh| mesh.motion.is_none() && is_deep(mesh)));
+        let moving = moving_meshes(&scene, &is_deep);
         let (solid, mixed) = (tree_if(&|mesh| !mesh.material.blends), tree_if(&|mesh| mesh.material.blends));
         let tree = ProximityBvh::new(&bounds);
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
         let blends = scene.has_blended();
-        Self { scene, tree, bounds, deep, solid, mixed, shapes, shape_from_ned, blends, linear }
+        Self {
+            scene,
+            tree,
+            bounds,
+            deep,
+            solid,
+            mixed,
+            moving,
+            deep_still,
+            shapes,
+            shape_from_ned,
+            blends,
+            linear,
+        }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
@@ -147,9 +173,29 @@ impl Surfaces {
         self.first_hit_in(&self.deep, origin_ned_m, direction_ned)
     }
 
-    /// First model along `origin + t direction`, 0 <= t <= `limit`.
-    pub fn model_hit(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Option<SurfaceHit> {
-        self.model_hit_in(&self.deep, origin_ned_m, direction_ned, limit)
+    /// Whether anything moves.
+    pub fn moves(&self) -> bool {
+        self.deep_still.is_some()
+    }
+
+    /// First surface along `origin + t direction`, t >= 0, with everything where it is at path time `t_s`.
+    pub fn first_hit_at(&self, t_s: f64, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<SurfaceHit> {
+        let Some(still) = &self.deep_still else { return self.first_hit(origin_ned_m, direction_ned) };
+        let hit = self.first_hit_in(still, origin_ned_m, direction_ned);
+        self.nearer_moving(t_s, origin_ned_m, direction_ned, f64::INFINITY, hit)
+    }
+
+    /// First model along `origin + t direction`, 0 <= t <= `limit`, at path time `t_s`.
+    pub fn model_hit_at(
+        &self,
+        t_s: f64,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+    ) -> Option<SurfaceHit> {
+        let still = self.deep_still.as_ref().unwrap_or(&self.deep);
+        let hit = self.model_hit_in(still, origin_ned_m, direction_ned, limit);
+        self.nearer_moving(t_s, origin_ned_m, direction_ned, limit, hit)
     }
 
     fn model_hit_in(
@@ -197,6 +243,18 @@ impl Surfaces {
         direction_ned: DVec3,
         limit: f64,
     ) -> Option<SurfaceHit> {
+        let (depth_m, (corners, weights)) = self.triangle_hit(i, origin_ned_m, direction_ned, limit)?;
+        Some(self.surface_hit(i, depth_m, corners, weights, direction_ned))
+    }
+
+    /// Ray parameter, corners and weights on a mesh, which stands where it is at path time 0.
+    fn triangle_hit(
+        &self,
+        i: usize,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+    ) -> Option<(f64, ([u32; 3], [f64; 3]))> {
         let mesh = &self.scene.meshes[i];
         let shape_from_ned = self.shape_from_ned[i];
         let (origin, direction) =
@@ -207,8 +265,7 @@ impl Surfaces {
             let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
             mesh.is_visible(corners, weights, direction_ned).then_some((t, (corners, weights)))
         };
-        let (depth_m, (corners, weights)) = self.shapes[i].for_rays.first(origin, direction, limit, meet)?;
-        Some(self.surface_hit(i, depth_m, corners, weights, direction_ned))
+        self.shapes[i].for_rays.first(origin, direction, limit, meet)
     }
 
     pub fn surface_hit(
@@ -219,7 +276,19 @@ impl Surfaces {
         weights: [f64; 3],
         direction_ned: DVec3,
     ) -> SurfaceHit {
-        let mesh = &self.scene.meshes[i];
+        self.hit_on(&self.scene.meshes[i], i, depth_m, corners, weights, direction_ned)
+    }
+
+    /// What is known of a hit on mesh `i`, which stands as `mesh` has it.
+    fn hit_on(
+        &self,
+        mesh: &Mesh,
+        i: usize,
+        depth_m: f64,
+        corners: [u32; 3],
+        weights: [f64; 3],
+        direction_ned: DVec3,
+    ) -> SurfaceHit {
         let [r, g, b, _] = mesh.tint_at(corners, weights);
         let light =
             self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));

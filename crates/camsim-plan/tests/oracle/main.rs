@@ -11,5 +11,6 @@ mod disocclusion;
 mod fixtures;
 mod hostile;
 mod measuring;
+mod moving;
 mod planted_faults;
 mod tracks;

@@ -12,13 +12,21 @@ use camsim_core::{
     pose::BodyState,
     reference::Oracle,
     scenario::{Channel, FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver},
-    scene::{Encoding, Mesh, Scene, Terrain, Texture},
+    scene::{
+        Encoding, Mesh, RigidMotion, Scene, Terrain, Texture,
+        motion::{Joint, JointFrame, Track},
+    },
     sequence::Sequence,
     trajectory::Trajectory,
 };
 
 /// Roofs over hills, seen by a fast camera that turns, with a lens, an exposure and the skyline in view.
 fn sequence(solver: Option<Solver>) -> Arc<Sequence> {
+    sequence_with(solver, None)
+}
+
+/// The same with a motion of the second roof.
+fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Arc<Sequence> {
     // Long because: every part of a sequence is written out.
     let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
     let roof = |north_m: f64, height_m: f64| {
@@ -30,7 +38,7 @@ fn sequence(solver: Option<Solver>) -> Arc<Sequence> {
     let terrain = Terrain::from_heights(65, 65, 10.0, &heights, Some(texture.clone())).unwrap();
     let scene = Scene {
         terrain: Some(terrain),
-        meshes: vec![roof(20.0, 25.0), roof(70.0, 35.0)],
+        meshes: vec![roof(20.0, 25.0), Mesh { motion, ..roof(70.0, 35.0) }],
         ..Scene::default()
     };
     let mut scenario = Scenario {
@@ -85,7 +93,17 @@ fn sequence(solver: Option<Solver>) -> Arc<Sequence> {
 
 #[test]
 fn pixel_truth_is_that_of_the_oracle() {
-    let sequence = sequence(None);
+    let hub = glam::DAffine3::from_translation(DVec3::new(65.0, 5.0, -35.0));
+    let axis = DVec3::new(0.0, 0.6, 0.8);
+    let spin =
+        Joint::new(JointFrame::from_affine(&hub).unwrap(), Track::Spin { axis, hz: 3.0, phase_rad: 0.0 });
+    let turning = Arc::new(RigidMotion::new(vec![spin]));
+    for motion in [None, Some(turning)] {
+        compare_with_oracle(&sequence_with(None, motion));
+    }
+}
+
+fn compare_with_oracle(sequence: &Arc<Sequence>) {
     let plan = Planner::new(sequence.clone(), &[Channel::Coords], 16_384).unwrap();
     let (planner, plan) = (&plan, plan.plan(1).unwrap());
     assert!(plan.has_exact_truth(), "{:?}", plan.temporal);

@@ -44,8 +44,9 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Words(words) => word_list(ui, key, value, words),
         ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
+        ValueKind::Numbered(..) => numbered(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
-        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts => None,
+        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
     };
     if let Some(Edit { value, is_dragged }) = edit {
         out.push(Message::Set(key.to_owned(), value, is_dragged));
@@ -335,6 +336,19 @@ fn finished_text(ui: &mut Ui, key: &str, present: &str, param: &Param) -> Option
     }
     ui.data_mut(|data| data.remove_temp::<String>(id))?;
     (response.lost_focus() && text != present).then_some(text)
+}
+
+/// A table of names with numbers, written `roof = 3, wall = 4`.
+fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+    let pairs = value.and_then(Value::as_table).into_iter().flatten();
+    let quoted = |name: &str| Value::String(name.to_owned()).to_string();
+    let written: Vec<String> = pairs.map(|(name, value)| format!("{} = {value}", quoted(name))).collect();
+    let edit = text(ui, key, Some(&Value::String(written.join(", "))), param)?;
+    let Some(Value::String(text)) = edit.value else { return Some(edit) };
+    let parsed = toml::from_str::<toml::Table>(&format!("v = {{ {text} }}")).ok();
+    // A text that is no table stays a text, which the schema refuses with a message.
+    let value = parsed.and_then(|mut table| table.remove("v")).unwrap_or(Value::String(text));
+    Some(Edit { value: Some(value), ..edit })
 }
 
 /// A path shortened to its file name.

@@ -1,6 +1,6 @@
 //! Editors of lists of tables: vibration, zoom calibrations, models.
 
-use camsim_io::scenario_file::keys;
+use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{Role, Ui};
 use toml::{Table, Value};
 
@@ -32,6 +32,9 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
                 let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else {
                     continue;
                 };
+                if is_in_inner_list(key, element) {
+                    continue;
+                }
                 if let Some(param) = params::find(element) {
                     row_with_param(ui, state, document, &format!("{key}.{index}.{field}"), *kind, param, out);
                 }
@@ -45,6 +48,14 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
         list.push(Value::Table(new_entry(document, key)));
         out.push(Message::Set(key.to_owned(), Some(Value::Array(list)), false));
     }
+}
+
+/// Whether an element of a list belongs to a list within it, which has no editor.
+fn is_in_inner_list(list: &str, element: &str) -> bool {
+    let is_below = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
+    keys()
+        .iter()
+        .any(|(inner, kind)| *kind == ValueKind::Tables && is_below(inner, list) && is_below(element, inner))
 }
 
 /// A new entry: the present camera at the next zoom value, or slight vibration in pitch.

@@ -21,6 +21,7 @@ pub fn element_labels(key: &str, lens: LensModel) -> &'static [&'static str] {
         ("window_s", _) => &["from", "to"],
         ("vignette_thresholds", _) => &["t1", "t2"],
         ("sky", _) => &["R", "G", "B"],
+        ("axis", _) => &["x", "y", "z"],
         ("origin" | "geodetic", _) => GEODETIC,
         ("at", _) if key.starts_with("scene.") => NED,
         _ => &[],

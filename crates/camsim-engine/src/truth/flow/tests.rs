@@ -1,0 +1,196 @@
+//! Flow, motion and blur of what moves, against the reference renderer and finite differences.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::sync::Arc;
+
+use camsim_core::{
+    mount::CameraPath,
+    pose::BodyState,
+    reference::Oracle,
+    row_time::WorldPoint,
+    scenario::{Channel, FlightSpec, FlowState, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scene::{
+        Encoding, Mesh, RigidMotion, Scene, Texture,
+        motion::{Between, Curve, Joint, JointFrame, Keys, Track},
+    },
+    sequence::Sequence,
+    trajectory::Trajectory,
+};
+use camsim_plan::{PixelHit, Planner, uniforms::Truth};
+use glam::{DQuat, DVec2, DVec3};
+
+use super::*;
+
+const SIZE_PX: [u32; 2] = [64, 48];
+const READOUT_S: f64 = 0.03;
+const EXPOSURE_S: f64 = 0.008;
+const FPS: f64 = 30.0;
+
+/// A raft that turns while it drifts below a camera in flight, over a picture that stands still.
+fn sequence() -> Arc<Sequence> {
+    // Long because: every part of a sequence is written out.
+    let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+    let times_s = vec![-1.0, 1.0];
+    let drift = DVec3::new(4.0, 9.0, -1.0);
+    let turns = [-1.1, 1.1].map(DQuat::from_rotation_z).to_vec();
+    let keys = Keys {
+        position: Curve::new(times_s.clone(), vec![-drift, drift], Between::Linear).unwrap(),
+        rotation: Curve::new(times_s, turns, Between::Linear).unwrap(),
+        start_s: 0.0,
+        repeat: None,
+    };
+    let motion = RigidMotion::new(vec![Joint::new(JointFrame::IDENTITY, Track::Keys(keys))]);
+    let raft = Mesh {
+        motion: Some(Arc::new(motion)),
+        ..Mesh::level_picture(texture.clone(), DVec3::new(1.0, 0.0, -10.0), 30.0)
+    };
+    let ground = Mesh::level_picture(texture, DVec3::ZERO, 500.0);
+    let scene = Scene { meshes: vec![ground, raft], ..Scene::default() };
+    let mut scenario = Scenario {
+        seed: 1,
+        flight: FlightSpec {
+            log: "in-memory".into(),
+            format: Default::default(),
+            time_unit: Default::default(),
+            angle_unit: Default::default(),
+            angles: Default::default(),
+            attitude: Default::default(),
+            origin: Default::default(),
+            height: Default::default(),
+            window_s: None,
+            speed: 1.0,
+        },
+        tracker: Default::default(),
+        camera: Default::default(),
+        scene: Default::default(),
+        quality: Default::default(),
+        output: Default::default(),
+    };
+    scenario.camera.size_px = SIZE_PX;
+    scenario.camera.focal_px = [50.0, 52.0];
+    scenario.camera.fps = FPS;
+    scenario.camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+    scenario.camera.shutter =
+        ShutterSpec { readout_ms: 1e3 * READOUT_S, exposure_ms: 1e3 * EXPOSURE_S, ..ShutterSpec::default() };
+    let first = BodyState {
+        position_ned_m: DVec3::new(-10.0, 0.0, -50.0),
+        velocity_ned_m_s: DVec3::new(10.0, -2.0, 1.0),
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: DQuat::IDENTITY,
+        rate_body_rad_s: DVec3::new(0.1, -0.1, 0.3),
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
+    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
+    Arc::new(Sequence {
+        scenario,
+        path,
+        epoch_ns: 0,
+        start_s: 0.0,
+        frames: 9,
+        scene: Arc::new(scene),
+        vignette: None,
+        zoom_track: Vec::new(),
+    })
+}
+
+/// Mid-exposure of a fractional row of a frame.
+fn row_s(frame: u32, y: f64) -> f64 {
+    f64::from(frame) / FPS + READOUT_S * ((y + 0.5) / f64::from(SIZE_PX[1]) - 0.5)
+}
+
+/// Pixels of frame 1, all valid.
+fn with_pixels(check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
+    let sequence = sequence();
+    let planner = Planner::new(sequence.clone(), &[Channel::Flow], 16_384).unwrap();
+    let plan = planner.plan(1).unwrap();
+    let rays = planner.frame_rays(&plan, 0.0);
+    let all = || (0..SIZE_PX[1]).flat_map(|y| (0..SIZE_PX[0]).map(move |x| [x, y]));
+    let uv = |pixel: [u32; 2]| plan.camera.unproject(DVec2::from_array(pixel.map(f64::from))).unwrap();
+    let truth: Vec<Truth> =
+        all().map(|pixel| Truth { uv: uv(pixel).as_vec2().to_array(), ..Truth::default() }).collect();
+    let hits: Vec<Option<PixelHit>> = all().map(|pixel| rays.cast(pixel, uv(pixel)).hit).collect();
+    let color_rgba = vec![1.0; 4 * truth.len()];
+    let pixels = FramePixels {
+        planner: &planner,
+        plan: &plan,
+        rays: &rays,
+        truth: &truth,
+        color_rgba: &color_rgba,
+        hits: &hits,
+    };
+    check(&pixels, &Oracle::new(sequence).unwrap());
+}
+
+#[test]
+fn flow_leads_to_where_the_oracle_sees_the_same_place() {
+    with_pixels(|pixels, oracle| {
+        for target in [2, 0] {
+            let to = FlowTarget::new(pixels.planner.frame_camera(i64::from(target)).unwrap());
+            let (mut visible, mut worst_px) = ([0; 3], 0.0_f64);
+            for (i, [dx, dy, state]) in flow(pixels, &to).into_iter().enumerate() {
+                if state != f32::from(FlowState::Visible as u8) {
+                    continue;
+                }
+                let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
+                let from = oracle.sample(1, pixel, DVec2::ZERO, 0.0).unwrap().hit.unwrap();
+                let px = DVec2::from_array(pixel.map(f64::from)) + DVec2::new(dx.into(), dy.into());
+                let t_s = row_s(target, px.y);
+                let pose = oracle.sequence().path.pose(t_s);
+                let ray = pose.ned_from_camera * pixels.plan.camera.unproject(px).unwrap().extend(1.0);
+                let seen = oracle.cast_at(t_s, pose.position_ned_m, ray).unwrap();
+                // At a border rounding decides.
+                if seen.surface == from.surface {
+                    let size_m = if seen.surface == 2 { 30.0 } else { 500.0 };
+                    let off = DVec2::from_array(seen.texture_uv) - DVec2::from_array(from.texture_uv);
+                    worst_px = worst_px.max(off.length() * size_m / seen.depth_m * 50.0);
+                    visible[seen.surface as usize] += 1;
+                }
+            }
+            // Flow is stored in single precision, and so are the rays here.
+            assert!(worst_px < 1e-4, "{target}: {worst_px:.1e} px");
+            assert!(visible[1] > 200 && visible[2] > 400, "{visible:?}");
+        }
+    });
+}
+
+#[test]
+fn motion_and_blur_are_those_of_the_moved_place() {
+    with_pixels(|pixels, oracle| {
+        let (path, camera) = (&oracle.sequence().path, &pixels.plan.camera);
+        let mut count = 0;
+        for (i, hit) in pixels.hits.iter().enumerate() {
+            let position = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
+            let [u, v] = pixels.truth[i].uv.map(f64::from);
+            let pixel = Pixel { position, uv: DVec2::new(u, v), hit: hit.as_ref() };
+            let sample = oracle.sample(1, position, DVec2::ZERO, 0.0).unwrap();
+            let [u, v] = sample.hit.unwrap().texture_uv;
+            if sample.hit.unwrap().surface != 2 {
+                continue;
+            }
+            let raft = &oracle.sequence().scene.meshes[1];
+            let shown = |t_s: f64| {
+                let now = raft.at(t_s);
+                let local = DVec3::new(15.0 * (1.0 - 2.0 * v), 15.0 * (2.0 * u - 1.0), 0.0);
+                let place = now.origin_ned_m + now.ned_from_shape * local;
+                camera.show(&path.pose(t_s), t_s, WorldPoint::At(place)).unwrap().0
+            };
+            let (t_s, h) = (sample.t_s, 1e-4);
+            let expected = (shown(t_s + h) - shown(t_s - h)) / (2.0 * h);
+            let [vx, vy] = motion(pixels, pixel);
+            let off = expected.distance(DVec2::new(vx.into(), vy.into()));
+            assert!(off < 1e-3, "{position:?}: {off:.1e} px/s of {expected}");
+            let [x0, y0, x1, y1] = blur_path(pixels, pixel).map(f64::from);
+            let from_px = DVec2::from_array(position.map(f64::from));
+            for (phase, found) in [(-0.5, DVec2::new(x0, y0)), (0.5, DVec2::new(x1, y1))] {
+                let off = (shown(t_s + phase * EXPOSURE_S) - from_px).distance(found);
+                assert!(off < 1e-5, "{position:?}: {off:.1e} px");
+            }
+            count += 1;
+        }
+        assert!(count > 400, "{count}");
+    });
+}
