@@ -487,6 +487,17 @@ mod tests {
             found.is_inside.then(|| (found.solutions as usize, search(&frame, &frame.fields[0], point)))
         });
         let counts: Vec<(usize, Vec<DVec2>)> = counts.collect();
+        // Each position by itself, where the search finds as many.
+        for point in points() {
+            let (found, expected) = (frame.find_all(point), search(&frame, &frame.fields[0], point));
+            for seen in found.iter().filter(|_| found.len() == expected.len()) {
+                let off_px = expected.iter().map(|px| px.distance(seen.px)).fold(f64::INFINITY, f64::min);
+                assert!(
+                    off_px < 0.01 && seen.solutions as usize == found.len(),
+                    "{point:?}: {off_px:.1e} px"
+                );
+            }
+        }
         let several = counts.iter().filter(|(_, expected)| expected.len() > 1).count();
         let right = counts.iter().filter(|(found, expected)| *found == expected.len()).count();
         assert!(several > 20 && right * 100 > 98 * counts.len(), "{several} {right} {}", counts.len());
