@@ -185,7 +185,10 @@ fn psnr_db(pictures: &[RenderedFrame], blurred: &RenderedFrame) -> f64 {
 /// renderings, each of which `quality.max_error_dn` bounds: 1/255 is 48 dB.
 #[test]
 fn the_mean_of_a_burst_is_the_blurred_frame() {
-    let base = moving();
+    // Paths of about five pixels over a pattern of 15 px.
+    let mut base = flight([DVec3::new(60.0, 20.0, -1.0), DVec3::new(1.2, -0.8, 1.0)]);
+    base.scene = Arc::new(pattern(250.0));
+    base.scenario.camera.shutter.exposure_ms = 30.0;
     let blurred = frame(&base, &[Channel::Color]);
     let mean_of = |count: u32| {
         let burst = TwinSpec { instants: Some(count), ..spec("burst") };

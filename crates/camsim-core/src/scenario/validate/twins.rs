@@ -36,7 +36,8 @@ fn check_name(check: &mut Check, i: usize, name: &str) {
         && !DEVICES.iter().any(|device| name.eq_ignore_ascii_case(device));
     check.require(is_folder, key.as_str(), || {
         format!(
-            "is the name of a folder: 1 to {MOST_LETTERS} letters, digits, - and _, such as \"sharp\", not \
+            "is the name of a folder: 1 to {MOST_LETTERS} letters, digits, - and _, such as \"sharp\", and not a \
+             device of some systems (con, prn, aux, nul), not \
              \"{name}\""
         )
     });
