@@ -198,7 +198,8 @@ fn the_mean_of_a_burst_is_the_blurred_frame() {
     };
     let [one, three, nine] = [1, 3, 9].map(mean_of);
     eprintln!("mean of 1, 3, 9 pictures: {one:.1}, {three:.1}, {nine:.1} dB");
-    assert!(one + 6.0 < three && three < nine && nine > 45.0, "{one} {three} {nine}");
+    // Measured: 39.5, 60.4 and 59.4 dB; three pictures are already as good as the renderings.
+    assert!(one + 15.0 < three && three.min(nine) > 55.0, "{one} {three} {nine}");
 }
 
 #[test]
