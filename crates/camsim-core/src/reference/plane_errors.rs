@@ -101,9 +101,6 @@ enum Value {
     Number(u32),
 }
 
-/// Error of a value, and whether it is beyond the tolerance, so away from borders, and a fault.
-type Judged = (f64, bool, bool, bool);
-
 impl Compared<'_> {
     fn errors(&self, plane: &Plane) -> Option<PlaneErrors> {
         let components = match plane.channel {
