@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Second difference of inverse depth, relative to the largest of the three, from which a depth is checked by
 /// a ray. Unchecked depths err by at most a quarter of it.
 const BEND: f32 = 4e-4;
+/// Relative change of inverse depth over the distance by which drawn surfaces may be displaced, from which a
+/// depth is checked by a ray.
+const STEEP: f32 = 5e-4;
 /// Relative change of inverse depth by a ray from which the neighbours of the pixel are checked too.
 const CHANGE: f32 = 5e-4;
 
@@ -28,6 +31,8 @@ pub struct DepthGrid<'a> {
     pub inverse_depth: &'a [f32],
     /// Whether the pixel has a ray.
     pub valid: &'a [bool],
+    /// How far surfaces may be drawn from where they are, pixels: the terrain's level of detail.
+    pub displacement_px: f32,
 }
 
 /// Whether inverse depth bends between three pixels in a line by more than a smooth surface does. Sky beside
@@ -44,7 +49,8 @@ pub fn changed(looked_up: f32, by_ray: f32) -> bool {
 }
 
 impl DepthGrid<'_> {
-    /// Pixels at which inverse depth bends, and their neighbours, row-major.
+    /// Pixels at which inverse depth bends, and their neighbours, and pixels at which it is so steep that a
+    /// displacement of the surface changes it; row-major.
     #[must_use]
     pub fn unreliable_pixels(&self) -> Vec<bool> {
         let mut bent = vec![false; self.inverse_depth.len()];
@@ -57,6 +63,7 @@ impl DepthGrid<'_> {
                     row[x] |= bent[x] | bent[x.saturating_sub(1)] | bent[(x + 1).min(self.width - 1)];
                 }
             }
+            self.steep_of_row(y, row);
         });
         unreliable.iter_mut().zip(self.valid).for_each(|(suspect, valid)| *suspect &= valid);
         unreliable
@@ -74,6 +81,23 @@ impl DepthGrid<'_> {
         let (height, step) = (self.inverse_depth.len() / self.width, self.row_step);
         let below = Some(y + step).filter(|&row| row < height);
         [y.checked_sub(step), Some(y), below].into_iter().flatten()
+    }
+
+    fn steep_of_row(&self, y: usize, steep: &mut [bool]) {
+        if self.displacement_px <= 0.0 {
+            return;
+        }
+        let (width, height) = (self.width, self.inverse_depth.len() / self.width);
+        let row = |y: usize| &self.inverse_depth[y * width..][..width];
+        let below =
+            if y + self.row_step < height { y + self.row_step } else { y.saturating_sub(self.row_step) };
+        let (here, beside) = (row(y), row(below));
+        let down = self.displacement_px / self.row_step as f32;
+        for x in 0..width {
+            let right = here[if x + 1 < width { x + 1 } else { x.saturating_sub(1) }];
+            let change = ((right - here[x]) * self.displacement_px).hypot((beside[x] - here[x]) * down);
+            steep[x] |= change > STEEP * here[x];
+        }
     }
 
     fn bends_of_row(&self, y: usize, bent: &mut [bool]) {
@@ -120,7 +144,13 @@ mod tests {
         let places = || (0..10).flat_map(|y| (0..12).map(move |x| [x, y]));
         let inverse_depth: Vec<f32> = places().map(|[x, y]| look(x as f32, y as f32)).collect();
         let valid: Vec<bool> = places().map(|[x, y]| valid(x, y)).collect();
-        let grid = DepthGrid { width: 12, row_step, inverse_depth: &inverse_depth, valid: &valid };
+        let grid = DepthGrid {
+            width: 12,
+            row_step,
+            inverse_depth: &inverse_depth,
+            valid: &valid,
+            displacement_px: 0.0,
+        };
         places().zip(grid.unreliable_pixels()).filter(|(_, suspect)| *suspect).map(|(at, _)| at).collect()
     }
 
@@ -156,7 +186,13 @@ mod tests {
     #[test]
     fn neighbours_stay_in_the_picture_and_in_the_field() {
         let (inverse_depth, valid) = ([0.0; 120], [true; 120]);
-        let grid = DepthGrid { width: 12, row_step: 2, inverse_depth: &inverse_depth, valid: &valid };
+        let grid = DepthGrid {
+            width: 12,
+            row_step: 2,
+            inverse_depth: &inverse_depth,
+            valid: &valid,
+            displacement_px: 0.0,
+        };
         assert_eq!(grid.neighbours(0).collect::<Vec<_>>(), [0, 1, 24, 25]);
         assert_eq!(grid.neighbours(119).collect::<Vec<_>>(), [94, 95, 118, 119]);
     }

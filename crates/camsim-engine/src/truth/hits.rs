@@ -83,7 +83,8 @@ fn complete_pixels(
     let valid: Vec<bool> = color_rgba.chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let looked_up: Vec<f32> = truth.iter().map(inverse_depth).collect();
     let row_step = if plan.shutter.interlace_s() > 0.0 { 2 } else { 1 };
-    let grid = DepthGrid { width, row_step, inverse_depth: &looked_up, valid: &valid };
+    let displacement_px = rays.terrain_displacement_px() as f32;
+    let grid = DepthGrid { width, row_step, inverse_depth: &looked_up, valid: &valid, displacement_px };
     let unreliable = if hits.is_some() { valid.clone() } else { grid.unreliable_pixels() };
     let mut frame = Frame { width, truth, source: &mut source, rays, hits: hits.as_deref_mut() };
     frame.walk_rows(&unreliable, &looked_up);

@@ -130,6 +130,7 @@ impl<'a> Twin<'a> {
             row_step: if self.plan.shutter.interlace_s() > 0.0 { 2 } else { 1 },
             inverse_depth: &inverse_depth,
             valid: &valid,
+            displacement_px: self.plan.terrain_error_px as f32,
         };
         let mut is_cast = grid.unreliable_pixels();
         let mut to_cast: Vec<usize> = (0..pixels.len()).filter(|&i| is_cast[i]).collect();
