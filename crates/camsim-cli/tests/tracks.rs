@@ -159,7 +159,7 @@ fn the_picture_shows_the_corners_of_boards_where_the_tracks_say() {
         // The fast renderer may move single corners by a part of a pixel within its tolerance, but not all.
         let fast = offsets_px(&base.join("fast"));
         let mean_px = [0, 1].map(|k| fast.iter().map(|offset| offset[k]).sum::<f64>() / fast.len() as f64);
-        println!(
+        eprintln!(
             "{} corners: {rms_px:.4} RMS, {worst_px:.4} px; {}: mean {mean_px:.4?}",
             exact.len(),
             fast.len()

@@ -17,6 +17,9 @@ use camsim_engine::{Engine, RenderError};
 use common::{engine, render, roof, scenario, sequence, steady};
 use glam::{DQuat, DVec2, DVec3};
 
+/// A name, and what is different in the scenario.
+type Change = (&'static str, fn(&mut Scenario));
+
 const SIZE_PX: [u32; 2] = [96, 72];
 const FRAME: u64 = 3;
 
@@ -71,7 +74,7 @@ fn difference(a: &[f32], b: &[f32]) -> (f64, Vec<usize>) {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn frames_with_moving_things_are_those_of_the_reference() {
-    let cases: [(&str, fn(&mut Scenario)); 4] = [
+    let cases: [Change; 4] = [
         ("rows", |_| {}),
         ("columns", |s| s.camera.shutter.readout = Readout::LeftToRight),
         ("interlaced", |s| s.camera.shutter.interlace_ms = FieldOr::Field),

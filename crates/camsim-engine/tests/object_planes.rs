@@ -16,6 +16,9 @@ use camsim_engine::Engine;
 use common::{barrel_lens, render, rolling, roof, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
+/// A name, and what is different in the scenario.
+type Change = (&'static str, fn(&mut Scenario));
+
 const CHANNELS: [Channel; 5] =
     [Channel::Range, Channel::Normal, Channel::NormalWorld, Channel::Object, Channel::Class];
 const SIZE_PX: [u32; 2] = [120, 90];
@@ -69,7 +72,7 @@ fn errors(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Vec<PlaneErrors> {
 
 #[test]
 fn every_value_belongs_to_a_visible_surface() {
-    let cases: [(&str, fn(&mut Scenario)); 2] =
+    let cases: [Change; 2] =
         [("rows", |_| {}), ("columns", |s| s.camera.shutter.readout = Readout::RightToLeft)];
     for (name, change) in cases {
         let sequence = over_hills(change);

@@ -18,6 +18,9 @@ use camsim_engine::{Engine, Finished};
 use common::{render, roof, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
+/// A name, and what is different in the scenario.
+type Change = (&'static str, fn(&mut Scenario));
+
 const SIZE_PX: [u32; 2] = [120, 90];
 /// The frame that is looked at, and the step of its flow.
 const FRAME: u64 = 20;
@@ -58,7 +61,7 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let changes: [(&str, fn(&mut Scenario)); 5] = [
+    let changes: [Change; 5] = [
         ("rows", |_| {}),
         ("rows from below", |s| s.camera.shutter.readout = Readout::BottomToTop),
         ("columns", |s| s.camera.shutter.readout = Readout::LeftToRight),

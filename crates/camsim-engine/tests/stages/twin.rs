@@ -125,12 +125,16 @@ impl<'a> Twin<'a> {
             .map(|pixel| inverse(pixel.and_then(|pixel| pixel.depth_m).unwrap_or(0.0)))
             .collect();
         let valid: Vec<bool> = pixels.iter().map(Option::is_some).collect();
+        let FramePlan { camera, ideal, terrain_error_px, .. } = self.plan;
+        let camera_from_ideal = (camera.focal_px / ideal.focal_px).max_element();
+        let has_terrain = self.case.sequence.scene.terrain.is_some();
+        let displacement_px = if has_terrain { terrain_error_px * camera_from_ideal } else { 0.0 } as f32;
         let grid = DepthGrid {
             width: self.plan.camera.size_px[0] as usize,
             row_step: if self.plan.shutter.interlace_s() > 0.0 { 2 } else { 1 },
             inverse_depth: &inverse_depth,
             valid: &valid,
-            displacement_px: self.plan.terrain_error_px as f32,
+            displacement_px,
         };
         let mut is_cast = grid.unreliable_pixels();
         let mut to_cast: Vec<usize> = (0..pixels.len()).filter(|&i| is_cast[i]).collect();

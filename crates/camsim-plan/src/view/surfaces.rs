@@ -83,6 +83,9 @@ fn may_have_depth(mesh: &Mesh, of_pictures: &mut HashMap<*const Texture, u8>) ->
     mesh.material.cutoff.is_none_or(|cutoff| of_picture * of_corners + HAIR >= f64::from(cutoff))
 }
 
+/// A point of a triangle: its corners and their barycentric weights.
+type TrianglePoint = ([u32; 3], [f64; 3]);
+
 impl Surfaces {
     pub fn new(scene: Arc<Scene>) -> Self {
         let mut known: HashMap<*const Shape, Arc<ShapeTrees>> = HashMap::new();
@@ -254,7 +257,7 @@ impl Surfaces {
         origin_ned_m: DVec3,
         direction_ned: DVec3,
         limit: f64,
-    ) -> Option<(f64, ([u32; 3], [f64; 3]))> {
+    ) -> Option<(f64, TrianglePoint)> {
         let mesh = &self.scene.meshes[i];
         let shape_from_ned = self.shape_from_ned[i];
         let (origin, direction) =
