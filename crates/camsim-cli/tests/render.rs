@@ -508,7 +508,7 @@ const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0
       "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAPwAAAAAAAAAAAAAAAAAAAD8AAAAA" }] }"#;
 
 #[test]
-fn what_moves_is_rendered_by_the_reference_renderer_alone() {
+fn what_moves_is_rendered_but_not_by_the_papers_methods() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
     fs::write(folder.join("model.gltf"), MODEL).unwrap();
@@ -526,13 +526,12 @@ fn what_moves_is_rendered_by_the_reference_renderer_alone() {
                 .concat(),
         )
     };
-    let (code, out, err) = render(&["--backend", "cpu"]);
-    assert!(
-        code != 0 && err.contains("--backend reference") && err.contains("scene.gltf.motion"),
-        "{out}{err}"
-    );
-    let (code, out, err) = render(&["--backend", "reference"]);
-    assert!(code == 0 && out.starts_with("2 frames in"), "{out}{err}");
-    let frames = [0, 1].map(|i| bytes(folder, &format!("out/color/frame_00000{i}.exr")));
-    assert_ne!(frames[0], frames[1], "the blade has turned");
+    let (code, out, err) = render(&["--backend", "cpu", "--preset", "paper"]);
+    assert!(code != 0 && err.contains("quality.preset") && err.contains("scene.gltf.motion"), "{out}{err}");
+    for backend in ["cpu", "reference"] {
+        let (code, out, err) = render(&["--backend", backend]);
+        assert!(code == 0 && out.starts_with("2 frames in"), "{out}{err}");
+        let frames = [0, 1].map(|i| bytes(folder, &format!("out/color/frame_00000{i}.exr")));
+        assert_ne!(frames[0], frames[1], "{backend}: the blade has turned");
+    }
 }

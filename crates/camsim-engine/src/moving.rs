@@ -24,9 +24,9 @@ use rayon::prelude::*;
 use outline::Outline;
 
 /// Rays of a pixel: at least, at most, and for each pixel that a thing moves within the exposure.
-const LEAST_RAYS: u32 = 16;
-const MOST_RAYS: u32 = 128;
-const RAYS_A_PIXEL: f64 = 3.0;
+const LEAST_RAYS: u32 = 32;
+const MOST_RAYS: u32 = 256;
+const RAYS_A_PIXEL: f64 = 8.0;
 
 /// A sequence whose scene has things that move.
 #[derive(Debug)]
