@@ -462,7 +462,7 @@ mod tests {
             terrain = { dem = "x/4", ortho = "x/5" }
             pattern = { image = "x/6", width_m = 1.0 }
             board = { target = "x/7" }
-            gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10" }]
+            gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10", motion = { poses = "x/11" } }]
         "#;
         let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
         let mut tree = serde_json::to_value(&scenario).unwrap();
@@ -471,7 +471,7 @@ mod tests {
         for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
             assert!(visited.iter().any(|visited| visited == key), "{key}");
         }
-        assert_eq!(visited.len(), 10);
+        assert_eq!(visited.len(), 11);
     }
 
     #[test]

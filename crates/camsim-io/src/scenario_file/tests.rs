@@ -190,7 +190,7 @@ fn errors_name_file_line_and_key() {
             "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?",
         ),
         ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
-        ("[quality]\nnope = 3", "quality.nope: unknown key; `camsim render --print-default`"),
+        ("[quality]\nxyz = 3", "quality.xyz: unknown key; `camsim render --print-default`"),
         (
             "[camera]\nresolution = [640, 480]",
             "camera.resolution: unknown key; `camsim render --print-default`",
