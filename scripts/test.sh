@@ -28,6 +28,7 @@ fi
 if cargo clippy --version >/dev/null 2>&1; then
     say "lints"
     cargo clippy --workspace --all-targets -- -D warnings
+    cargo clippy --no-default-features -- -D warnings
 else
     say "lints not checked: rustup component add clippy"
 fi

@@ -80,7 +80,7 @@ impl From<io::Error> for Failure {
 impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
         let code = match error {
-            GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
+            GpuError::NotBuilt | GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
             GpuError::TooLarge { .. } => BAD_INPUT,
             _ => FAILED,
         };
@@ -93,7 +93,7 @@ impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Fail
         match error {
             RenderError::Gpu(error) => error.into(),
             RenderError::Plan(error) => Self::bad_input(error),
-            moving @ RenderError::Moving(_) => Self::bad_input(moving),
+            moving @ RenderError::Moving => Self::bad_input(moving),
             RenderError::Shader(error) => Self::failed(error),
             RenderError::Sink(error) => Self::failed(error),
         }

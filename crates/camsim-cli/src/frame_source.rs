@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 
+use anyhow::anyhow;
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
-    scenario::Auto,
+    reference::{Oracle, RenderOptions, is_rendered},
+    scenario::{Auto, Scenario},
     scene::LodSelection,
     sequence::Sequence,
 };
 use camsim_engine::{Engine, Finished, FrameTimes, Session};
 use camsim_io::write::WriteError;
-use camsim_plan::Planner;
+use camsim_plan::{PlanError, Planner};
 
 use crate::failure::{Failure, OrFail};
 
@@ -24,6 +25,18 @@ pub trait FrameSource {
 
     /// The planner of the sequence.
     fn planner(&self) -> &Planner;
+
+    /// A planner that knows what moves, too.
+    fn scene_planner(&self) -> &Planner {
+        self.planner()
+    }
+
+    /// A planner of another sequence with the same scene.
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError>;
+
+    /// Turns to another sequence, whose frames are those of a new source. What belongs to the scene is kept if
+    /// it is the same [`Arc`].
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure>;
 
     /// Renders frames in the given order and passes each to `sink`.
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure>;
@@ -58,6 +71,19 @@ impl FrameSource for EngineSource<'_> {
         self.session.planner()
     }
 
+    fn scene_planner(&self) -> &Planner {
+        self.session.scene_planner()
+    }
+
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError> {
+        self.session.planner().renewed(sequence.clone(), &sequence.scenario.output.channels)
+    }
+
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure> {
+        let channels = &sequence.scenario.output.channels;
+        Ok(self.session.renew::<WriteError>(sequence.clone(), channels)?)
+    }
+
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {
         Ok(self.session.render(frames.iter().copied(), sink)?)
     }
@@ -81,12 +107,16 @@ pub struct ReferenceSource {
 impl ReferenceSource {
     /// Builds the ray-casting structures.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, Failure> {
-        let scenario = &sequence.scenario;
-        let mut planned = Sequence::clone(sequence);
-        planned.scenario.quality.solver = Auto::Auto;
-        let planner = Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX)
+        refuse_unrendered(&sequence.scenario)?;
+        let planned = planned(sequence);
+        let planner = Planner::new(planned, &sequence.scenario.output.channels, MAX_IDEAL_SIDE_PX)
             .or_bad_input()?
             .with_ideals_of_any_area();
+        Self::with_planner(sequence, planner)
+    }
+
+    fn with_planner(sequence: &Arc<Sequence>, planner: Planner) -> Result<Self, Failure> {
+        let scenario = &sequence.scenario;
         let options = RenderOptions {
             channels: scenario.output.channels.clone(),
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
@@ -96,6 +126,33 @@ impl ReferenceSource {
     }
 }
 
+/// Refuses channels, of frames or of twins, that the reference renderer does not have.
+fn refuse_unrendered(scenario: &Scenario) -> Result<(), Failure> {
+    let output = &scenario.output;
+    let of_twins = output
+        .twin
+        .iter()
+        .enumerate()
+        .filter_map(|(i, twin)| Some((format!("output.twin.{i}.channels"), twin.channels.as_ref()?)));
+    for (key, channels) in std::iter::once(("output.channels".to_owned(), &output.channels)).chain(of_twins) {
+        if let Some(channel) = channels.iter().find(|channel| !is_rendered(**channel)) {
+            return Err(Failure::bad_input(anyhow!(
+                "{key}: the reference renderer has no {}: leave it out, or render with another --backend and \
+                 quality.solver",
+                channel.name()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The sequence as the engine would plan it.
+fn planned(sequence: &Sequence) -> Arc<Sequence> {
+    let mut planned = sequence.clone();
+    planned.scenario.quality.solver = Auto::Auto;
+    Arc::new(planned)
+}
+
 impl FrameSource for ReferenceSource {
     fn adapter(&self) -> String {
         Oracle::describe()
@@ -103,6 +160,16 @@ impl FrameSource for ReferenceSource {
 
     fn planner(&self) -> &Planner {
         &self.planner
+    }
+
+    fn planner_of(&self, sequence: &Arc<Sequence>) -> Result<Planner, PlanError> {
+        let planner = self.planner.renewed(planned(sequence), &sequence.scenario.output.channels)?;
+        Ok(planner.with_ideals_of_any_area())
+    }
+
+    fn renew(&mut self, sequence: &Arc<Sequence>) -> Result<(), Failure> {
+        *self = Self::with_planner(sequence, self.planner_of(sequence).or_bad_input()?)?;
+        Ok(())
     }
 
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {

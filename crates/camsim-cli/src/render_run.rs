@@ -9,12 +9,13 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::{frame::RenderedFrame, sequence::Sequence};
+use camsim_core::sequence::Sequence;
 use camsim_engine::Finished;
 use camsim_io::{
-    inputs,
+    load::TrackInputs,
     manifest::{RunManifest, in_shard},
-    write::{FrameFiles, FrameWriter, WriteError},
+    portable::write_camera,
+    write::{FrameWriter, SourceFrame, WriteError},
 };
 
 use crate::{
@@ -24,15 +25,20 @@ use crate::{
     frame_source::FrameSource,
     interrupt,
     progress::{frames_bar, waiting},
-    tolerances::{OverlapCycles, Tolerances},
 };
 
+mod findings;
 mod folder;
+mod pictures;
 mod tables;
+mod tracks;
 
+use findings::Findings;
 use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
+use pictures::{Pictures, Series};
 pub use tables::{body_at, camera_at, source_frame};
+use tracks::JobTracks;
 
 /// A rendering job.
 #[derive(Debug)]
@@ -45,6 +51,9 @@ pub struct Job<'a> {
     pub frames: &'a [u64],
     /// Frames of this run's shard.
     pub shard: Option<Shard>,
+    /// Points of `[output.tracks]` that files and keys give, whose pixels in the frames are written. Twins have
+    /// no tracks.
+    pub tracks: &'a TrackInputs,
     /// Whether existing frames are kept.
     pub resume: bool,
     /// Warnings of loading, stored in `run.json`.
@@ -54,191 +63,340 @@ pub struct Job<'a> {
 }
 
 /// Result of a run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Outcome {
     /// Frames rendered.
     pub frames: u64,
+    /// Pictures of twins rendered.
+    pub twins: u64,
     /// Frames that existed already.
     pub skipped: u64,
     /// Bytes of frame files.
     pub bytes: u64,
-    /// From the first submission until the last file was written.
+    /// From the first submission until the last file was written, without the tables of twins.
     pub time: Duration,
     /// Time of planning the first frame, before that.
     pub first_plan: Duration,
 }
 
 impl Outcome {
-    /// Frames per second; 0 if there was nothing to do.
+    /// Frames and pictures of twins per second; 0 if there was nothing to do.
     #[must_use]
-    pub fn frames_per_s(&self) -> f64 {
-        if self.frames == 0 { 0.0 } else { self.frames as f64 / self.time.as_secs_f64().max(1e-9) }
+    pub fn pictures_per_s(&self) -> f64 {
+        let pictures = self.frames + self.twins;
+        if pictures == 0 { 0.0 } else { pictures as f64 / self.time.as_secs_f64().max(1e-9) }
+    }
+
+    /// What was rendered, for users: `10 frames and 20 pictures of twins`.
+    #[must_use]
+    pub fn pictures(&self) -> String {
+        let kept = if self.skipped > 0 { format!(" ({} existed)", self.skipped) } else { String::new() };
+        let twins =
+            if self.twins > 0 { format!(" and {} pictures of twins", self.twins) } else { String::new() };
+        format!("{} frames{kept}{twins}", self.frames)
+    }
+
+    /// Pictures per second, for users.
+    #[must_use]
+    pub fn rate(&self) -> String {
+        let unit = if self.twins > 0 { "pictures/s" } else { "frames/s" };
+        format!("{:.1} {unit}", self.pictures_per_s())
     }
 }
 
-/// Renders a job. `on_frame` receives each finished frame before it is written and can stop the run, as
-/// Ctrl-C can. Written frames are kept then, the tables list them, and `run.json` marks the run as
-/// unfinished.
+/// What a finished picture is passed to before it is written, with the name of its twin; it can stop the run.
+pub type OnFrame<'f> = dyn FnMut(Option<&str>, &Finished) -> ControlFlow<()> + 'f;
+
+/// Renders a job: the frames, then their twins one after the other. `on_frame` receives each finished frame
+/// before it is written and can stop the run, as Ctrl-C can. Written frames are kept then, the tables list
+/// them, and `run.json` marks the run as unfinished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
     console: &mut Console<'_>,
-    on_frame: &mut dyn FnMut(&Finished) -> ControlFlow<()>,
+    on_frame: &mut OnFrame<'_>,
 ) -> Result<Outcome, Failure> {
-    let scenario = &job.sequence.scenario;
-    let files = folder::files_of(scenario, job.folder);
-    let inputs = inputs::scenario_fingerprints(scenario);
+    let frames = Pictures::of_frames(job);
+    let twins = job.sequence.scenario.output.twin.iter();
+    let twins: Vec<Pictures> = twins.map(|twin| Pictures::of_twin(job, twin)).collect::<Result<_, _>>()?;
     let adapter = source.adapter();
-    folder::check(job, &files, &inputs, &adapter, console)?;
-    let shard_frames: Vec<u64> = job
-        .frames
-        .iter()
-        .copied()
-        .filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0)))
-        .collect();
-    let todo: Vec<u64> =
-        shard_frames.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
+    for pictures in std::iter::once(&frames).chain(&twins) {
+        folder::check(job, pictures, &adapter, console)?;
+    }
     // Planning errors are reported before anything is written.
+    let mut outcome =
+        Outcome { first_plan: plan_first(job, &frames, source, console)?, ..Outcome::default() };
+    for twin in &twins {
+        plan_first(job, twin, source, console)?;
+    }
+    let tracks = JobTracks::new(job, source.scene_planner(), console)?;
+    let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
+    let mut manifest = run.render(&frames, twins.is_empty(), source)?;
+    for twin in &twins {
+        run.render(twin, true, source)?;
+    }
+    if !twins.is_empty() {
+        manifest.finished = true;
+        manifest.write(job.folder).or_failed()?;
+    }
+    Ok(outcome)
+}
+
+/// Plans the first of the pictures that a run renders; returns the time it takes.
+fn plan_first(
+    job: &Job<'_>,
+    pictures: &Pictures,
+    source: &dyn FrameSource,
+    console: &Console<'_>,
+) -> Result<Duration, Failure> {
     let begin = Instant::now();
-    if let Some(&first) = todo.first() {
+    let first = |series: &Series| todo(job, series).first().copied();
+    if let Some((series, frame)) = pictures.series.iter().find_map(|series| Some((series, first(series)?))) {
         let waiting = waiting("planning the first frame", console.is_quiet());
-        let planned = source.planner().plan(first);
+        let planned = match pictures.twin {
+            None => source.planner().plan(frame),
+            Some(_) => source.planner_of(&series.sequence).and_then(|planner| planner.plan(frame)),
+        };
         waiting.finish_and_clear();
         planned.or_bad_input()?;
     }
-    let first_plan = begin.elapsed();
-    let mut manifest = RunManifest {
+    Ok(begin.elapsed())
+}
+
+/// Frames of this run's shard.
+fn shard_frames(job: &Job<'_>) -> Vec<u64> {
+    let is_ours = |frame: &u64| job.shard.is_none_or(|shard| in_shard(*frame, shard.0));
+    job.frames.iter().copied().filter(is_ours).collect()
+}
+
+/// Frames of which a run renders the picture of a series.
+fn todo(job: &Job<'_>, series: &Series) -> Vec<u64> {
+    shard_frames(job).into_iter().filter(|&frame| !(job.resume && series.files.exist(frame))).collect()
+}
+
+/// A run at work.
+struct Run<'r, 'j, 'c, 'f> {
+    job: &'r Job<'j>,
+    /// Tracks in the frames.
+    tracks: Option<JobTracks<'r>>,
+    console: &'r mut Console<'c>,
+    on_frame: &'r mut OnFrame<'f>,
+    outcome: &'r mut Outcome,
+}
+
+/// What is collected over the pictures of a folder.
+struct Collected {
+    made: BTreeMap<(u64, Option<u32>), SourceFrame>,
+    findings: Findings,
+    manifest: RunManifest,
+}
+
+impl Run<'_, '_, '_, '_> {
+    /// Renders the pictures of a folder; they complete the run if `is_all`.
+    fn render(
+        &mut self,
+        pictures: &Pictures,
+        is_all: bool,
+        source: &mut dyn FrameSource,
+    ) -> Result<RunManifest, Failure> {
+        let job = self.job;
+        let frames = shard_frames(job).len() * pictures.series.len();
+        let todo: Vec<Vec<u64>> = pictures.series.iter().map(|series| todo(job, series)).collect();
+        let mut manifest = manifest(job, pictures, source.adapter());
+        manifest.skipped = (frames - todo.iter().map(Vec::len).sum::<usize>()) as u64;
+        let tracks = tracks_of(&self.tracks, pictures);
+        manifest.tracked_points = tracks.map(JobTracks::points);
+        manifest.warnings.extend(tracks.into_iter().flat_map(JobTracks::notes).cloned());
+        prepare(job, pictures, &todo, &manifest, tracks, source, self.console)?;
+        let findings = Findings::new(&pictures.sequence.scenario.quality);
+        let mut collected = Collected { made: BTreeMap::new(), findings, manifest };
+        let last = pictures.series.len() - 1;
+        for (i, (series, todo)) in pictures.series.iter().zip(&todo).enumerate() {
+            if pictures.twin.is_some() {
+                source.renew(&series.sequence)?;
+            }
+            let completes = (i == last).then_some(is_all);
+            self.render_series(pictures, series, todo, completes, source, &mut collected)?;
+        }
+        let manifest = collected.manifest;
+        match pictures.twin {
+            None => (self.outcome.frames, self.outcome.skipped) = (manifest.written, manifest.skipped),
+            Some(_) => self.outcome.twins += manifest.written,
+        }
+        Ok(manifest)
+    }
+
+    /// Renders one picture of each frame. `completes` is given for the last ones in the folder: whether the run
+    /// is finished by them.
+    // Long because: what was rendered has to be on disk and in the tables however the run ends.
+    fn render_series(
+        &mut self,
+        pictures: &Pictures,
+        series: &Series,
+        todo: &[u64],
+        completes: Option<bool>,
+        source: &mut dyn FrameSource,
+        collected: &mut Collected,
+    ) -> Result<(), Failure> {
+        let writes_frames = !series.sequence.scenario.output.format.is_empty();
+        let writer = writes_frames.then(|| FrameWriter::new(series.files.clone(), threads()));
+        let bar = frames_bar(todo.len() as u64, self.console.is_quiet());
+        bar.set_message(label(pictures, series));
+        let begin = Instant::now();
+        let watch = interrupt::watch();
+        let Collected { made, findings, manifest } = collected;
+        let tracks = tracks_of(&self.tracks, pictures);
+        let rendered = source.render(todo, &mut |finished| {
+            if (self.on_frame)(pictures.name(), &finished).is_break() {
+                return Err(WriteError::Stopped);
+            }
+            findings.add(&finished);
+            let key = (finished.plan.frame, series.files.instant());
+            made.insert(key, source_frame(&series.sequence, &finished.plan));
+            bar.inc(1);
+            tracks.map_or(Ok(()), |tracks| tracks.write(finished.plan.frame))?;
+            writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))?;
+            if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
+        });
+        bar.finish_and_clear();
+        // All rendered frames are on disk before messages about them.
+        let written = writer.map(FrameWriter::finish).transpose().or_failed();
+        let is_stopped = rendered.is_err() && watch.is_asked();
+        drop(watch);
+        self.outcome.time += begin.elapsed();
+        let is_ok = rendered.is_ok() && written.is_ok();
+        if completes.is_some() && rendered.is_ok() {
+            manifest.warnings.extend(warn(self.console, pictures, findings));
+        }
+        manifest.written = pictures
+            .series
+            .iter()
+            .map(|series| {
+                let files = &series.files;
+                let here = made.keys().filter(|(_, instant)| *instant == files.instant());
+                here.filter(|(frame, _)| !writes_frames || files.exist(*frame)).count() as u64
+            })
+            .sum();
+        manifest.finished = is_ok && completes == Some(true);
+        let tables_written = finish(pictures, series, made, manifest, tracks, source);
+        if is_stopped && written.is_ok() {
+            tables_written?;
+            return Err(self.interrupted(pictures, manifest.written));
+        }
+        rendered?;
+        self.outcome.bytes += written?.map_or(0, |summary| summary.bytes);
+        tables_written
+    }
+
+    /// The message after an interruption.
+    fn interrupted(&self, pictures: &Pictures, written: u64) -> Failure {
+        let frames = shard_frames(self.job);
+        let done = if pictures.sequence.scenario.output.format.is_empty() {
+            written
+        } else {
+            let done = |series: &Series| frames.iter().filter(|&&frame| series.files.exist(frame)).count();
+            pictures.series.iter().map(done).sum::<usize>() as u64
+        };
+        let (all, folder) = (frames.len() * pictures.series.len(), pictures.folder.display());
+        let what = if pictures.has_instants() { "pictures" } else { "frames" };
+        Failure::interrupted(anyhow!(
+            "{done} of {all} {what} are in {folder}; to resume: {}",
+            self.job.resume_command
+        ))
+    }
+}
+
+/// The tracks that are written beside these pictures.
+fn tracks_of<'t, 'r>(tracks: &'t Option<JobTracks<'r>>, pictures: &Pictures) -> Option<&'t JobTracks<'r>> {
+    tracks.as_ref().filter(|_| pictures.twin.is_none())
+}
+
+/// Prints what was found, and returns it for `run.json`.
+fn warn(console: &mut Console<'_>, pictures: &Pictures, findings: &Findings) -> Vec<String> {
+    let of = pictures.name().map_or_else(String::new, |name| format!("twin {name}: "));
+    let warnings: Vec<String> =
+        findings.warnings().map(|warning| console.whole(&format!("{of}{warning}"))).collect();
+    warnings.iter().for_each(|warning| console.warn(warning));
+    warnings
+}
+
+/// What is in front of a progress bar.
+fn label(pictures: &Pictures, series: &Series) -> String {
+    match (pictures.name(), series.files.instant()) {
+        (None, _) => String::new(),
+        (Some(name), None) => format!("{name} "),
+        (Some(name), Some(k)) => format!("{name} {} of {} ", k + 1, pictures.series.len()),
+    }
+}
+
+/// `run.json` before the first picture.
+fn manifest(job: &Job<'_>, pictures: &Pictures, adapter: String) -> RunManifest {
+    let scenario = &pictures.sequence.scenario;
+    RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         adapter,
         seed: scenario.seed,
         paths: String::new(),
+        twin: pictures.twin.clone(),
         scenario: scenario.clone(),
-        inputs,
+        inputs: pictures.inputs.clone(),
         frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
         shard: job.shard.map(|shard| shard.0),
         written: 0,
-        skipped: (shard_frames.len() - todo.len()) as u64,
+        skipped: 0,
         finished: false,
+        tracked_points: None,
         warnings: job.warnings.to_vec(),
-    };
-    prepare(job, &files, &todo, &manifest, source, console)?;
-
-    let writes_frames = !scenario.output.format.is_empty();
-    let writer = writes_frames.then(|| FrameWriter::new(files.clone(), threads()));
-    let (mut sky_only, mut empty, mut cycles) = (0_u64, 0_u64, OverlapCycles::default());
-    let mut tolerances = Tolerances::new(&scenario.quality);
-    let mut made = BTreeMap::new();
-    let bar = frames_bar(todo.len() as u64, console.is_quiet());
-    let begin = Instant::now();
-    let watch = interrupt::watch();
-    let rendered = source.render(&todo, &mut |finished| {
-        if on_frame(&finished).is_break() {
-            return Err(WriteError::Stopped);
-        }
-        sky_only += u64::from(finished.plan.motion.nearest_m.is_infinite());
-        empty += u64::from(is_empty(&finished.frame));
-        cycles.add(finished.plan.frame, finished.out_of_order);
-        tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
-        made.insert(finished.plan.frame, source_frame(job.sequence, &finished.plan));
-        bar.inc(1);
-        writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))?;
-        if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
-    });
-    bar.finish_and_clear();
-    // All rendered frames are on disk before messages about them.
-    let written = writer.map(FrameWriter::finish).transpose().or_failed();
-    let is_stopped = rendered.is_err() && watch.is_asked();
-    drop(watch);
-    let time = begin.elapsed();
-    let run_warnings: Vec<String> = if rendered.is_ok() {
-        let warnings = validity_warnings(sky_only, empty, todo.len()).chain(cycles.warning(todo.len()));
-        warnings
-            .chain(tolerances.iter().flat_map(Tolerances::warnings))
-            .map(|warning| console.whole(&warning))
-            .collect()
-    } else {
-        Vec::new()
-    };
-    run_warnings.iter().for_each(|warning| console.warn(warning));
-    manifest.warnings.extend(run_warnings);
-    manifest.written = made.keys().filter(|&&frame| !writes_frames || files.exist(frame)).count() as u64;
-    manifest.finished = rendered.is_ok() && written.is_ok();
-    let tables_written = finish(job, &files, &made, &manifest, source);
-    if is_stopped && written.is_ok() {
-        tables_written?;
-        let done = if writes_frames {
-            shard_frames.iter().filter(|&&frame| files.exist(frame)).count() as u64
-        } else {
-            manifest.written
-        };
-        let folder = job.folder.display();
-        return Err(Failure::interrupted(anyhow!(
-            "{done} of {} frames are in {folder}; to resume: {}",
-            shard_frames.len(),
-            job.resume_command
-        )));
     }
-    rendered?;
-    let bytes = written?.map_or(0, |summary| summary.bytes);
-    tables_written?;
-    Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
 }
 
 /// Writes the files before the first frame. Frames of another scenario are removed from the folder.
 fn prepare(
     job: &Job<'_>,
-    files: &FrameFiles,
-    todo: &[u64],
+    pictures: &Pictures,
+    todo: &[Vec<u64>],
     manifest: &RunManifest,
-    source: &mut dyn FrameSource,
+    tracks: Option<&JobTracks<'_>>,
+    source: &dyn FrameSource,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    let _lock = Lock::take(job.folder)?;
+    let _lock = Lock::take(&pictures.folder)?;
     // Checked again under the lock.
-    let folder_state = folder::folder_state(job, files, &manifest.inputs)?;
-    if folder_state == FolderState::Replaced {
-        files.remove(job.frames).or_failed()?;
+    let folder_state = folder::folder_state(job, pictures)?;
+    tracks::check_folder(&pictures.folder, tracks.is_some())?;
+    for (series, todo) in pictures.series.iter().zip(todo) {
+        if folder_state == FolderState::Replaced {
+            series.files.remove(job.frames).or_failed()?;
+        }
+        series.files.remove_temporaries(todo);
     }
-    manifest.write(job.folder).or_failed()?;
-    files.remove_temporaries(todo);
-    tables::write_fixed(job, source.planner(), console)?;
-    tables::begin_frames(job, folder_state == FolderState::Ours)
+    if folder_state == FolderState::Replaced {
+        tables::remove_objects(&pictures.folder)?;
+        tracks::remove(&pictures.folder)?;
+    }
+    manifest.write(&pictures.folder).or_failed()?;
+    match pictures.twin {
+        None => tables::write_fixed(job, source.planner(), console)?,
+        Some(_) => write_camera(&pictures.folder, &pictures.sequence.scenario.camera).or_failed()?,
+    }
+    tables::write_objects(pictures)?;
+    tracks.map_or(Ok(()), JobTracks::begin)?;
+    tables::begin_frames(pictures, folder_state == FolderState::Ours)
 }
 
 /// Writes the files after the last frame.
 fn finish(
-    job: &Job<'_>,
-    files: &FrameFiles,
-    made: &BTreeMap<u64, camsim_io::write::SourceFrame>,
+    pictures: &Pictures,
+    series: &Series,
+    made: &BTreeMap<(u64, Option<u32>), SourceFrame>,
     manifest: &RunManifest,
-    source: &mut dyn FrameSource,
+    tracks: Option<&JobTracks<'_>>,
+    source: &dyn FrameSource,
 ) -> Result<(), Failure> {
-    let _lock = Lock::take(job.folder)?;
-    tables::end_frames(job, files, source.planner(), made)?;
-    manifest.write(job.folder).or_failed()
-}
-
-/// Warns of frames that see only sky, and of frames without a valid pixel.
-fn validity_warnings(sky_only: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
-    let sky_only = (sky_only > 0).then(|| {
-        format!(
-            "{sky_only} of {frames} frames see only sky: check camera.mount, flight.height and the position \
-                 of the scene"
-        )
-    });
-    let empty = (empty > 0).then(|| {
-        format!(
-            "{empty} of {frames} frames have no valid pixel: no ray of the camera is within the ideal frame, \
-             or the lens has none; check camera.principal_point_px and camera.focal_px against \
-             camera.size_px, and see `camsim explain SCENARIO.toml`"
-        )
-    });
-    sky_only.into_iter().chain(empty)
-}
-
-/// Whether no pixel of a frame's colour is valid; false for a frame without colour.
-fn is_empty(frame: &RenderedFrame) -> bool {
-    !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
+    let _lock = Lock::take(&pictures.folder)?;
+    let frames = tables::end_frames(pictures, series, source.planner(), made)?;
+    tracks.map_or(Ok(()), |tracks| tracks.finish(&frames))?;
+    manifest.write(&pictures.folder).or_failed()
 }
 
 /// Command that renders the missing frames of a folder's scenario.

@@ -12,9 +12,12 @@ use crate::progress::waiting;
 pub struct TimesTable {
     /// Stages before the first frame.
     start: Vec<(&'static str, Duration)>,
-    parts: Vec<(String, Vec<f64>)>,
-    frames: usize,
+    /// Of the frames (`None`) and of each twin.
+    groups: Vec<(Option<String>, Parts)>,
 }
+
+/// Milliseconds of each stage, by its name.
+type Parts = Vec<(String, Vec<f64>)>;
 
 impl TimesTable {
     /// Adds a stage before the first frame.
@@ -32,30 +35,34 @@ impl TimesTable {
         done
     }
 
-    /// Adds a frame.
-    pub fn add(&mut self, times: &FrameTimes) {
-        self.frames += 1;
+    /// Adds a frame, or a picture of a twin with this name.
+    pub fn add(&mut self, twin: Option<&str>, times: &FrameTimes) {
+        let group = match self.groups.iter().position(|(name, _)| name.as_deref() == twin) {
+            Some(group) => group,
+            None => {
+                self.groups.push((twin.map(str::to_owned), Parts::new()));
+                self.groups.len() - 1
+            }
+        };
+        let parts = &mut self.groups[group].1;
+        let mut add = |name: String, ms: f64| match parts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, all)) => all.push(ms),
+            None => parts.push((name, vec![ms])),
+        };
         for (name, ms) in [
             ("cpu: plan", times.plan_ms),
             ("cpu: record", times.record_ms),
             ("cpu: submit", times.submit_ms),
             ("cpu: wait", times.wait_ms),
         ] {
-            self.part(name.to_owned(), ms);
+            add(name.to_owned(), ms);
         }
         for (name, ms) in [("cpu: ideal", times.ideal_ms), ("cpu: reverse", times.reverse_ms)] {
-            ms.into_iter().for_each(|ms| self.part(name.to_owned(), ms));
+            ms.into_iter().for_each(|ms| add(name.to_owned(), ms));
         }
-        self.part("cpu: read".to_owned(), times.read_ms);
+        add("cpu: read".to_owned(), times.read_ms);
         for pass in &times.passes {
-            self.part(format!("gpu: {}", pass.name), pass.ms);
-        }
-    }
-
-    fn part(&mut self, name: String, ms: f64) {
-        match self.parts.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, all)) => all.push(ms),
-            None => self.parts.push((name, vec![ms])),
+            add(format!("gpu: {}", pass.name), pass.ms);
         }
     }
 
@@ -63,13 +70,24 @@ impl TimesTable {
     /// reused).
     #[must_use]
     pub fn text(&mut self) -> String {
-        let mut text = format!("{:<24}{:>10}{:>10}{:>10}\n", "ms per frame", "median", "largest", "frames");
-        for (name, all) in &mut self.parts {
-            all.sort_by(f64::total_cmp);
-            let (median, largest) = (all[all.len() / 2], all[all.len() - 1]);
-            text += &format!("  {name:<22}{median:>10.2}{largest:>10.2}{:>10}\n", all.len());
+        let mut text = String::new();
+        if self.groups.is_empty() {
+            self.groups.push((None, Parts::new()));
         }
-        if self.parts.iter().all(|(name, _)| name.starts_with("cpu")) {
+        for (twin, parts) in &mut self.groups {
+            let title = match twin {
+                None => "ms per frame".to_owned(),
+                Some(name) => format!("ms per picture of {name}"),
+            };
+            text += &format!("{title:<24}{:>10}{:>10}{:>10}\n", "median", "largest", "frames");
+            for (name, all) in parts {
+                all.sort_by(f64::total_cmp);
+                let (median, largest) = (all[all.len() / 2], all[all.len() - 1]);
+                text += &format!("  {name:<22}{median:>10.2}{largest:>10.2}{:>10}\n", all.len());
+            }
+        }
+        let mut names = self.groups.iter().flat_map(|(_, parts)| parts).map(|(name, _)| name);
+        if names.all(|name| name.starts_with("cpu")) {
             text += "  no gpu passes: the cpu rendered all frames, or the adapter has no time stamps\n";
         }
         text += "ms before the first frame\n";

@@ -71,5 +71,6 @@ pub mod shutter;
 pub mod silhouette;
 pub mod temporal;
 pub mod tracker;
+pub mod tracks;
 pub mod trajectory;
 pub mod transfer;

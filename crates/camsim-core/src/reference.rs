@@ -26,6 +26,8 @@ mod lens_inverse;
 mod measure;
 mod mesh_bvh;
 mod moving;
+mod plane_errors;
+mod planes;
 mod ray;
 mod render;
 mod shading;
@@ -41,6 +43,8 @@ pub use measure::{
 };
 use mesh_bvh::MeshBvh;
 use moving::{MovingMeshes, moving_meshes};
+pub use plane_errors::{NORMAL_TOLERANCE_RAD, PlaneErrors, is_compared, plane_errors};
+pub use planes::is_rendered;
 use ray::Ray;
 pub use render::{Convergence, IdealView, RenderOptions};
 use shading::Shading;
@@ -103,6 +107,8 @@ pub struct Hit {
     pub texture_uv: [f64; 2],
     /// Factor on the texture's colour at the point.
     pub tint: [f64; 3],
+    /// Unit normal of the triangle, NED, on the side that the ray comes from; 0 for a triangle without area.
+    pub normal_ned: DVec3,
     /// 0 = terrain, 1 + i = mesh i of the scene.
     pub surface: u32,
 }

@@ -184,24 +184,33 @@ impl FrameCamera {
     /// if the point is behind the camera or beyond the reach of its lens.
     #[must_use]
     pub fn find(&self, point: WorldPoint<'_>, near_px: DVec2) -> Option<ImagePoint> {
+        let seen = self.find_all(point);
+        let nearest = seen
+            .iter()
+            .min_by(|a, b| a.px.distance_squared(near_px).total_cmp(&b.px.distance_squared(near_px)));
+        nearest.copied().or_else(|| self.outside(point, near_px))
+    }
+
+    /// All positions within the picture at which the frame shows a point, in the order of its fields and rows;
+    /// each has their number.
+    #[must_use]
+    pub fn find_all(&self, point: WorldPoint<'_>) -> Vec<ImagePoint> {
         let seen = self.fields.iter().flat_map(|field| {
             let solutions = self.solutions(field, point).into_iter();
             let points = solutions.filter_map(|(row, slope)| self.image_point(field, point, row, slope));
-            points.filter(|seen| seen.is_inside).map(|seen| (field.has_row(seen.px.y), seen))
+            points.filter(|seen| seen.is_inside).map(|seen| (field.distance_to_rows_px(seen.px.y), seen))
         });
-        let seen: Vec<(bool, ImagePoint)> = seen.collect();
-        let on_own_rows = seen.iter().filter(|(is_own, _)| *is_own).count();
-        // A point may pass between the rows of both fields. It is then in the field that it is nearest to.
-        let counts = |is_own: bool| is_own || on_own_rows == 0;
-        let nearest = seen
-            .iter()
-            .filter(|(is_own, _)| counts(*is_own))
-            .map(|(_, seen)| seen)
-            .min_by(|a, b| a.px.distance_squared(near_px).total_cmp(&b.px.distance_squared(near_px)));
-        match nearest {
-            Some(nearest) => Some(ImagePoint { solutions: on_own_rows.max(1) as u32, ..*nearest }),
-            None => self.outside(point, near_px),
+        let mut seen: Vec<(f64, ImagePoint)> = seen.collect();
+        let is_own = |(distance_px, _): &(f64, ImagePoint)| *distance_px <= 0.5;
+        if seen.iter().any(is_own) {
+            seen.retain(is_own);
+        } else {
+            // A point may pass between the rows of both fields. It is then in the field that it is nearest to.
+            let nearest = seen.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            seen = nearest.into_iter().collect();
         }
+        let solutions = seen.len() as u32;
+        seen.into_iter().map(|(_, seen)| ImagePoint { solutions, ..seen }).collect()
     }
 
     /// Fractional rows of a field at which it shows a point, with the movement of the projection from row to
@@ -353,9 +362,11 @@ impl Field {
         }
     }
 
-    /// Whether the image row nearest to a pixel coordinate belongs to the field.
-    fn has_row(&self, y_px: f64) -> bool {
-        self.parity.is_none_or(|parity| (y_px.round() as i64).rem_euclid(2) == i64::from(parity))
+    /// Distance from a pixel coordinate to the nearest image row of the field, pixels; 0 where all rows belong
+    /// to it.
+    fn distance_to_rows_px(&self, y_px: f64) -> f64 {
+        let from_first = |parity: u32| y_px - f64::from(parity);
+        self.parity.map(from_first).map_or(0.0, |y_px| (y_px - 2.0 * (0.5 * y_px).round()).abs())
     }
 }
 
@@ -476,6 +487,17 @@ mod tests {
             found.is_inside.then(|| (found.solutions as usize, search(&frame, &frame.fields[0], point)))
         });
         let counts: Vec<(usize, Vec<DVec2>)> = counts.collect();
+        // Each position by itself, where the search finds as many.
+        for point in points() {
+            let (found, expected) = (frame.find_all(point), search(&frame, &frame.fields[0], point));
+            for seen in found.iter().filter(|_| found.len() == expected.len()) {
+                let off_px = expected.iter().map(|px| px.distance(seen.px)).fold(f64::INFINITY, f64::min);
+                assert!(
+                    off_px < 0.01 && seen.solutions as usize == found.len(),
+                    "{point:?}: {off_px:.1e} px"
+                );
+            }
+        }
         let several = counts.iter().filter(|(_, expected)| expected.len() > 1).count();
         let right = counts.iter().filter(|(found, expected)| *found == expected.len()).count();
         assert!(several > 20 && right * 100 > 98 * counts.len(), "{several} {right} {}", counts.len());
@@ -496,7 +518,7 @@ mod tests {
                 (field.time_s(row) - found.t_s).abs() < 1e-9
             });
             let field = field.unwrap();
-            of_field[field] += usize::from(frame.fields[field].has_row(found.px.y));
+            of_field[field] += usize::from(frame.fields[field].distance_to_rows_px(found.px.y) <= 0.5);
         }
         assert!(of_field.iter().all(|&count| count > 30), "{of_field:?}");
     }

@@ -13,6 +13,8 @@ mod camera;
 mod channel;
 mod motion;
 mod scene;
+mod tracks;
+mod twin;
 mod validate;
 
 pub use auto::{Auto, FieldOr};
@@ -23,9 +25,11 @@ pub use camera::{
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use scene::{
-    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec,
+    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
+pub use tracks::{PointSource, TracksSpec};
+pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera,
@@ -379,6 +383,16 @@ pub struct OutputSpec {
     pub flow_step: u32,
     /// Instant of the picture that `flow-global` leads to.
     pub flow_instant: FlowInstant,
+    /// Whether `object` and `class` get pictures in colour, for people, in `object_palette` and
+    /// `class_palette`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub palette: bool,
+    /// Points whose pixel is written for every frame that sees them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracks: Option<TracksSpec>,
+    /// Twins of every frame, each in a folder of its own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub twin: Vec<TwinSpec>,
 }
 
 impl Default for OutputSpec {
@@ -392,6 +406,9 @@ impl Default for OutputSpec {
             exr_compression: ExrCompression::Zip1,
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
+            palette: false,
+            tracks: None,
+            twin: Vec::new(),
         }
     }
 }
@@ -408,6 +425,14 @@ pub enum Stamps {
 }
 
 impl OutputSpec {
+    /// Channels of the frames and of their twins, some of them twice.
+    pub fn all_channels(&self) -> impl Iterator<Item = Channel> {
+        self.channels
+            .iter()
+            .chain(self.twin.iter().filter_map(|twin| twin.channels.as_ref()).flatten())
+            .copied()
+    }
+
     /// Time of the written clock at path time 0, nanoseconds. The log's clock shows `log_epoch_ns` there, and
     /// the window begins at `start_s` of path time.
     #[must_use]

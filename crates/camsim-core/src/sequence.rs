@@ -2,7 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::{mount::CameraPath, photometric::vignette_weights, scenario::Scenario, scene::Scene};
+use crate::{
+    mount::CameraPath,
+    photometric::vignette_weights,
+    scenario::{Scenario, TwinSpec},
+    scene::Scene,
+    shutter::ShutterError,
+};
 
 /// All inputs of a run, loaded and validated. Immutable; shared between threads.
 #[derive(Clone, Debug)]
@@ -28,6 +34,18 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// The sequence of a twin's pictures, as [`Scenario::twin`]: of the same path and scene, with the same
+    /// frame numbers.
+    ///
+    /// # Errors
+    /// A shutter that cannot be used.
+    pub fn twin(&self, twin: &TwinSpec, instant: Option<u32>) -> Result<Self, ShutterError> {
+        let scenario = self.scenario.twin(twin, instant)?;
+        let has_vignette = scenario.camera.photometric.vignette.is_some();
+        let vignette = self.vignette.clone().filter(|_| has_vignette);
+        Ok(Self { scenario, vignette, ..self.clone() })
+    }
+
     /// Weights of the vignette map at every pixel, and the size of their picture; a single 1 without a map.
     #[must_use]
     pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {

@@ -10,7 +10,7 @@
 //! from the left; the two reverse readout directions count from the other end. Interlaced fields always
 //! consist of image rows, for any readout direction.
 
-use crate::scenario::{FieldOr, Parity, Readout, ShutterSpec};
+use crate::scenario::{FieldOr, FlowInstant, Parity, Readout, ShutterSpec};
 
 /// Invalid values in `[camera.shutter]`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,6 +120,22 @@ impl Shutter {
             RowAxis::Columns => x,
         };
         self.dt_readout_s(line) - self.field_lag_s(y)
+    }
+
+    /// Instant of the readout, relative to the stamp, seconds: mid-exposure of the outer row or column that is
+    /// read first or last, or the middle between both, which is `-delay` without interlacing.
+    pub fn dt_instant_s(&self, instant: FlowInstant) -> f64 {
+        let last = self.lines() - 1;
+        let [top_s, bottom_s] = [self.dt_row_s(0), self.dt_row_s(last)];
+        match instant {
+            FlowInstant::FirstRow => top_s.min(bottom_s),
+            // The readout is symmetric about the delay; a mean of both ends would add rounding.
+            FlowInstant::Centre => match self.row_axis() {
+                RowAxis::Rows => -self.delay_s - 0.5 * (self.field_lag_s(0) + self.field_lag_s(last)),
+                RowAxis::Columns => -self.delay_s,
+            },
+            FlowInstant::LastRow => top_s.max(bottom_s),
+        }
     }
 
     /// Lag of an image row by interlacing: that of the fields for rows of the first field, else 0.
@@ -266,6 +282,27 @@ mod tests {
                 .unwrap();
         assert!((sideways.dt_pixel_s(1, 1) - sideways.dt_pixel_s(1, 2) - 0.02).abs() < 1e-15);
         assert_eq!(sideways.dt_pixel_s(1, 1), sideways.dt_row_s(1));
+    }
+
+    #[test]
+    fn instants_are_those_of_the_outer_rows_and_of_their_middle() {
+        for readout in
+            [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft]
+        {
+            for interlace_ms in [0.0, 20.0] {
+                let spec = ShutterSpec { readout, interlace_ms: FieldOr::Ms(interlace_ms), ..spec() };
+                let shutter = Shutter::from_spec(&spec, 30.0, [6, 4]).unwrap();
+                let [first_s, centre_s, last_s] =
+                    [FlowInstant::FirstRow, FlowInstant::Centre, FlowInstant::LastRow]
+                        .map(|instant| shutter.dt_instant_s(instant));
+                let times: Vec<f64> = (0..shutter.lines()).map(|line| shutter.dt_row_s(line)).collect();
+                let last = times.len() - 1;
+                assert_eq!(first_s, times[0].min(times[last]));
+                assert_eq!(last_s, times[0].max(times[last]));
+                assert!((centre_s - 0.5 * (times[0] + times[last])).abs() < 1e-15);
+                assert!(interlace_ms > 0.0 || centre_s == -0.005);
+            }
+        }
     }
 
     #[test]

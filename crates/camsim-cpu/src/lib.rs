@@ -24,6 +24,7 @@ mod renderer;
 mod reverse;
 mod simd;
 
+pub use cast::{Instant, MovingCaster, RayScratch};
 pub use general::RowTable;
 pub use renderer::{CpuRenderer, IdealBuffer, ReverseInputs};
 pub use reverse::{IdealTexels, suits_processor};

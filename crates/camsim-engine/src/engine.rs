@@ -42,6 +42,7 @@ impl Engine {
         match backend {
             Backend::Cpu => Ok(Self::cpu()),
             Backend::Auto => match Self::new(AdapterChoice::Best) {
+                Err(GpuError::NotBuilt) => Ok(Self::cpu()),
                 Err(GpuError::NoAdapter(wanted)) if wanted.is_empty() => Ok(Self::cpu()),
                 opened => opened,
             },

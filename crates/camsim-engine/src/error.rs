@@ -15,12 +15,12 @@ pub enum RenderError<E: std::error::Error + 'static> {
     /// The shader files are invalid.
     #[error(transparent)]
     Shader(#[from] camsim_gpu::shaders::ComposeError),
-    /// The scene has things that move.
+    /// The paper's methods do not show things that move.
     #[error(
-        "{0} surfaces of the scene move (scene.gltf.motion), which only the reference renderer draws: render \
-            with --backend reference, or leave scene.gltf.motion out"
+        "scene.gltf.motion: quality.preset = \"paper\" has no method for things that move: write preset = \
+         \"default\", or leave motion out"
     )]
-    Moving(usize),
+    Moving,
     /// The sink failed.
     #[error(transparent)]
     Sink(E),
@@ -45,7 +45,7 @@ impl<E: std::error::Error + 'static> RenderError<E> {
             RenderError::Gpu(error) => Self::Gpu(error),
             RenderError::Plan(error) => Self::Plan(error),
             RenderError::Shader(error) => Self::Shader(error),
-            RenderError::Moving(surfaces) => RenderError::Moving(surfaces),
+            RenderError::Moving => RenderError::Moving,
             RenderError::Sink(never) => match never {},
         }
     }

@@ -28,6 +28,7 @@ mod engine;
 mod error;
 mod finished;
 mod memory;
+mod moving;
 mod planner_threads;
 mod prepare_ahead;
 mod session;

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use camsim_core::{
     frame::{Plane, RenderedFrame},
     pose::CameraPose,
-    scenario::Channel,
+    scenario::{Channel, Preset},
     scene::{LodSelection, LodTolerance, SceneBatches},
     sequence::Sequence,
     temporal::IdealGeometry,
@@ -23,7 +23,9 @@ use camsim_plan::{
 use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
-    finished, planner_threads,
+    finished,
+    moving::MovingScene,
+    planner_threads,
     prepare_ahead::{PrepareAhead, Prepared, Preparer},
     truth::{FramePixels, hits, planes},
 };
@@ -38,6 +40,9 @@ pub struct Session<'a> {
     ideal: Option<IdealCache>,
     coords_phase: f32,
     channels: Vec<Channel>,
+    moving: Option<MovingScene>,
+    /// Knows everything in the scene, where something moves.
+    scene_planner: Option<Arc<Planner>>,
 }
 
 /// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
@@ -89,10 +94,13 @@ impl<'a> Session<'a> {
         sequence: Arc<Sequence>,
         channels: &[Channel],
     ) -> Result<Self, RenderErrorBase> {
-        let moving = sequence.scene.meshes.iter().filter(|mesh| mesh.motion.is_some()).count();
-        if moving > 0 {
-            return Err(RenderError::Moving(moving));
-        }
+        let moving = MovingScene::new(&sequence, None);
+        let scene_planner = match &moving {
+            Some(_) if sequence.scenario.quality.preset == Preset::Paper => return Err(RenderError::Moving),
+            Some(_) => Some(Arc::new(Planner::new(sequence.clone(), channels, engine.max_side_px())?)),
+            None => None,
+        };
+        let sequence = moving.as_ref().map_or(sequence, |moving| moving.still().clone());
         let planner = Planner::new(sequence.clone(), channels, engine.max_side_px())?;
         let planner = Arc::new(planner.with_capabilities(engine.capabilities()));
         let meshes = Arc::new(SceneBatches::new(&sequence.scene));
@@ -101,7 +109,17 @@ impl<'a> Session<'a> {
             .map(|gpu| GpuSession::new(gpu, &sequence, meshes.clone(), planner.wants_truth()))
             .transpose()?;
         let cpu = CpuRenderer::new(sequence.clone(), meshes);
-        Ok(Self { engine, planner, cpu, gpu, ideal: None, coords_phase: 0.0, channels: channels.into() })
+        Ok(Self {
+            engine,
+            planner,
+            cpu,
+            gpu,
+            ideal: None,
+            coords_phase: 0.0,
+            channels: channels.into(),
+            moving,
+            scene_planner,
+        })
     }
 
     /// Replaces the sequence. The next frames are bit for bit those of a new session. Fast if the scene is
@@ -115,11 +133,18 @@ impl<'a> Session<'a> {
         channels: &[Channel],
     ) -> Result<(), RenderError<E>> {
         let before = self.planner.sequence();
+        let moving = MovingScene::new(&sequence, self.moving.as_ref());
+        let still = moving.as_ref().map_or(&sequence, MovingScene::still).clone();
         let (old, new) = (&before.scenario, &sequence.scenario);
-        if !Arc::ptr_eq(&before.scene, &sequence.scene) || old.quality.preset != new.quality.preset {
+        if !Arc::ptr_eq(&before.scene, &still.scene) || old.quality.preset != new.quality.preset {
             *self = self.engine.session(sequence, channels)?;
             return Ok(());
         }
+        let scene_planner = match &self.scene_planner {
+            Some(planner) => Some(Arc::new(planner.renewed(sequence, channels)?)),
+            None => None,
+        };
+        let sequence = still;
         let planner = Arc::new(self.planner.renewed(sequence.clone(), channels)?);
         if let Some(gpu) = &mut self.gpu {
             gpu.renew((before, self.planner.wants_truth()), &sequence, planner.wants_truth())?;
@@ -127,6 +152,8 @@ impl<'a> Session<'a> {
         self.cpu.renew(sequence);
         self.planner = planner;
         self.channels = channels.into();
+        self.moving = moving;
+        self.scene_planner = scene_planner;
         Ok(())
     }
 
@@ -134,6 +161,13 @@ impl<'a> Session<'a> {
     #[must_use]
     pub fn planner(&self) -> &Planner {
         &self.planner
+    }
+
+    /// A planner of this sequence that knows everything in its scene, things that move too, which
+    /// [`Session::planner`] leaves to rays.
+    #[must_use]
+    pub fn scene_planner(&self) -> &Planner {
+        self.scene_planner.as_ref().unwrap_or(&self.planner)
     }
 
     /// Sets the instant of the exposure, in [-0.5, 0.5], of the source coordinates in `coords` (0 =
@@ -318,10 +352,13 @@ impl<'a> Session<'a> {
     fn with_truth(
         &self,
         plan: &FramePlan,
-        color_rgba: Vec<f32>,
+        mut color_rgba: Vec<f32>,
         mut truth: Option<Vec<Truth>>,
     ) -> Result<RenderedFrame, PlanError> {
         let sequence = self.planner.sequence();
+        if let Some(moving) = &self.moving {
+            moving.paint(&mut color_rgba, plan);
+        }
         let planes = match &mut truth {
             Some(truth) => self.complete_truth(plan, &color_rgba, truth)?,
             None => Vec::new(),
@@ -346,9 +383,12 @@ impl<'a> Session<'a> {
         color_rgba: &[f32],
         truth: &mut Vec<Truth>,
     ) -> Result<Vec<Plane>, PlanError> {
-        let planner = &*self.planner;
+        let planner = self.scene_planner();
         let rays = planner.frame_rays(plan, f64::from(self.coords_phase));
-        if !self.channels.iter().any(|channel| channel.needs_every_ray()) {
+        // What moves is not in the picture that depth is looked up in.
+        let needs_every_ray =
+            self.moving.is_some() || self.channels.iter().any(|channel| channel.needs_every_ray());
+        if !needs_every_ray {
             if plan.has_exact_truth() {
                 hits::complete(truth, color_rgba, plan, &rays);
             }

@@ -1,6 +1,7 @@
 //! Truth about each pixel of an output frame, by rays in f64: whatever renderer made the picture, the truth is
 //! the same.
 
+mod coverage;
 mod flow;
 pub(crate) mod hits;
 mod planes;

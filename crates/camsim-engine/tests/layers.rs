@@ -298,7 +298,7 @@ fn blending_test_model_matches_the_reference() {
     let model = read_gltf(&file, GltfOptions::default()).expect("a model");
     assert_eq!(
         model.notes,
-        ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are left out"]
+        ["colour is albedo alone: metallicRoughnessTexture, normalTexture and occlusionTexture are ignored"]
     );
     let ahead = DMat3::from_rotation_y(-std::f64::consts::FRAC_PI_2);
     let mut meshes: Vec<Mesh> = model.place(DVec3::ZERO, std::f64::consts::PI, 10.0).collect();

@@ -1,6 +1,6 @@
 //! Errors of the passes.
 
-use crate::{context::GpuError, shaders::ComposeError};
+use crate::{adapter::GpuError, shaders::ComposeError};
 
 /// Why a pass cannot be recorded or read back.
 #[derive(Debug, thiserror::Error)]

@@ -1,9 +1,6 @@
 //! Commands of a frame while they are recorded, its uploads, and GPU time stamps of its passes.
 
-use crate::{
-    context::{GpuContext, GpuError},
-    staging::Staging,
-};
+use crate::{adapter::GpuError, context::GpuContext, staging::Staging};
 
 /// Maximum number of timed passes of a frame: two of the lens map, ideal frame, its multisampled depth, edge
 /// mask, triangles near edges, supersampled frame, edge mask to alpha, edge lines, reverse, candidates, rays.

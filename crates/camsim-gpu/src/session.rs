@@ -10,7 +10,8 @@ use camsim_core::{
 use camsim_plan::{EdgeStage, FramePlan, RayStage};
 
 use crate::{
-    context::{GpuContext, GpuError},
+    adapter::GpuError,
+    context::GpuContext,
     error::PassError,
     ideal::{IdealPass, IdealTarget},
     layout::{FrameUniforms, Truth},

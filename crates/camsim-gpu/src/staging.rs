@@ -1,7 +1,7 @@
 //! Staging memory for uploads. The commands of a frame copy from it; later frames reuse it.
 //! `Queue::write_buffer` would allocate a buffer for each call.
 
-use crate::context::GpuError;
+use crate::adapter::GpuError;
 
 /// Initial size: enough for a frame of a few thousand triangles.
 const FIRST_BYTES: u64 = 1 << 18;

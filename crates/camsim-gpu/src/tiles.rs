@@ -5,11 +5,7 @@ use std::sync::Arc;
 
 use camsim_core::scene::{TILE_SIDE, Terrain, TerrainTiles, TexelForm, TileSource, tile_bytes};
 
-use crate::{
-    context::{GpuContext, GpuError},
-    recorder::Recorder,
-    upload::texture_format,
-};
+use crate::{adapter::GpuError, context::GpuContext, recorder::Recorder, upload::texture_format};
 
 /// Tiles along a side of an array layer, as in shaders/ideal/texture/tiled.wgsl.
 const TILES_PER_SIDE: u32 = 8;

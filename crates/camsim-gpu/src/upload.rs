@@ -7,7 +7,8 @@ use camsim_core::scene::{Batch, Encoding, Scene, SceneBatches, Terrain, TexelFor
 use wgpu::util::DeviceExt;
 
 use crate::{
-    context::{GpuContext, GpuError},
+    adapter::GpuError,
+    context::GpuContext,
     layout::{MeshMaterial, MeshVertexData},
     tiles::TilePool,
 };

@@ -100,8 +100,22 @@ struct Part {
     shape: Arc<Shape>,
     material: Material,
     model_from_shape: DAffine3,
+    labels: PartLabels,
     /// In the model's axes; `None` if it stands still in them.
     motion: Option<Arc<RigidMotion>>,
+}
+
+/// What a part of a model is called in its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartLabels {
+    /// Index of its node.
+    pub node: usize,
+    /// Names of its node and of those above it, from the root; `nodes.3` for a node without a name.
+    pub node_names: Arc<[String]>,
+    /// Index of its material; `None` for the default material.
+    pub material: Option<usize>,
+    /// Name of its material; `materials.3` without one, `default` for the default material.
+    pub material_name: String,
 }
 
 /// Rotation from the model's axes (x left, y up, z forward) to forward, right, down.
@@ -118,6 +132,11 @@ pub(crate) const MAX_RADIUS_M: f64 = 1e9;
 const MAX_NODE_DEPTH: usize = 1024;
 
 impl Model {
+    /// What each mesh that [`Model::place`] returns is called in the file, in the same order.
+    pub fn labels(&self) -> impl Iterator<Item = &PartLabels> {
+        self.parts.iter().map(|part| &part.labels)
+    }
+
     /// Meshes of the model with its origin at `origin_ned_m`, its z axis `heading_rad` clockwise from north,
     /// and its lengths times `scale`.
     pub fn place(&self, origin_ned_m: DVec3, heading_rad: f64, scale: f64) -> impl Iterator<Item = Mesh> {
@@ -222,6 +241,7 @@ fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model
         texels_left: MAX_BAKED_TEXELS,
         parts: Vec::new(),
         visited: HashSet::new(),
+        node_names: Vec::new(),
         notes: Vec::new(),
         radius_m: 0.0,
     };
@@ -286,6 +306,8 @@ struct Reader<'a> {
     parts: Vec<Part>,
     /// Indices of visited nodes: a valid tree visits each once.
     visited: HashSet<usize>,
+    /// Names of the node that is read and of those above it, from the root.
+    node_names: Vec<String>,
     notes: Vec<String>,
     /// Radius about the model's origin that contains all points so far, metres.
     radius_m: f64,
@@ -313,13 +335,17 @@ impl Reader<'_> {
         let is_hidden = is_hidden || !self.asset.is_visible(node.index());
         let (model_from_node, chain) =
             self.moving.node(self.asset, &self.pose, node, model_from_parent, chain)?;
+        self.node_names.push(self.asset.name_of("nodes", node.index()));
         if let Some(mesh) = node.mesh().filter(|_| !is_hidden) {
             let instances = self.asset.instances(node.index())?;
             for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, &mesh, model_from_node * node_from_instance, &chain)?;
             }
         }
-        node.children().try_for_each(|child| self.node(&child, model_from_node, &chain, is_hidden, depth + 1))
+        node.children()
+            .try_for_each(|child| self.node(&child, model_from_node, &chain, is_hidden, depth + 1))?;
+        self.node_names.pop();
+        Ok(())
     }
 
     /// Adds the primitives of a node's mesh.
@@ -393,7 +419,16 @@ impl Reader<'_> {
         self.extend_radius(node, mesh, &shape, &model_from_shape)?;
         if !shape.indices.is_empty() {
             let material = self.materials.for_shape(&shape, material);
-            self.parts.push(Part { shape, material, model_from_shape, motion });
+            let of = primitive.material();
+            let labels = PartLabels {
+                node: node.index(),
+                node_names: self.node_names.as_slice().into(),
+                material: of.index(),
+                material_name: of
+                    .index()
+                    .map_or_else(|| "default".to_owned(), |index| self.asset.name_of("materials", index)),
+            };
+            self.parts.push(Part { shape, material, model_from_shape, motion, labels });
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use std::{
     time::UNIX_EPOCH,
 };
 
-use camsim_core::scenario::Scenario;
+use camsim_core::scenario::{PointSource, Scenario};
 use rayon::prelude::*;
 
 use crate::{gltf_file::referenced_files, terrain::sidecar_files};
@@ -38,6 +38,11 @@ pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
         paths.extend(referenced_files(&model.file));
         paths.extend(model.placements.clone());
     }
+    let tracked = scenario.output.tracks.iter().flat_map(|tracks| &tracks.points);
+    paths.extend(tracked.filter_map(|source| match source {
+        PointSource::Table(path) => Some(path.clone()),
+        PointSource::Terrain | PointSource::Vertices | PointSource::Board => None,
+    }));
     file_fingerprints(paths)
 }
 
@@ -109,6 +114,7 @@ mod tests {
             "zoom.csv",
             "board.yaml",
             "places.csv",
+            "points.csv",
             "a mesh.bin",
             "skin.png",
             "house.gltf",
@@ -139,6 +145,8 @@ mod tests {
             placements = "places.csv"
             [[scene.gltf]]
             file = "gone.glb"
+            [output.tracks]
+            points = ["terrain", "points.csv"]
         "#;
         let scenario = parse_scenario(text, &folder.path().join("s.toml"), &[]).unwrap();
         let before = scenario_fingerprints(&scenario);

@@ -6,7 +6,9 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{Auto, CameraSpec, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
+    scenario::{
+        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Scenario, TrackerKind,
+    },
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{TrackResult, TrackerError, track},
@@ -22,16 +24,19 @@ use crate::{
 };
 
 mod motion;
+mod objects;
 mod optics;
 mod ortho_coverage;
 mod placements;
 mod pose_table;
 mod scene;
+mod track_points;
 
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_position_ned_m;
 use scene::load_scene;
+pub use track_points::TrackInputs;
 
 /// Maximum number of frames of a sequence: four days at 30 per second. More is a mistake in `camera.fps`.
 const MAX_FRAMES: f64 = 10e6;
@@ -73,9 +78,35 @@ pub enum LoadError {
     /// A model cannot be read.
     #[error("scene.gltf: {0}")]
     Gltf(#[from] GltfError),
+    /// `scene.gltf.classes` names nothing of its model.
+    #[error("scene.gltf.classes: {}: has no {kind} `{name}`; its {kind}s are {}", file.display(), listed(known))]
+    NoSuchPart {
+        /// The model.
+        file: PathBuf,
+        /// `node` or `material`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// All names of that kind.
+        known: Vec<String>,
+    },
+    /// More objects than `object` can number.
+    #[error(
+        "the scene has {0} objects, and output.channels object, class and coverage number at most \
+            {MAX_OBJECTS}: set objects = \"placement\" for models, place fewer, or leave these channels out"
+    )]
+    TooManyObjects(usize),
     /// A table of placements cannot be read.
     #[error("{path}: {problem}")]
     Placements {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A table of points to track cannot be read.
+    #[error("{path}: {problem}")]
+    TrackPoints {
         /// The file.
         path: PathBuf,
         /// What is wrong, where, and what to do.
@@ -152,6 +183,17 @@ pub enum LoadError {
     ZoomPair,
 }
 
+/// Largest number of an object: `object` is a picture of 16 bits.
+pub const MAX_OBJECTS: usize = 65_535;
+
+/// Names for a message, at most twenty.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 20;
+    let shown: Vec<String> = names.iter().take(MOST).map(|name| format!("`{name}`")).collect();
+    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    if names.is_empty() { "none".to_owned() } else { shown.join(", ") + &more }
+}
+
 /// A loaded scenario, with warnings.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -163,6 +205,8 @@ pub struct Loaded {
     pub tracked: Arc<TrackResult>,
     /// Extent and resolution of the terrain.
     pub terrain: Option<TerrainSummary>,
+    /// Points of `[output.tracks]` that files and keys give.
+    pub tracks: TrackInputs,
     /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The part of [`Self::warnings`] that concerns the scene.
@@ -215,6 +259,11 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
             (Arc::new(scene), terrain, notes)
         }
     };
+    let numbers_objects =
+        |channel: Channel| matches!(channel, Channel::Object | Channel::Class | Channel::Coverage);
+    if scene.objects.len() > MAX_OBJECTS && scenario.output.all_channels().any(numbers_objects) {
+        return Err(LoadError::TooManyObjects(scene.objects.len()));
+    }
     let vignette_path = &scenario.camera.photometric.vignette;
     let vignette_error = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
     let vignette = match reusable.filter(|(_, old)| old.camera.photometric.vignette == *vignette_path) {
@@ -224,6 +273,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }
     };
     let zoom_track = load_zoom_track(scenario, &log)?;
+    let tracks = TrackInputs::load(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
     let sequence = Sequence {
@@ -238,7 +288,14 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(scene_notes.iter().cloned());
-    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
+    let output = &scenario.output;
+    let has_numbers = output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+    warnings.extend(
+        (output.palette && !has_numbers).then(|| {
+            "output.palette colours nothing: output.channels has neither object nor class".to_owned()
+        }),
+    );
+    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
 }
 
 /// Whether anything moves by a table of poses, whose times are on the log's clock.

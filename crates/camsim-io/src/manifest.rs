@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::scenario::Scenario;
+use camsim_core::scenario::{BurstOver, Scenario, TwinSpec};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
@@ -36,7 +36,11 @@ pub struct RunManifest {
     pub seed: u64,
     /// Base of the paths: [`PATHS`].
     pub paths: String,
-    /// The scenario with defaults and `--set` applied.
+    /// In the folder of a twin: which one it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin: Option<TwinRecord>,
+    /// The scenario with defaults and `--set` applied. In the folder of a twin, the one whose frames the twin's
+    /// pictures are; of a burst, that of its centre.
     pub scenario: Scenario,
     /// Fingerprints of the files that the scenario names.
     pub inputs: Inputs,
@@ -50,8 +54,35 @@ pub struct RunManifest {
     pub skipped: u64,
     /// Whether the run is finished; `false` is written at its start.
     pub finished: bool,
+    /// Number of tracked points, if the scenario has `[output.tracks]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracked_points: Option<u64>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
+}
+
+/// What `run.json` in the folder of a twin says of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TwinRecord {
+    /// Its name.
+    pub name: String,
+    /// The run whose frames it belongs to, relative to this file.
+    pub of: String,
+    /// Number of pictures in a burst.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instants: Option<u32>,
+    /// What a burst is spread over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over: Option<BurstOver>,
+}
+
+impl TwinRecord {
+    /// The record of a twin in a folder below that of the frames.
+    #[must_use]
+    pub fn new(twin: &TwinSpec) -> Self {
+        let over = twin.instants.map(|_| twin.over.unwrap_or_default());
+        Self { name: twin.name.clone(), of: "../run.json".into(), instants: twin.instants, over }
+    }
 }
 
 /// Why a run cannot be resumed in a folder.
@@ -156,11 +187,41 @@ pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Resu
     let (mut old, old_inputs) =
         (value_of(&run, "scenario", &path)?.clone(), value_of(&run, "inputs", &path)?);
     let mut new = through_text(&portable_scenario(scenario, folder).map_err(parse)?).map_err(parse)?;
+    // Each twin has a folder and a `run.json` of its own.
+    [&mut old, &mut new].into_iter().filter_map(|tree| tree.get_mut("output")?.as_object_mut()).for_each(
+        |output| {
+            output.remove("twin");
+        },
+    );
     let new_inputs = portable_inputs(inputs, folder);
     let moved = MovedFiles::between(&mut old, old_inputs, &mut new, &new_inputs);
     check_equal(&path, BY_OTHER_SCENARIO, &old, &new)?;
     let new_inputs = through_text(&new_inputs).map_err(parse)?;
     check_equal(&path, "when a file had something else in it", &moved.inputs(old_inputs), &new_inputs)?;
+    Ok(true)
+}
+
+/// Checks that the pictures in `folder` are those of the same burst, or of no burst. `Ok(false)` as
+/// [`check_resume`].
+///
+/// # Errors
+/// As [`check_resume`].
+pub fn check_burst(folder: &Path, twin: Option<&TwinRecord>) -> Result<bool, ResumeError> {
+    let path = folder.join("run.json");
+    let Some(run) = read_run(&path)? else { return Ok(false) };
+    let parse =
+        |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
+    let new = through_text(&twin).map_err(parse)?;
+    let burst = |twin: Option<&Value>| {
+        let fields = ["instants", "over"].map(|key| (key, twin.and_then(|twin| twin.get(key)).cloned()));
+        fields.into_iter().filter_map(|(key, value)| Some((format!("twin.{key}"), value?))).collect()
+    };
+    check_equal(
+        &path,
+        BY_OTHER_SCENARIO,
+        &Value::Object(burst(run.get("twin"))),
+        &Value::Object(burst(Some(&new))),
+    )?;
     Ok(true)
 }
 
@@ -303,6 +364,7 @@ mod tests {
             adapter: "llvmpipe".into(),
             seed: scenario.seed,
             paths: PATHS.to_owned(),
+            twin: None,
             scenario,
             inputs: [("a.csv".to_owned(), "3 bytes".to_owned())].into(),
             frames: [0, 10],
@@ -310,6 +372,7 @@ mod tests {
             written: 3,
             skipped: 0,
             finished: true,
+            tracked_points: None,
             warnings: vec![],
         }
     }
@@ -349,6 +412,29 @@ mod tests {
 
         std::fs::write(dir.path().join("run.json"), "{").unwrap();
         assert!(matches!(check_resume(dir.path(), &other, &ours.inputs), Err(ResumeError::Parse { .. })));
+    }
+
+    #[test]
+    fn twins_have_manifests_of_their_own() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut ours = manifest(scenario(&[("camera.shutter.exposure_ms", "8")]));
+        ours.write(dir.path()).unwrap();
+        let mut with_twin = ours.scenario.clone();
+        let burst = TwinSpec { name: "burst".into(), instants: Some(9), ..TwinSpec::default() };
+        with_twin.output.twin.push(burst.clone());
+        assert!(check_resume(dir.path(), &with_twin, &ours.inputs).unwrap(), "a twin changes no frame");
+        let record = TwinRecord::new(&burst);
+        let error = check_burst(dir.path(), Some(&record)).unwrap_err().to_string();
+        assert!(error.contains("twin.instants was nothing, now 9"), "{error}");
+        assert!(check_burst(dir.path(), None).unwrap());
+        ours.twin = Some(record.clone());
+        ours.write(dir.path()).unwrap();
+        assert!(check_burst(dir.path(), Some(&record)).unwrap());
+        let error = check_burst(dir.path(), None).unwrap_err().to_string();
+        assert!(error.contains("twin.over was \"exposure\", now nothing"), "{error}");
+        let more = TwinRecord { instants: Some(11), ..record };
+        assert!(check_burst(dir.path(), Some(&more)).is_err());
+        assert!(!check_burst(&dir.path().join("none"), None).unwrap());
     }
 
     #[test]
@@ -463,6 +549,8 @@ mod tests {
             pattern = { image = "x/6", width_m = 1.0 }
             board = { target = "x/7" }
             gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10", motion = { poses = "x/11" } }]
+            [output.tracks]
+            points = ["terrain", "x/12.csv"]
         "#;
         let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
         let mut tree = serde_json::to_value(&scenario).unwrap();
@@ -471,7 +559,8 @@ mod tests {
         for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
             assert!(visited.iter().any(|visited| visited == key), "{key}");
         }
-        assert_eq!(visited.len(), 11);
+        assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");
+        assert_eq!(visited.len(), 12);
     }
 
     #[test]

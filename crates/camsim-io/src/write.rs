@@ -7,11 +7,15 @@
 //! OUT/trajectory.csv              motion of the platform
 //! OUT/camera_trajectory.csv       motion of the camera, with mount and vibration
 //! OUT/frames.csv                  stamp, pose, ideal frame and files of every written frame
+//! OUT/points.csv                  tracked points, if asked for
+//! OUT/tracks.csv                  where every written frame shows them
 //! OUT/color/frame_000123.exr      R G B A, linear   (.png: in the encoding of camera.photometric.output)
 //! OUT/depth/frame_000123.exr      Z, metres, 0 = nothing
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
 //! OUT/coords/frame_000123.exr     u v x y dt n e d; n e d is the direction where depth is 0 (sky)
 //! OUT/rows/frame_000123.csv       time, pose and velocity of each row
+//! OUT/sharp/...                   a twin of every frame: run.json, camera.toml, frames.csv and channels of its own
+//! OUT/burst/color/frame_000123_7.png   a burst of each frame
 //! ```
 //!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
@@ -31,17 +35,19 @@ mod frames;
 mod picture;
 mod png_file;
 mod tables;
+mod tracks;
 
 pub use atomic::write_atomic;
 pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, frames_path};
-pub use frames::{FrameFiles, FrameWriter, WriteSummary};
+pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
 pub use picture::write_picture;
-pub use png_file::contact_sheet;
+pub use png_file::{contact_sheet, palette_rgb8};
 pub use tables::{
-    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, ROWS_COLUMNS, TRAJECTORY_COLUMNS, TrajectoryRecord,
-    camera_trajectory_csv, rows_csv, trajectory_csv,
+    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
+    TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
+pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
 
 /// Why a file was not written.
 #[derive(Debug, Error)]

@@ -28,6 +28,7 @@
 //! | `picture_error` | texture spectra, transfer functions, and the picture error by each cause |
 //! | `choose` | budget, prices, and the choices: sampling, silhouettes, temporal inverse, key frames, sharing |
 //! | `planner` | the [`Planner`], which puts a plan together from the choices |
+//! | `tracks` | where frames show given points of the scene |
 //! | [`uniforms`] | the numbers of a frame as the renderers read them |
 //! | `describe` | the plan as text and as JSON |
 //!
@@ -40,6 +41,7 @@ mod ir;
 mod picture_error;
 mod planner;
 mod source_error;
+mod tracks;
 pub mod uniforms;
 mod view;
 
@@ -62,4 +64,5 @@ pub use ir::{
 };
 pub use planner::Planner;
 pub use source_error::pixel_truth::{FrameRays, PixelHit, PixelTruth};
+pub use tracks::{Sighting, Tracks};
 pub use view::lens_reach::LensReach;

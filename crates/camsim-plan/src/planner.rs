@@ -8,6 +8,7 @@ use camsim_core::{
     camera::{CameraModel, ZoomTable},
     frame::RowRecord,
     mount::CameraPath,
+    pose::CameraPose,
     row_time::FrameCamera,
     scenario::{Channel, FlowInstant, Preset},
     sequence::Sequence,
@@ -34,6 +35,7 @@ use crate::{
         pixel_truth::FrameRays,
         temporal_method::{TemporalMethod, is_of_twist},
     },
+    view::surfaces::Surfaces,
 };
 use steps::Draft;
 
@@ -219,6 +221,19 @@ impl Planner {
         FrameRays::new(self.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
     }
 
+    /// The surfaces of the scene.
+    pub(crate) fn surfaces(&self) -> &Surfaces {
+        &self.inputs.scene.surfaces
+    }
+
+    /// The camera of a frame at the mid-exposure of its centre.
+    pub(crate) fn middle_view(&self, frame: u64) -> Result<(Arc<CameraModel>, f64, CameraPose), PlanError> {
+        let (path, camera, stamp_s) = self.camera_at(frame as i64)?;
+        let (first_s, last_s) = self.inputs.shutter.window_s();
+        let t_s = stamp_s + 0.5 * (first_s + last_s);
+        Ok((camera, t_s, path.pose(t_s)))
+    }
+
     /// The camera of a frame with the poses of its rows, for frames of any number.
     ///
     /// # Errors
@@ -234,14 +249,7 @@ impl Planner {
     /// As [`Planner::frame_camera`].
     pub fn global_camera(&self, frame: i64, instant: FlowInstant) -> Result<FrameCamera, PlanError> {
         let (path, camera, stamp_s) = self.camera_at(frame)?;
-        let shutter = &self.inputs.shutter;
-        let last = shutter.lines() - 1;
-        let [first_s, last_s] = [shutter.dt_row_s(0), shutter.dt_row_s(last)];
-        let dt_s = match instant {
-            FlowInstant::FirstRow => first_s.min(last_s),
-            FlowInstant::Centre => 0.5 * (first_s + last_s),
-            FlowInstant::LastRow => first_s.max(last_s),
-        };
+        let dt_s = self.inputs.shutter.dt_instant_s(instant);
         Ok(FrameCamera::global(path, camera, stamp_s + dt_s))
     }
 

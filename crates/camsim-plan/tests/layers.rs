@@ -8,8 +8,8 @@ use std::{
 };
 
 /// From the lowest to the highest.
-const LAYERS: [&str; 8] =
-    ["ir", "view", "source_error", "picture_error", "choose", "planner", "uniforms", "describe"];
+const LAYERS: [&str; 9] =
+    ["ir", "view", "source_error", "picture_error", "choose", "planner", "tracks", "uniforms", "describe"];
 const MOST_LINES_OF_FILE: usize = 400;
 const MOST_LINES_OF_FUNCTION: usize = 60;
 /// In a function that is longer than that, before its reason.

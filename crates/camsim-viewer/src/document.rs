@@ -282,7 +282,17 @@ fn path_keys(tree: &Table) -> Vec<String> {
             (0..count).map(|index| format!("{list}.{index}.{leaf}")).collect()
         }
     });
-    expanded.collect()
+    let mixed = keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::WordsOrTables(_)));
+    let tables = mixed.flat_map(|(key, kind)| match get_key(tree, key) {
+        Some(Value::String(text)) if kind.is_path(text) => vec![(*key).to_owned()],
+        Some(Value::Array(list)) => {
+            let is_path = |element: &Value| element.as_str().is_some_and(|text| kind.is_path(text));
+            let paths = list.iter().enumerate().filter(|(_, element)| is_path(element));
+            paths.map(|(index, _)| format!("{key}.{index}")).collect()
+        }
+        _ => Vec::new(),
+    });
+    expanded.chain(tables).collect()
 }
 
 /// The value of a dotted key.

@@ -31,7 +31,7 @@ pub struct ExportJob {
 /// Progress of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// Number of finished frames.
+    /// Number of finished pictures.
     pub done: u64,
     /// How it ended: a summary, or an error; `None` while it runs.
     pub ended: Option<Result<String, String>>,
@@ -72,7 +72,14 @@ impl ExportJob {
         job
     }
 
-    /// Counts a finished frame; returns whether to continue.
+    /// Number of pictures: the frames, and those of their twins.
+    pub fn pictures(&self) -> u64 {
+        let frames = self.frames[1].saturating_sub(self.frames[0]);
+        let twins = self.scenario.output.twin.iter();
+        frames * (1 + twins.map(|twin| u64::from(twin.instants.unwrap_or(1))).sum::<u64>())
+    }
+
+    /// Counts a finished picture; returns whether to continue.
     pub fn tick(&self) -> bool {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).done += 1;
         self.request_repaint();
@@ -98,7 +105,7 @@ impl ExportJob {
     /// first includes setup.
     pub fn remaining_s(&self) -> Option<f64> {
         let done = self.progress().done;
-        let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;
+        let left = self.pictures().checked_sub(done)?;
         (done >= 2).then(|| left as f64 * self.began.elapsed().as_secs_f64() / done as f64)
     }
 

@@ -30,6 +30,9 @@ const ANY: [f64; 2] = [-1e9, 1e9];
 /// Range of keys that are not negative.
 const POSITIVE: [f64; 2] = [0.0, 1e9];
 
+/// Range of classes of objects.
+const CLASS: [f64; 2] = [1.0, 65_535.0];
+
 /// The description of a key.
 pub fn find(key: &str) -> Option<&'static Param> {
     PARAMS.iter().find(|param| param.key == key)
@@ -221,6 +224,8 @@ pub const PARAMS: &[Param] = &[
         "stored value of white, if the orthophoto does not use all bits",
     ),
     param("scene.terrain.beyond", "", ANY, 1.0, "appearance of terrain beyond the orthophoto"),
+    param("scene.terrain.name", "", ANY, 1.0, "name of the object in objects.csv; default: terrain"),
+    param("scene.terrain.class", "", CLASS, 0.2, "class of the object, 1 to 65535"),
     param(
         "scene.pattern.image",
         "",
@@ -230,6 +235,8 @@ pub const PARAMS: &[Param] = &[
     ),
     param("scene.pattern.width_m", "m", POSITIVE, 1.0, "width of the pattern on the ground"),
     param("scene.pattern.at", "m", ANY, 1.0, "centre of the pattern: the origin, or north, east, down"),
+    param("scene.pattern.name", "", ANY, 1.0, "name of the object in objects.csv; default: pattern"),
+    param("scene.pattern.class", "", CLASS, 0.2, "class of the object, 1 to 65535"),
     param("scene.board.target", "", ANY, 1.0, "Kalibr's target YAML, in place of the keys below"),
     param("scene.board.kind", "", ANY, 1.0, "kind of calibration board"),
     param(
@@ -263,6 +270,8 @@ pub const PARAMS: &[Param] = &[
     param("scene.board.at", "m", ANY, 0.1, "middle of the board: the origin, or north, east, down"),
     param("scene.board.geodetic", "deg deg m", ANY, 0.1, "middle of the board: latitude, longitude, height"),
     param("scene.board.angles_deg", "deg", ANY, 0.1, "roll, pitch, yaw; 0 0 0 is face up, pitch 90 upright"),
+    param("scene.board.name", "", ANY, 1.0, "name of the object in objects.csv; default: board"),
+    param("scene.board.class", "", CLASS, 0.2, "class of the object, 1 to 65535"),
     param("scene.gltf", "", ANY, 1.0, "models, each at one place or at those of a placement table"),
     param("scene.gltf.file", "", ANY, 1.0, "model file, .gltf or .glb"),
     param("scene.gltf.at", "m", ANY, 0.1, "position of the model: the origin, or north, east, down"),
@@ -274,6 +283,10 @@ pub const PARAMS: &[Param] = &[
     param("scene.gltf.scene", "", [0.0, 1e6], 0.1, "index of the scene in the file"),
     param("scene.gltf.time_s", "s", ANY, 0.01, "time of the animation"),
     param("scene.gltf.animation", "", [0.0, 1e6], 0.1, "index of the animation in the file"),
+    param("scene.gltf.name", "", ANY, 1.0, "name of the object in objects.csv; default: the file's"),
+    param("scene.gltf.class", "", CLASS, 0.2, "class of the object, 1 to 65535"),
+    param("scene.gltf.objects", "", ANY, 1.0, "what an object is: each copy, or its nodes or materials"),
+    param("scene.gltf.classes", "", ANY, 1.0, "classes by name of node or material"),
     param("scene.gltf.motion.poses", "", ANY, 1.0, "CSV table of poses by time, in place of a path"),
     param("scene.gltf.motion.path", "m", ANY, 1.0, "points that the model passes: north, east, down"),
     param("scene.gltf.motion.speed_m_s", "m/s", POSITIVE, 0.1, "speed along the path"),
@@ -377,6 +390,41 @@ pub const PARAMS: &[Param] = &[
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
+    param(
+        "output.flow_step",
+        "frames",
+        [1.0, 1e6],
+        0.1,
+        "frames from one to the other of flow and flow-back",
+    ),
+    param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow-global leads to"),
+    param("output.palette", "", ANY, 1.0, "pictures of object and class in colour"),
+    param(
+        "output.tracks.points",
+        "",
+        ANY,
+        1.0,
+        "points whose pixel tracks.csv has for every frame: terrain, vertices, board, tables (.csv)",
+    ),
+    param("output.tracks.count", "", [1.0, 1e6], 10.0, "most points of terrain, vertices and board, each"),
+    param(
+        "output.twin",
+        "",
+        ANY,
+        1.0,
+        "the same frames by a better camera, each twin in a folder of its own",
+    ),
+    param("output.twin.name", "", ANY, 1.0, "name of the twin's folder"),
+    param("output.twin.exposure", "", ANY, 1.0, "off: an instant in place of the exposure, no motion blur"),
+    param("output.twin.shutter", "", ANY, 1.0, "global: all pixels at one instant"),
+    param("output.twin.instant", "", ANY, 1.0, "mid-exposure that a global shutter shows"),
+    param("output.twin.lens", "", ANY, 1.0, "off: a pinhole with the same focal length and principal point"),
+    param("output.twin.noise", "", ANY, 1.0, "off: no noise"),
+    param("output.twin.vignette", "", ANY, 1.0, "off: no vignette"),
+    param("output.twin.ideal", "", ANY, 1.0, "no exposure, rolling shutter, lens, noise or vignette"),
+    param("output.twin.instants", "", [1.0, 1000.0], 0.1, "pictures in a burst for each frame"),
+    param("output.twin.over", "", ANY, 1.0, "what the instants of a burst are spread over"),
+    param("output.twin.channels", "", ANY, 1.0, "channels of the twin; those of the frame if none is chosen"),
 ];
 
 #[cfg(test)]

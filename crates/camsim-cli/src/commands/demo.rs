@@ -54,6 +54,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let warnings = &loaded.warnings;
     let job = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder,
         frames: &frames,
         shard: None,
@@ -68,7 +69,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         &job,
         &mut EngineSource::new(&engine, &loaded.sequence)?,
         console,
-        &mut |finished| {
+        &mut |_, finished| {
             if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
                 thumbnails.push(finished.frame.clone());
             }
@@ -84,11 +85,11 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let both = [render_one(&engine, &flawless, middle)?, render_one(&engine, &loaded.sequence, middle)?];
     contact_sheet(&pair, &both, 2, 1).or_failed()?;
 
-    let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
+    let (seconds, folder_name) = (outcome.time.as_secs_f64(), folder.display());
     console.line(format_args!(
-        "{} frames in {seconds:.2} s, {rate:.1} frames/s, in {}",
-        outcome.frames,
-        folder.display()
+        "{} in {seconds:.2} s, {}, in {folder_name}",
+        outcome.pictures(),
+        outcome.rate()
     ))?;
     console.line(format_args!("  {}/   linear EXR and sRGB PNG", folder.join("color").display()))?;
     console.line(format_args!("  {}/    time and pose of each row", folder.join("rows").display()))?;

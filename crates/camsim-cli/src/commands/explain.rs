@@ -1,5 +1,7 @@
 //! `camsim explain`: the plan of one frame, without rendering it.
 
+mod twins;
+
 use camsim_core::{
     scenario::{Auto, LightSpec, Solver},
     scene::{self, ModelLod, SceneLods, TerrainDetail, TerrainTiles, TexelForm, tile_bytes},
@@ -52,6 +54,8 @@ struct ExplainReport<'a> {
     level_of_detail: Option<LevelOfDetail>,
     models: Option<ModelFacts>,
     memory: Option<MemoryFacts>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    twins: Vec<twins::TwinReport<'a>>,
 }
 
 /// The frame to which the source coordinates x, y of `coords` refer, with the names of `frames.csv`.
@@ -175,6 +179,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         .or_bad_input()?;
     let planner = planner.with_capabilities(engine.capabilities());
     let plan = planner.plan(args.frame).or_bad_input()?;
+    let twins = twins::plans(&loaded.sequence, &planner, args.frame)?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
     let models = models(&loaded.sequence, &plan);
@@ -197,6 +202,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
             level_of_detail,
             models,
             memory,
+            twins: twins.iter().map(twins::TwinPlan::report).collect(),
         })?);
     }
     let [first_s, last_s] = log.span_s;
@@ -251,7 +257,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
              {finest_triangles} triangles at the finest level"
         ))?;
     }
-    Ok(())
+    twins::print(&twins, console)
 }
 
 /// Level of detail that the ideal pass chooses for its middle key frame.

@@ -1,7 +1,7 @@
 //! `camsim info`.
 
 use camsim_engine::{AdapterChoice, Engine};
-use camsim_gpu::context::{AdapterSummary, adapters};
+use camsim_gpu::{AdapterSummary, context::adapters};
 use serde::Serialize;
 
 use crate::{backend::BackendArgs, console::Console, failure::Failure};

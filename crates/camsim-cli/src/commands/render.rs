@@ -26,8 +26,10 @@ use crate::{
 ///
 /// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv
 /// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json,
-/// which repeats the run: `camsim render DIR/run.json`. Paths in these files are relative to them, so a
-/// folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
+/// which repeats the run: `camsim render DIR/run.json`; with [output.tracks], points.csv and tracks.csv (the
+/// exact pixel of points of the scene in each frame). Each twin of the frames ([[output.twin]]) has a folder of
+/// its own among them, with frames.csv, camera.toml and run.json. Paths in these files are relative to them, so
+/// a folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
 /// command that resumes the run.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -137,6 +139,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let resume_command = console.command_with("--resume");
     let job = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder: &folder,
         frames: &frames,
         shard: args.shard,
@@ -158,8 +161,8 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         Box::new(engine_source)
     };
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let mut on_frame = |finished: &Finished| {
-        times.add(&finished.times);
+    let mut on_frame = |twin: Option<&str>, finished: &Finished| {
+        times.add(twin, &finished.times);
         ControlFlow::Continue(())
     };
     let outcome = render_run::run(&job, &mut *source, console, &mut on_frame).inspect_err(|failure| {
@@ -168,13 +171,12 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         }
     })?;
     if !console.is_quiet() {
-        let kept =
-            if outcome.skipped > 0 { format!(" ({} existed)", outcome.skipped) } else { String::new() };
-        let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
-        let size_mb = outcome.bytes as f64 * 1e-6;
-        let (frames, folder) = (outcome.frames, folder.display());
+        let (seconds, size_mb) = (outcome.time.as_secs_f64(), outcome.bytes as f64 * 1e-6);
         console.line(format_args!(
-            "{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"
+            "{} in {seconds:.2} s, {}, {size_mb:.1} MB in {}",
+            outcome.pictures(),
+            outcome.rate(),
+            folder.display()
         ))?;
     }
     if args.times {

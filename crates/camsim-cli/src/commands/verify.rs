@@ -5,8 +5,9 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     reference::{
-        CoordErrors, DEPTH_TOLERANCE, Disocclusion, ErrorStats, ErrorVerdict, IdealView, Oracle,
-        RenderOptions, TruthErrors, coord_errors, disocclusion, image_errors, silhouettes, truth_errors,
+        CoordErrors, DEPTH_TOLERANCE, Disocclusion, ErrorStats, ErrorVerdict, IdealView,
+        NORMAL_TOLERANCE_RAD, Oracle, PlaneErrors, RenderOptions, TruthErrors, coord_errors, disocclusion,
+        image_errors, is_compared, plane_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, Channel, Solver},
 };
@@ -26,6 +27,9 @@ use crate::{
 /// Number of frames to verify by default.
 const DEFAULT_FRAMES: u64 = 5;
 
+/// Channels from which errors of sources, depths and points are measured.
+const MEASURED: [Channel; 2] = [Channel::Color, Channel::Coords];
+
 /// Measure the errors of frames against the reference renderer, and compare them with the predicted errors
 ///
 /// The source error is the distance, in pixels of the ideal frame, between the source that was used for a
@@ -44,6 +48,8 @@ const DEFAULT_FRAMES: u64 = 5;
 /// Depth and point (north, east, down) of every pixel, silhouettes included, are compared with the surface
 /// that the pixel's exact ray hits. A depth or point that is off by more than 0.1 % of the depth is a fault
 /// if no surface within quality.max_error_px of the pixel's centre has it. A single fault gives exit code 1.
+/// The channels range, normal, normal-world, object and class are compared in the same way if output.channels
+/// has them: a range may be off by 0.1 %, a normal by 0.1 degrees, and a number not at all.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -84,6 +90,8 @@ struct Verified {
     measured: Measured,
     /// Errors of depths and points; `None` for solvers that compute sources without exact depths.
     truth: Option<Truth>,
+    /// Errors of the channels range, normal, object and class, where the scenario asks for them.
+    planes: Vec<PlaneTruth>,
     /// Level of detail of the terrain.
     level_of_detail: Option<LevelOfDetail>,
     /// Whether the frame's 99th percentile is within the tolerance.
@@ -124,6 +132,44 @@ struct Truth {
     points_beyond: u64,
     point_faults: u64,
     point_max: Option<f64>,
+}
+
+/// Errors of a truth channel. `null` if sky and surface are confused.
+#[derive(Serialize)]
+struct PlaneTruth {
+    channel: &'static str,
+    /// Whether every value belongs to a surface near the pixel's ray.
+    kept: bool,
+    pixels: u64,
+    /// Number of wrong values: of a range by 0.1 %, of a normal by 0.1 degrees.
+    beyond: u64,
+    /// Number of those that are not beside a border between objects.
+    beyond_away: u64,
+    /// Number of those that belong to no surface near the pixel's ray.
+    faults: u64,
+    /// Of ranges relative, of normals in degrees; absent for numbers.
+    p99: Option<f64>,
+    max: Option<f64>,
+}
+
+impl From<PlaneErrors> for PlaneTruth {
+    fn from(errors: PlaneErrors) -> Self {
+        let is_normal = matches!(errors.channel, Channel::Normal | Channel::NormalWorld);
+        let has_size = is_normal || errors.channel == Channel::Range;
+        let size = |error: f64| {
+            (has_size && error.is_finite()).then_some(if is_normal { error.to_degrees() } else { error })
+        };
+        Self {
+            channel: errors.channel.name(),
+            kept: errors.faults == 0,
+            pixels: errors.pixels,
+            beyond: errors.beyond,
+            beyond_away: errors.beyond_away,
+            faults: errors.faults,
+            p99: size(errors.p99),
+            max: size(errors.max),
+        }
+    }
 }
 
 impl From<TruthErrors> for Truth {
@@ -189,7 +235,7 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let engine = args.backend.open()?;
     check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;
     let adapter = engine.to_string();
-    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
+    let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
     let tolerance_px = scenario.quality.max_error_px;
     let tolerance_dn = scenario.quality.max_error_dn;
     let mut report = VerifyReport { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
@@ -208,7 +254,8 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         let verified = verify(frame, &mut session, &oracle, tolerance_px, args.pictures)?;
         report.kept &= verified.kept
             && verified.picture.as_ref().is_none_or(|picture| picture.kept)
-            && verified.truth.as_ref().is_none_or(|truth| truth.kept);
+            && verified.truth.as_ref().is_none_or(|truth| truth.kept)
+            && verified.planes.iter().all(|plane| plane.kept);
         if !args.json {
             print(&verified, tolerance_dn, console)?;
         }
@@ -229,11 +276,14 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
             .collect();
         frames.join(", ")
     };
-    let has_truth_fault = |frame: &Verified| frame.truth.as_ref().is_some_and(|truth| !truth.kept);
+    let has_truth_fault = |frame: &Verified| {
+        frame.truth.as_ref().is_some_and(|truth| !truth.kept) || frame.planes.iter().any(|plane| !plane.kept)
+    };
     if report.frames.iter().all(|frame| frame.kept) && report.frames.iter().any(has_truth_fault) {
         let frames = frames_where(&has_truth_fault);
         return Err(Failure::failed(anyhow!(
-            "frame {frames}: depths or points belong to no surface within {tolerance_px} px of their pixel"
+            "frame {frames}: depths, points or other truth belong to no surface within {tolerance_px} px of their \
+             pixel"
         )));
     }
     let Some(first) = report.frames.iter().find(|frame| !frame.kept) else {
@@ -313,8 +363,10 @@ fn verify(
     let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px)
         .filter(|_| is_exact)
         .map(Truth::from);
+    let planes = planes(frame, session, oracle, tolerance_px)?;
     Ok(Verified {
         frame,
+        planes,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
         kept: p99_px <= tolerance_px,
         truth,
@@ -336,6 +388,27 @@ fn verify(
         },
         picture,
     })
+}
+
+/// Errors of the channels that the scenario asks for. They are rendered by themselves: depths and coordinates
+/// beside them are those of rays, and would hide the errors of the sources.
+fn planes(
+    frame: u64,
+    session: &mut Session<'_>,
+    oracle: &Oracle,
+    tolerance_px: f64,
+) -> Result<Vec<PlaneTruth>, Failure> {
+    let sequence = session.scene_planner().sequence().clone();
+    let asked = sequence.scenario.output.channels.iter().copied().filter(|&channel| is_compared(channel));
+    let asked: Vec<Channel> = asked.collect();
+    if asked.is_empty() {
+        return Ok(Vec::new());
+    }
+    session.renew::<Infallible>(sequence.clone(), &[&MEASURED[..], &asked].concat())?;
+    let done = render_at_phase(session, frame, 0.0)?;
+    session.renew::<Infallible>(sequence, &MEASURED)?;
+    let errors = plane_errors(oracle, done.plan.frame, &done.frame, tolerance_px);
+    Ok(errors.into_iter().map(PlaneTruth::from).collect())
 }
 
 /// Exposure phases to measure besides mid-exposure: the begin, the middles between two pairs of nodes, where
@@ -450,6 +523,9 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
     if let Some(truth) = &verified.truth {
         console.line(format_args!("       | {}", describe_truth(truth)))?;
     }
+    for plane in &verified.planes {
+        console.line(format_args!("       | {}", describe_plane(plane)))?;
+    }
     if let Some(Picture { rms_dn, predicted_dn, kept, psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) =
         &verified.picture
     {
@@ -491,6 +567,26 @@ fn describe_truth(truth: &Truth) -> String {
          {point_faults}: {}",
         largest(depth_max),
         largest(point_max),
+        if *kept { "kept" } else { "FAULTS" }
+    )
+}
+
+fn describe_plane(plane: &PlaneTruth) -> String {
+    let PlaneTruth { channel, kept, pixels, beyond, beyond_away, faults, max, .. } = plane;
+    let largest = match (*channel, max) {
+        ("object" | "class", _) => String::new(),
+        (_, None) => " (largest error: sky instead of surface)".to_owned(),
+        ("range", Some(max)) => format!(" (largest error {:.3} %)", 100.0 * max),
+        (_, Some(max)) => format!(" (largest error {max:.3} deg)"),
+    };
+    let allowed = match *channel {
+        "object" | "class" => "wrong".to_owned(),
+        "range" => format!("off by more than {} %", 100.0 * DEPTH_TOLERANCE),
+        _ => format!("off by more than {:.1} deg", NORMAL_TOLERANCE_RAD.to_degrees()),
+    };
+    format!(
+        "{channel} {allowed}: {beyond} of {pixels} pixels{largest}, {beyond_away} of them away from borders of \
+         objects, {faults} on no surface near the pixel's ray: {}",
         if *kept { "kept" } else { "FAULTS" }
     )
 }

@@ -42,6 +42,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let warnings = &loaded.warnings;
     let run = Job {
         sequence: &loaded.sequence,
+        tracks: &loaded.tracks,
         folder,
         frames: &frames,
         shard: None,
@@ -57,10 +58,11 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
         engine = Engine::open(Backend::Auto)?;
         Box::new(EngineSource::new(&engine, &loaded.sequence)?)
     };
-    let mut on_frame = |_: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let mut on_frame =
+        |_: Option<&str>, _: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
     let outcome = render_run::run(&run, &mut *source, &mut console, &mut on_frame)?;
-    let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
-    Ok(format!("{} frames in {seconds:.1} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))
+    let seconds = outcome.time.as_secs_f64();
+    Ok(format!("{} in {seconds:.1} s, {}, in {}", outcome.pictures(), outcome.rate(), folder.display()))
 }
 
 #[cfg(test)]

@@ -8,12 +8,11 @@ use std::{
 use anyhow::anyhow;
 use camsim_core::scenario::Scenario;
 use camsim_io::{
-    inputs::Inputs,
-    manifest::{BY_OTHER_SCENARIO, ResumeError, check_resume, check_resume_key},
-    write::FrameFiles,
+    manifest::{BY_OTHER_SCENARIO, ResumeError, check_burst, check_resume, check_resume_key},
+    write::{FrameFiles, unlisted_frame_files},
 };
 
-use super::Job;
+use super::{Job, pictures::Pictures};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -28,48 +27,52 @@ pub enum FolderState {
     Replaced,
 }
 
-/// Checks the folder with [`folder_state`], and prints warnings.
+/// Checks the folder of pictures with [`folder_state`], and prints warnings.
 pub fn check(
     job: &Job<'_>,
-    files: &FrameFiles,
-    inputs: &Inputs,
+    pictures: &Pictures,
     adapter: &str,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    match folder_state(job, files, inputs)? {
-        FolderState::Replaced if job.frames.iter().any(|&frame| files.exist(frame)) => {
+    match folder_state(job, pictures)? {
+        FolderState::Replaced if pictures.any_exists(job.frames) => {
             console.warn(format_args!(
                 "{} belongs to another scenario, or its input files have changed: its frames are replaced",
-                job.folder.display()
+                pictures.folder.display()
             ));
         }
-        FolderState::Ours if job.resume => warn_of_adapter(job, adapter, console),
+        FolderState::Ours if job.resume => warn_of_adapter(&pictures.folder, adapter, console),
         _ => {}
     }
     Ok(())
 }
 
 /// Determines the state of a folder. Frames of different scenarios never mix in one folder.
-pub fn folder_state(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Result<FolderState, Failure> {
-    let error = match check_resume(job.folder, &job.sequence.scenario, inputs) {
-        Ok(true) => return Ok(FolderState::Ours),
-        Ok(false) => None,
-        Err(error) => Some(error),
-    };
-    match error {
-        // Other files of the same frames do not contradict each other.
-        Some(ResumeError::Differs { made: BY_OTHER_SCENARIO, differences, .. })
-            if !job.resume && differences.iter().all(|text| is_of_files(text)) =>
-        {
-            Ok(FolderState::Ours)
+pub fn folder_state(job: &Job<'_>, pictures: &Pictures) -> Result<FolderState, Failure> {
+    let folder = &pictures.folder;
+    let checked = check_resume(folder, &pictures.sequence.scenario, &pictures.inputs);
+    let is_burst_of_others = check_burst(folder, pictures.twin.as_ref()).err();
+    // Other files of the same frames do not contradict each other.
+    let is_ours = match &checked {
+        Ok(is_ours) => *is_ours,
+        Err(ResumeError::Differs { made: BY_OTHER_SCENARIO, differences, .. }) => {
+            !job.resume && differences.iter().all(|text| is_of_files(text))
         }
+        Err(_) => false,
+    };
+    if is_ours && is_burst_of_others.is_none() {
+        return Ok(FolderState::Ours);
+    }
+    let error = checked.err().filter(|_| !is_ours).or(is_burst_of_others);
+    match error {
         Some(error) if job.resume => Err(Failure::bad_input(error)),
         Some(error @ ResumeError::Differs { .. }) => {
-            refuse_others(job.frames, files, &error.reason())?;
+            refuse_files(&pictures.files_of_others(job.frames), &error.reason())?;
             Ok(FolderState::Replaced)
         }
         _ => {
-            refuse_unknown(job.folder, job.frames, files, job.resume)?;
+            let others = pictures.files_of_others(job.frames);
+            refuse_origin(folder, &others, job.resume && pictures.any_exists(job.frames))?;
             Ok(FolderState::Replaced)
         }
     }
@@ -77,12 +80,17 @@ pub fn folder_state(job: &Job<'_>, files: &FrameFiles, inputs: &Inputs) -> Resul
 
 /// Whether a key only selects files, without changing their contents.
 fn is_of_files(difference: &str) -> bool {
-    ["output.channels was ", "output.format was "].iter().any(|key| difference.starts_with(key))
+    ["output.channels was ", "output.format was ", "output.palette was ", "output.tracks"]
+        .iter()
+        .any(|key| difference.starts_with(key))
 }
 
 /// Refuses a folder with frame files other than those that will be replaced.
-pub fn refuse_others(frames: &[u64], files: &FrameFiles, why: &str) -> Result<(), Failure> {
-    let others = files.unlisted_frame_files(frames);
+pub fn refuse_others(folder: &Path, frames: &[u64], files: &FrameFiles, why: &str) -> Result<(), Failure> {
+    refuse_files(&unlisted_frame_files(folder, &files.paths(frames)), why)
+}
+
+fn refuse_files(others: &[String], why: &str) -> Result<(), Failure> {
     let Some(first) = others.first() else { return Ok(()) };
     let count = others.len();
     Err(Failure::bad_input(anyhow!(
@@ -98,18 +106,23 @@ pub fn refuse_unknown(
     files: &FrameFiles,
     is_resumed: bool,
 ) -> Result<(), Failure> {
+    let others = unlisted_frame_files(folder, &files.paths(frames));
+    refuse_origin(folder, &others, is_resumed && frames.iter().any(|&frame| files.exist(frame)))
+}
+
+fn refuse_origin(folder: &Path, others: &[String], would_keep: bool) -> Result<(), Failure> {
     let unknown = format!("{} has frames, but no run.json that describes their origin", folder.display());
-    if is_resumed && frames.iter().any(|&frame| files.exist(frame)) {
+    if would_keep {
         return Err(Failure::bad_input(anyhow!(
             "{unknown}: render without --resume, or into another folder"
         )));
     }
-    refuse_others(frames, files, &unknown)
+    refuse_files(others, &unknown)
 }
 
-fn warn_of_adapter(job: &Job<'_>, adapter: &str, console: &mut Console<'_>) {
+fn warn_of_adapter(folder: &Path, adapter: &str, console: &mut Console<'_>) {
     if let Err(ResumeError::Differs { path, .. }) =
-        check_resume_key(job.folder, "adapter", "by another adapter", &adapter)
+        check_resume_key(folder, "adapter", "by another adapter", &adapter)
     {
         console.warn(format_args!(
             "{} was rendered by another adapter than {adapter}: existing frames are kept, and differ from \

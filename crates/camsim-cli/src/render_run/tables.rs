@@ -1,21 +1,31 @@
 //! Tables beside the frames: `camera.toml`, the trajectories, `frames.csv`.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use anyhow::anyhow;
 use camsim_core::{
-    mount::CameraPath, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory,
+    mount::CameraPath,
+    scenario::{Channel, Scenario},
+    sequence::Sequence,
+    shutter::Shutter,
+    trajectory::Trajectory,
 };
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord,
-        camera_trajectory_csv, frames_path, trajectory_csv, write_atomic,
+        CameraRecord, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, WriteError,
+        camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic,
     },
 };
 use camsim_plan::{FramePlan, Planner};
 
-use super::Job;
+use super::{
+    Job,
+    pictures::{Pictures, Series},
+};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -23,6 +33,36 @@ use crate::{
 
 /// Most rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
 const MOST_TRAJECTORY_ROWS: f64 = 10e6;
+
+/// The table of objects.
+const OBJECTS_CSV: &str = "objects.csv";
+
+/// Whether a scenario writes numbers of objects or classes.
+fn numbers_objects(scenario: &Scenario) -> bool {
+    let of_objects = |channel: &Channel| matches!(channel, Channel::Object | Channel::Class);
+    scenario.output.channels.iter().any(of_objects) && !scenario.output.format.is_empty()
+}
+
+/// Removes the table of objects of another scenario.
+pub fn remove_objects(folder: &Path) -> Result<(), Failure> {
+    let path = folder.join(OBJECTS_CSV);
+    match std::fs::remove_file(&path) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::Io { path, source }).or_failed()
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes `objects.csv` if numbers of objects or classes are written.
+pub fn write_objects(pictures: &Pictures) -> Result<(), Failure> {
+    let sequence = &pictures.sequence;
+    if !numbers_objects(&sequence.scenario) {
+        return Ok(());
+    }
+    let objects = objects_csv(&sequence.scene.objects);
+    write_atomic(&pictures.folder.join(OBJECTS_CSV), objects.as_bytes()).or_failed()
+}
 
 /// Writes `camera.toml` and the trajectories, which depend on the scenario only.
 pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -58,38 +98,43 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
 }
 
 /// Rows of this scenario in the folder's `frames.csv`.
-pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
-    let path = frames_path(job.folder);
-    let mut table = if is_ours { FrameTable::read(&path) } else { FrameTable::default() };
-    table.retain_existing(job.folder, &|_| false);
+pub fn begin_frames(pictures: &Pictures, is_ours: bool) -> Result<(), Failure> {
+    let path = frames_path(&pictures.folder);
+    let has_instants = pictures.has_instants();
+    let mut table =
+        if is_ours { FrameTable::read(&path, has_instants) } else { FrameTable::new(has_instants) };
+    table.retain_existing(&pictures.folder, &|_, _| false);
     table.write(&path).or_failed()
 }
 
 /// Updates `frames.csv`: rows of other runs stay with their files, `made` are those of this run, and frames
 /// whose run did not write its rows get them from their plans. Without frame files (`format = []`) the rows
-/// are those of the rendered frames.
+/// are those of the rendered frames. `series` is the last one that was rendered, with its planner. Returns the
+/// frames that the table lists.
 pub fn end_frames(
-    job: &Job<'_>,
-    files: &FrameFiles,
+    pictures: &Pictures,
+    series: &Series,
     planner: &Planner,
-    made: &BTreeMap<u64, SourceFrame>,
-) -> Result<(), Failure> {
-    let path = frames_path(job.folder);
-    let mut table = FrameTable::read(&path);
-    let writes = !job.sequence.scenario.output.format.is_empty();
-    for (&frame, source) in made.iter().filter(|(frame, _)| !writes || files.exist(**frame)) {
-        table.insert(&record(job.sequence, files, planner, frame, *source));
-    }
-    for frame in
-        (0..job.sequence.frames).filter(|&frame| writes && files.exist(frame) && !made.contains_key(&frame))
-    {
-        if !table.has_files(frame, &files.names(frame)) {
+    made: &BTreeMap<(u64, Option<u32>), SourceFrame>,
+) -> Result<BTreeSet<u64>, Failure> {
+    let path = frames_path(&pictures.folder);
+    let mut table = FrameTable::read(&path, pictures.has_instants());
+    let Series { sequence, files } = series;
+    let instant = files.instant();
+    let writes = !sequence.scenario.output.format.is_empty();
+    let made_here = |frame: u64| made.get(&(frame, instant));
+    for frame in (0..sequence.frames).filter(|&frame| !writes || files.exist(frame)) {
+        if let Some(source) = made_here(frame) {
+            table.insert(&record(series, planner, frame, *source));
+        } else if writes && !table.has_files(frame, instant, &files.names(frame)) {
             let plan = planner.plan(frame).or_bad_input()?;
-            table.insert(&record(job.sequence, files, planner, frame, source_frame(job.sequence, &plan)));
+            table.insert(&record(series, planner, frame, source_frame(sequence, &plan)));
         }
     }
-    table.retain_existing(job.folder, &|frame| !writes && made.contains_key(&frame));
-    table.write(&path).or_failed()
+    table
+        .retain_existing(&pictures.folder, &|frame, instant| !writes && made.contains_key(&(frame, instant)));
+    table.write(&path).or_failed()?;
+    Ok(table.frames().collect())
 }
 
 /// The frame to which the source coordinates of a plan refer.
@@ -97,16 +142,12 @@ pub fn source_frame(sequence: &Sequence, plan: &FramePlan) -> SourceFrame {
     SourceFrame::new(plan, sequence.epoch_ns)
 }
 
-fn record(
-    sequence: &Sequence,
-    files: &FrameFiles,
-    planner: &Planner,
-    frame: u64,
-    source: SourceFrame,
-) -> FrameRecord {
+fn record(series: &Series, planner: &Planner, frame: u64, source: SourceFrame) -> FrameRecord {
+    let Series { sequence, files } = series;
     let stamp_s = planner.stamp_s(frame);
     FrameRecord {
         frame,
+        instant: files.instant(),
         stamp_ns: stamp_ns(sequence.epoch_ns, stamp_s),
         pose: sequence.path.pose(stamp_s),
         source,

@@ -97,7 +97,7 @@ fn invalid_input_is_refused_with_place_and_remedy() {
         (vec!["lens", &camera, "distort", "--points", &words], "line 2: v is `two`"),
         (vec!["lens", &camera, "undistort", "--points", &words], "x_px,y_px"),
         (vec!["lens", &camera, "distort", "--points", "nowhere.csv"], "nowhere.csv"),
-        (vec!["camera", "import", &words], "known are"),
+        (vec!["camera", "import", &words], "supported are"),
         (vec!["camera", "import", &words, "--format", "blender"], "kalibr"),
         (vec!["compare", &picture, &other], "acircles.png"),
         (vec!["compare", &picture, "nowhere.png"], "nowhere.png"),

@@ -215,7 +215,8 @@ impl MeshBvh {
             .map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
         let [red, green, blue, alpha]: [f64; 4] = [0, 1, 2, 3]
             .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].tint[k])).sum());
-        let hit = hit_at(ray, t, weights, vertices.map(|vertex| vertex.uv), triangle.surface);
+        let uv = vertices.map(|vertex| vertex.uv);
+        let hit = hit_at(ray, t, weights, uv, triangle.corners, triangle.surface);
         let alpha = cover.holes.as_ref().map_or(1.0, |(coat, _)| coat.alpha_at(hit.texture_uv) * alpha);
         let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray));
         Some((Hit { tint: [red, green, blue].map(|part| part * lit), ..hit }, alpha))
@@ -260,11 +261,27 @@ fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
     mesh.shape.normals.iter().map(standing).collect()
 }
 
-/// The hit of a ray on a triangle.
-pub(super) fn hit_at(ray: &Ray, t: f64, weights: [f64; 3], uv: [[f32; 2]; 3], surface: u32) -> Hit {
+/// The hit of a ray on a triangle with these corners.
+pub(super) fn hit_at(
+    ray: &Ray,
+    t: f64,
+    weights: [f64; 3],
+    uv: [[f32; 2]; 3],
+    [a, b, c]: [DVec3; 3],
+    surface: u32,
+) -> Hit {
+    let normal = (b - a).cross(c - b).normalize_or_zero();
+    let normal_ned = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
     let texture_uv =
         [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
-    Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, tint: [1.0; 3], surface }
+    Hit {
+        point_ned_m: ray.origin + t * ray.direction,
+        depth_m: t,
+        texture_uv,
+        tint: [1.0; 3],
+        normal_ned,
+        surface,
+    }
 }
 
 /// Splits at the median triangle along the longest side of the box around the triangles' centres.

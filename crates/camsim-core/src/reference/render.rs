@@ -17,7 +17,8 @@ use crate::{
 
 /// Steps of the additive low-discrepancy sequences in 3 and 2 dimensions: powers of 1/g with `g^4 = g + 1`,
 /// and of 1/g with `g^3 = g + 1` (Roberts, the R sequences).
-const EVEN_3D: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
+pub(super) const EVEN_3D: [f64; 3] =
+    [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
 const EVEN_2D: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 /// Samples per batch; the error is estimated from the means of batches.
 const BATCH: u32 = 8;
@@ -27,8 +28,8 @@ const BATCHES_A_CHECK: u32 = 4;
 /// Channels of a frame of the oracle, and the accuracy to which it is refined.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel; the others
-    /// are always present.
+    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel, those of
+    /// [`super::is_rendered`] another one, and [`Channel::Coverage`] 256; the others are always present.
     pub channels: Vec<Channel>,
     /// Least number of samples of each pixel; rounded up to 32.
     pub min_samples: u32,
@@ -161,7 +162,7 @@ impl Oracle {
             depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
             coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
             rows: self.row_records(frame),
-            planes: Vec::new(),
+            planes: self.planes(frame, options),
         };
         (rendered, convergence)
     }
@@ -348,7 +349,7 @@ impl<'a> SamplePoses<'a> {
 }
 
 /// Three pseudo-random numbers in 0..1 (splitmix64).
-fn shifts(key: u64) -> [f64; 3] {
+pub(super) fn shifts(key: u64) -> [f64; 3] {
     let mut state = key;
     std::array::from_fn(|_| {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -147,5 +147,6 @@ fn first_in_block(terrain: &Terrain, block: [u32; 2], ray: &Ray, mut limit: f64)
         let [i, j] = [i0 + i as u32, j0 + j as u32];
         terrain.vertices[(span.first_vertex + j * (span.cells[0] + 1) + i) as usize].uv
     });
-    Some(hit_at(ray, t, weights, uv, TERRAIN))
+    let corners = corners.map(|[i, j]| terrain.position_ned_m(chunk, i0 + i as u32, j0 + j as u32));
+    Some(hit_at(ray, t, weights, uv, corners, TERRAIN))
 }

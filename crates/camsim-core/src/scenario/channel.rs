@@ -31,6 +31,9 @@ pub enum Channel {
     Object,
     /// Class of the object, as the scenario gives it; 0 = none.
     Class,
+    /// Share of the pixel's area and exposure that the object of [`Self::Object`] has, 0 to 1; 0 without a
+    /// ray.
+    Coverage,
     /// Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows,
     /// shows the point that the pixel sees. With a state.
     Flow,
@@ -75,7 +78,7 @@ pub enum FlowState {
 
 impl Channel {
     /// All channels.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Color,
         Self::Depth,
         Self::Valid,
@@ -86,6 +89,7 @@ impl Channel {
         Self::NormalWorld,
         Self::Object,
         Self::Class,
+        Self::Coverage,
         Self::Flow,
         Self::FlowBack,
         Self::FlowGlobal,
@@ -107,6 +111,7 @@ impl Channel {
             Self::NormalWorld => "normal-world",
             Self::Object => "object",
             Self::Class => "class",
+            Self::Coverage => "coverage",
             Self::Flow => "flow",
             Self::FlowBack => "flow-back",
             Self::FlowGlobal => "flow-global",
@@ -124,6 +129,7 @@ impl Channel {
             Self::Range => Some(PlaneKind::Float(&["range"])),
             Self::Normal => Some(PlaneKind::Float(&["x", "y", "z"])),
             Self::NormalWorld => Some(PlaneKind::Float(&["n", "e", "d"])),
+            Self::Coverage => Some(PlaneKind::Float(&["coverage"])),
             Self::Object | Self::Class => Some(PlaneKind::Index),
             Self::Flow | Self::FlowBack | Self::FlowGlobal => Some(PlaneKind::Float(FLOW)),
             Self::Motion => Some(PlaneKind::Float(&["vx", "vy"])),
@@ -144,7 +150,7 @@ impl Channel {
     }
 }
 
-/// Instant of the picture that `flow-global` leads to.
+/// Instant of a picture with a global shutter: that `flow-global` leads to, or a twin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FlowInstant {

@@ -1,6 +1,6 @@
 //! `[scene]`: the contents of the scene.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -77,6 +77,12 @@ pub struct TerrainSpec {
     /// Ground outside of the ortho-image.
     #[serde(default)]
     pub beyond: Beyond,
+    /// Name of the object in `objects.csv`; `terrain` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Class of the object, 1 to 65535; left out: 0, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
 }
 
 /// Unit of heights.
@@ -127,6 +133,12 @@ pub struct PatternSpec {
     /// Centre: `"origin"` or `[north_m, east_m, down_m]`.
     #[serde(default)]
     pub at: PatternCentre,
+    /// Name of the object in `objects.csv`; `pattern` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Class of the object, 1 to 65535; left out: 0, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
 }
 
 /// `scene.board`: a calibration board, by its parameters or by a target file of Kalibr.
@@ -180,6 +192,12 @@ pub struct BoardSpec {
     /// upright and faces a viewer who looks north.
     #[serde(default)]
     pub angles_deg: [f64; 3],
+    /// Name of the object in `objects.csv`; `board` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Class of the object, 1 to 65535; left out: 0, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
 }
 
 /// `[[scene.gltf]]`: a model, placed once or by a table.
@@ -218,9 +236,41 @@ pub struct GltfSpec {
     /// Index of the animation; by default all animations together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<u32>,
+    /// Name of its objects in `objects.csv`; the file's name without ending by default. The k-th row of a
+    /// placement table (from 1) gives `name#k`, and each node or material `name/node`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Class of its objects, 1 to 65535; left out: 0, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<u16>,
+    /// What an object is.
+    #[serde(default, skip_serializing_if = "ObjectsOf::is_default")]
+    pub objects: ObjectsOf,
+    /// Classes, 1 to 65535, of nodes (and all below them) or of materials, by name, in place of `class`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub classes: BTreeMap<String, u16>,
     /// How it moves; by default it stands still.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSpec>,
+}
+
+/// What an object of a model is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectsOf {
+    /// Each placed copy.
+    #[default]
+    Placement,
+    /// Each node with a mesh, of each placed copy.
+    Node,
+    /// Each material, of each placed copy.
+    Material,
+}
+
+impl ObjectsOf {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 fn one() -> f64 {

@@ -10,6 +10,8 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod motion;
 mod scene;
+mod tracks;
+mod twins;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -46,6 +48,8 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_camera(&mut check, &scenario.camera);
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
+    tracks::check_tracks(&mut check, scenario);
+    twins::check_twins(&mut check, scenario);
     check.problems
 }
 
@@ -296,6 +300,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
     });
+    check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
+        "must be at least 1: flow leads from frame i to frame i + flow_step".into()
+    });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
     });
@@ -349,15 +356,16 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::path::PathBuf;
 
     use super::*;
     use crate::scenario::{
-        BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
+        BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, ObjectsOf, PatternSpec, SceneSpec,
+        VibrationSpec, ZoomSpec,
     };
 
-    fn good() -> Scenario {
+    pub(crate) fn good() -> Scenario {
         Scenario {
             seed: 0,
             flight: FlightSpec {
@@ -379,6 +387,8 @@ mod tests {
                     image: "grid.png".into(),
                     width_m: 100.0,
                     at: Default::default(),
+                    name: None,
+                    class: None,
                 }),
                 ..Default::default()
             },
@@ -399,6 +409,10 @@ mod tests {
             scene: None,
             time_s: None,
             animation: None,
+            name: None,
+            class: None,
+            objects: Default::default(),
+            classes: Default::default(),
             motion: None,
         }
     }
@@ -492,6 +506,17 @@ mod tests {
                 s.scene.board =
                     Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
             }),
+            ("scene.pattern.class", |s| s.scene.pattern.iter_mut().for_each(|p| p.class = Some(0))),
+            ("scene.gltf.0.name", |s| {
+                s.scene.gltf = vec![GltfSpec { name: Some(String::new()), ..model() }];
+            }),
+            ("scene.gltf.0.classes", |s| {
+                s.scene.gltf = vec![GltfSpec { classes: [("roof".into(), 1)].into(), ..model() }];
+            }),
+            ("scene.gltf.0.classes.roof", |s| {
+                let classes = [("roof".into(), 0)].into();
+                s.scene.gltf = vec![GltfSpec { classes, objects: ObjectsOf::Node, ..model() }];
+            }),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("scene.light.sun_azimuth_deg", |s| {
@@ -561,6 +586,7 @@ mod tests {
                 s.quality.solver = Auto::Value(Solver::Rk2);
             }),
             ("output.channels", |s| s.output.channels.clear()),
+            ("output.flow_step", |s| s.output.flow_step = 0),
         ];
         for (key, edit) in cases {
             let mut scenario = good();

@@ -20,12 +20,14 @@ use rayon::prelude::*;
 use crate::general::{FineSamples, IdealImage};
 
 mod mips;
+mod moving;
 mod shade;
 #[cfg(test)]
 mod tests;
 mod trace;
 
 use mips::MipChain;
+pub use moving::{Instant, MovingCaster, RayScratch};
 use shade::{KeyCamera, SurfaceShader};
 use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
 
@@ -157,6 +159,7 @@ impl<'a> FrameCaster<'a> {
             camera: KeyCamera::new(&plan.ideal, &key.pose, scale),
             reads: plan.surface_reads,
             fog_per_m: visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
+            posed: &[],
         };
         Self { trees: &cast.trees, shader }
     }
@@ -239,7 +242,8 @@ impl<'a> FrameCaster<'a> {
     }
 
     fn trace(&self, position_px: DVec2, hits: &mut Hits) {
-        self.trees.trace(self.shader.scene, &self.shader.camera.ray(position_px), NEAR_M, hits);
+        let ray = self.shader.camera.ray(position_px);
+        self.trees.trace(self.shader.scene, self.shader.posed, &ray, NEAR_M, hits);
     }
 
     /// 0 of the sky, 1/m.

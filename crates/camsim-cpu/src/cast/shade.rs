@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{Prefilter, PrefilterTaps, Scene, Wrap},
+    scene::{Mesh, Prefilter, PrefilterTaps, Scene, Wrap},
     temporal::IdealGeometry,
 };
 use glam::{DMat2, DVec2, DVec3, Vec3, Vec4};
 
 use super::{
     mips::{MipChain, Sampling},
+    moving::PosedMesh,
     trace::{SceneRay, Triangle, terrain_position},
 };
 
@@ -45,6 +46,20 @@ impl KeyCamera {
         }
     }
 
+    /// With positions in units of `step_uv` from the optical axis, tangents.
+    pub fn with_steps(pose: &CameraPose, step_uv: DVec2) -> Self {
+        Self {
+            position_ned_m: pose.position_ned_m,
+            focal_px: step_uv.recip(),
+            principal_px: DVec2::ZERO,
+            steps_ned: [
+                pose.ned_from_camera * DVec3::X * step_uv.x,
+                pose.ned_from_camera * DVec3::Y * step_uv.y,
+            ],
+            axis_ned: pose.ned_from_camera * DVec3::Z,
+        }
+    }
+
     /// The ray of a position; its parameter is planar depth, metres.
     pub fn ray(&self, position_px: DVec2) -> SceneRay {
         let DVec2 { x, y } = position_px - self.principal_px;
@@ -70,6 +85,8 @@ pub(super) struct SurfaceShader<'a> {
     pub reads: PrefilterTaps,
     /// Extinction, 1/m.
     pub fog_per_m: f64,
+    /// Meshes that are elsewhere than in the scene.
+    pub posed: &'a [PosedMesh],
 }
 
 /// The plane of a triangle at a position.
@@ -114,6 +131,12 @@ impl PlanePoint {
 }
 
 impl SurfaceShader<'_> {
+    /// A mesh where it is.
+    pub fn mesh(&self, number: usize) -> &Mesh {
+        let posed = self.posed.iter().find(|posed| posed.number as usize == number);
+        posed.map_or(&self.scene.meshes[number], |posed| &posed.mesh)
+    }
+
     pub fn sky(&self) -> Vec3 {
         Vec3::from_array(self.scene.sky_linear)
     }
@@ -146,7 +169,7 @@ impl SurfaceShader<'_> {
         ray: &SceneRay,
         position_px: DVec2,
     ) -> Option<Vec4> {
-        let mesh = &self.scene.meshes[number];
+        let mesh = self.mesh(number);
         let (material, corners) = (&mesh.material, triangle.corners);
         let points = corners.map(|corner| mesh.position_ned_m(corner));
         let uvs = corners.map(|corner| uv_of(mesh.shape.vertices[corner as usize].uv));

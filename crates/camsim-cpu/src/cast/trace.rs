@@ -7,6 +7,8 @@ use camsim_core::scene::{
 };
 use glam::{DMat3, DVec3};
 
+use super::moving::PosedMesh;
+
 /// Two hits of blended triangles of one mesh are one where they share an edge: difference of their ray
 /// parameters, relative, and barycentric weight of the corner beside that edge.
 const SAME_EDGE: f64 = 1e-9;
@@ -82,59 +84,77 @@ impl MeshHit {
 impl SceneTrees {
     pub fn new(scene: &Scene) -> Self {
         let mut known: HashMap<*const Shape, Arc<RayBvh>> = HashMap::new();
+        // What moves is met where it is at the instant of the ray.
+        let still = |(bounds, mesh): (Aabb, &Mesh)| if mesh.motion.is_some() { Aabb::EMPTY } else { bounds };
+        let bounds: Vec<Aabb> = scene.mesh_bounds().into_iter().zip(&scene.meshes).map(still).collect();
         let mut tree = |mesh: &Mesh| {
             let shape = &mesh.shape;
             known.entry(Arc::as_ptr(shape)).or_insert_with(|| Arc::new(shape_tree(shape))).clone()
         };
         Self {
-            meshes: RayBvh::new(&scene.mesh_bounds()),
+            meshes: RayBvh::new(&bounds),
             shapes: scene.meshes.iter().map(&mut tree).collect(),
             shape_from_ned: scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect(),
         }
     }
 
-    /// Everything that a ray meets from `t_min` on up to the first opaque surface.
-    pub fn trace(&self, scene: &Scene, ray: &SceneRay, t_min: f64, hits: &mut Hits) {
+    /// Everything that a ray meets from `t_min` on up to the first opaque surface. Meshes of `posed` are where
+    /// they are there, and not in the scene.
+    pub fn trace(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay, t_min: f64, hits: &mut Hits) {
         let origin_ned_m = ray.origin_ned_m + t_min * ray.direction_ned;
-        let direction_ned = ray.direction_ned;
+        let ray = SceneRay { origin_ned_m, direction_ned: ray.direction_ned };
         let terrain = scene.terrain.as_ref();
         let ground =
-            terrain.and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
-        let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
+            terrain.and_then(|terrain| terrain.intersect(origin_ned_m, ray.direction_ned, f64::INFINITY));
+        let mut limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         hits.blended.clear();
         let blended = RefCell::new(&mut hits.blended);
-        let first = self.meshes.first(origin_ned_m, direction_ned, limit, |number, limit| {
-            let mesh = &scene.meshes[number as usize];
-            let shape_from_ned = self.shape_from_ned[number as usize];
-            let origin = shape_from_ned * (origin_ned_m - mesh.origin_ned_m);
-            // Boxes are met in the shape's own axes, triangles where they stand.
-            self.shapes[number as usize].first(
-                origin,
-                shape_from_ned * direction_ned,
-                limit,
-                |triangle, limit| {
-                    let first = 3 * triangle as usize;
-                    let corners = [0, 1, 2].map(|k| mesh.shape.indices[first + k]);
-                    let points = corners.map(|corner| mesh.position_ned_m(corner));
-                    let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
-                    let [a, b, c] = points;
-                    if mesh.material.one_sided && (b - a).cross(c - a).dot(direction_ned) >= 0.0 {
-                        return None;
-                    }
-                    let hit = MeshHit { t, mesh: number, corners, weights };
-                    if mesh.material.blends {
-                        blended.borrow_mut().push(hit);
-                        return None;
-                    }
-                    has_depth(mesh, &hit).then_some((t, hit))
-                },
-            )
+        let mut first = self.meshes.first(origin_ned_m, ray.direction_ned, limit, |number, limit| {
+            let (mesh, shape_from_ned) =
+                (&scene.meshes[number as usize], &self.shape_from_ned[number as usize]);
+            self.meet(number, mesh, shape_from_ned, &ray, limit, &blended)
         });
+        for PosedMesh { number, mesh, shape_from_ned } in posed {
+            limit = first.map_or(limit, |(t, _)| t);
+            first = self.meet(*number, mesh, shape_from_ned, &ray, limit, &blended).or(first);
+        }
         let ground = ground.map(|hit| OpaqueHit::Terrain(TerrainHit { t: hit.t + t_min, ..hit }));
         let mesh = first.map(|(_, hit)| OpaqueHit::Mesh(MeshHit { t: hit.t + t_min, ..hit }));
         hits.opaque = mesh.or(ground);
         hits.blended.iter_mut().for_each(|hit| hit.t += t_min);
         hits.sort();
+    }
+
+    /// First opaque hit of a mesh before `limit`. Boxes are met in the shape's own axes, triangles where they
+    /// stand; blended ones are added to `blended`.
+    fn meet(
+        &self,
+        number: u32,
+        mesh: &Mesh,
+        shape_from_ned: &DMat3,
+        ray: &SceneRay,
+        limit: f64,
+        blended: &RefCell<&mut Vec<MeshHit>>,
+    ) -> Option<(f64, MeshHit)> {
+        let SceneRay { origin_ned_m, direction_ned } = *ray;
+        let origin = *shape_from_ned * (origin_ned_m - mesh.origin_ned_m);
+        let direction = *shape_from_ned * direction_ned;
+        self.shapes[number as usize].first(origin, direction, limit, |triangle, limit| {
+            let first = 3 * triangle as usize;
+            let corners = [0, 1, 2].map(|k| mesh.shape.indices[first + k]);
+            let points = corners.map(|corner| mesh.position_ned_m(corner));
+            let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
+            let [a, b, c] = points;
+            if mesh.material.one_sided && (b - a).cross(c - a).dot(direction_ned) >= 0.0 {
+                return None;
+            }
+            let hit = MeshHit { t, mesh: number, corners, weights };
+            if mesh.material.blends {
+                blended.borrow_mut().push(hit);
+                return None;
+            }
+            has_depth(mesh, &hit).then_some((t, hit))
+        })
     }
 }
 

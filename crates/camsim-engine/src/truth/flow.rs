@@ -85,19 +85,18 @@ pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
 /// Displacement of the point that a pixel sees at the begin and at the end of its exposure, pixels; 0 where
 /// the camera of that instant does not show it.
 pub(super) fn blur_path(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 4] {
-    let plan = pixels.plan;
-    let path = &pixels.planner.sequence().path;
-    let [x, y] = pixel.position;
-    let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-    let from_px = DVec2::from_array(pixel.position.map(f64::from));
-    let point = world_point(pixels, pixel);
-    let moved = |phase: f64| {
-        let t_s = mid_s + phase * plan.shutter.exposure_s();
-        let shown = plan.camera.show(&path.pose(t_s), t_s, point);
-        shown.map_or(DVec2::ZERO, |(px, _)| px - from_px).as_vec2().to_array()
-    };
+    let moved = |phase| moved_px(pixels, pixel, phase).unwrap_or_default().as_vec2().to_array();
     let ([x0, y0], [x1, y1]) = (moved(-0.5), moved(0.5));
     [x0, y0, x1, y1]
+}
+
+/// Displacement of the point that a pixel sees at an exposure phase, -0.5 to 0.5, pixels; `None` where the
+/// camera of that instant does not show it.
+pub(super) fn moved_px(pixels: &FramePixels<'_>, pixel: Pixel<'_>, phase: f64) -> Option<DVec2> {
+    let from_px = DVec2::from_array(pixel.position.map(f64::from));
+    let (t_s, pose) = pixels.rays.camera_at(pixel.position, phase);
+    let shown = pixels.plan.camera.show(&pose, t_s, world_point(pixels, pixel));
+    shown.map(|(px, _)| px - from_px)
 }
 
 #[cfg(test)]

@@ -9,7 +9,10 @@ use camsim_plan::{FramePlan, FrameRays, PixelHit, PlanError, Planner, uniforms::
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::flow::{FlowTarget, blur_path, flow, motion};
+use super::{
+    coverage::coverage,
+    flow::{FlowTarget, blur_path, flow, motion},
+};
 
 /// What is known of the pixels of a frame.
 pub(crate) struct FramePixels<'a> {
@@ -96,6 +99,7 @@ pub(crate) fn planes(pixels: &FramePixels<'_>, channels: &[Channel]) -> Result<V
             Channel::NormalWorld => pixels.normal(false),
             Channel::Object => pixels.indices(scene, Scene::object_of_surface),
             Channel::Class => pixels.indices(scene, Scene::class_of_surface),
+            Channel::Coverage => PlaneValues::Float(coverage(pixels)),
             Channel::Flow => flow_to(frame + step)?,
             Channel::FlowBack => flow_to(frame - step)?,
             Channel::FlowGlobal => {

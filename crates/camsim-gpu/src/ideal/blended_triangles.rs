@@ -12,11 +12,7 @@ use camsim_core::{
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{IdealSlot, draw_surfaces::index_buffer, surface_pipelines::SurfacePipelines};
-use crate::{
-    context::{GpuContext, GpuError},
-    recorder::Recorder,
-    upload::SceneBuffers,
-};
+use crate::{adapter::GpuError, context::GpuContext, recorder::Recorder, upload::SceneBuffers};
 
 const FEWER_TRIANGLES: &str =
     "have fewer triangles with alphaMode BLEND, or make those MASK whose alpha is 0 or 1";

@@ -9,7 +9,8 @@ use glam::DVec3;
 
 use super::{IdealSlot, surface_pipelines::SurfacePipelines, triangles_near_edges::SelectedTriangles};
 use crate::{
-    context::{GpuContext, GpuError},
+    adapter::GpuError,
+    context::GpuContext,
     layout::MeshPlacement,
     recorder::Recorder,
     tiles::TilePool,

@@ -448,8 +448,8 @@ mod tests {
             let module = naga::front::wgsl::parse_str(&text)
                 .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             // Alpha masks are evaluated per sample: all but the oldest adapters support it.
-            let holes = name.starts_with("ideal/mesh_holes");
-            let capabilities = if holes {
+            let is_masked = name.starts_with("ideal/mesh_masked");
+            let capabilities = if is_masked {
                 naga::valid::Capabilities::MULTISAMPLED_SHADING
             } else {
                 naga::valid::Capabilities::empty()

@@ -3,11 +3,7 @@
 use camsim_core::temporal::IdealGeometry;
 
 use super::readback::TextureReadback;
-use crate::{
-    context::{GpuContext, GpuError},
-    ideal::IdealTarget,
-    recorder::Recorder,
-};
+use crate::{adapter::GpuError, context::GpuContext, ideal::IdealTarget, recorder::Recorder};
 
 /// Number of copies: one for the frame at work, one for the frame in flight after it.
 const COPY_COUNT: usize = 2;

@@ -6,7 +6,7 @@ use super::{
     GpuSession,
     readback::{read_buffer, read_texture},
 };
-use crate::{context::GpuError, ideal::SRGB_FORMAT};
+use crate::{adapter::GpuError, ideal::SRGB_FORMAT};
 
 /// Geometry, linear R G B A (A is 0 at edge pixels), and inverse depth in 1/m of an ideal frame, row-major.
 pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);

@@ -6,7 +6,7 @@ use std::{
     thread::{Builder, available_parallelism},
 };
 
-use crate::context::{GpuContext, GpuError};
+use crate::{adapter::GpuError, context::GpuContext};
 
 /// An output buffer and its copy that the CPU reads.
 #[derive(Debug)]

@@ -112,11 +112,6 @@ impl Asset {
         self.json.pointer(&pointer).and_then(Value::as_bool).unwrap_or(true)
     }
 
-    /// Name of a node.
-    pub fn node_name(&self, node: usize) -> Option<&str> {
-        self.json.pointer(&format!("/nodes/{node}/name")).and_then(Value::as_str)
-    }
-
     /// The first four nodes that `KHR_node_visibility` hides, as messages name them.
     pub fn hidden_nodes(&self) -> Vec<String> {
         let hidden = self.document.nodes().map(|node| node.index()).filter(|&node| !self.is_visible(node));
@@ -138,6 +133,17 @@ impl Asset {
             Some(name) => format!("materials.{index} ({name})"),
             None => format!("materials.{index}"),
         }
+    }
+
+    /// The name that the file gives to a node or material; `nodes.3` without one.
+    pub fn name_of(&self, list: &str, index: usize) -> String {
+        self.given_name(list, index).map_or_else(|| format!("{list}.{index}"), str::to_owned)
+    }
+
+    /// The name that the file gives to a node or material, if it gives one.
+    pub fn given_name(&self, list: &str, index: usize) -> Option<&str> {
+        let name = self.json.pointer(&format!("/{list}/{index}/name")).and_then(Value::as_str);
+        name.filter(|name| !name.trim().is_empty())
     }
 
     /// Transforms of a node's instances by `EXT_mesh_gpu_instancing`; `None` without the extension.

@@ -179,7 +179,8 @@ impl<'a> Moving<'a> {
         let i = node.index();
         let parent_from_node = pose.parent_from_node(node);
         let (translation, rotation) = (self.translations.get(&i), self.rotations.get(&i));
-        let is_own = |spin: &&NodeSpin| spin.node.is_some() && spin.node.as_deref() == asset.node_name(i);
+        let is_own =
+            |spin: &&NodeSpin| spin.node.is_some() && spin.node.as_deref() == asset.given_name("nodes", i);
         let spins: Vec<&NodeSpin> = self.spins.iter().filter(is_own).collect();
         if translation.is_none() && rotation.is_none() && spins.is_empty() {
             return Ok((model_from_parent * parent_from_node, parent.clone()));
@@ -217,7 +218,7 @@ impl<'a> Moving<'a> {
             return Ok(());
         };
         let names: BTreeSet<&str> =
-            asset.document.nodes().filter_map(|node| asset.node_name(node.index())).collect();
+            asset.document.nodes().filter_map(|node| asset.given_name("nodes", node.index())).collect();
         let some: Vec<&str> = names.iter().copied().take(20).collect();
         let known = match (names.len(), some.len()) {
             (0, _) => "no node of its scene has a name".to_owned(),

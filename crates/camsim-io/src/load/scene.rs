@@ -16,6 +16,7 @@ use glam::DVec3;
 use super::{
     LoadError, height_conversions,
     motion::{carrier, model_motion},
+    objects::{ModelObjects, ObjectList, name_or},
     placements::{Placement, read_placements},
 };
 use crate::{
@@ -40,6 +41,7 @@ pub(super) fn load_scene(
         fog_visibility_m: spec.fog_visibility_m,
         ..Scene::default()
     };
+    let mut objects = ObjectList::default();
     let mut notes = Vec::new();
     let mut summary = None;
     if let Some(terrain) = &spec.terrain {
@@ -50,19 +52,23 @@ pub(super) fn load_scene(
         let shift = if shift_terrain { Some(&undulation_m as HeightShift<'_>) } else { None };
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
+        scene.terrain_object = objects.add(name_or(&terrain.name, "terrain"), terrain.class);
         summary = Some(loaded.summary);
         notes.extend(loaded.notes);
     }
+    // Pattern and board come before the models: the choice of tracked corners counts on it.
     if let Some(pattern) = &spec.pattern {
         let picture_error = |source| LoadError::Picture { key: "scene.pattern.image", source };
         let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(picture_error)?;
-        scene.meshes.push(Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m));
+        let object = objects.add(name_or(&pattern.name, "pattern"), pattern.class);
+        let mesh = Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m);
+        scene.meshes.push(Mesh { object, ..mesh });
     }
     if let Some(spec) = &spec.board {
-        scene.meshes.push(
-            read_board(spec)?
-                .mesh(board_position_ned_m(scenario, spec, log)?, ned_from_board(spec.angles_deg)),
-        );
+        let object = objects.add(name_or(&spec.name, "board"), spec.class);
+        let mesh = read_board(spec)?
+            .mesh(board_position_ned_m(scenario, spec, log)?, ned_from_board(spec.angles_deg));
+        scene.meshes.push(Mesh { object, ..mesh });
     }
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
         notes.push(
@@ -72,8 +78,9 @@ pub(super) fn load_scene(
         );
     }
     for spec in &spec.gltf {
-        notes.extend(add_model(scenario, log, spec, &mut scene)?);
+        notes.extend(add_model(scenario, log, spec, &mut scene, &mut objects)?);
     }
+    scene.objects = objects.into_objects();
     notes.extend(blended_triangles_note(&scene));
     let remaining = split_intersecting_blended(&mut scene.meshes).remaining;
     notes.extend((remaining > 0).then(|| {
@@ -108,6 +115,7 @@ fn add_model(
     log: &FlightLog,
     spec: &GltfSpec,
     scene: &mut Scene,
+    objects: &mut ObjectList,
 ) -> Result<Vec<String>, LoadError> {
     let number = |n: Option<u32>| n.map(|n| n as usize);
     let options = GltfOptions {
@@ -121,11 +129,14 @@ fn add_model(
         let notes = model.notes.iter().cloned().chain(left_out);
         notes.map(|note| format!("{}: {note}", spec.file.display())).collect()
     };
+    let model_objects = ModelObjects::new(spec, &model)?;
     if let Some(carrier) = carrier(scenario, log, spec, scene.terrain.as_ref())? {
         let position_ned_m = carrier.start().position_m;
         check_reach(spec, position_ned_m, model.radius_m * spec.scale)?;
         let heading_rad = spec.heading_deg.to_radians();
-        scene.meshes.extend(model.place_on(Some(&carrier), position_ned_m, heading_rad, spec.scale));
+        let placed = model.place_on(Some(&carrier), position_ned_m, heading_rad, spec.scale);
+        let numbers = model_objects.of_copy(1, objects);
+        scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
         return Ok(notes_of(None));
     }
     let placements = match &spec.placements {
@@ -133,7 +144,7 @@ fn add_model(
         Some(path) => read_placements(path, spec.on_ground)?,
     };
     let (all, mut without_ground) = (placements.len(), 0);
-    for Placement { position: (local, geodetic), heading_deg, scale } in placements {
+    for (row, Placement { position: (local, geodetic), heading_deg, scale }) in (1..).zip(placements) {
         let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a place of scene.gltf")?;
         if spec.on_ground {
             let ground = scene
@@ -156,11 +167,10 @@ fn add_model(
             position_ned_m.z = ground_down_m;
         }
         check_reach(spec, position_ned_m, model.radius_m * spec.scale * scale)?;
-        scene.meshes.extend(model.place(
-            position_ned_m,
-            (spec.heading_deg + heading_deg).to_radians(),
-            spec.scale * scale,
-        ));
+        let placed =
+            model.place(position_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale);
+        let numbers = model_objects.of_copy(row, objects);
+        scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
     }
     let left_out = (without_ground > 0)
         .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
@@ -219,7 +229,7 @@ fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
 
 /// Height of the geoid above the ellipsoid, metres. A sum of harmonics per vertex would take minutes, so each
 /// thread that reads terrain interpolates in a cached grid.
-fn undulation_m(lat_rad: f64, lon_rad: f64) -> f64 {
+pub(super) fn undulation_m(lat_rad: f64, lon_rad: f64) -> f64 {
     thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
     GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
 }

@@ -53,6 +53,13 @@ fn check_table(
                 *path = tree.resolve(&indexed_key, path).to_string_lossy().into_owned();
                 None
             }
+            (Some(kind @ ValueKind::WordsOrTables(words)), value) => {
+                let problem = type_problem(schema, &key, kind, value);
+                if problem.is_none() {
+                    resolve_tables(tree, words, value, &indexed_key);
+                }
+                problem
+            }
             (Some(kind), value) => type_problem(schema, &key, kind, value),
             (None, Value::Table(table)) if schema.is_table(&key) => {
                 check_table(tree, schema, table, &indexed_key, &key, problems);
@@ -73,6 +80,19 @@ fn check_table(
         if *parent == key && !has(table, path) {
             problems.push((join(indexed_key, path), "is missing, and has no default; add it".into()));
         }
+    }
+}
+
+/// Resolves the paths of a value that is a word, the path of a table, or a list of these.
+fn resolve_tables(tree: &Tree, words: &[&str], value: &mut Value, indexed_key: &str) {
+    match value {
+        Value::String(text) if !words.contains(&text.as_str()) => {
+            *text = tree.resolve(indexed_key, text).to_string_lossy().into_owned();
+        }
+        Value::Array(array) => array.iter_mut().enumerate().for_each(|(i, element)| {
+            resolve_tables(tree, words, element, &join(indexed_key, &i.to_string()));
+        }),
+        _ => {}
     }
 }
 
@@ -111,6 +131,14 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
                 format!("a whole number, {min} to {max}"),
             )
         }
+        ValueKind::Numbered(min, max) => {
+            let range = i64::from(min)..=i64::from(max);
+            let is_number = |value: &Value| value.as_integer().is_some_and(|v| range.contains(&v));
+            (
+                value.as_table().is_some_and(|table| table.values().all(is_number)),
+                format!("a table of names with whole numbers, {min} to {max}, such as {{ roof = {min} }}"),
+            )
+        }
         ValueKind::CountOr(max, words) => {
             (count(value) || among(value, words), format!("a whole number up to {max} or {}", list(words)))
         }
@@ -136,6 +164,14 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         ValueKind::Words(words) => {
             (all(value, None, &|value| among(value, words)), format!("a list of any of {}", list(words)))
         }
+        ValueKind::WordsOrTables(words) => {
+            let ending = |path: &str| path.len() > 4 && path.to_ascii_lowercase().ends_with(".csv");
+            let fits = |value: &Value| among(value, words) || value.as_str().is_some_and(ending);
+            (
+                fits(value) || all(value, None, &fits),
+                format!("one of {} or a table \"NAME.csv\", or a list of these", list(words)),
+            )
+        }
         ValueKind::Unsupported => return Some("is not supported by this version; leave it out".into()),
     };
     if ok {
@@ -154,6 +190,7 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
     let hint = match kind {
         ValueKind::Word(words)
         | ValueKind::Words(words)
+        | ValueKind::WordsOrTables(words)
         | ValueKind::NumberOr(words)
         | ValueKind::CountOr(_, words) => written
             .iter()

@@ -2,10 +2,7 @@
 
 use serde_json::Value;
 
-use super::{
-    schema::{SCENARIO, ValueKind},
-    tree::join,
-};
+use super::{schema::SCENARIO, tree::join};
 
 /// Calls `visitor` for every path of a scenario, a tree of JSON, in the order of keys. Array elements have
 /// their index in the key.
@@ -23,7 +20,9 @@ fn visit(value: &mut Value, indexed_key: &str, key: &str, visitor: &mut dyn FnMu
             .iter_mut()
             .enumerate()
             .for_each(|(i, value)| visit(value, &join(indexed_key, &i.to_string()), key, visitor)),
-        Value::String(text) if SCENARIO.kind(key) == Some(ValueKind::Path) => visitor(indexed_key, text),
+        Value::String(text) if SCENARIO.kind(key).is_some_and(|kind| kind.is_path(text)) => {
+            visitor(indexed_key, text);
+        }
         _ => {}
     }
 }

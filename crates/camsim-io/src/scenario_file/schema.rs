@@ -2,7 +2,10 @@
 //! `frame_file` has the schema of FRAME.toml.
 
 use camsim_core::{
-    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
+    scenario::{
+        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
+        MAX_SIDE_PX, PointSource, TracksSpec,
+    },
     temporal::SAMPLES,
 };
 use camsim_plan::MAX_KEYS;
@@ -65,6 +68,10 @@ pub enum ValueKind {
     Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
+    /// A table of names of the user's, each with a whole number from the first to the last.
+    Numbered(u32, u32),
+    /// One of these words or the path of a CSV table, or a list of them.
+    WordsOrTables(&'static [&'static str]),
     /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
     /// Reserved; not supported by this version.
@@ -73,7 +80,28 @@ pub enum ValueKind {
 
 use ValueKind::*;
 
+/// Class of an object.
+const CLASS: ValueKind = Within(1, u16::MAX as u32);
 const AUTO: &[&str] = &["auto"];
+/// Channels of frames and of their twins.
+const CHANNELS: &[&str] = &[
+    "color",
+    "depth",
+    "valid",
+    "rows",
+    "coords",
+    "range",
+    "normal",
+    "normal-world",
+    "object",
+    "class",
+    "coverage",
+    "flow",
+    "flow-back",
+    "flow-global",
+    "motion",
+    "blur-path",
+];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
 /// Keys of a scenario.
@@ -136,9 +164,13 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.terrain.height_unit", Word(&["m", "ft", "us-ft"])),
     ("scene.terrain.ortho_white", Number),
     ("scene.terrain.beyond", Word(&["grey", "edge", "void"])),
+    ("scene.terrain.name", Text),
+    ("scene.terrain.class", CLASS),
     ("scene.pattern.image", Path),
     ("scene.pattern.width_m", Number),
     ("scene.pattern.at", NumbersOr(3, "origin")),
+    ("scene.pattern.name", Text),
+    ("scene.pattern.class", CLASS),
     ("scene.board.target", Path),
     ("scene.board.kind", Word(&["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"])),
     ("scene.board.columns", Within(1, 80)),
@@ -154,6 +186,8 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.board.at", NumbersOr(3, "origin")),
     ("scene.board.geodetic", Numbers(3)),
     ("scene.board.angles_deg", Numbers(3)),
+    ("scene.board.name", Text),
+    ("scene.board.class", CLASS),
     ("scene.gltf", Tables),
     ("scene.gltf.file", Path),
     ("scene.gltf.at", NumbersOr(3, "origin")),
@@ -165,6 +199,10 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.gltf.scene", Within(0, u32::MAX)),
     ("scene.gltf.time_s", Number),
     ("scene.gltf.animation", Within(0, u32::MAX)),
+    ("scene.gltf.name", Text),
+    ("scene.gltf.class", CLASS),
+    ("scene.gltf.objects", Word(&["placement", "node", "material"])),
+    ("scene.gltf.classes", Numbered(1, u16::MAX as u32)),
     ("scene.gltf.motion.poses", Path),
     ("scene.gltf.motion.path", Points(3)),
     ("scene.gltf.motion.speed_m_s", Number),
@@ -196,17 +234,33 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
-    ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
+    ("output.channels", Words(CHANNELS)),
     ("output.format", Words(&["exr", "png"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+    ("output.flow_step", Within(1, u32::MAX)),
+    ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.palette", Flag),
+    ("output.tracks.points", WordsOrTables(&PointSource::WORDS)),
+    ("output.tracks.count", Within(1, TracksSpec::MOST_POINTS)),
+    ("output.twin", Tables),
+    ("output.twin.name", Text),
+    ("output.twin.exposure", Flag),
+    ("output.twin.shutter", Word(&["global"])),
+    ("output.twin.instant", Word(&["first-row", "centre", "last-row"])),
+    ("output.twin.lens", Flag),
+    ("output.twin.noise", Flag),
+    ("output.twin.vignette", Flag),
+    ("output.twin.ideal", Flag),
+    ("output.twin.instants", Within(1, MAX_INSTANTS)),
+    ("output.twin.over", Word(&["exposure", "readout"])),
+    ("output.twin.channels", Words(CHANNELS)),
 ];
 
 /// Words that this version does not support.
-pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] =
-    &[("flight.format", "ulog"), ("output.channels", "flow")];
+pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[("flight.format", "ulog")];
 
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
@@ -221,8 +275,22 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),
+    ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
+    ("output.twin.name", "output.twin"),
 ];
+
+impl ValueKind {
+    /// Whether a text at a key of this kind is a path.
+    #[must_use]
+    pub fn is_path(self, text: &str) -> bool {
+        match self {
+            Path => true,
+            WordsOrTables(words) => !words.contains(&text),
+            _ => false,
+        }
+    }
+}
 
 impl Schema {
     /// The values that `key` takes; `None` if it is unknown.

@@ -1,8 +1,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, LoopKind, MotionSpec,
-    OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
+    Auto, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr, FlowInstant,
+    HeightUnit, LoopKind, MotionSpec, ObjectsOf, OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
+    TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -32,7 +33,7 @@ fn printed_default_has_the_default_values() {
 #[test]
 fn every_word_of_the_schema_deserialises() {
     for (key, kind) in KEYS {
-        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."]
+        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf.", "output.twin."]
             .iter()
             .any(|table| key.starts_with(table))
         {
@@ -70,6 +71,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
         "gltf",
         "fog_visibility_m",
         "light",
+        "tracks",
     ] {
         text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
     }
@@ -91,6 +93,19 @@ fn every_key_of_the_structs_is_in_the_schema() {
         "a saved scenario reads back"
     );
     scenario.camera.name = "left".into();
+    scenario.output.twin = vec![TwinSpec {
+        name: "sharp".into(),
+        exposure: Some(false),
+        shutter: Some(TwinShutter::Global),
+        instant: Some(FlowInstant::LastRow),
+        lens: Some(false),
+        noise: Some(false),
+        vignette: Some(false),
+        ideal: true,
+        instants: Some(3),
+        over: Some(BurstOver::Readout),
+        channels: Some(vec![Channel::Color]),
+    }];
     scenario.scene.board = Some(BoardSpec {
         target: Some("target.yaml".into()),
         kind: Some(BoardKind::Charuco),
@@ -102,9 +117,19 @@ fn every_key_of_the_structs_is_in_the_schema() {
         first_id: Some(1),
         margin_m: Some(1.0),
         geodetic: Some([47.0, 8.0, 400.0]),
+        name: Some("target".into()),
+        class: Some(9),
         ..board(1, 1, 1.0)
     });
+    scenario.output.palette = true;
+    scenario.output.channels.push(camsim_core::scenario::Channel::Object);
+    let terrain = scenario.scene.terrain.as_mut().unwrap();
+    (terrain.name, terrain.class) = (Some("ground".into()), Some(2));
+    let pattern = scenario.scene.pattern.as_mut().unwrap();
+    (pattern.name, pattern.class) = (Some("marks".into()), Some(3));
     let model = &mut scenario.scene.gltf[0];
+    (model.name, model.class, model.objects) = (Some("house".into()), Some(7), ObjectsOf::Node);
+    model.classes = [("roof".to_owned(), 8)].into();
     (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
     (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
     model.motion = Some(MotionSpec {
@@ -127,6 +152,29 @@ fn every_key_of_the_structs_is_in_the_schema() {
             !is_unsupported,
             "{key} stands in the schema but not in the struct, or the other way round"
         );
+    }
+}
+
+#[test]
+fn twins_are_read_and_their_problems_named_by_line() {
+    let with =
+        |twin: &str| parse(&format!("{GOOD}[camera.shutter]\nexposure_ms = 8\n[[output.twin]]\n{twin}\n"));
+    let scenario = with("name = \"burst\"\ninstants = 9\nchannels = [\"color\", \"flow-global\"]").unwrap();
+    let [twin] = scenario.output.twin.as_slice() else { panic!("one twin") };
+    assert_eq!((twin.name.as_str(), twin.instants), ("burst", Some(9)));
+    assert_eq!(twin.channels, Some(vec![Channel::Color, Channel::FlowGlobal]));
+    for (twin, wanted) in [
+        ("exposure = false", "output.twin.0.name: is missing"),
+        ("name = \"a\"\nexposre = false", "s.toml:10: output.twin.0.exposre: unknown key; did you mean"),
+        ("name = \"a\"\nshutter = \"globl\"", "s.toml:10: output.twin.0.shutter: expected one of \"global\""),
+        ("name = \"a/b\"\nlens = false", "s.toml:9: output.twin.0.name: is the name of a folder"),
+        (
+            "name = \"a\"\ninstant = \"last-row\"\nlens = false",
+            "s.toml:10: output.twin.0.instant: is that of",
+        ),
+    ] {
+        let error = with(twin).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
     }
 }
 
@@ -244,7 +292,7 @@ fn errors_name_file_line_and_key() {
             "[quality]\npreset = \"paper\"\nsolver = \"linear\"",
             "dir/s.toml:8: quality.solver: is rk2 with quality.preset",
         ),
-        ("[output]\nchannels = [\"color\", \"flow\"]", "\"flow\" is not supported by this version"),
+        ("[output]\nchannels = [\"color\", \"flaw\"]", "did you mean \"flow\"?"),
         ("[camera]\nfps = nan", "dir/s.toml:7: camera.fps: must be a finite number above 0"),
         (
             "[camera]\nmount = { vibration = [{ axis = \"roll\" }] }",

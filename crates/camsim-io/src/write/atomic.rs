@@ -3,7 +3,8 @@
 use std::{
     collections::{HashMap, HashSet},
     ffi::{OsStr, OsString},
-    fs, io,
+    fs::{self, File},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
 };
@@ -16,6 +17,14 @@ use super::WriteError;
 /// # Errors
 /// [`WriteError`] with the path, the error of the system and what to do.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    write_atomic_with(path, &mut |out| out.write_all(bytes))
+}
+
+/// As [`write_atomic`], for contents that `write` gives piece by piece.
+pub(super) fn write_atomic_with(
+    path: &Path,
+    write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), WriteError> {
     let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
     let name = path
         .file_name()
@@ -27,7 +36,12 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
     let temporary = folder.join(format!(".{}.{}-{unique}.tmp", name.to_string_lossy(), std::process::id()));
-    fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|source| {
+    let written = File::create(&temporary).and_then(|file| {
+        let mut out = BufWriter::new(file);
+        write(&mut out)?;
+        out.flush()
+    });
+    written.and_then(|()| fs::rename(&temporary, path)).map_err(|source| {
         // The first error is reported; failure to remove the temporary file does no harm.
         let _ = fs::remove_file(&temporary);
         fail(source)

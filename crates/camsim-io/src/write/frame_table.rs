@@ -22,11 +22,16 @@ pub const FRAMES_COLUMNS: &str = "\
                                   ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,\
                                   ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
+/// Column after [`FRAMES_COLUMNS`] in the table of a burst.
+const INSTANT_COLUMN: &str = ",instant";
+
 /// One row of `frames.csv`.
 #[derive(Clone, Debug)]
 pub struct FrameRecord {
     /// Frame number.
     pub frame: u64,
+    /// Number within the frame's burst; `None` for a frame by itself. One table has one kind only.
+    pub instant: Option<u32>,
     /// Stamp, nanoseconds.
     pub stamp_ns: i64,
     /// Pose of the camera at the stamp.
@@ -71,32 +76,53 @@ impl SourceFrame {
 pub struct FrameTable {
     /// Names of the columns of paths.
     columns: Vec<String>,
-    /// By frame number: the text before the paths, and the path of each column, empty where there is none.
-    rows: BTreeMap<u64, (String, Vec<String>)>,
+    /// By frame and number within its burst: the text before the paths, and the path of each column, empty
+    /// where there is none.
+    rows: BTreeMap<(u64, Option<u32>), (String, Vec<String>)>,
+    /// Whether it is of a burst.
+    has_instants: bool,
 }
 
 impl FrameTable {
+    /// An empty table, of the pictures of a burst or of frames.
+    #[must_use]
+    pub fn new(has_instants: bool) -> Self {
+        Self { has_instants, ..Self::default() }
+    }
+
     /// Reads a table; empty if the file does not exist or has other columns.
     #[must_use]
-    pub fn read(path: &Path) -> Self {
-        std::fs::read_to_string(path).ok().and_then(|text| Self::parse(&text)).unwrap_or_default()
+    pub fn read(path: &Path, has_instants: bool) -> Self {
+        std::fs::read_to_string(path)
+            .ok()
+            .and_then(|text| Self::parse(&text))
+            .filter(|table| table.has_instants == has_instants)
+            .unwrap_or_else(|| Self::new(has_instants))
     }
 
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
         let files = lines.next()?.strip_prefix(FRAMES_COLUMNS)?;
-        let columns: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
-        let value_columns = FRAMES_COLUMNS.split(',').count();
+        let burst =
+            files.strip_prefix(INSTANT_COLUMN).filter(|rest| rest.is_empty() || rest.starts_with(','));
+        let columns: Vec<String> = burst.unwrap_or(files).split(',').skip(1).map(str::to_owned).collect();
+        let has_instants = burst.is_some();
+        let value_columns = FRAMES_COLUMNS.split(',').count() + usize::from(has_instants);
         let row = |line: &str| {
             let (end, _) = line.match_indices(',').chain([(line.len(), "")]).nth(value_columns - 1)?;
             let (values, files) = line.split_at(end);
             let mut files: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
             files.resize(columns.len(), String::new());
-            Some((values.split(',').next()?.parse().ok()?, (values.to_owned(), files)))
+            let instant = match has_instants {
+                true => Some(values.rsplit(',').next()?.parse().ok()?),
+                false => None,
+            };
+            let frame = values.split(',').next()?.parse().ok()?;
+            Some(((frame, instant), (values.to_owned(), files)))
         };
         // A malformed line is dropped, so that its frame counts as missing.
         let rows = lines.filter_map(row).collect();
-        Some(Self { columns, rows })
+        Some(Self { columns, rows, has_instants })
     }
 
     /// Inserts or replaces the row of a frame. Paths in columns that `record` does not have are kept.
@@ -116,7 +142,10 @@ impl FrameTable {
         values += &format!(",{}", source.t_ns);
         push(&mut values, &source.pose.position_ned_m.to_array());
         push(&mut values, &wxyz(source.pose.ned_from_camera));
-        let row = self.rows.entry(record.frame).or_default();
+        if let Some(instant) = record.instant {
+            values += &format!(",{instant}");
+        }
+        let row = self.rows.entry((record.frame, record.instant)).or_default();
         row.0 = values;
         row.1.resize(self.columns.len(), String::new());
         for (column, file) in &record.files {
@@ -128,12 +157,12 @@ impl FrameTable {
 
     /// Removes the paths of files that do not exist below `folder`, rows without any path unless `also`
     /// selects their frame, and empty columns.
-    pub fn retain_existing(&mut self, folder: &Path, also: &dyn Fn(u64) -> bool) {
+    pub fn retain_existing(&mut self, folder: &Path, also: &dyn Fn(u64, Option<u32>) -> bool) {
         let columns = self.columns.len();
-        self.rows.retain(|frame, (_, files)| {
+        self.rows.retain(|(frame, instant), (_, files)| {
             files.resize(columns, String::new());
             files.iter_mut().filter(|file| !folder.join(file.as_str()).is_file()).for_each(String::clear);
-            files.iter().any(|file| !file.is_empty()) || also(*frame)
+            files.iter().any(|file| !file.is_empty()) || also(*frame, *instant)
         });
         let is_used = |column: usize| self.rows.values().any(|(_, files)| !files[column].is_empty());
         let used: Vec<bool> = (0..columns).map(is_used).collect();
@@ -147,13 +176,18 @@ impl FrameTable {
     /// Whether frame `index` has a row.
     #[must_use]
     pub fn contains(&self, index: u64) -> bool {
-        self.rows.contains_key(&index)
+        self.rows.contains_key(&(index, None))
     }
 
-    /// Whether frame `index` has a row with all of these files.
+    /// Numbers of the frames that have a row, ascending; of bursts, once for each picture.
+    pub fn frames(&self) -> impl Iterator<Item = u64> {
+        self.rows.keys().map(|(frame, _)| *frame)
+    }
+
+    /// Whether frame `index`, or a picture of its burst, has a row with all of these files.
     #[must_use]
-    pub fn has_files(&self, index: u64, files: &[(String, String)]) -> bool {
-        let Some((_, paths)) = self.rows.get(&index) else { return false };
+    pub fn has_files(&self, index: u64, instant: Option<u32>, files: &[(String, String)]) -> bool {
+        let Some((_, paths)) = self.rows.get(&(index, instant)) else { return false };
         let has = |column: &String, file: &String| {
             self.columns.iter().zip(paths).any(|(known, path)| known == column && path == file)
         };
@@ -171,6 +205,9 @@ impl FrameTable {
             }
             text.push('\n');
         };
+        if self.has_instants {
+            text += INSTANT_COLUMN;
+        }
         line(&mut text, &self.columns);
         for (values, files) in self.rows.values() {
             text.push_str(values);
@@ -214,7 +251,7 @@ mod tests {
         };
         let files =
             columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
-        FrameRecord { frame, stamp_ns: 9, pose, source, files }
+        FrameRecord { frame, instant: None, stamp_ns: 9, pose, source, files }
     }
 
     #[test]
@@ -248,7 +285,7 @@ mod tests {
             table
         };
         table_of(&[0, 2, 4]).write(&path).unwrap();
-        let mut table = FrameTable::read(&path);
+        let mut table = FrameTable::read(&path, false);
         [1, 3, 4].iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
         assert_eq!(table.to_csv(), table_of(&[0, 1, 2, 3, 4]).to_csv());
         // Another channel of the same frames.
@@ -259,7 +296,7 @@ mod tests {
         // Files that do not exist are dropped.
         std::fs::create_dir(folder.path().join("depth")).unwrap();
         std::fs::write(folder.path().join("depth/3"), "").unwrap();
-        table.retain_existing(folder.path(), &|frame| frame == 1);
+        table.retain_existing(folder.path(), &|frame, _| frame == 1);
         let lines: Vec<String> = table.to_csv().lines().map(str::to_owned).collect();
         assert!(lines.len() == 3 && lines[0].ends_with("ideal_qz,depth"), "{lines:?}");
         assert!(
@@ -269,5 +306,27 @@ mod tests {
                 && lines[2].ends_with(",depth/3")
         );
         assert!(table.contains(3) && !table.contains(0));
+    }
+
+    #[test]
+    fn pictures_of_a_burst_have_a_row_each() {
+        let mut table = FrameTable::new(true);
+        for (frame, instant) in [(4, 1), (2, 0), (4, 0), (2, 10), (2, 9)] {
+            table.insert(&FrameRecord { instant: Some(instant), ..record(frame, &["color_png"]) });
+        }
+        let text = table.to_csv();
+        assert_eq!(FrameTable::parse(&text).unwrap(), table);
+        let ends: Vec<&str> =
+            text.lines().map(|line| line.rsplit_once(",0,").map_or(line, |(_, end)| end)).collect();
+        assert!(ends[0].ends_with("ideal_qz,instant,color_png"), "{text}");
+        assert_eq!(
+            ends[1..],
+            ["0,color_png/2", "9,color_png/2", "10,color_png/2", "0,color_png/4", "1,color_png/4"]
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = frames_path(folder.path());
+        table.write(&path).unwrap();
+        assert_eq!(FrameTable::read(&path, true), table);
+        assert_eq!(FrameTable::read(&path, false), FrameTable::default(), "a table of another kind");
     }
 }

@@ -23,6 +23,7 @@ pub struct FrameFiles {
     folder: PathBuf,
     output: OutputSpec,
     encoding: OutputEncoding,
+    instant: Option<u32>,
 }
 
 /// One of the files of a frame.
@@ -35,18 +36,33 @@ enum OutputFile {
     Rows,
     /// A channel of [`RenderedFrame::planes`].
     Plane(Channel, PlaneKind),
+    /// A channel of numbers in colour.
+    Palette(Channel),
 }
 
 impl FrameFiles {
     /// Files below `folder` for the channels and formats of `output`; `encoding` is
     /// `camera.photometric.output`.
     pub fn new(folder: &Path, output: &OutputSpec, encoding: OutputEncoding) -> Self {
-        Self { folder: folder.into(), output: output.clone(), encoding }
+        Self { folder: folder.into(), output: output.clone(), encoding, instant: None }
+    }
+
+    /// The files of a picture of each frame's burst: `frame_000123_7.png`.
+    #[must_use]
+    pub fn of_instant(self, instant: Option<u32>) -> Self {
+        Self { instant, ..self }
+    }
+
+    /// Number within the burst.
+    #[must_use]
+    pub fn instant(&self) -> Option<u32> {
+        self.instant
     }
 
     /// Column of `frames.csv` and path below the folder of each file of frame `index`.
     pub fn names(&self, index: u64) -> Vec<(String, String)> {
-        self.files().into_iter().map(|file| (column_name(file).to_owned(), file_name(file, index))).collect()
+        let name = |file| (column_name(file).to_owned(), file_name(file, index, self.instant));
+        self.files().into_iter().map(name).collect()
     }
 
     /// Whether all files of frame `index` exist. `--resume` skips such frames, as files are never incomplete.
@@ -72,31 +88,9 @@ impl FrameFiles {
         Ok(())
     }
 
-    /// Sorted paths, below the folder, of the files of frames of any channel that do not belong to `frames`.
-    pub fn unlisted_frame_files(&self, frames: &[u64]) -> Vec<String> {
-        let listed: std::collections::HashSet<String> =
-            frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
-        let mut unlisted = Vec::new();
-        // Folders that cannot be read count as empty.
-        for channel in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
-            let channel_name = channel.file_name().to_string_lossy().into_owned();
-            for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
-                let name = file.file_name().to_string_lossy().into_owned();
-                let number = name
-                    .strip_prefix("frame_")
-                    .and_then(|rest| rest.split_once('.'))
-                    .map(|(number, _)| number);
-                let is_frame = number.is_some_and(|number| {
-                    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
-                });
-                let path = format!("{channel_name}/{name}");
-                if is_frame && !listed.contains(&path) {
-                    unlisted.push(path);
-                }
-            }
-        }
-        unlisted.sort();
-        unlisted
+    /// Paths, below the folder, of the files of these frames.
+    pub fn paths(&self, frames: &[u64]) -> Vec<String> {
+        frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect()
     }
 
     /// Removes the temporary files that a killed run left for these frames.
@@ -119,7 +113,16 @@ impl FrameFiles {
                 Channel::Valid => vec![OutputFile::Valid],
                 Channel::Coords => vec![OutputFile::Coords],
                 Channel::Rows => vec![OutputFile::Rows],
-                plane => plane.plane().map(|kind| OutputFile::Plane(plane, kind)).into_iter().collect(),
+                plane => {
+                    let palette = (self.output.palette && plane.plane() == Some(PlaneKind::Index))
+                        .then_some(OutputFile::Palette(plane));
+                    plane
+                        .plane()
+                        .map(|kind| OutputFile::Plane(plane, kind))
+                        .into_iter()
+                        .chain(palette)
+                        .collect()
+                }
             };
             // A channel or format that is listed twice gives one file.
             channel_files.into_iter().for_each(|file| {
@@ -136,7 +139,7 @@ impl FrameFiles {
         check_sizes(frame, &files)?;
         let mut written = 0;
         for file in files {
-            let path = self.folder.join(file_name(file, frame.index));
+            let path = self.folder.join(file_name(file, frame.index, self.instant));
             let exr = |names: &[&str], samples: &[f32], pixel| {
                 exr_file::encode(&path, frame.size_px, names, samples, pixel, self.output.exr_compression)
             };
@@ -162,12 +165,46 @@ impl FrameFiles {
                     frame.size_px,
                     frame.indices(channel).unwrap_or_default(),
                 )?,
+                OutputFile::Palette(channel) => png_file::encode_palette(
+                    &path,
+                    frame.size_px,
+                    frame.indices(channel).unwrap_or_default(),
+                )?,
             };
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
         }
         Ok(written)
     }
+}
+
+/// Sorted paths, below `folder`, of the files of frames and of bursts of any channel, without those of `listed`.
+#[must_use]
+pub fn unlisted_frame_files(folder: &Path, listed: &[String]) -> Vec<String> {
+    let listed: std::collections::HashSet<&str> = listed.iter().map(String::as_str).collect();
+    let mut unlisted = Vec::new();
+    // Folders that cannot be read count as empty.
+    for channel in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let channel_name = channel.file_name().to_string_lossy().into_owned();
+        for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
+            let name = file.file_name().to_string_lossy().into_owned();
+            let path = format!("{channel_name}/{name}");
+            if is_frame_file(&name) && !listed.contains(path.as_str()) {
+                unlisted.push(path);
+            }
+        }
+    }
+    unlisted.sort();
+    unlisted
+}
+
+/// Whether a name is that of a file of a frame, or of a picture of its burst.
+fn is_frame_file(name: &str) -> bool {
+    let Some((number, _)) = name.strip_prefix("frame_").and_then(|rest| rest.split_once('.')) else {
+        return false;
+    };
+    let mut parts = number.splitn(2, '_');
+    parts.all(|part| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 /// Column of `frames.csv`.
@@ -180,11 +217,13 @@ fn column_name(file: OutputFile) -> &'static str {
         OutputFile::Coords => "coords",
         OutputFile::Rows => "rows",
         OutputFile::Plane(channel, _) => channel.name(),
+        OutputFile::Palette(Channel::Class) => "class_palette",
+        OutputFile::Palette(_) => "object_palette",
     }
 }
 
 /// Path below the output folder.
-fn file_name(file: OutputFile, index: u64) -> String {
+fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
     let (folder, ending) = match file {
         OutputFile::Color(ImageFormat::Exr) => ("color", "exr"),
         OutputFile::Color(ImageFormat::Png) => ("color", "png"),
@@ -194,8 +233,10 @@ fn file_name(file: OutputFile, index: u64) -> String {
         OutputFile::Rows => ("rows", "csv"),
         OutputFile::Plane(channel, PlaneKind::Float(_)) => (channel.name(), "exr"),
         OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
+        OutputFile::Palette(_) => (column_name(file), "png"),
     };
-    format!("{folder}/frame_{index:06}.{ending}")
+    let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
+    format!("{folder}/frame_{index:06}{instant}.{ending}")
 }
 
 /// Checks that all planes have the size of the frame, which the encoders assume.
@@ -211,7 +252,7 @@ fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteE
         OutputFile::Plane(channel, PlaneKind::Float(names)) => {
             (channel.name(), frame.floats(channel).map_or(0, <[f32]>::len), pixels * names.len())
         }
-        OutputFile::Plane(channel, PlaneKind::Index) => {
+        OutputFile::Plane(channel, PlaneKind::Index) | OutputFile::Palette(channel) => {
             (channel.name(), frame.indices(channel).map_or(0, <[u32]>::len), pixels)
         }
     };

@@ -61,6 +61,34 @@ pub(super) fn encode_indices(path: &Path, size_px: [u32; 2], indices: &[u32]) ->
     encode(path, size_px, &bytes, ExtendedColorType::L16)
 }
 
+/// Encodes numbers of objects or classes as 8 bit RGB by [`palette_rgb8`].
+pub(super) fn encode_palette(path: &Path, size_px: [u32; 2], indices: &[u32]) -> Result<Vec<u8>, WriteError> {
+    let bytes: Vec<u8> = indices.iter().flat_map(|&index| palette_rgb8(index)).collect();
+    encode(path, size_px, &bytes, ExtendedColorType::Rgb8)
+}
+
+/// Colour of the object or class with number n; black for 0. Hue h = fract(0.618034 n), by the golden ratio,
+/// so that numbers near each other differ. Neighbouring hues recur after 34, 55, 89 ... numbers, so saturation
+/// and brightness change too: s = 0.9, 0.55, 0.9, 0.55 and v = 1, 0.95, 0.65, 0.7 for n mod 4 = 0, 1, 2, 3.
+/// Channel c (0 red, 1 green, 2 blue) is
+///
+/// ```text
+/// 255 v (1 - s clamp(2 - |6 fract(h + (3 - c)/3) - 3|, 0, 1))
+/// ```
+#[must_use]
+pub fn palette_rgb8(number: u32) -> [u8; 3] {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    if number == 0 {
+        return [0; 3];
+    }
+    let hue = (GOLDEN * f64::from(number)).fract();
+    let (saturation, value) = [(0.9, 1.0), (0.55, 0.95), (0.9, 0.65), (0.55, 0.7)][number as usize % 4];
+    [0.0, 1.0, 2.0].map(|channel| {
+        let missing = (2.0 - (6.0 * (hue + (3.0 - channel) / 3.0).fract() - 3.0).abs()).clamp(0.0, 1.0);
+        (255.0 * value * (1.0 - saturation * missing)).round() as u8
+    })
+}
+
 fn encode(
     path: &Path,
     [width, height]: [u32; 2],

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use camsim_core::{
     frame::RowRecord,
     pose::{BodyState, CameraPose},
+    scene::SceneObject,
 };
 use glam::{DQuat, DVec3};
 
@@ -68,6 +69,24 @@ pub fn rows_csv(rows: &[RowRecord]) -> String {
         push(&mut text, &wxyz(row.ned_from_camera));
         push(&mut text, &row.velocity_ned_m_s.to_array());
         text.push('\n');
+    }
+    text
+}
+
+/// Columns of `objects.csv`.
+pub const OBJECTS_COLUMNS: &str = "number,name,class";
+
+/// Text of `objects.csv`: number (from 1), name and class of each object. Names with commas, quotes or line
+/// breaks are quoted, as RFC 4180 has it.
+pub fn objects_csv(objects: &[SceneObject]) -> String {
+    let mut text = format!("{OBJECTS_COLUMNS}\n");
+    for (number, SceneObject { name, class }) in (1..).zip(objects) {
+        let number: u32 = number;
+        let name = match name.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", name.replace('"', "\"\"")),
+            false => name.clone(),
+        };
+        let _ = writeln!(text, "{number},{name},{class}");
     }
     text
 }

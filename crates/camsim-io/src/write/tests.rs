@@ -3,9 +3,10 @@
 use std::{fs, path::Path};
 
 use camsim_core::{
-    frame::{RenderedFrame, RowRecord},
+    frame::{Plane, PlaneValues, RenderedFrame, RowRecord},
     pose::{BodyState, CameraPose},
     scenario::{Channel, ExrCompression, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
+    scene::SceneObject,
 };
 use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DQuat, DVec3};
@@ -256,4 +257,68 @@ fn contact_sheet_has_all_frames() {
     let read = image::open(&path).unwrap();
     assert_eq!([read.width(), read.height()], [22, 14]);
     assert!(contact_sheet(&path, &[], 2, 3).is_err());
+}
+
+#[test]
+fn numbers_of_objects_are_written_as_numbers_and_in_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let pixels = SIZE[0] * SIZE[1];
+    let numbers = |factor: u32| PlaneValues::Index((0..pixels).map(|i| factor * i).collect());
+    let mut shown = frame(3);
+    shown.planes = vec![
+        Plane { channel: Channel::Object, values: numbers(90) },
+        Plane { channel: Channel::Class, values: numbers(1) },
+    ];
+    let output = OutputSpec {
+        channels: vec![Channel::Object, Channel::Class],
+        palette: true,
+        ..OutputSpec::default()
+    };
+    let files = FrameFiles::new(folder.path(), &output, OutputEncoding::Srgb8);
+    let columns: Vec<String> = files.names(3).into_iter().map(|(column, _)| column).collect();
+    assert_eq!(columns, ["object", "object_palette", "class", "class_palette"]);
+    let writer = FrameWriter::new(files, 1);
+    writer.write(shown.clone()).unwrap();
+    writer.finish().unwrap();
+    let open = |name: &str| image::open(folder.path().join(format!("{name}/frame_000003.png"))).unwrap();
+    let object = open("object").into_luma16();
+    let palette = open("object_palette").into_rgb8();
+    for (i, (number, colour)) in object.pixels().zip(palette.pixels()).enumerate() {
+        assert_eq!(u32::from(number.0[0]), 90 * i as u32);
+        assert_eq!(colour.0, palette_rgb8(90 * i as u32));
+    }
+    assert_eq!(open("class_palette").into_rgb8().get_pixel(1, 0).0, palette_rgb8(1));
+    // 16 bits hold no larger number.
+    shown.planes[0].values = numbers(100);
+    let writer = FrameWriter::new(FrameFiles::new(folder.path(), &output, OutputEncoding::Srgb8), 1);
+    let _ = writer.write(shown);
+    assert!(writer.finish().unwrap_err().to_string().contains("above 65535"));
+}
+
+#[test]
+fn colours_of_objects_are_those_of_the_formula_and_differ() {
+    // Hue 0.618: between cyan and blue, 1.708 sectors above green.
+    assert_eq!(palette_rgb8(0), [0, 0, 0]);
+    let [h, s, v] = [0.618_034, 0.55, 0.95];
+    let sector = 6.0 * h - 3.0;
+    let wanted = [v * (1.0 - s), v * (1.0 - s * sector), v].map(|part: f64| (255.0 * part).round() as u8);
+    assert_eq!(palette_rgb8(1), wanted);
+    let colours: Vec<[u8; 3]> = (0..=64).map(palette_rgb8).collect();
+    let distance = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap();
+    for (i, &a) in colours.iter().enumerate() {
+        for (k, &b) in colours[..i].iter().enumerate() {
+            assert!(distance(a, b) >= 8, "{i} {a:?} and {k} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn names_of_objects_are_quoted_where_a_table_needs_it() {
+    let object = |name: &str, class| SceneObject { name: name.into(), class };
+    let objects = [object("house#1/roof", 3), object("a, \"b\"\nc", 0)];
+    let text = objects_csv(&objects);
+    assert!(text.starts_with("number,name,class\n1,house#1/roof,3\n2,\""), "{text}");
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows[1], csv::StringRecord::from(vec!["2", "a, \"b\"\nc", "0"]));
 }

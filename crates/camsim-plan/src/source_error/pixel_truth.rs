@@ -58,6 +58,7 @@ struct RowCamera {
 /// drawn is within [`FramePlan::terrain_error_px`] of.
 #[derive(Debug)]
 pub struct FrameRays<'a> {
+    path: &'a CameraPath,
     surfaces: &'a Surfaces,
     plan: &'a FramePlan,
     /// Camera at mid-exposure of each row, or of each column in either field.
@@ -68,7 +69,7 @@ pub struct FrameRays<'a> {
 
 impl<'a> FrameRays<'a> {
     /// Rays whose coordinates are of exposure phase `phase`, -0.5 to 0.5.
-    pub(crate) fn new(path: &CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
+    pub(crate) fn new(path: &'a CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
         let [columns, rows] = plan.camera.size_px;
         let pixels: Vec<[u32; 2]> = match plan.shutter.row_axis() {
             RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
@@ -80,7 +81,7 @@ impl<'a> FrameRays<'a> {
         };
         let shift_s = phase * plan.shutter.exposure_s();
         let at_phase = if shift_s == 0.0 { Vec::new() } else { cameras(shift_s) };
-        Self { surfaces, plan, mid: cameras(0.0), at_phase }
+        Self { path, surfaces, plan, mid: cameras(0.0), at_phase }
     }
 
     /// What the ray `uv` of a pixel meets.
@@ -104,7 +105,8 @@ impl<'a> FrameRays<'a> {
         let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let terrain = self.surfaces.terrain()?;
         let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
-        let in_front_m = window * depth_m;
+        // What moves is not in the picture that was looked up.
+        let in_front_m = if self.surfaces.moves() { depth_m } else { window * depth_m };
         let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
         let is_hidden = self.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
         let normal_ned = terrain.normal_ned(triangle);
@@ -131,6 +133,23 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
         &self.ray(&self.mid, pixel, DVec2::ZERO).0.pose
+    }
+
+    /// Instant and camera of a pixel at an exposure phase, -0.5 (begin) to 0.5 (end).
+    #[must_use]
+    pub fn camera_at(&self, [x, y]: [u32; 2], phase: f64) -> (f64, CameraPose) {
+        let FramePlan { shutter, stamp_s, .. } = self.plan;
+        let t_s = stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_s();
+        (t_s, self.path.pose(t_s))
+    }
+
+    /// The surface (0 = terrain, 1 + i = mesh i of the scene) that the ray `uv` of a camera meets first at path
+    /// time `t_s`.
+    #[must_use]
+    pub fn surface(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> Option<u32> {
+        let ray_ned = pose.ned_from_camera * uv.extend(1.0);
+        let hit = self.surfaces.first_hit_at(t_s, pose.position_ned_m, ray_ned);
+        hit.map(|hit| hit.surface as u32)
     }
 
     /// Mid-exposure of a pixel, path time, seconds.

@@ -173,6 +173,11 @@ impl Surfaces {
         self.first_hit_in(&self.deep, origin_ned_m, direction_ned)
     }
 
+    /// Whether anything moves.
+    pub fn moves(&self) -> bool {
+        self.deep_still.is_some()
+    }
+
     /// First surface along `origin + t direction`, t >= 0, with everything where it is at path time `t_s`.
     pub fn first_hit_at(&self, t_s: f64, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<SurfaceHit> {
         let Some(still) = &self.deep_still else { return self.first_hit(origin_ned_m, direction_ned) };

@@ -13,3 +13,4 @@ mod hostile;
 mod measuring;
 mod moving;
 mod planted_faults;
+mod tracks;

@@ -140,14 +140,15 @@ fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut O
 fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(job) = &state.export else { return };
     let progress = job.progress();
-    let all = job.frames[1].saturating_sub(job.frames[0]).max(1);
+    let all = job.pictures().max(1);
+    let what = if job.scenario.output.twin.is_empty() { "frames" } else { "pictures" };
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;
             let left = job
                 .remaining_s()
                 .map_or_else(String::new, |remaining_s| format!(", about {} left", duration(remaining_s)));
-            ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames{left}", progress.done)));
+            ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} {what}{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {
                 out.push(Message::CancelExport);

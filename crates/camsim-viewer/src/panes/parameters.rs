@@ -91,10 +91,7 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
     let open = matches!(group.name, "camera.lens" | "camera.shutter" | "camera.photometric");
     egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
         for (key, kind) in &group.keys {
-            match kind {
-                ValueKind::Tables => lists::show(ui, state, document, key, out),
-                kind => row(ui, state, document, key, *kind, out),
-            }
+            show_key(ui, state, document, key, *kind, out);
         }
     });
 }
@@ -103,7 +100,14 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
 pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
     let Some(document) = &state.document else { return };
     for (key, kind) in groups().iter().filter(|group| group.name == name).flat_map(|group| &group.keys) {
-        row(ui, state, document, key, *kind, out);
+        show_key(ui, state, document, key, *kind, out);
+    }
+}
+
+fn show_key(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: ValueKind, out: &mut Outbox) {
+    match kind {
+        ValueKind::Tables => lists::show(ui, state, document, key, out),
+        kind => row(ui, state, document, key, kind, out),
     }
 }
 

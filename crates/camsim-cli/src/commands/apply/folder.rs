@@ -102,7 +102,7 @@ pub(super) fn run(
         Ok(false) => refuse_unknown(folder, &numbers, &files, args.resume)?,
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
         Err(error) => {
-            refuse_others(&numbers, &files, &error.reason())?;
+            refuse_others(folder, &numbers, &files, &error.reason())?;
             console
                 .warn(format_args!("{} belongs to other inputs: its frames are replaced", folder.display()));
         }

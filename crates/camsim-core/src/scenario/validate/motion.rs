@@ -75,6 +75,10 @@ mod tests {
             scene: None,
             time_s: None,
             animation: None,
+            name: None,
+            class: None,
+            objects: Default::default(),
+            classes: Default::default(),
             motion: None,
         };
         let mut check = Check::default();

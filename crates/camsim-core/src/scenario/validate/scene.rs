@@ -2,7 +2,7 @@
 
 use super::{Check, motion::check_motion};
 use crate::{
-    scenario::{BoardSpec, LightSpec, PatternCentre, SceneSpec},
+    scenario::{BoardSpec, LightSpec, ObjectsOf, PatternCentre, SceneSpec, TerrainSpec},
     scene::{Board, BoardError},
 };
 
@@ -19,6 +19,15 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         check.finite(format!("{table}.heading_deg"), &[model.heading_deg]);
         check.positive(format!("{table}.scale"), model.scale, "1 is as the file has it");
         check.finite(format!("{table}.time_s"), &[model.time_s.unwrap_or(0.0)]);
+        check_object(check, &table, &model.name, model.class);
+        check.require(
+            model.classes.is_empty() || model.objects != ObjectsOf::Placement,
+            format!("{table}.classes"),
+            || "needs objects = \"node\" or \"material\"; a placed copy has the one class of class".into(),
+        );
+        for (name, &class) in &model.classes {
+            check_class(check, format!("{table}.classes.{name}"), class);
+        }
         check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
             "needs a terrain: give scene.terrain, or heights in the placements".into()
         });
@@ -38,10 +47,15 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
             "give the stored value of white, 2047 for 11 bits",
         );
     }
+    if let Some(TerrainSpec { name, class, .. }) = &scene.terrain {
+        check_object(check, "scene.terrain", name, *class);
+    }
     if let Some(board) = &scene.board {
         check_board(check, board);
+        check_object(check, "scene.board", &board.name, board.class);
     }
     if let Some(pattern) = &scene.pattern {
+        check_object(check, "scene.pattern", &pattern.name, pattern.class);
         check.positive("scene.pattern.width_m", pattern.width_m, "give the width on the ground in metres");
         if let PatternCentre::Ned(centre) = pattern.at {
             check.finite("scene.pattern.at", &centre);
@@ -96,6 +110,18 @@ fn check_board(check: &mut Check, board: &BoardSpec) {
     }
     check_place(check, "scene.board", board.at, board.geodetic);
     check.finite("scene.board.angles_deg", &board.angles_deg);
+}
+
+/// Name and class of an object.
+fn check_object(check: &mut Check, table: &str, name: &Option<String>, class: Option<u16>) {
+    check.require(name.as_ref().is_none_or(|name| !name.trim().is_empty()), format!("{table}.name"), || {
+        "is empty; leave it out for the usual name".into()
+    });
+    class.into_iter().for_each(|class| check_class(check, format!("{table}.class"), class));
+}
+
+fn check_class(check: &mut Check, key: String, class: u16) {
+    check.require(class > 0, key, || "must be 1 to 65535; leave it out for no class".into());
 }
 
 /// Placement of an object: in local north-east-down or geodetic, not both.

@@ -18,6 +18,9 @@ use crate::{
     params::Param,
 };
 
+/// Keys of twins, all of which but the name may be left out.
+const TWINS: &str = "output.twin.";
+
 /// The edit that a pass over an editor made.
 struct Edit {
     /// The new value; `None` removes the key.
@@ -40,9 +43,11 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::NumberList => number_list(ui, document, key, value, param, out),
         ValueKind::Path => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
-        ValueKind::Word(words) => word(ui, key, value, words),
-        ValueKind::Words(words) => word_list(ui, key, value, words),
+        ValueKind::Word(words) => word(ui, key, value, words).or_else(|| removal(ui, key, value)),
+        ValueKind::Words(words) => word_list(ui, key, value, words).or_else(|| removal(ui, key, value)),
+        ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
+        ValueKind::Numbered(..) => numbered(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
         ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
     };
@@ -95,7 +100,8 @@ fn number(
         .map(|(number, is_dragged)| Edit { value: Some(to_value(number, whole)), is_dragged });
     let may_be_left_out =
         matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
-            || key.starts_with("scene.light.");
+            || key.starts_with("scene.light.")
+            || key.starts_with(TWINS);
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, is_dragged: false });
     }
@@ -108,6 +114,7 @@ fn first_value(param: &Param) -> f64 {
     match param.key {
         "scene.fog_visibility_m" => 10_000.0,
         "scene.terrain.ortho_white" => 2047.0,
+        "output.twin.instants" => 9.0,
         "scene.light.sun_azimuth_deg" => light.sun_azimuth_deg,
         "scene.light.sun_elevation_deg" => light.sun_elevation_deg,
         "scene.light.sun" => light.sun,
@@ -122,6 +129,12 @@ fn remove(ui: &mut Ui, key: &str) -> bool {
     let button = ui.small_button("x").with_tooltip(&name);
     named(&button, Role::Button, &name);
     button.clicked()
+}
+
+/// The removal of a key of a twin that is set.
+fn removal(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
+    let is_asked = key.starts_with(TWINS) && value.is_some() && remove(ui, key);
+    is_asked.then_some(Edit { value: None, is_dragged: false })
 }
 
 /// A number, or one of the given words.
@@ -293,7 +306,35 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
 
 /// A text, taken when its field loses focus; an empty one removes the key.
 fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
-    let present = value.and_then(Value::as_str).unwrap_or_default();
+    let text = finished_text(ui, key, value.and_then(Value::as_str).unwrap_or_default(), param)?;
+    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
+}
+
+/// Words and paths of tables, separated by commas.
+fn words_or_tables(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    value: Option<&Value>,
+    kind: ValueKind,
+    param: &Param,
+) -> Option<Edit> {
+    let list = value
+        .and_then(Value::as_array)
+        .map_or_else(|| value.into_iter().collect(), |list| list.iter().collect::<Vec<_>>());
+    let present: Vec<String> =
+        list.into_iter().filter_map(Value::as_str).map(|text| document.relative_path(text)).collect();
+    let text = finished_text(ui, key, &present.join(", "), param)?;
+    let element = |text: &str| {
+        Value::String(if kind.is_path(text) { document.resolved_path(text) } else { text.to_owned() })
+    };
+    let elements: Vec<Value> =
+        text.split(',').map(str::trim).filter(|text| !text.is_empty()).map(element).collect();
+    Some(Edit { value: (!elements.is_empty()).then_some(Value::Array(elements)), is_dragged: false })
+}
+
+/// A field of text; its text when it loses focus and differs from `present`.
+fn finished_text(ui: &mut Ui, key: &str, present: &str, param: &Param) -> Option<String> {
     let id = egui::Id::unique(("text", key));
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
     let response = ui
@@ -305,10 +346,20 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
         return None;
     }
     ui.data_mut(|data| data.remove_temp::<String>(id))?;
-    if !response.lost_focus() || text == present {
-        return None;
-    }
-    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
+    (response.lost_focus() && text != present).then_some(text)
+}
+
+/// A table of names with numbers, written `roof = 3, wall = 4`.
+fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+    let pairs = value.and_then(Value::as_table).into_iter().flatten();
+    let quoted = |name: &str| Value::String(name.to_owned()).to_string();
+    let written: Vec<String> = pairs.map(|(name, value)| format!("{} = {value}", quoted(name))).collect();
+    let edit = text(ui, key, Some(&Value::String(written.join(", "))), param)?;
+    let Some(Value::String(text)) = edit.value else { return Some(edit) };
+    let parsed = toml::from_str::<toml::Table>(&format!("v = {{ {text} }}")).ok();
+    // A text that is no table stays a text, which the schema refuses with a message.
+    let value = parsed.and_then(|mut table| table.remove("v")).unwrap_or(Value::String(text));
+    Some(Edit { value: Some(value), ..edit })
 }
 
 /// A path shortened to its file name.
@@ -319,7 +370,9 @@ fn shortened(path: &str) -> String {
 
 /// A truth value.
 fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
-    let mut on = value.and_then(Value::as_bool).unwrap_or_default();
+    // What a twin does not leave out is as in the frame.
+    let is_on_by_default = key.starts_with(TWINS) && !key.ends_with(".ideal");
+    let mut on = value.and_then(Value::as_bool).unwrap_or(is_on_by_default);
     let response = ui.checkbox(&mut on, "");
     named(&response, Role::CheckBox, key);
     response.changed().then_some(Value::Boolean(on)).and_then(single_edit)
@@ -340,7 +393,8 @@ fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option
 
 /// Several of the given words.
 fn word_list(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
-    let array = value?.as_array()?;
+    let none = Vec::new();
+    let array = value.and_then(Value::as_array).unwrap_or(&none);
     let mut edit = None;
     for word in words {
         let mut on = array.iter().any(|element| element.as_str() == Some(word));

@@ -1,4 +1,4 @@
-//! Editors of lists of tables: vibration, zoom calibrations, models.
+//! Editors of lists of tables: vibration, zoom calibrations, models, twins.
 
 use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{Role, Ui};
@@ -58,7 +58,8 @@ fn is_in_inner_list(list: &str, element: &str) -> bool {
         .any(|(inner, kind)| *kind == ValueKind::Tables && is_below(inner, list) && is_below(element, inner))
 }
 
-/// A new entry: the present camera at the next zoom value, or slight vibration in pitch.
+/// A new entry: the present camera at the next zoom value, a twin without motion blur, or slight vibration in
+/// pitch.
 fn new_entry(document: &Document, key: &str) -> Table {
     let mut table = Table::new();
     let mut put = |name: &str, value: Value| table.insert(name.to_owned(), value);
@@ -68,6 +69,13 @@ fn new_entry(document: &Document, key: &str) -> Table {
         put("at", Value::Float(camera.zoom.last().map_or(1.0, |entry| entry.at + 1.0)));
         put("focal_px", floats(&camera.focal_px));
         put("coefficients", floats(&camera.lens.coefficients));
+    } else if key == "output.twin" {
+        let twins = &document.scenario.output.twin;
+        let names =
+            (1..).map(|number: usize| if number == 1 { "sharp".into() } else { format!("sharp{number}") });
+        let is_free = |name: &String| twins.iter().all(|twin| !twin.name.eq_ignore_ascii_case(name));
+        put("name", Value::String(names.into_iter().find(is_free).unwrap_or_default()));
+        put("exposure", Value::Boolean(false));
     } else {
         put("axis", Value::String("pitch".into()));
         put("amplitude_deg", Value::Float(0.05));

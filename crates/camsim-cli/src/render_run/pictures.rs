@@ -1,0 +1,88 @@
+//! What a run renders into which folder: the frames, and each twin of them.
+
+use std::{path::PathBuf, sync::Arc};
+
+use camsim_core::{scenario::TwinSpec, sequence::Sequence};
+use camsim_io::{
+    inputs::{self, Inputs},
+    manifest::TwinRecord,
+    write::{FrameFiles, unlisted_frame_files},
+};
+
+use super::{Job, folder::files_of};
+use crate::failure::{Failure, OrFail};
+
+/// Pictures that belong into one folder.
+#[derive(Debug)]
+pub struct Pictures {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The twin that they are; `None` for the frames.
+    pub twin: Option<TwinRecord>,
+    /// The sequence of `run.json`.
+    pub sequence: Arc<Sequence>,
+    /// Fingerprints of the files that its scenario names.
+    pub inputs: Inputs,
+    /// Series of pictures: one, or one for each instant of a burst.
+    pub series: Vec<Series>,
+}
+
+/// One picture of each frame.
+#[derive(Debug)]
+pub struct Series {
+    /// The sequence whose frames they are.
+    pub sequence: Arc<Sequence>,
+    /// Their files.
+    pub files: FrameFiles,
+}
+
+impl Pictures {
+    /// The frames of a job.
+    pub fn of_frames(job: &Job<'_>) -> Self {
+        let sequence = job.sequence.clone();
+        let files = files_of(&sequence.scenario, job.folder);
+        Self {
+            folder: job.folder.into(),
+            twin: None,
+            inputs: inputs::scenario_fingerprints(&sequence.scenario),
+            series: vec![Series { sequence: sequence.clone(), files }],
+            sequence,
+        }
+    }
+
+    /// A twin of the frames.
+    pub fn of_twin(job: &Job<'_>, twin: &TwinSpec) -> Result<Self, Failure> {
+        let folder = job.folder.join(&twin.name);
+        let derived = |instant| job.sequence.twin(twin, instant).map(Arc::new).or_bad_input();
+        let sequence = derived(None)?;
+        let mut series = Vec::new();
+        for instant in twin.instants() {
+            let sequence = derived(instant)?;
+            let files = files_of(&sequence.scenario, &folder).of_instant(instant);
+            series.push(Series { sequence, files });
+        }
+        let inputs = inputs::scenario_fingerprints(&sequence.scenario);
+        Ok(Self { folder, twin: Some(TwinRecord::new(twin)), sequence, inputs, series })
+    }
+
+    /// Name of the twin.
+    pub fn name(&self) -> Option<&str> {
+        self.twin.as_ref().map(|twin| twin.name.as_str())
+    }
+
+    /// Whether they are bursts.
+    pub fn has_instants(&self) -> bool {
+        self.twin.as_ref().is_some_and(|twin| twin.instants.is_some())
+    }
+
+    /// Whether any file of these frames exists completely.
+    pub fn any_exists(&self, frames: &[u64]) -> bool {
+        self.series.iter().any(|series| frames.iter().any(|&frame| series.files.exist(frame)))
+    }
+
+    /// Files in the folder of other frames, or of other pictures of their bursts.
+    pub fn files_of_others(&self, frames: &[u64]) -> Vec<String> {
+        let listed: Vec<String> = self.series.iter().flat_map(|series| series.files.paths(frames)).collect();
+        unlisted_frame_files(&self.folder, &listed)
+    }
+}

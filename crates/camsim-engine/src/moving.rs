@@ -1,0 +1,189 @@
+//! Pixels in which something moves, by rays of their own.
+//!
+//! The renderers draw what stands still. Within the outline that a moving thing sweeps in the exposure of a
+//! row, each pixel is then replaced by the mean of rays over its area and exposure, each cast at its own
+//! instant with everything where it is then: parallax, rolling shutter, blur and what comes into view behind
+//! need no approximation there. Elsewhere nothing changes.
+
+mod outline;
+
+use std::sync::{Arc, OnceLock};
+
+use camsim_core::{
+    noise::tail_table,
+    photometric::photometric,
+    scene::{RigidMotion, Scene},
+    sequence::Sequence,
+    shutter::RowAxis,
+};
+use camsim_cpu::{Instant, MovingCaster, RayScratch};
+use camsim_plan::FramePlan;
+use glam::{DMat2, DVec2, Vec3};
+use rayon::prelude::*;
+
+use outline::Outline;
+
+/// Rays of a pixel: at least, at most, and for each pixel that a thing moves within the exposure.
+const LEAST_RAYS: u32 = 16;
+const MOST_RAYS: u32 = 128;
+const RAYS_A_PIXEL: f64 = 3.0;
+
+/// A sequence whose scene has things that move.
+#[derive(Debug)]
+pub(crate) struct MovingScene {
+    /// With everything.
+    sequence: Arc<Sequence>,
+    /// Without what moves.
+    still: Arc<Sequence>,
+    /// Built for the first frame that shows something that moves.
+    caster: Arc<OnceLock<MovingCaster>>,
+    vignette: Vec<f32>,
+    noise_table: Vec<f32>,
+}
+
+/// The motions of a scene, each with all that it carries.
+fn motions(scene: &Scene) -> Vec<(Arc<RigidMotion>, camsim_core::scene::Aabb)> {
+    let mut motions: Vec<(Arc<RigidMotion>, camsim_core::scene::Aabb)> = Vec::new();
+    for mesh in &scene.meshes {
+        let Some(motion) = &mesh.motion else { continue };
+        match motions.iter_mut().find(|(known, _)| Arc::ptr_eq(known, motion)) {
+            Some((_, bounds)) => *bounds = bounds.union(&mesh.bounds()),
+            None => motions.push((motion.clone(), mesh.bounds())),
+        }
+    }
+    motions
+}
+
+impl MovingScene {
+    /// `None` if nothing moves. `before` has the scenes of an earlier sequence, which are kept if they are the
+    /// same.
+    pub fn new(sequence: &Arc<Sequence>, before: Option<&Self>) -> Option<Self> {
+        let scene = &sequence.scene;
+        if scene.meshes.iter().all(|mesh| mesh.motion.is_none()) {
+            return None;
+        }
+        let known = before.filter(|before| Arc::ptr_eq(&before.sequence.scene, scene));
+        let still_scene = known.map_or_else(
+            || {
+                let mut still = Scene::clone(scene);
+                still.meshes.retain(|mesh| mesh.motion.is_none());
+                Arc::new(still)
+            },
+            |before| before.still.scene.clone(),
+        );
+        let still = Sequence { scene: still_scene, ..Sequence::clone(sequence) };
+        Some(Self {
+            sequence: sequence.clone(),
+            still: Arc::new(still),
+            caster: known.map_or_else(Arc::default, |before| before.caster.clone()),
+            vignette: sequence.vignette_weights().1,
+            noise_table: tail_table(),
+        })
+    }
+
+    /// The sequence without what moves.
+    pub fn still(&self) -> &Arc<Sequence> {
+        &self.still
+    }
+
+    /// Replaces the colours of the pixels in which something may move: linear R G B A, row-major.
+    pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
+        let motions = motions(&self.sequence.scene);
+        let outline = Outline::new(&self.sequence.path, plan, &motions);
+        let count = if plan.shutter.exposure_s() > 0.0 {
+            ((RAYS_A_PIXEL * outline.blur_px) as u32).clamp(LEAST_RAYS, MOST_RAYS)
+        } else {
+            LEAST_RAYS
+        };
+        let lines: Vec<usize> = (0..outline.spans.len()).filter(|&i| !outline.spans[i].is_empty()).collect();
+        if lines.is_empty() {
+            return;
+        }
+        let caster = self.caster.get_or_init(|| MovingCaster::new(&self.sequence.scene));
+        let painted: Vec<Vec<(usize, [f32; 3])>> = lines
+            .into_par_iter()
+            .map(|line| self.line(caster, plan, count, line, &outline.spans[line], color_rgba))
+            .collect();
+        for (i, color) in painted.into_iter().flatten() {
+            color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
+        }
+    }
+
+    /// Colours of the pixels of a row of the readout that are in an outline, by their index.
+    fn line(
+        &self,
+        caster: &MovingCaster,
+        plan: &FramePlan,
+        count: u32,
+        line: usize,
+        spans: &[[u32; 2]],
+        color_rgba: &[f32],
+    ) -> Vec<(usize, [f32; 3])> {
+        let pixels = spans.iter().flat_map(|&[first, last]| first..=last);
+        let pixels = pixels.map(|along| outline::pixel(plan, line, along));
+        let width = plan.camera.size_px[0] as usize;
+        let index = |[x, y]: [u32; 2]| y as usize * width + x as usize;
+        let pixels: Vec<[u32; 2]> = pixels.filter(|&pixel| color_rgba[4 * index(pixel) + 3] > 0.0).collect();
+        let Some(&[x, y]) = pixels.first() else { return Vec::new() };
+        let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+        let instants: Vec<(DVec2, Instant)> = (0..count)
+            .map(|i| {
+                let phase = (f64::from(i) + 0.5) / f64::from(count) - 0.5;
+                let t_s = mid_s + phase * plan.shutter.exposure_s();
+                (place(i), caster.at(t_s, self.sequence.path.pose(t_s)))
+            })
+            .collect();
+        let mut scratch = RayScratch::default();
+        let color = |pixel: [u32; 2]| {
+            let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
+            let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
+            let scenario = &self.sequence.scenario;
+            let value = photometric(
+                &scenario.camera.photometric,
+                linear.to_array(),
+                weight,
+                pixel,
+                plan.frame as u32,
+                scenario.noise_seed(),
+                &self.noise_table,
+            );
+            Some((index(pixel), value))
+        };
+        pixels.into_iter().filter_map(color).collect()
+    }
+}
+
+/// Mean over a pixel's area and exposure, linear R G B.
+fn mean_color(
+    caster: &MovingCaster,
+    plan: &FramePlan,
+    instants: &[(DVec2, Instant)],
+    pixel: [u32; 2],
+    scratch: &mut RayScratch,
+) -> Option<Vec3> {
+    let camera = &plan.camera;
+    let uv = camera.unproject(DVec2::from_array(pixel.map(f64::from)))?;
+    let px_from_uv = DMat2::from_diagonal(camera.focal_px) * camera.lens.jacobian(uv);
+    let uv_from_px = px_from_uv.inverse();
+    // Each ray stands for its part of the pixel's area.
+    let share = f64::from(instants.len() as u32).sqrt().recip();
+    let step_uv = share * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
+    let ray = |(place, instant): &(DVec2, Instant)| {
+        caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
+    };
+    Some(instants.iter().map(ray).sum::<Vec3>() / instants.len() as f32)
+}
+
+/// Place of a ray in the pixel, -0.5 to 0.5: Roberts' R2 sequence, whose generator is the plastic number.
+fn place(i: u32) -> DVec2 {
+    const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
+    (f64::from(i + 1) * STEP + 0.5).fract() - 0.5
+}
+
+/// Number of rows of the readout, with those of either field for columns.
+pub(super) fn line_count(plan: &FramePlan) -> usize {
+    match plan.shutter.row_axis() {
+        RowAxis::Rows => plan.camera.size_px[1] as usize,
+        RowAxis::Columns => 2 * plan.camera.size_px[0] as usize,
+    }
+}
