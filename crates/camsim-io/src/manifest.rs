@@ -548,9 +548,9 @@ mod tests {
             terrain = { dem = "x/4", ortho = "x/5" }
             pattern = { image = "x/6", width_m = 1.0 }
             board = { target = "x/7" }
-            gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10" }]
+            gltf = [{ file = "x/8", placements = "x/9" }, { file = "x/10", motion = { poses = "x/11" } }]
             [output.tracks]
-            points = ["terrain", "x/11.csv"]
+            points = ["terrain", "x/12.csv"]
         "#;
         let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
         let mut tree = serde_json::to_value(&scenario).unwrap();
@@ -560,7 +560,7 @@ mod tests {
             assert!(visited.iter().any(|visited| visited == key), "{key}");
         }
         assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");
-        assert_eq!(visited.len(), 11);
+        assert_eq!(visited.len(), 12);
     }
 
     #[test]

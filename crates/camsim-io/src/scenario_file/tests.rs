@@ -73,7 +73,8 @@ fn every_key_of_the_structs_is_in_the_schema() {
         "light",
         "tracks",
     ] {
-        text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
+        // The first: a table that is commented out further below may have a key of that name.
+        text = text.replacen(&format!("# {commented} = "), &format!("{commented} = "), 1);
     }
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
     text += "[[camera.mount.vibration]]\naxis = \"roll\"\nhz = 3\n";
@@ -238,7 +239,7 @@ fn errors_name_file_line_and_key() {
             "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?",
         ),
         ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
-        ("[quality]\nnope = 3", "quality.nope: unknown key; `camsim render --print-default`"),
+        ("[quality]\nxyz = 3", "quality.xyz: unknown key; `camsim render --print-default`"),
         (
             "[camera]\nresolution = [640, 480]",
             "camera.resolution: unknown key; `camsim render --print-default`",

@@ -201,6 +201,33 @@ impl Surfaces {
         self.nearer_moving(t_s, origin_ned_m, direction_ned, limit, hit)
     }
 
+    /// `hit`, or what moves in front of it and before `limit`.
+    fn nearer_moving(
+        &self,
+        t_s: f64,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+        hit: Option<SurfaceHit>,
+    ) -> Option<SurfaceHit> {
+        self.moving.iter().fold(hit, |hit, group| {
+            let state = group.motion.state(t_s);
+            let origin = state.point_at_start(origin_ned_m);
+            let direction = state.rotation.conjugate() * direction_ned;
+            let meet = |k: u32, limit: f64| {
+                let i = group.meshes[k as usize];
+                self.triangle_hit(i, origin, direction, limit).map(|(t, on)| (t, (i, on)))
+            };
+            let limit = hit.map_or(limit, |hit| hit.depth_m);
+            let Some((depth_m, (i, (corners, weights)))) = group.tree.first(origin, direction, limit, meet)
+            else {
+                return hit;
+            };
+            let now = self.scene.meshes[i].at(t_s);
+            Some(self.hit_on(&now, i, depth_m, corners, weights, direction_ned))
+        })
+    }
+
     fn model_hit_in(
         &self,
         tree: &RayBvh,

@@ -177,7 +177,7 @@ fn busy() -> Scene {
         let normals = vec![normal; mesh.shape.vertices.len()];
         Mesh { shape: Arc::new(Shape { normals, ..(*mesh.shape).clone() }), ..mesh }
     };
-    let roof = lit(Mesh::level_picture(checker(4), DVec3::new(5.0, -8.0, -70.0), 60.0), [0.3, -0.1, -0.9]);
+    let roof = lit(Mesh::level_picture(checker(4), DVec3::new(5.0, -8.0, -71.5), 60.0), [0.3, -0.1, -0.9]);
     let house = block(DVec3::new(-20.0, 15.0, -40.0), 12.0, 30.0);
     let mut pane = Mesh::level_picture(checker(2), DVec3::new(20.0, 10.0, -80.0), 40.0);
     pane.material.cutoff = Some(0.5);

@@ -1,20 +1,17 @@
-//! Rays that meet what moves: they are taken to where it was at path time 0.
+//! Meshes that move, prepared for rays that are taken to where these were at path time 0.
 
 use std::sync::Arc;
 
 use camsim_core::scene::{Aabb, Mesh, RigidMotion, Scene, ray_bvh::RayBvh};
-use glam::DVec3;
-
-use super::{SurfaceHit, Surfaces};
 
 /// Meshes that move together and may have depth.
 #[derive(Debug)]
 pub(super) struct MovingMeshes {
-    motion: Arc<RigidMotion>,
+    pub motion: Arc<RigidMotion>,
     /// Indices in the scene.
-    meshes: Vec<usize>,
+    pub meshes: Vec<usize>,
     /// Boxes around them at path time 0.
-    tree: RayBvh,
+    pub tree: RayBvh,
 }
 
 /// All meshes that move and that `counts`, by their motions.
@@ -32,33 +29,4 @@ pub(super) fn moving_meshes(scene: &Scene, counts: &dyn Fn(&Mesh) -> bool) -> Ve
         MovingMeshes { motion, tree: RayBvh::new(&boxes), meshes }
     };
     groups.into_iter().map(prepared).collect()
-}
-
-impl Surfaces {
-    /// `hit`, or what moves in front of it and before `limit`.
-    pub(super) fn nearer_moving(
-        &self,
-        t_s: f64,
-        origin_ned_m: DVec3,
-        direction_ned: DVec3,
-        limit: f64,
-        hit: Option<SurfaceHit>,
-    ) -> Option<SurfaceHit> {
-        self.moving.iter().fold(hit, |hit, group| {
-            let state = group.motion.state(t_s);
-            let origin = state.point_at_start(origin_ned_m);
-            let direction = state.rotation.conjugate() * direction_ned;
-            let meet = |k: u32, limit: f64| {
-                let i = group.meshes[k as usize];
-                self.triangle_hit(i, origin, direction, limit).map(|(t, on)| (t, (i, on)))
-            };
-            let limit = hit.map_or(limit, |hit| hit.depth_m);
-            let Some((depth_m, (i, (corners, weights)))) = group.tree.first(origin, direction, limit, meet)
-            else {
-                return hit;
-            };
-            let now = self.scene.meshes[i].at(t_s);
-            Some(self.hit_on(&now, i, depth_m, corners, weights, direction_ned))
-        })
-    }
 }
