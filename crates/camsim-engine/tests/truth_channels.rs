@@ -121,7 +121,9 @@ impl Case {
         let step = if is_interlaced { 2 } else { 1 };
         // A row beside the position, and another of its field.
         let row = if is_sideways { x } else { y };
-        let row = (row.round() as u32).min(last);
+        // Below the last row: the last one of the same field.
+        let row = row.round() as u32;
+        let row = if row > last { row - step } else { row };
         let other = if row >= step { row - step } else { row + step };
         let at = |row: u32| {
             view.mid_s(if is_sideways { [row, y.round() as u32] } else { [x.round() as u32, row] })
