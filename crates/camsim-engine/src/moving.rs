@@ -21,12 +21,8 @@ use camsim_plan::FramePlan;
 use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
+use crate::truth::{RAYS, ray};
 use outline::Outline;
-
-/// Rays of a pixel: at least, at most, and for each pixel that a thing moves within the exposure.
-const LEAST_RAYS: u32 = 32;
-const MOST_RAYS: u32 = 256;
-const RAYS_A_PIXEL: f64 = 8.0;
 
 /// A sequence whose scene has things that move.
 #[derive(Debug)]
@@ -90,11 +86,6 @@ impl MovingScene {
     pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
         let motions = motions(&self.sequence.scene);
         let outline = Outline::new(&self.sequence.path, plan, &motions);
-        let count = if plan.shutter.exposure_s() > 0.0 {
-            ((RAYS_A_PIXEL * outline.blur_px) as u32).clamp(LEAST_RAYS, MOST_RAYS)
-        } else {
-            LEAST_RAYS
-        };
         let lines: Vec<usize> = (0..outline.spans.len()).filter(|&i| !outline.spans[i].is_empty()).collect();
         if lines.is_empty() {
             return;
@@ -102,7 +93,7 @@ impl MovingScene {
         let caster = self.caster.get_or_init(|| MovingCaster::new(&self.sequence.scene));
         let painted: Vec<Vec<(usize, [f32; 3])>> = lines
             .into_par_iter()
-            .map(|line| self.line(caster, plan, count, line, &outline.spans[line], color_rgba))
+            .map(|line| self.line(caster, plan, line, &outline.spans[line], color_rgba))
             .collect();
         for (i, color) in painted.into_iter().flatten() {
             color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
@@ -114,7 +105,6 @@ impl MovingScene {
         &self,
         caster: &MovingCaster,
         plan: &FramePlan,
-        count: u32,
         line: usize,
         spans: &[[u32; 2]],
         color_rgba: &[f32],
@@ -126,11 +116,11 @@ impl MovingScene {
         let pixels: Vec<[u32; 2]> = pixels.filter(|&pixel| color_rgba[4 * index(pixel) + 3] > 0.0).collect();
         let Some(&[x, y]) = pixels.first() else { return Vec::new() };
         let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-        let instants: Vec<(DVec2, Instant)> = (0..count)
-            .map(|i| {
-                let phase = (f64::from(i) + 0.5) / f64::from(count) - 0.5;
+        let instants: Vec<(DVec2, Instant)> = (0..RAYS)
+            .map(ray)
+            .map(|(place, phase)| {
                 let t_s = mid_s + phase * plan.shutter.exposure_s();
-                (place(i), caster.at(t_s, self.sequence.path.pose(t_s)))
+                (place, caster.at(t_s, self.sequence.path.pose(t_s)))
             })
             .collect();
         let mut scratch = RayScratch::default();
@@ -172,12 +162,6 @@ fn mean_color(
         caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
     };
     Some(instants.iter().map(ray).sum::<Vec3>() / instants.len() as f32)
-}
-
-/// Place of a ray in the pixel, -0.5 to 0.5: Roberts' R2 sequence, whose generator is the plastic number.
-fn place(i: u32) -> DVec2 {
-    const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
-    (f64::from(i + 1) * STEP + 0.5).fract() - 0.5
 }
 
 /// Number of rows of the readout, with those of either field for columns.

@@ -6,4 +6,5 @@ mod flow;
 pub(crate) mod hits;
 mod planes;
 
+pub(crate) use coverage::{RAYS, ray};
 pub(crate) use planes::{FramePixels, planes};

@@ -25,15 +25,12 @@ const ROOM: f64 = 0.1;
 pub(super) struct Outline {
     /// For each row of the readout: first and last pixel along it, ascending and apart from each other.
     pub spans: Vec<Vec<[u32; 2]>>,
-    /// Longest way of a corner within the exposure, pixels.
-    pub blur_px: f64,
 }
 
 /// A box in the picture during the exposure of a row.
 struct Projected {
     low_px: DVec2,
     high_px: DVec2,
-    blur_px: f64,
 }
 
 /// Pixel of a row of the readout. Columns of both fields follow each other.
@@ -46,21 +43,15 @@ pub(super) fn pixel(plan: &FramePlan, line: usize, along: u32) -> [u32; 2] {
 
 impl Outline {
     pub fn new(path: &CameraPath, plan: &FramePlan, motions: &[(Arc<RigidMotion>, Aabb)]) -> Self {
-        let lines: Vec<(Vec<[u32; 2]>, f64)> = (0..line_count(plan))
-            .into_par_iter()
-            .map(|line| {
-                let boxes =
-                    motions.iter().filter_map(|(motion, bounds)| project(path, plan, line, motion, bounds));
-                let boxes: Vec<Projected> = boxes.collect();
-                let mut spans: Vec<[u32; 2]> =
-                    boxes.iter().filter_map(|projected| span(plan, line, projected)).collect();
-                spans.sort_unstable();
-                let blur_px = boxes.iter().map(|projected| projected.blur_px).fold(0.0, f64::max);
-                (merged(&spans), if spans.is_empty() { 0.0 } else { blur_px })
-            })
-            .collect();
-        let blur_px = lines.iter().map(|(_, blur_px)| *blur_px).fold(0.0, f64::max);
-        Self { spans: lines.into_iter().map(|(spans, _)| spans).collect(), blur_px }
+        let spans = (0..line_count(plan)).into_par_iter().map(|line| {
+            let boxes =
+                motions.iter().filter_map(|(motion, bounds)| project(path, plan, line, motion, bounds));
+            let mut spans: Vec<[u32; 2]> =
+                boxes.filter_map(|projected| span(plan, line, &projected)).collect();
+            spans.sort_unstable();
+            merged(&spans)
+        });
+        Self { spans: spans.collect() }
     }
 }
 
@@ -74,15 +65,13 @@ fn project(
 ) -> Option<Projected> {
     let [x, y] = pixel(plan, line, 0);
     let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-    let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY, blur_px: 0.0 };
+    let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY };
     let (mut low_px, mut high_px) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (mut shown, mut in_front, mut all) = (0, 0, 0);
-    let mut ways_px = [DVec2::NAN; 8];
-    let mut blur_px = 0.0_f64;
     for phase in PHASES {
         let t_s = mid_s + phase * plan.shutter.exposure_s();
         let (pose, state) = (path.pose(t_s), motion.state(t_s));
-        for (k, way_px) in ways_px.iter_mut().enumerate() {
+        for k in 0..8 {
             let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
             let [min, max] = [bounds.min, bounds.max];
             let corner = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
@@ -93,10 +82,6 @@ fn project(
             if let Some((px, _)) = plan.camera.show(&pose, t_s, WorldPoint::At(point_ned_m)) {
                 shown += 1;
                 (low_px, high_px) = (low_px.min(px), high_px.max(px));
-                if way_px.is_finite() {
-                    blur_px += px.distance(*way_px) / 8.0;
-                }
-                *way_px = px;
             }
         }
     }
@@ -105,7 +90,7 @@ fn project(
         (shown, _) if shown < all => Some(everywhere),
         _ => {
             let room_px = DVec2::splat(ROOM_PX) + ROOM * (high_px - low_px);
-            Some(Projected { low_px: low_px - room_px, high_px: high_px + room_px, blur_px })
+            Some(Projected { low_px: low_px - room_px, high_px: high_px + room_px })
         }
     }
 }

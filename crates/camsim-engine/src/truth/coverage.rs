@@ -15,7 +15,7 @@ use super::{
 };
 
 /// Rays of a pixel near a border.
-const RAYS: u32 = 64;
+pub(crate) const RAYS: u32 = 64;
 /// Exposure phases between which the way of a point is measured: vibration may turn it back.
 const PHASES: i32 = 8;
 /// Longest reach, pixels. Beyond it a picture is all blur.
@@ -25,7 +25,7 @@ const MOST_REACH_PX: f64 = 256.0;
 /// Sobol's sequence, a (0, 6, 3) net in base 2. Every box with sides of 2^-a, 2^-b and 2^-c, a + b + c = 6,
 /// has one ray. For a straight border that crosses the pixel at any speed the error of a coverage is 0.015 RMS
 /// and 0.1 at most.
-fn ray(i: u32) -> (DVec2, f64) {
+pub(crate) fn ray(i: u32) -> (DVec2, f64) {
     let unit = |bits: u32| (f64::from(bits) + 0.5) / f64::from(RAYS) - 0.5;
     let place = DVec2::new(unit(i), unit(i.reverse_bits() >> 26));
     // Direction numbers of the Sobol sequence for the polynomial x + 1, of 6 bits.
