@@ -90,13 +90,13 @@ fn verify_compares_the_channels_that_a_scenario_asks_for() {
         let common = ["verify", scenario.to_str().unwrap(), "--frames", "3", "--backend", "cpu"];
         camsim(&[&common[..], &SMALL, more].concat())
     };
-    let channels = "output.channels=[\"range\", \"normal\", \"normal-world\", \"object\", \"class\"]";
+    let channels = "output.channels=[\"range\", \"normal\", \"normal_world\", \"object\", \"class\"]";
     let (code, out, err) = verify(&["--set", channels, "--json"]);
     assert_eq!(code, 0, "{out}{err}");
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     let planes = report["frames"][0]["planes"].as_array().unwrap();
     let names: Vec<&str> = planes.iter().map(|plane| plane["channel"].as_str().unwrap()).collect();
-    assert_eq!(names, ["range", "normal", "normal-world", "object", "class"]);
+    assert_eq!(names, ["range", "normal", "normal_world", "object", "class"]);
     for plane in planes {
         assert!(plane["kept"] == true && plane["pixels"].as_u64() > Some(2000), "{plane}");
         assert_eq!(plane["beyond_away"], 0, "{plane}");

@@ -379,9 +379,9 @@ pub struct OutputSpec {
     pub exr_pixel: ExrPixel,
     /// EXR compression.
     pub exr_compression: ExrCompression,
-    /// Frames from one to the other of `flow` and `flow-back`.
+    /// Frames from one to the other of `flow` and `flow_back`.
     pub flow_step: u32,
-    /// Instant of the picture that `flow-global` leads to.
+    /// Instant of the picture that `flow_global` leads to.
     pub flow_instant: FlowInstant,
     /// Whether `object` and `class` get pictures in colour, for people, in `object_palette` and
     /// `class_palette`.

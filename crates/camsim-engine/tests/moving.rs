@@ -15,7 +15,7 @@ use camsim_core::{
 };
 use camsim_engine::{Engine, RenderError};
 use common::{engine, render, roof, scenario, sequence, steady};
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 /// A name, and what is different in the scenario.
 type Change = (&'static str, fn(&mut Scenario));
@@ -112,6 +112,33 @@ fn frames_with_moving_things_are_those_of_the_reference() {
             assert!(painted.len() * 4 < 3 * found.len() / 4, "{name}: a part of the picture is left alone");
         }
     }
+}
+
+/// A blade that turns more than once within an exposure, and one that no row can see.
+#[test]
+fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
+    let with_rotor = |centre_ned_m: DVec3| {
+        let frame = JointFrame::from_affine(&DAffine3::from_translation(centre_ned_m)).expect("a frame");
+        let spin = Track::Spin { axis: DVec3::Z, hz: 100.0, phase_rad: 0.3 };
+        let motion = Some(Arc::new(RigidMotion::new(vec![Joint::new(frame, spin)])));
+        let origin_ned_m = centre_ned_m + DVec3::new(14.0, 0.0, 0.0);
+        let mut scene = scene(false);
+        scene.meshes.push(Mesh { motion, origin_ned_m, ..roof(40.0, 5.0) });
+        let still = camera(false, |_| {});
+        Arc::new(Sequence { scene: Arc::new(scene), ..Sequence::clone(&still) })
+    };
+    let cpu = Engine::cpu();
+    let frame = |sequence: &Arc<Sequence>| render(&cpu, sequence, &[Channel::Color], FRAME).frame.color_rgba;
+    let without = frame(&camera(false, |_| {}));
+    let rotor = with_rotor(DVec3::new(10.0, 0.0, -40.0));
+    let oracle = Oracle::new(rotor.clone()).expect("a usable camera");
+    let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
+    let (error_dn, _) = difference(&frame(&rotor), &oracle.render(FRAME, &options).color_rgba);
+    let (gone_dn, _) = difference(&frame(&rotor), &without);
+    eprintln!("rotor: {error_dn:.2} DN; without it {gone_dn:.1} DN");
+    assert!(gone_dn > 5.0 && error_dn < 0.1 * gone_dn, "{error_dn} of {gone_dn}");
+    let behind = with_rotor(DVec3::new(-4000.0, 0.0, -40.0));
+    assert_eq!(frame(&behind), without);
 }
 
 #[test]

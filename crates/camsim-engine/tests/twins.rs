@@ -214,7 +214,7 @@ fn pictures_of_a_burst_have_noise_of_their_own() {
     assert_eq!(a, b);
 }
 
-/// `flow-global` leads to the pixel of the global twin that sees the same point.
+/// `flow_global` leads to the pixel of the global twin that sees the same point.
 #[test]
 fn global_flow_leads_to_the_same_point_in_the_global_twin() {
     let [width, height] = SIZE_PX.map(|side| side as usize);

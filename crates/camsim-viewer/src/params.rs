@@ -395,9 +395,9 @@ pub const PARAMS: &[Param] = &[
         "frames",
         [1.0, 1e6],
         0.1,
-        "frames from one to the other of flow and flow-back",
+        "frames from one to the other of flow and flow_back",
     ),
-    param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow-global leads to"),
+    param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow_global leads to"),
     param("output.palette", "", ANY, 1.0, "pictures of object and class in colour"),
     param(
         "output.tracks.points",

@@ -48,7 +48,7 @@ const MEASURED: [Channel; 2] = [Channel::Color, Channel::Coords];
 /// Depth and point (north, east, down) of every pixel, silhouettes included, are compared with the surface
 /// that the pixel's exact ray hits. A depth or point that is off by more than 0.1 % of the depth is a fault
 /// if no surface within quality.max_error_px of the pixel's centre has it. A single fault gives exit code 1.
-/// The channels range, normal, normal-world, object and class are compared in the same way if output.channels
+/// The channels range, normal, normal_world, object and class are compared in the same way if output.channels
 /// has them: a range may be off by 0.1 %, a normal by 0.1 degrees, and a number not at all.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

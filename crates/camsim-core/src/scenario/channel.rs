@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// output frame, where nothing else is said. Pixels without a ray have zeros. Blended surfaces count where
 /// their alpha is 1/2 or more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// The picture.
     Color,
@@ -108,15 +108,15 @@ impl Channel {
             Self::Coords => "coords",
             Self::Range => "range",
             Self::Normal => "normal",
-            Self::NormalWorld => "normal-world",
+            Self::NormalWorld => "normal_world",
             Self::Object => "object",
             Self::Class => "class",
             Self::Coverage => "coverage",
             Self::Flow => "flow",
-            Self::FlowBack => "flow-back",
-            Self::FlowGlobal => "flow-global",
+            Self::FlowBack => "flow_back",
+            Self::FlowGlobal => "flow_global",
             Self::Motion => "motion",
-            Self::BlurPath => "blur-path",
+            Self::BlurPath => "blur_path",
         }
     }
 
@@ -150,7 +150,7 @@ impl Channel {
     }
 }
 
-/// Instant of a picture with a global shutter: that `flow-global` leads to, or a twin.
+/// Instant of a picture with a global shutter: that `flow_global` leads to, or a twin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FlowInstant {

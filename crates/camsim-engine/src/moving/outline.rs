@@ -5,7 +5,7 @@ use std::sync::Arc;
 use camsim_core::{
     mount::CameraPath,
     row_time::WorldPoint,
-    scene::{Aabb, RigidMotion},
+    scene::{Aabb, RigidMotion, terrain::Frustum},
     shutter::RowAxis,
 };
 use camsim_plan::FramePlan;
@@ -14,12 +14,17 @@ use rayon::prelude::*;
 
 use super::line_count;
 
-/// Exposure phases at which boxes are projected.
+/// Exposure phases of the cameras that boxes are projected by.
 const PHASES: [f64; 3] = [-0.5, 0.0, 0.5];
 /// Room around the projected corners of a box, pixels, and as a share of its size: edges that a lens bends and
-/// ways that are not straight.
+/// cameras that shake within an exposure.
 const ROOM_PX: f64 = 2.0;
 const ROOM: f64 = 0.1;
+
+/// Intervals of a frame's window at whose ends the camera's position is looked up, and factor on its distance
+/// for what it travels in between.
+const INSTANTS: u32 = 16;
+const TRAVEL: f64 = 1.1;
 
 /// Pixels in which something may move.
 pub(super) struct Outline {
@@ -43,6 +48,8 @@ pub(super) fn pixel(plan: &FramePlan, line: usize, along: u32) -> [u32; 2] {
 
 impl Outline {
     pub fn new(path: &CameraPath, plan: &FramePlan, motions: &[(Arc<RigidMotion>, Aabb)]) -> Self {
+        let motions: Vec<_> =
+            motions.iter().filter(|(motion, bounds)| may_be_seen(path, plan, motion, bounds)).collect();
         let spans = (0..line_count(plan)).into_par_iter().map(|line| {
             let boxes =
                 motions.iter().filter_map(|(motion, bounds)| project(path, plan, line, motion, bounds));
@@ -55,7 +62,24 @@ impl Outline {
     }
 }
 
-/// Where a box may be seen during the exposure of a row; `None` if it is behind the camera.
+/// Whether any row may see what moves: all rays of the frame have directions within its ideal frame's field of
+/// view, and begin no farther from that frame's camera than the path leads.
+fn may_be_seen(path: &CameraPath, plan: &FramePlan, motion: &RigidMotion, bounds: &Aabb) -> bool {
+    let [begin_s, end_s] = plan.window_s;
+    let swept = motion.bounds(bounds, begin_s, end_s);
+    let instants_s = (0..=INSTANTS).map(|i| begin_s + (end_s - begin_s) * f64::from(i) / f64::from(INSTANTS));
+    let positions_ned_m: Vec<DVec3> = instants_s.map(|t_s| path.pose(t_s).position_ned_m).collect();
+    let key_poses = if plan.keys.is_empty() { vec![plan.key_pose] } else { plan.key_poses() };
+    key_poses.iter().any(|key_pose| {
+        let distance_m = |position_ned_m: &DVec3| position_ned_m.distance(key_pose.position_ned_m);
+        let reach_m = TRAVEL * positions_ned_m.iter().map(distance_m).fold(0.0, f64::max);
+        let swept = Aabb { min: swept.min - reach_m, max: swept.max + reach_m };
+        Frustum::new(key_pose, plan.tangents()).may_see(&swept)
+    })
+}
+
+/// Where a box may be seen during the exposure of a row; `None` if it is behind the camera. The box is the one
+/// that holds all of the motion within the exposure, however fast it turns.
 fn project(
     path: &CameraPath,
     plan: &FramePlan,
@@ -65,21 +89,22 @@ fn project(
 ) -> Option<Projected> {
     let [x, y] = pixel(plan, line, 0);
     let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+    let half_s = 0.5 * plan.shutter.exposure_s();
+    let Aabb { min, max } = motion.bounds(bounds, mid_s - half_s, mid_s + half_s);
     let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY };
     let (mut low_px, mut high_px) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (mut shown, mut in_front, mut all) = (0, 0, 0);
     for phase in PHASES {
         let t_s = mid_s + phase * plan.shutter.exposure_s();
-        let (pose, state) = (path.pose(t_s), motion.state(t_s));
+        let pose = path.pose(t_s);
         for k in 0..8 {
             let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
-            let [min, max] = [bounds.min, bounds.max];
-            let corner = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
-            let point_ned_m = state.point(corner);
+            let corner_ned_m =
+                DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
             all += 1;
-            let depth_m = (pose.ned_from_camera.conjugate() * (point_ned_m - pose.position_ned_m)).z;
+            let depth_m = (pose.ned_from_camera.conjugate() * (corner_ned_m - pose.position_ned_m)).z;
             in_front += u32::from(depth_m > 0.0);
-            if let Some((px, _)) = plan.camera.show(&pose, t_s, WorldPoint::At(point_ned_m)) {
+            if let Some((px, _)) = plan.camera.show(&pose, t_s, WorldPoint::At(corner_ned_m)) {
                 shown += 1;
                 (low_px, high_px) = (low_px.min(px), high_px.max(px));
             }

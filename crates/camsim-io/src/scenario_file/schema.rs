@@ -92,15 +92,15 @@ const CHANNELS: &[&str] = &[
     "coords",
     "range",
     "normal",
-    "normal-world",
+    "normal_world",
     "object",
     "class",
     "coverage",
     "flow",
-    "flow-back",
-    "flow-global",
+    "flow_back",
+    "flow_global",
     "motion",
-    "blur-path",
+    "blur_path",
 ];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 

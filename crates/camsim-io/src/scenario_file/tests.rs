@@ -160,7 +160,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
 fn twins_are_read_and_their_problems_named_by_line() {
     let with =
         |twin: &str| parse(&format!("{GOOD}[camera.shutter]\nexposure_ms = 8\n[[output.twin]]\n{twin}\n"));
-    let scenario = with("name = \"burst\"\ninstants = 9\nchannels = [\"color\", \"flow-global\"]").unwrap();
+    let scenario = with("name = \"burst\"\ninstants = 9\nchannels = [\"color\", \"flow_global\"]").unwrap();
     let [twin] = scenario.output.twin.as_slice() else { panic!("one twin") };
     assert_eq!((twin.name.as_str(), twin.instants), ("burst", Some(9)));
     assert_eq!(twin.channels, Some(vec![Channel::Color, Channel::FlowGlobal]));
