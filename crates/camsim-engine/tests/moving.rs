@@ -133,10 +133,18 @@ fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
     let rotor = with_rotor(DVec3::new(10.0, 0.0, -40.0));
     let oracle = Oracle::new(rotor.clone()).expect("a usable camera");
     let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
-    let (error_dn, _) = difference(&frame(&rotor), &oracle.render(FRAME, &options).color_rgba);
-    let (gone_dn, _) = difference(&frame(&rotor), &without);
-    eprintln!("rotor: {error_dn:.2} DN; without it {gone_dn:.1} DN");
-    assert!(gone_dn > 5.0 && error_dn < 0.1 * gone_dn, "{error_dn} of {gone_dn}");
+    let expected = oracle.render(FRAME, &options).color_rgba;
+    let found = frame(&rotor);
+    let (error_dn, _) = difference(&found, &expected);
+    let (gone_dn, _) = difference(&found, &without);
+    let red_dn = |a: &[f32], b: &[f32], i: usize| 255.0 * (a[4 * i] - b[4 * i]).abs();
+    let pixels = 0..found.len() / 4;
+    let swept: Vec<usize> = pixels.filter(|&i| red_dn(&expected, &without, i) > 10.0).collect();
+    let missed = swept.iter().filter(|&&i| red_dn(&found, &without, i) == 0.0).count();
+    eprintln!("rotor: {error_dn:.2} DN; without it {gone_dn:.1} DN; {missed} of {} px missed", swept.len());
+    assert!(swept.len() > 300 && missed == 0, "{missed} of {}", swept.len());
+    // A pixel sees the blade in a tenth of the exposure: in 6 of 64 instants, give or take one.
+    assert!(error_dn < gone_dn / 6.0, "{error_dn} of {gone_dn}");
     let behind = with_rotor(DVec3::new(-4000.0, 0.0, -40.0));
     assert_eq!(frame(&behind), without);
 }
