@@ -1,21 +1,21 @@
 //! `camsim verify`: measured errors of frames against predicted ones.
 
+mod report;
+
 use std::convert::Infallible;
 
 use anyhow::anyhow;
 use camsim_core::{
     reference::{
-        CoordErrors, DEPTH_TOLERANCE, Disocclusion, ErrorStats, ErrorVerdict, IdealView,
-        NORMAL_TOLERANCE_RAD, Oracle, PlaneErrors, RenderOptions, TruthErrors, coord_errors, disocclusion,
-        image_errors, is_compared, plane_errors, silhouettes, truth_errors,
+        CoordErrors, Disocclusion, ErrorVerdict, IdealView, Oracle, RenderOptions, coord_errors,
+        disocclusion, image_errors, is_compared, plane_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, Channel, Solver},
 };
 use camsim_engine::{Finished, Session};
 use camsim_plan::{FramePlan, Predicted};
-use serde::Serialize;
 
-use super::explain::{LevelOfDetail, level_of_detail};
+use super::explain::level_of_detail;
 use crate::{
     backend::BackendArgs,
     console::Console,
@@ -23,6 +23,8 @@ use crate::{
     frame_list::FrameList,
     inputs::{self, ScenarioArgs},
 };
+
+use report::{Measured, Picture, PlaneTruth, Truth, Verified, VerifyReport, describe_plane, describe_truth};
 
 /// Number of frames to verify by default.
 const DEFAULT_FRAMES: u64 = 5;
@@ -70,150 +72,6 @@ pub struct VerifyArgs {
     json: bool,
     #[command(flatten)]
     backend: BackendArgs,
-}
-
-#[derive(Serialize)]
-struct VerifyReport {
-    adapter: String,
-    tolerance_px: f64,
-    tolerance_dn: f64,
-    /// Whether every frame keeps the tolerances: `quality.max_error_px`, and with pictures
-    /// `quality.max_error_dn`.
-    kept: bool,
-    frames: Vec<Verified>,
-}
-
-#[derive(Serialize)]
-struct Verified {
-    frame: u64,
-    predicted: Predicted,
-    measured: Measured,
-    /// Errors of depths and points; `None` for solvers that compute sources without exact depths.
-    truth: Option<Truth>,
-    /// Errors of the channels range, normal, object and class, where the scenario asks for them.
-    planes: Vec<PlaneTruth>,
-    /// Level of detail of the terrain.
-    level_of_detail: Option<LevelOfDetail>,
-    /// Whether the frame's 99th percentile is within the tolerance.
-    kept: bool,
-    /// Whether the frame's 99th percentile is within the prediction.
-    as_predicted: bool,
-    picture: Option<Picture>,
-    /// Causes of picture error that are not predicted.
-    not_in_the_picture: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Measured {
-    /// Pixels away from silhouettes.
-    smooth: Figures,
-    silhouettes: Figures,
-    all: Figures,
-    /// Pixels whose 99th percentile is compared with the tolerance: "smooth", "all" if hardly any pixel is
-    /// smooth, or "nothing" if too many are falsely valid or missing.
-    judged_by: &'static str,
-    falsely_valid: u64,
-    missing: u64,
-    /// Disoccluded share of the picture.
-    disocclusion_share: f64,
-}
-
-/// Errors are shares of the depth; `null` if sky and surface are confused.
-#[derive(Serialize)]
-struct Truth {
-    /// Whether every depth and point belongs to a surface near the pixel's ray.
-    kept: bool,
-    pixels: u64,
-    /// Number of depths that are off by more than 0.1 %.
-    depth_beyond: u64,
-    /// Number of those that belong to no surface near the pixel's ray.
-    depth_faults: u64,
-    depth_max: Option<f64>,
-    points_beyond: u64,
-    point_faults: u64,
-    point_max: Option<f64>,
-}
-
-/// Errors of a truth channel. `null` if sky and surface are confused.
-#[derive(Serialize)]
-struct PlaneTruth {
-    channel: &'static str,
-    /// Whether every value belongs to a surface near the pixel's ray.
-    kept: bool,
-    pixels: u64,
-    /// Number of wrong values: of a range by 0.1 %, of a normal by 0.1 degrees.
-    beyond: u64,
-    /// Number of those that are not beside a border between objects.
-    beyond_away: u64,
-    /// Number of those that belong to no surface near the pixel's ray.
-    faults: u64,
-    /// Of ranges relative, of normals in degrees; absent for numbers.
-    p99: Option<f64>,
-    max: Option<f64>,
-}
-
-impl From<PlaneErrors> for PlaneTruth {
-    fn from(errors: PlaneErrors) -> Self {
-        let is_normal = matches!(errors.channel, Channel::Normal | Channel::NormalWorld);
-        let has_size = is_normal || errors.channel == Channel::Range;
-        let size = |error: f64| {
-            (has_size && error.is_finite()).then_some(if is_normal { error.to_degrees() } else { error })
-        };
-        Self {
-            channel: errors.channel.name(),
-            kept: errors.faults == 0,
-            pixels: errors.pixels,
-            beyond: errors.beyond,
-            beyond_away: errors.beyond_away,
-            faults: errors.faults,
-            p99: size(errors.p99),
-            max: size(errors.max),
-        }
-    }
-}
-
-impl From<TruthErrors> for Truth {
-    fn from(errors: TruthErrors) -> Self {
-        let finite = |error: f64| error.is_finite().then_some(error);
-        Self {
-            kept: errors.is_consistent(),
-            pixels: errors.pixels,
-            depth_beyond: errors.depth_beyond,
-            depth_faults: errors.depth_faults,
-            depth_max: finite(errors.depth_max),
-            points_beyond: errors.points_beyond,
-            point_faults: errors.point_faults,
-            point_max: finite(errors.point_max),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Figures {
-    pixels: u64,
-    rms_px: f64,
-    p99_px: f64,
-    max_px: f64,
-}
-
-/// PSNR in dB on linear values, peak 1; `null` without pixels or without a difference.
-#[derive(Serialize)]
-struct Picture {
-    /// RMS error of the picture in DN, which `quality.max_error_dn` bounds.
-    rms_dn: f64,
-    predicted_dn: f64,
-    /// Whether `rms_dn` is within the tolerance.
-    kept: bool,
-    psnr_db: Option<f64>,
-    smooth_psnr_db: Option<f64>,
-    silhouettes_psnr_db: Option<f64>,
-    max: f64,
-}
-
-impl From<ErrorStats> for Figures {
-    fn from(stats: ErrorStats) -> Self {
-        Self { pixels: stats.count, rms_px: stats.rms_px, p99_px: stats.p99_px, max_px: stats.max_px }
-    }
 }
 
 /// Measures and compares.
@@ -552,43 +410,6 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         }
     }
     Ok(())
-}
-
-fn describe_truth(truth: &Truth) -> String {
-    let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } =
-        truth;
-    let largest = |error: &Option<f64>| {
-        error.map_or_else(|| "sky instead of surface".to_owned(), |error| format!("{:.3} %", 100.0 * error))
-    };
-    let percent = 100.0 * DEPTH_TOLERANCE;
-    format!(
-        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error \
-         {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and \
-         {point_faults}: {}",
-        largest(depth_max),
-        largest(point_max),
-        if *kept { "kept" } else { "FAULTS" }
-    )
-}
-
-fn describe_plane(plane: &PlaneTruth) -> String {
-    let PlaneTruth { channel, kept, pixels, beyond, beyond_away, faults, max, .. } = plane;
-    let largest = match (*channel, max) {
-        ("object" | "class", _) => String::new(),
-        (_, None) => " (largest error: sky instead of surface)".to_owned(),
-        ("range", Some(max)) => format!(" (largest error {:.3} %)", 100.0 * max),
-        (_, Some(max)) => format!(" (largest error {max:.3} deg)"),
-    };
-    let allowed = match *channel {
-        "object" | "class" => "wrong".to_owned(),
-        "range" => format!("off by more than {} %", 100.0 * DEPTH_TOLERANCE),
-        _ => format!("off by more than {:.1} deg", NORMAL_TOLERANCE_RAD.to_degrees()),
-    };
-    format!(
-        "{channel} {allowed}: {beyond} of {pixels} pixels{largest}, {beyond_away} of them away from borders of \
-         objects, {faults} on no surface near the pixel's ray: {}",
-        if *kept { "kept" } else { "FAULTS" }
-    )
 }
 
 /// Verdict on the tolerance and on the prediction.

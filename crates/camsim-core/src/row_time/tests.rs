@@ -1,0 +1,185 @@
+//! Positions in frames with rows of their own instants, against a search of all instants.
+
+#![allow(clippy::unwrap_used)]
+
+use glam::{DAffine3, DQuat};
+
+use super::*;
+use crate::{
+    pose::BodyState,
+    scenario::{Axis, FieldOr, LensModel, MountSpec, Readout, ShutterSpec, VibrationSpec},
+    scene::motion::{Joint, JointFrame, Track},
+    trajectory::Trajectory,
+};
+
+const SIZE_PX: [u32; 2] = [64, 48];
+
+fn path(vibration_deg: f64) -> Arc<CameraPath> {
+    let first = BodyState {
+        position_ned_m: DVec3::new(0.0, 0.0, -50.0),
+        velocity_ned_m_s: DVec3::new(20.0, 5.0, 1.0),
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: DQuat::IDENTITY,
+        rate_body_rad_s: DVec3::new(0.2, -0.1, 0.3),
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
+    let vibration = VibrationSpec {
+        axis: Axis::Pitch,
+        amplitude_deg: vibration_deg,
+        amplitude_m: 0.0,
+        hz: 30.0,
+        phase_deg: 0.0,
+    };
+    let spec =
+        MountSpec { angles_deg: [0.0, -40.0, 0.0], vibration: vec![vibration], ..MountSpec::default() };
+    Arc::new(CameraPath::new(trajectory, &spec).unwrap())
+}
+
+fn camera() -> Arc<CameraModel> {
+    let coefficients = [-0.2, 0.05, 0.001, -0.002];
+    let camera =
+        CameraModel::new(SIZE_PX, [50.0, 52.0], None, LensModel::BrownConrady, &coefficients).unwrap();
+    Arc::new(camera)
+}
+
+fn shutter(spec: ShutterSpec) -> Shutter {
+    Shutter::from_spec(&spec, 30.0, SIZE_PX).unwrap()
+}
+
+fn points() -> impl Iterator<Item = WorldPoint<'static>> {
+    (0..400).map(|i| {
+        let (north, east) = (f64::from(i % 20) * 6.0 - 10.0, f64::from(i / 20) * 6.0 - 60.0);
+        if i % 7 == 0 {
+            WorldPoint::Towards(DVec3::new(60.0, east, f64::from(i % 5) * 20.0))
+        } else {
+            WorldPoint::At(DVec3::new(north + 30.0, east, 0.0))
+        }
+    })
+}
+
+/// All solutions on a grid of instants: rows at which the miss changes its sign.
+fn search(frame: &FrameCamera, field: &Field, point: WorldPoint<'_>) -> Vec<DVec2> {
+    let last = field.poses.len() as f64 - 1.0;
+    let steps = 40 * field.poses.len();
+    let miss = |i: usize| {
+        let row = -0.5 + (last + 1.0) * i as f64 / steps as f64;
+        let t_s = field.time_s(row);
+        let seen = frame.project(&frame.path.pose(t_s), t_s, point)?;
+        Some((field.row_of(frame.along(seen.px)) - row, seen.px))
+    };
+    let mut found = Vec::new();
+    for i in 0..steps {
+        if let (Some(a), Some(b)) = (miss(i), miss(i + 1))
+            && (a.0 >= 0.0) != (b.0 >= 0.0)
+        {
+            found.push(a.1.lerp(b.1, a.0 / (a.0 - b.0)));
+        }
+    }
+    let [width, height] = SIZE_PX.map(f64::from);
+    found.retain(|px| px.min_element() >= -0.5 && px.x < width - 0.5 && px.y < height - 0.5);
+    found
+}
+
+#[test]
+fn points_are_found_where_a_search_of_all_instants_finds_them() {
+    let readouts = [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft];
+    let mut inside = 0;
+    for (direction, vibration_deg) in readouts.into_iter().flat_map(|d| [(d, 0.0), (d, 0.4)]) {
+        let spec = ShutterSpec { readout_ms: 30.0, readout: direction, ..ShutterSpec::default() };
+        let frame = FrameCamera::new(path(vibration_deg), camera(), &shutter(spec), 0.5);
+        for point in points() {
+            let expected = search(&frame, &frame.fields[0], point);
+            let near_px = DVec2::new(30.0, 20.0);
+            let found = frame.find(point, near_px).filter(|found| found.is_inside);
+            assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{point:?}");
+            if let Some(found) = found {
+                let off_px = expected.iter().map(|px| px.distance(found.px)).fold(f64::INFINITY, f64::min);
+                assert!(off_px < 1e-4, "{direction:?} {point:?}: {off_px:.1e} px");
+                inside += 1;
+            }
+        }
+    }
+    assert!(inside > 500, "{inside}");
+}
+
+#[test]
+fn a_fast_picture_shows_a_point_several_times_or_never() {
+    // Fifteen degrees thirty times a second: the picture moves faster than the readout.
+    let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+    let frame = FrameCamera::new(path(15.0), camera(), &shutter(spec), 0.5);
+    let counts = points().filter_map(|point| {
+        let found = frame.find(point, DVec2::ZERO)?;
+        found.is_inside.then(|| (found.solutions as usize, search(&frame, &frame.fields[0], point)))
+    });
+    let counts: Vec<(usize, Vec<DVec2>)> = counts.collect();
+    // Each position by itself, where the search finds as many.
+    for point in points() {
+        let (found, expected) = (frame.find_all(point), search(&frame, &frame.fields[0], point));
+        for seen in found.iter().filter(|_| found.len() == expected.len()) {
+            let off_px = expected.iter().map(|px| px.distance(seen.px)).fold(f64::INFINITY, f64::min);
+            assert!(off_px < 0.01 && seen.solutions as usize == found.len(), "{point:?}: {off_px:.1e} px");
+        }
+    }
+    let several = counts.iter().filter(|(_, expected)| expected.len() > 1).count();
+    let right = counts.iter().filter(|(found, expected)| *found == expected.len()).count();
+    assert!(several > 20 && right * 100 > 98 * counts.len(), "{several} {right} {}", counts.len());
+}
+
+#[test]
+fn interlaced_rows_belong_to_their_own_field() {
+    let spec = ShutterSpec { readout_ms: 10.0, interlace_ms: FieldOr::Ms(15.0), ..ShutterSpec::default() };
+    let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
+    let mut of_field = [0, 0];
+    for point in points() {
+        let Some(found) = frame.find(point, DVec2::ZERO).filter(|found| found.is_inside) else {
+            continue;
+        };
+        let field = frame.fields.iter().position(|field| {
+            let row = field.row_of(found.px.y);
+            (field.time_s(row) - found.t_s).abs() < 1e-9
+        });
+        let field = field.unwrap();
+        of_field[field] += usize::from(frame.fields[field].distance_to_rows_px(found.px.y) <= 0.5);
+    }
+    assert!(of_field.iter().all(|&count| count > 30), "{of_field:?}");
+}
+
+#[test]
+fn a_point_that_moves_is_found_where_a_search_finds_it() {
+    let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+    let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
+    // It turns about the place below the picture's middle, 12 times a second: half as fast as rows are
+    // read.
+    let hub = DAffine3::from_translation(DVec3::new(65.0, 3.0, 0.0));
+    let track = Track::Spin { axis: DVec3::Z, hz: 12.0, phase_rad: 0.3 };
+    let joint = Joint::new(JointFrame::from_affine(&hub).unwrap(), track);
+    let motion = RigidMotion::new(vec![joint]);
+    let mut inside = 0;
+    for k in 0..60 {
+        let at = DVec3::new(50.0 + 2.0 * f64::from(k % 8), -15.0 + 4.0 * f64::from(k / 8), 0.0);
+        let point = WorldPoint::On { motion: &motion, at_start_ned_m: at };
+        let expected = search(&frame, &frame.fields[0], point);
+        let found = frame.find(point, DVec2::new(30.0, 20.0)).filter(|found| found.is_inside);
+        assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{at}");
+        if let Some(found) = found {
+            let off_px = expected.iter().map(|px| px.distance(found.px)).fold(f64::INFINITY, f64::min);
+            assert!(off_px < 1e-3, "{at}: {off_px:.1e} px");
+            let again = WorldPoint::on(Some(&motion), point.position_ned_m(0.7).unwrap(), 0.7);
+            assert!(again.position_ned_m(0.0).unwrap().distance(at) < 1e-12);
+            inside += 1;
+        }
+    }
+    assert!(inside > 20, "{inside}");
+}
+
+#[test]
+fn a_global_shutter_shows_a_point_where_its_camera_projects_it() {
+    let frame = FrameCamera::global(path(0.4), camera(), 0.5);
+    let pose = frame.path.pose(0.5);
+    for point in points() {
+        let expected = frame.project(&pose, 0.5, point);
+        let found = frame.find(point, DVec2::ZERO);
+        assert_eq!(found.map(|found| found.px), expected.map(|seen| seen.px));
+    }
+}
