@@ -5,12 +5,14 @@ pub mod apply;
 pub mod bench;
 pub mod board;
 pub mod camera;
+pub mod cluster;
 pub mod compare;
 pub mod completions;
 pub mod demo;
 pub mod explain;
 pub mod info;
 pub mod lens;
+pub mod merge;
 pub mod render;
 #[cfg(feature = "lab")]
 pub mod reproduce;

@@ -76,6 +76,8 @@ enum Command {
     Apply(commands::apply::ApplyArgs),
     Board(commands::board::BoardArgs),
     Compare(commands::compare::CompareArgs),
+    Cluster(commands::cluster::ClusterArgs),
+    Merge(commands::merge::MergeArgs),
     #[cfg(feature = "lab")]
     Bench(commands::bench::BenchArgs),
     #[cfg(feature = "lab")]
@@ -122,6 +124,8 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Apply(args) => commands::apply::run(&args, console),
         Command::Board(args) => commands::board::run(&args, console),
         Command::Compare(args) => commands::compare::run(&args, console),
+        Command::Cluster(args) => commands::cluster::run(&args, console),
+        Command::Merge(args) => commands::merge::run(&args, console),
         #[cfg(feature = "lab")]
         Command::Bench(args) => commands::bench::run(&args, console),
         #[cfg(feature = "lab")]

@@ -171,7 +171,13 @@ fn shard_frames(job: &Job<'_>) -> Vec<u64> {
 
 /// Frames of which a run renders the picture of a series.
 fn todo(job: &Job<'_>, series: &Series) -> Vec<u64> {
-    shard_frames(job).into_iter().filter(|&frame| !(job.resume && series.files.exist(frame))).collect()
+    let ours = shard_frames(job);
+    let is_missing = |frame: &u64| !(job.resume && series.files.exist(*frame));
+    // A video is made of all frames.
+    if series.files.has_video() && ours.iter().any(is_missing) {
+        return ours;
+    }
+    ours.into_iter().filter(is_missing).collect()
 }
 
 /// A run at work.
@@ -239,7 +245,11 @@ impl Run<'_, '_, '_, '_> {
         collected: &mut Collected,
     ) -> Result<(), Failure> {
         let writes_frames = !series.sequence.scenario.output.format.is_empty();
-        let writer = writes_frames.then(|| FrameWriter::new(series.files.clone(), threads()));
+        let start = || {
+            FrameWriter::new(series.files.clone(), threads())
+                .with_videos(series.sequence.scenario.camera.fps, todo)
+        };
+        let mut writer = writes_frames.then(start).transpose().or_bad_input()?;
         let bar = frames_bar(todo.len() as u64, self.console.is_quiet());
         bar.set_message(label(pictures, series));
         let begin = Instant::now();
@@ -255,7 +265,7 @@ impl Run<'_, '_, '_, '_> {
             made.insert(key, source_frame(&series.sequence, &finished.plan));
             bar.inc(1);
             tracks.map_or(Ok(()), |tracks| tracks.write(finished.plan.frame))?;
-            writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))?;
+            writer.as_mut().map_or(Ok(()), |writer| writer.write(finished.frame))?;
             if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
         });
         bar.finish_and_clear();

@@ -16,6 +16,7 @@ mod scene;
 mod tracks;
 mod twin;
 mod validate;
+mod video;
 
 pub use auto::{Auto, FieldOr};
 pub use camera::{
@@ -34,6 +35,7 @@ pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera,
 };
+pub use video::{ImageFormat, VideoCodec, VideoSpec};
 
 /// All inputs of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -379,6 +381,9 @@ pub struct OutputSpec {
     pub exr_pixel: ExrPixel,
     /// EXR compression.
     pub exr_compression: ExrCompression,
+    /// Encoding of `mp4` and `mkv`.
+    #[serde(skip_serializing_if = "VideoSpec::is_default")]
+    pub video: VideoSpec,
     /// Frames from one to the other of `flow` and `flow_back`.
     pub flow_step: u32,
     /// Instant of the picture that `flow_global` leads to.
@@ -404,6 +409,7 @@ impl Default for OutputSpec {
             epoch_ns: 0,
             exr_pixel: ExrPixel::Half,
             exr_compression: ExrCompression::Zip1,
+            video: VideoSpec::default(),
             flow_step: 1,
             flow_instant: FlowInstant::Centre,
             palette: false,
@@ -444,16 +450,6 @@ impl OutputSpec {
                 .saturating_sub((start_s * 1e9).round() as i64),
         }
     }
-}
-
-/// Image file formats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ImageFormat {
-    /// OpenEXR, linear, unquantised.
-    Exr,
-    /// PNG in the encoding of `camera.photometric.output`.
-    Png,
 }
 
 /// Pixel type of EXR colour channels.

@@ -281,7 +281,7 @@ mod tests {
 
     fn render(folder: &Path, value: f32, frames: u64, width: u32) {
         let spec = OutputSpec { format: vec![ImageFormat::Exr, ImageFormat::Png], ..OutputSpec::default() };
-        let writer = FrameWriter::new(FrameFiles::new(folder, &spec, OutputEncoding::Linear8), 1);
+        let mut writer = FrameWriter::new(FrameFiles::new(folder, &spec, OutputEncoding::Linear8), 1);
         for index in 0..frames {
             let color_rgba = (0..width * 12).flat_map(|_| [value, value, value, 1.0]).collect();
             writer

@@ -26,6 +26,7 @@
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
 //! | [`write`](mod@write) | frames and tables |
 //! | [`manifest`] | `run.json`; resuming of runs |
+//! | [`merge`](mod@merge) | joining of shards |
 //! | [`inputs`] | fingerprints of input files |
 //! | [`portable`] | relative paths in output folders |
 //! | [`compare`] | comparison of pictures |
@@ -43,6 +44,7 @@ pub mod gltf_file;
 pub mod inputs;
 pub mod load;
 pub mod manifest;
+pub mod merge;
 pub mod pictures;
 pub mod portable;
 pub mod scenario_file;

@@ -33,7 +33,7 @@ pub fn relative_to(path: &Path, folder: &Path) -> PathBuf {
 }
 
 /// The absolute path, with symbolic links resolved as far as it exists.
-fn resolved(path: &Path) -> PathBuf {
+pub(crate) fn resolved(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.into());
     for ancestor in absolute.ancestors() {
         if let Ok(canonical) = ancestor.canonicalize() {
@@ -92,6 +92,18 @@ pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError
             this file.\n{text}"
     );
     write_atomic(&target, text.as_bytes())
+}
+
+/// Writes a scenario file with paths relative to it.
+///
+/// # Errors
+/// A path that is not Unicode; the file cannot be written.
+pub fn write_scenario(path: &Path, scenario: &Scenario) -> Result<(), WriteError> {
+    let encode = |message: String| WriteError::Encode { path: path.into(), message };
+    let portable = portable_scenario(scenario, path.parent().unwrap_or(Path::new("")))
+        .map_err(|error| encode(error.to_string()))?;
+    let text = toml::to_string(&portable).map_err(|error| encode(error.to_string()))?;
+    write_atomic(path, text.as_bytes())
 }
 
 /// The path of a file within `folder`, relative to it. A file elsewhere is copied to `inputs/`.

@@ -10,6 +10,7 @@
 //! OUT/points.csv                  tracked points, if asked for
 //! OUT/tracks.csv                  where every written frame shows them
 //! OUT/color/frame_000123.exr      R G B A, linear   (.png: in the encoding of camera.photometric.output)
+//! OUT/color.mp4                   a video of all frames (.mkv, .y4m)
 //! OUT/depth/frame_000123.exr      Z, metres, 0 = nothing
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
 //! OUT/coords/frame_000123.exr     u v x y dt n e d; n e d is the direction where depth is 0 (sky)
@@ -36,8 +37,10 @@ mod picture;
 mod png_file;
 mod tables;
 mod tracks;
+mod video;
 
 pub use atomic::write_atomic;
+pub(crate) use atomic::{temporary_path, write_atomic_with};
 pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, frames_path};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
@@ -48,6 +51,7 @@ pub use tables::{
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
 pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
+pub use video::Y4mStream;
 
 /// Why a file was not written.
 #[derive(Debug, Error)]

@@ -390,6 +390,9 @@ pub const PARAMS: &[Param] = &[
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
+    param("output.video.codec", "", ANY, 1.0, "encoder of mp4 and mkv"),
+    param("output.video.bits", "", [8.0, 10.0], 0.1, "bits of each code value of a video"),
+    param("output.video.crf", "", [0.0, 51.0], 0.1, "constant rate factor: 0 is best, 51 smallest"),
     param(
         "output.flow_step",
         "frames",

@@ -8,7 +8,7 @@ use std::{
 use anyhow::anyhow;
 use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Scenario, Solver, validate};
 use camsim_engine::Finished;
-use camsim_io::scenario_file::print_default;
+use camsim_io::{merge::write_checksums, scenario_file::print_default, write::Y4mStream};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::{
@@ -44,6 +44,9 @@ Examples:
                                                       exactly and slowly
   camsim render flight.toml --format none --frames 0..50 --times
                                                       how fast, and where the time goes
+  camsim render flight.toml --format mp4              a video, by ffmpeg
+  camsim render flight.toml --format none --pipe | mpv -
+                                                      look at it while it is made
   camsim render --print-default > flight.toml         a scenario to start from")]
 pub struct RenderArgs {
     /// Scenario (TOML), or the run.json of an earlier run
@@ -72,11 +75,17 @@ pub struct RenderArgs {
     #[arg(long)]
     resume: bool,
     /// Print the time of each stage at the end: on the cpu, and by pass on the gpu
-    #[arg(long)]
+    #[arg(long, conflicts_with = "pipe")]
     times: bool,
     /// Render only the I-th of N parts, with I from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Write checksums.csv at the end: size and CRC-32 of each file, which `camsim merge` checks
+    #[arg(long)]
+    checksums: bool,
+    /// Pass the frames to standard output as an uncompressed video (y4m), too, for ffmpeg, mpv or GStreamer
+    #[arg(long)]
+    pipe: bool,
     /// Print a scenario with every key, its default and its meaning, and exit
     #[arg(long, exclusive = true)]
     print_default: bool,
@@ -110,6 +119,12 @@ enum FormatArg {
     Exr,
     /// PNG in the encoding of camera.photometric.output
     Png,
+    /// A video of all frames, by ffmpeg: color.mp4
+    Mp4,
+    /// As mp4, in a Matroska file
+    Mkv,
+    /// An uncompressed video: color.y4m
+    Y4m,
     /// No frame files
     None,
 }
@@ -129,6 +144,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
     let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read(console)?;
     let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
+    refuse_parts_of_videos(&scenario, args.shard)?;
     let mut times = TimesTable::default();
     let is_quiet = console.is_quiet();
     let loaded = times.timed("scenario files", is_quiet, || inputs::load(&scenario, console))?;
@@ -161,29 +177,55 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         Box::new(engine_source)
     };
     console.detail(format_args!("adapter: {}", source.adapter()));
+    let (fps, bits) = (scenario.camera.fps, scenario.output.video.bits);
+    let mut pipe = args.pipe.then(|| Y4mStream::new(std::io::stdout(), fps, bits));
+    let mut broken_pipe = None;
     let mut on_frame = |twin: Option<&str>, finished: &Finished| {
         times.add(twin, &finished.times);
-        ControlFlow::Continue(())
+        let pipe = pipe.as_mut().filter(|_| twin.is_none());
+        broken_pipe = pipe.and_then(|pipe| pipe.write(&finished.frame).err());
+        if broken_pipe.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let outcome = render_run::run(&job, &mut *source, console, &mut on_frame).inspect_err(|failure| {
+    let outcome = render_run::run(&job, &mut *source, console, &mut on_frame);
+    if let Some(error) = broken_pipe {
+        return Err(anyhow!("--pipe: standard output takes no more frames: {error}")).or_failed();
+    }
+    let outcome = outcome.inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
             console.note(format_args!("written frames are kept; to resume: {resume_command}"));
         }
     })?;
+    if args.checksums {
+        write_checksums(&folder).or_failed()?;
+    }
     if !console.is_quiet() {
         let (seconds, size_mb) = (outcome.time.as_secs_f64(), outcome.bytes as f64 * 1e-6);
-        console.line(format_args!(
+        let summary = format!(
             "{} in {seconds:.2} s, {}, {size_mb:.1} MB in {}",
             outcome.pictures(),
             outcome.rate(),
             folder.display()
-        ))?;
+        );
+        if args.pipe { console.note(summary) } else { console.line(summary)? }
     }
     if args.times {
         times.add_start("plan of the first frame", outcome.first_plan);
         console.print(&times.text())?;
     }
     Ok(())
+}
+
+/// A shard has a part of the frames, and its video would have the name of all others.
+fn refuse_parts_of_videos(scenario: &Scenario, shard: Option<Shard>) -> Result<(), Failure> {
+    match scenario.output.format.iter().find(|format| format.is_video()) {
+        Some(video) if shard.is_some() => Err(Failure::bad_input(anyhow!(
+            "--shard makes a part of the frames, and an {} holds all of them: render the shards as png, then make \
+             the video by ffmpeg -framerate {} -i DIR/color/frame_%06d.png",
+            video.ending(),
+            scenario.camera.fps
+        ))),
+        _ => Ok(()),
+    }
 }
 
 fn default_folder(scenario: &Path) -> PathBuf {
@@ -240,6 +282,9 @@ fn with_outputs(mut scenario: Scenario, args: &RenderArgs) -> Result<Scenario, F
         let images = formats.iter().filter_map(|format| match format {
             FormatArg::Exr => Some(ImageFormat::Exr),
             FormatArg::Png => Some(ImageFormat::Png),
+            FormatArg::Mp4 => Some(ImageFormat::Mp4),
+            FormatArg::Mkv => Some(ImageFormat::Mkv),
+            FormatArg::Y4m => Some(ImageFormat::Y4m),
             FormatArg::None => None,
         });
         scenario.output.format = without_repeats(&images.collect::<Vec<_>>());

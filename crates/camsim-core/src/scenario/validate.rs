@@ -12,6 +12,7 @@ mod motion;
 mod scene;
 mod tracks;
 mod twins;
+mod video;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -49,6 +50,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
     tracks::check_tracks(&mut check, scenario);
+    video::check_video(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }

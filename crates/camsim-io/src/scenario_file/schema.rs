@@ -4,7 +4,7 @@
 use camsim_core::{
     scenario::{
         MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
-        MAX_SIDE_PX, PointSource, TracksSpec,
+        MAX_SIDE_PX, PointSource, TracksSpec, VideoSpec,
     },
     temporal::SAMPLES,
 };
@@ -235,11 +235,14 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
     ("output.channels", Words(CHANNELS)),
-    ("output.format", Words(&["exr", "png"])),
+    ("output.format", Words(&["exr", "png", "mp4", "mkv", "y4m"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+    ("output.video.codec", Word(&["h264", "h265", "ffv1"])),
+    ("output.video.bits", Within(8, 10)),
+    ("output.video.crf", Within(0, VideoSpec::WORST_CRF)),
     ("output.flow_step", Within(1, u32::MAX)),
     ("output.flow_instant", Word(&["first-row", "centre", "last-row"])),
     ("output.palette", Flag),

@@ -21,21 +21,12 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 }
 
 /// As [`write_atomic`], for contents that `write` gives piece by piece.
-pub(super) fn write_atomic_with(
+pub(crate) fn write_atomic_with(
     path: &Path,
     write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
-    let name = path
-        .file_name()
-        .ok_or_else(|| fail(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file")))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    if !folder.as_os_str().is_empty() {
-        fs::create_dir_all(folder).map_err(fail)?;
-    }
-    static COUNTER: AtomicU64 = AtomicU64::new(0);
-    let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
-    let temporary = folder.join(format!(".{}.{}-{unique}.tmp", name.to_string_lossy(), std::process::id()));
+    let temporary = temporary_path(path)?;
     let written = File::create(&temporary).and_then(|file| {
         let mut out = BufWriter::new(file);
         write(&mut out)?;
@@ -46,6 +37,21 @@ pub(super) fn write_atomic_with(
         let _ = fs::remove_file(&temporary);
         fail(source)
     })
+}
+
+/// A temporary name in the folder of `path`, which is created if missing.
+pub(crate) fn temporary_path(path: &Path) -> Result<PathBuf, WriteError> {
+    let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
+    let name = path
+        .file_name()
+        .ok_or_else(|| fail(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file")))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if !folder.as_os_str().is_empty() {
+        fs::create_dir_all(folder).map_err(fail)?;
+    }
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
+    Ok(folder.join(format!(".{}.{}-{unique}.tmp", name.to_string_lossy(), std::process::id())))
 }
 
 /// Removes the temporary files that killed runs left for these paths. Other processes that write to the same

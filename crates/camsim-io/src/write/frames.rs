@@ -15,7 +15,11 @@ use camsim_core::{
     scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec, PlaneKind},
 };
 
-use super::{WriteError, atomic, exr_file, png_file, tables, write_atomic};
+use super::{
+    WriteError, atomic, exr_file, png_file, tables,
+    video::{self, VideoWriter},
+    write_atomic,
+};
 
 /// Names and paths of the files of frames.
 #[derive(Clone, Debug)]
@@ -65,6 +69,11 @@ impl FrameFiles {
         self.files().into_iter().map(name).collect()
     }
 
+    /// Whether one of the files holds all frames, so that they can only be rendered together.
+    pub fn has_video(&self) -> bool {
+        self.files().iter().any(|file| matches!(file, OutputFile::Color(format) if format.is_video()))
+    }
+
     /// Whether all files of frame `index` exist. `--resume` skips such frames, as files are never incomplete.
     pub fn exist(&self, index: u64) -> bool {
         let names = self.names(index);
@@ -76,7 +85,9 @@ impl FrameFiles {
     /// # Errors
     /// A file that cannot be removed.
     pub fn remove(&self, frames: &[u64]) -> Result<(), WriteError> {
-        for (_, name) in frames.iter().flat_map(|&index| self.names(index)) {
+        let videos = ImageFormat::VIDEOS.map(|video| file_name(OutputFile::Color(video), 0, self.instant));
+        let files = frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name);
+        for name in files.chain(videos) {
             let path = self.folder.join(name);
             match std::fs::remove_file(&path) {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
@@ -148,6 +159,8 @@ impl FrameFiles {
                     exr(&["R", "G", "B", "A"], &frame.color_rgba, self.output.exr_pixel)?
                 }
                 OutputFile::Color(ImageFormat::Png) => png_file::encode_color(&path, frame, self.encoding)?,
+                // Videos get their frames in order, from `FrameWriter::write`.
+                OutputFile::Color(ImageFormat::Mp4 | ImageFormat::Mkv | ImageFormat::Y4m) => continue,
                 OutputFile::Depth => {
                     exr(&["Z"], frame.depth_m.as_deref().unwrap_or_default(), ExrPixel::Float)?
                 }
@@ -212,6 +225,9 @@ fn column_name(file: OutputFile) -> &'static str {
     match file {
         OutputFile::Color(ImageFormat::Exr) => "color_exr",
         OutputFile::Color(ImageFormat::Png) => "color_png",
+        OutputFile::Color(ImageFormat::Mp4) => "color_mp4",
+        OutputFile::Color(ImageFormat::Mkv) => "color_mkv",
+        OutputFile::Color(ImageFormat::Y4m) => "color_y4m",
         OutputFile::Depth => "depth",
         OutputFile::Valid => "valid",
         OutputFile::Coords => "coords",
@@ -224,9 +240,12 @@ fn column_name(file: OutputFile) -> &'static str {
 
 /// Path below the output folder.
 fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
+    let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
     let (folder, ending) = match file {
-        OutputFile::Color(ImageFormat::Exr) => ("color", "exr"),
-        OutputFile::Color(ImageFormat::Png) => ("color", "png"),
+        OutputFile::Color(format) if format.is_video() => {
+            return format!("color{instant}.{}", format.ending());
+        }
+        OutputFile::Color(format) => ("color", format.ending()),
         OutputFile::Depth => ("depth", "exr"),
         OutputFile::Valid => ("valid", "png"),
         OutputFile::Coords => ("coords", "exr"),
@@ -235,7 +254,6 @@ fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
         OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
         OutputFile::Palette(_) => (column_name(file), "png"),
     };
-    let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
     format!("{folder}/frame_{index:06}{instant}.{ending}")
 }
 
@@ -280,8 +298,10 @@ pub struct WriteSummary {
 /// Encodes and writes frames on worker threads behind a bounded queue, which limits the memory.
 #[derive(Debug)]
 pub struct FrameWriter {
-    queue: Option<SyncSender<RenderedFrame>>,
+    queue: Option<SyncSender<Arc<RenderedFrame>>>,
     workers: Vec<JoinHandle<()>>,
+    videos: Vec<VideoWriter>,
+    files: Arc<FrameFiles>,
     shared: Arc<WriterState>,
 }
 
@@ -313,14 +333,35 @@ impl FrameWriter {
                 std::thread::spawn(move || work(&files, &frames, &shared))
             })
             .collect();
-        Self { queue: Some(queue), workers, shared }
+        Self { queue: Some(queue), workers, videos: Vec::new(), files, shared }
+    }
+
+    /// Starts the videos of the output's formats. `frames` are those that will be written, in order, of a camera
+    /// with `fps`.
+    ///
+    /// # Errors
+    /// The frames are not equally spaced, or ffmpeg is needed and missing.
+    pub fn with_videos(mut self, fps: f64, frames: &[u64]) -> Result<Self, WriteError> {
+        for file in self.files.files() {
+            let OutputFile::Color(format) = file else { continue };
+            if format.is_video() {
+                let path = self.files.folder.join(file_name(file, 0, self.files.instant));
+                let series = video::Series::new(&path, fps, frames)?;
+                self.videos.push(VideoWriter::start(path, format, self.files.output.video, series)?);
+            }
+        }
+        Ok(self)
     }
 
     /// Queues a frame; waits while the queue is full.
     ///
     /// # Errors
     /// The first failure of an earlier frame; rendering should stop then.
-    pub fn write(&self, frame: RenderedFrame) -> Result<(), WriteError> {
+    pub fn write(&mut self, frame: RenderedFrame) -> Result<(), WriteError> {
+        let frame = Arc::new(frame);
+        for video in &mut self.videos {
+            video.add(&frame)?;
+        }
         let sent = self.queue.as_ref().is_some_and(|queue| queue.send(frame).is_ok());
         match self.shared.take_failure() {
             Some(failure) => Err(failure),
@@ -335,12 +376,15 @@ impl FrameWriter {
     /// The first failure that `write` has not reported yet.
     pub fn finish(mut self) -> Result<WriteSummary, WriteError> {
         let is_complete = self.join();
+        let mut bytes = self.shared.bytes.load(Ordering::Relaxed);
+        for video in &mut self.videos {
+            bytes += video.finish()?;
+        }
         match self.shared.take_failure() {
             Some(failure) => Err(failure),
-            None if is_complete => Ok(WriteSummary {
-                frames: self.shared.frames.load(Ordering::Relaxed),
-                bytes: self.shared.bytes.load(Ordering::Relaxed),
-            }),
+            None if is_complete => {
+                Ok(WriteSummary { frames: self.shared.frames.load(Ordering::Relaxed), bytes })
+            }
             None => Err(WriteError::Ended),
         }
     }
@@ -360,7 +404,7 @@ impl Drop for FrameWriter {
 }
 
 /// Loop of a worker thread.
-fn work(files: &FrameFiles, frames: &Mutex<Receiver<RenderedFrame>>, shared: &WriterState) {
+fn work(files: &FrameFiles, frames: &Mutex<Receiver<Arc<RenderedFrame>>>, shared: &WriterState) {
     loop {
         // The lock is held while waiting: one worker waits for a frame, the others for the lock.
         let next = frames.lock().unwrap_or_else(PoisonError::into_inner).recv();

@@ -95,7 +95,7 @@ fn all_channels_read_back_in_all_compressions() {
         let dir = tempfile::tempdir().unwrap();
         let files = FrameFiles::new(dir.path(), &everything(pixel, compression), OutputEncoding::Srgb8);
         assert!(!files.exist(7));
-        let writer = FrameWriter::new(files.clone(), 2);
+        let mut writer = FrameWriter::new(files.clone(), 2);
         for index in 0..9 {
             writer.write(frame(index)).unwrap();
         }
@@ -169,7 +169,7 @@ fn png_has_the_configured_encoding() {
 fn empty_format_writes_no_files() {
     let dir = tempfile::tempdir().unwrap();
     let spec = OutputSpec { format: vec![], ..everything(ExrPixel::Half, ExrCompression::Zip1) };
-    let writer = FrameWriter::new(FrameFiles::new(dir.path(), &spec, OutputEncoding::Srgb8), 1);
+    let mut writer = FrameWriter::new(FrameFiles::new(dir.path(), &spec, OutputEncoding::Srgb8), 1);
     writer.write(frame(0)).unwrap();
     assert_eq!(writer.finish().unwrap(), WriteSummary { frames: 1, bytes: 0 });
     assert!(files_below(dir.path()).is_empty());
@@ -181,7 +181,7 @@ fn failures_name_the_path_and_leave_no_files() {
     // A file in place of a folder causes an error for all users, root included.
     fs::write(dir.path().join("color"), "in the way").unwrap();
     let files = FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8);
-    let writer = FrameWriter::new(files, 2);
+    let mut writer = FrameWriter::new(files, 2);
     let error = (0..50)
         .find_map(|index| writer.write(frame(index)).err())
         .or_else(|| writer.finish().err())
@@ -196,7 +196,7 @@ fn failures_name_the_path_and_leave_no_files() {
     assert!(write_atomic(Path::new("/"), b"x").unwrap_err().to_string().contains("names no file"));
 
     let short = RenderedFrame { color_rgba: vec![0.0; 5], ..frame(3) };
-    let writer =
+    let mut writer =
         FrameWriter::new(FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8), 1);
     let result = writer.write(short);
     let error = result.err().or_else(|| writer.finish().err()).unwrap().to_string();
@@ -217,7 +217,7 @@ fn non_finite_values_are_written_without_panic() {
         f32::NAN,
     ]);
     let dir = tempfile::tempdir().unwrap();
-    let writer = FrameWriter::new(
+    let mut writer = FrameWriter::new(
         FrameFiles::new(dir.path(), &everything(ExrPixel::Half, ExrCompression::Zip1), OutputEncoding::Srgb8),
         1,
     );
@@ -277,7 +277,7 @@ fn numbers_of_objects_are_written_as_numbers_and_in_colour() {
     let files = FrameFiles::new(folder.path(), &output, OutputEncoding::Srgb8);
     let columns: Vec<String> = files.names(3).into_iter().map(|(column, _)| column).collect();
     assert_eq!(columns, ["object", "object_palette", "class", "class_palette"]);
-    let writer = FrameWriter::new(files, 1);
+    let mut writer = FrameWriter::new(files, 1);
     writer.write(shown.clone()).unwrap();
     writer.finish().unwrap();
     let open = |name: &str| image::open(folder.path().join(format!("{name}/frame_000003.png"))).unwrap();
@@ -290,7 +290,7 @@ fn numbers_of_objects_are_written_as_numbers_and_in_colour() {
     assert_eq!(open("class_palette").into_rgb8().get_pixel(1, 0).0, palette_rgb8(1));
     // 16 bits hold no larger number.
     shown.planes[0].values = numbers(100);
-    let writer = FrameWriter::new(FrameFiles::new(folder.path(), &output, OutputEncoding::Srgb8), 1);
+    let mut writer = FrameWriter::new(FrameFiles::new(folder.path(), &output, OutputEncoding::Srgb8), 1);
     let _ = writer.write(shown);
     assert!(writer.finish().unwrap_err().to_string().contains("above 65535"));
 }

@@ -351,7 +351,7 @@ fn render(
     console: &mut Console<'_>,
 ) -> Result<NoSourceCounts, Failure> {
     // A frame is rendered on all cores, while another thread writes.
-    let writer = FrameWriter::new(files, 1);
+    let mut writer = FrameWriter::new(files, 1);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let mut no_source = NoSourceCounts::default();
     let mut printed_kinds = Vec::new();

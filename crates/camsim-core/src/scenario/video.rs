@@ -1,0 +1,82 @@
+//! File formats of colour, and `[output.video]`.
+
+use serde::{Deserialize, Serialize};
+
+/// File formats of colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ImageFormat {
+    /// OpenEXR, linear, unquantised.
+    Exr,
+    /// PNG in the encoding of `camera.photometric.output`.
+    Png,
+    /// A video of all frames, encoded by ffmpeg.
+    Mp4,
+    /// As [`ImageFormat::Mp4`], in a Matroska file.
+    Mkv,
+    /// An uncompressed video (YUV4MPEG2).
+    Y4m,
+}
+
+impl ImageFormat {
+    /// The formats that hold all frames in one file.
+    pub const VIDEOS: [Self; 3] = [Self::Mp4, Self::Mkv, Self::Y4m];
+
+    /// Whether one file holds all frames.
+    #[must_use]
+    pub fn is_video(self) -> bool {
+        Self::VIDEOS.contains(&self)
+    }
+
+    /// Word in `output.format`, and ending of the files.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Exr => "exr",
+            Self::Png => "png",
+            Self::Mp4 => "mp4",
+            Self::Mkv => "mkv",
+            Self::Y4m => "y4m",
+        }
+    }
+}
+
+/// `[output.video]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VideoSpec {
+    /// Encoder of `mp4` and `mkv`.
+    pub codec: VideoCodec,
+    /// Bits of each code value, 8 or 10.
+    pub bits: u32,
+    /// Constant rate factor of H.264 and H.265: 0 is best, [`VideoSpec::WORST_CRF`] smallest.
+    pub crf: u32,
+}
+
+impl VideoSpec {
+    /// Largest value of `crf`.
+    pub const WORST_CRF: u32 = 51;
+
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Default for VideoSpec {
+    fn default() -> Self {
+        Self { codec: VideoCodec::H264, bits: 8, crf: 18 }
+    }
+}
+
+/// Encoders of videos.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VideoCodec {
+    /// H.264 by x264.
+    #[default]
+    H264,
+    /// H.265 by x265.
+    H265,
+    /// FFV1, which loses nothing of the code values; in `mkv` only.
+    Ffv1,
+}
