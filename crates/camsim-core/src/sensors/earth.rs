@@ -75,7 +75,7 @@ impl Earth {
 
     /// Gravity at a point: along the normal of the ellipsoid, or straight down and [`STANDARD_GRAVITY_M_S2`]
     /// where the place is not known.
-    pub(super) fn gravity_ned_m_s2(&mut self, point_ned_m: DVec3) -> DVec3 {
+    pub fn gravity_ned_m_s2(&mut self, point_ned_m: DVec3) -> DVec3 {
         match (self.place(point_ned_m), self.frame) {
             (Some(at), Some(frame)) => frame.down_ned(at) * normal_gravity_m_s2(at.lat_rad, at.height_m),
             _ => DVec3::Z * STANDARD_GRAVITY_M_S2,

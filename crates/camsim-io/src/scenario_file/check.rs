@@ -151,6 +151,9 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         ValueKind::Counts(n, max) => {
             (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {max}"))
         }
+        ValueKind::NumberOrNumbers(n) => {
+            (number(value) || all(value, Some(n), &number), format!("a number or a list of {n} numbers"))
+        }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
         ValueKind::Points(n) => (
             all(value, None, &|point| all(point, Some(n), &number)),

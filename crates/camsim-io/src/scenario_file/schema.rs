@@ -54,6 +54,8 @@ pub enum ValueKind {
     /// A list of this many whole numbers of at most 32 bits. The second number is the largest useful value,
     /// for the message; ranges are checked later.
     Counts(usize, u32),
+    /// A number, or a list of this many numbers.
+    NumberOrNumbers(usize),
     /// A list of any number of numbers.
     NumberList,
     /// A list of any number of lists of this many numbers.
@@ -102,6 +104,9 @@ const CHANNELS: &[&str] = &[
     "motion",
     "blur_path",
 ];
+const SENSOR_AXES: &[&str] = &["frd", "flu", "rdf"];
+/// One value of all axes, or one of each.
+const PER_AXIS: ValueKind = NumberOrNumbers(3);
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
 /// Keys of a scenario.
@@ -260,6 +265,77 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.twin.instants", Within(1, MAX_INSTANTS)),
     ("output.twin.over", Word(&["exposure", "readout"])),
     ("output.twin.channels", Words(CHANNELS)),
+    ("imu", Tables),
+    ("imu.name", Text),
+    ("imu.rate_hz", Number),
+    ("imu.mount.angles_deg", Numbers(3)),
+    ("imu.mount.offset_m", Numbers(3)),
+    ("imu.axes", Word(SENSOR_AXES)),
+    ("imu.earth_rate", Flag),
+    ("imu.gyro.noise_density", PER_AXIS),
+    ("imu.gyro.random_walk", PER_AXIS),
+    ("imu.gyro.bias", PER_AXIS),
+    ("imu.gyro.bias_sigma", PER_AXIS),
+    ("imu.gyro.drift_sigma", PER_AXIS),
+    ("imu.gyro.drift_tau_s", Number),
+    ("imu.gyro.scale", PER_AXIS),
+    ("imu.gyro.misalignment_deg", Numbers(6)),
+    ("imu.gyro.quantisation", PER_AXIS),
+    ("imu.gyro.range", PER_AXIS),
+    ("imu.accel.noise_density", PER_AXIS),
+    ("imu.accel.random_walk", PER_AXIS),
+    ("imu.accel.bias", PER_AXIS),
+    ("imu.accel.bias_sigma", PER_AXIS),
+    ("imu.accel.drift_sigma", PER_AXIS),
+    ("imu.accel.drift_tau_s", Number),
+    ("imu.accel.scale", PER_AXIS),
+    ("imu.accel.misalignment_deg", Numbers(6)),
+    ("imu.accel.quantisation", PER_AXIS),
+    ("imu.accel.range", PER_AXIS),
+    ("imu.g_sensitivity", PER_AXIS),
+    ("imu.clock_offset_ms", Number),
+    ("imu.jitter_ms", Number),
+    ("gnss", Tables),
+    ("gnss.name", Text),
+    ("gnss.rate_hz", Number),
+    ("gnss.offset_m", Numbers(3)),
+    ("gnss.sigma_m", Numbers(2)),
+    ("gnss.drift_m", Numbers(2)),
+    ("gnss.drift_tau_s", Number),
+    ("gnss.velocity_sigma_m_s", Numbers(2)),
+    ("gnss.dropouts_s", Points(2)),
+    ("gnss.dropout_every_s", Number),
+    ("gnss.dropout_mean_s", Number),
+    ("gnss.delay_ms", Number),
+    ("gnss.clock_offset_ms", Number),
+    ("gnss.jitter_ms", Number),
+    ("barometer", Tables),
+    ("barometer.name", Text),
+    ("barometer.rate_hz", Number),
+    ("barometer.offset_m", Numbers(3)),
+    ("barometer.sea_level_pa", Number),
+    ("barometer.bias_pa", Number),
+    ("barometer.sigma_pa", Number),
+    ("barometer.drift_pa", Number),
+    ("barometer.drift_tau_s", Number),
+    ("barometer.quantisation_pa", Number),
+    ("barometer.clock_offset_ms", Number),
+    ("barometer.jitter_ms", Number),
+    ("magnetometer", Tables),
+    ("magnetometer.name", Text),
+    ("magnetometer.rate_hz", Number),
+    ("magnetometer.mount.angles_deg", Numbers(3)),
+    ("magnetometer.mount.offset_m", Numbers(3)),
+    ("magnetometer.axes", Word(SENSOR_AXES)),
+    ("magnetometer.field_ned_ut", Numbers(3)),
+    ("magnetometer.date", Text),
+    ("magnetometer.hard_iron_ut", Numbers(3)),
+    ("magnetometer.soft_iron", Numbers(9)),
+    ("magnetometer.sigma_ut", PER_AXIS),
+    ("magnetometer.quantisation_ut", Number),
+    ("magnetometer.range_ut", Number),
+    ("magnetometer.clock_offset_ms", Number),
+    ("magnetometer.jitter_ms", Number),
 ];
 
 /// Words that this version does not support.
@@ -281,6 +357,10 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
     ("output.twin.name", "output.twin"),
+    ("imu.name", "imu"),
+    ("gnss.name", "gnss"),
+    ("barometer.name", "barometer"),
+    ("magnetometer.name", "magnetometer"),
 ];
 
 impl ValueKind {

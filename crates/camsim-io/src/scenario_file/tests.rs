@@ -1,9 +1,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr, FlowInstant,
-    HeightUnit, LoopKind, MotionSpec, ObjectsOf, OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
-    TwinShutter, TwinSpec,
+    Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
+    FlowInstant, GnssSpec, HeightUnit, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf,
+    OutputSpec, PerAxis, QualitySpec, Readout, SensorAxes, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -33,10 +33,10 @@ fn printed_default_has_the_default_values() {
 #[test]
 fn every_word_of_the_schema_deserialises() {
     for (key, kind) in KEYS {
-        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf.", "output.twin."]
-            .iter()
-            .any(|table| key.starts_with(table))
-        {
+        let of_lists =
+            ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf.", "output.twin."];
+        let of_sensors = ["imu.", "gnss.", "barometer.", "magnetometer."];
+        if of_lists.iter().chain(&of_sensors).any(|table| key.starts_with(table)) {
             continue;
         }
         let values: Vec<String> = match kind {
@@ -143,6 +143,14 @@ fn every_key_of_the_structs_is_in_the_schema() {
         spin: vec![SpinSpec { axis: [1.0; 3], hz: 1.0, phase_deg: 1.0, node: Some("a".into()) }],
         animate: true,
     });
+    scenario.imu = vec![ImuSpec { name: "imu0".into(), ..ImuSpec::default() }];
+    scenario.gnss = vec![GnssSpec { dropouts_s: vec![[1.0, 2.0]], ..GnssSpec::default() }];
+    scenario.barometer = vec![BarometerSpec::default()];
+    scenario.magnetometer = vec![MagnetometerSpec {
+        field_ned_ut: Some([20.0, 1.0, 43.0]),
+        date: Some("2026-11-27".into()),
+        ..MagnetometerSpec::default()
+    }];
     let saved = toml::to_string(&scenario).unwrap();
     let mut visited = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut visited);
@@ -175,6 +183,46 @@ fn twins_are_read_and_their_problems_named_by_line() {
         ),
     ] {
         let error = with(twin).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn sensors_are_read_and_their_problems_named_by_line() {
+    // The commented tables of the printed default are a scenario too.
+    let text: String = print_default()
+        .lines()
+        .skip_while(|line| !line.starts_with("# [[imu]]"))
+        .map(|line| line.trim_start_matches("# "))
+        .filter(|line| !line.starts_with("..."))
+        .fold(GOOD.to_owned(), |text, line| text + line + "\n");
+    let scenario = parse(&text).unwrap();
+    let names: Vec<(&str, &str)> = scenario.sensor_names().collect();
+    assert_eq!(names, [("imu", "imu0"), ("gnss", "gnss0"), ("barometer", "baro0"), ("magnetometer", "mag0")]);
+    let imu = &scenario.imu[0];
+    assert_eq!((imu.gyro.noise_density, imu.accel.random_walk), (PerAxis::all(1.7e-4), PerAxis::all(3e-3)));
+    assert_eq!(scenario.gnss[0].dropouts_s, [[12.0, 15.0]]);
+    let saved = toml::to_string(&scenario).unwrap();
+    assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario);
+
+    let with = |keys: &str| parse(&format!("{GOOD}[[imu]]\nname = \"a\"\n{keys}\n"));
+    let spec =
+        &with("axes = \"flu\"\ngyro.scale = [1e-3, 0, -1e-3]\naccel = { range = 160 }").unwrap().imu[0];
+    assert_eq!((spec.axes, spec.gyro.scale), (SensorAxes::Flu, PerAxis([1e-3, 0.0, -1e-3])));
+    assert_eq!(spec.accel.range, PerAxis::all(160.0));
+    for (keys, wanted) in [
+        ("rate = 200", "s.toml:8: imu.0.rate: unknown key; did you mean `imu.rate_hz`?"),
+        (
+            "gyro.noise_density = [1, 2]",
+            "s.toml:8: imu.0.gyro.noise_density: expected a number or a list of 3",
+        ),
+        ("gyro.noise_density = -1", "s.toml:8: imu.0.gyro.noise_density: must be finite and 0 or more"),
+        ("axes = \"fru\"", "imu.0.axes: expected one of \"frd\", \"flu\", \"rdf\""),
+        ("[[imu]]", "s.toml:8: imu.1.name: is missing"),
+        ("[[gnss]]\nname = \"A\"", "s.toml:9: gnss.0.name: \"A\" names two sensors"),
+        ("[[magnetometer]]\nname = \"m\"", "s.toml:8: magnetometer.0.field_ned_ut: or date is needed"),
+    ] {
+        let error = with(keys).unwrap_err().to_string();
         assert!(error.contains(wanted), "{error}");
     }
 }
