@@ -3,7 +3,8 @@
 use toml::{Table, Value};
 
 use super::{
-    schema::{self, Schema, ValueKind},
+    schema::{Schema, ValueKind},
+    similar,
     tree::{Tree, join},
 };
 
@@ -198,7 +199,7 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         | ValueKind::CountOr(_, words) => written
             .iter()
             .find(|word| !words.contains(word))
-            .and_then(|word| schema::nearest_word(word, words)),
+            .and_then(|word| similar::nearest_word(word, words)),
         _ => None,
     };
     let hint = hint.map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));

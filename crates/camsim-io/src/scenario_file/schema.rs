@@ -10,6 +10,8 @@ use camsim_core::{
 };
 use camsim_plan::MAX_KEYS;
 
+use super::similar::{MIN_KEY_SIMILARITY, similarity};
+
 /// Keys of a file format, with what error messages say about them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schema {
@@ -407,27 +409,4 @@ impl Schema {
         let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
         (score(&best) > MIN_KEY_SIMILARITY).then(|| best.to_owned())
     }
-}
-
-/// Similarity above which a key is suggested: `fsp` and `fps` have 0.82, words of four or five letters with
-/// one letter in common up to 0.79.
-const MIN_KEY_SIMILARITY: f64 = 0.8;
-
-/// Similarity above which a word is suggested.
-const MIN_WORD_SIMILARITY: f64 = 0.65;
-
-/// The word of `words` most similar to `word`, if it is similar enough to suggest.
-pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
-    let score = |candidate: &&str| similarity(word, candidate);
-    words
-        .iter()
-        .copied()
-        .max_by(|a, b| score(a).total_cmp(&score(b)))
-        .filter(|best| score(best) > MIN_WORD_SIMILARITY)
-}
-
-/// Similarity of two words, 0..=1: the larger of Jaro-Winkler, which favours common prefixes, and
-/// Damerau-Levenshtein, which finds swapped letters in short words.
-fn similarity(a: &str, b: &str) -> f64 {
-    strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
 }
