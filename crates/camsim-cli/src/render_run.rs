@@ -9,7 +9,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::sequence::Sequence;
+use camsim_core::{sensors::Sensors, sequence::Sequence};
 use camsim_engine::Finished;
 use camsim_io::{
     load::TrackInputs,
@@ -54,6 +54,8 @@ pub struct Job<'a> {
     /// Points of `[output.tracks]` that files and keys give, whose pixels in the frames are written. Twins have
     /// no tracks.
     pub tracks: &'a TrackInputs,
+    /// Sensors beside the camera.
+    pub sensors: &'a Sensors,
     /// Whether existing frames are kept.
     pub resume: bool,
     /// Warnings of loading, stored in `run.json`.

@@ -158,6 +158,18 @@ impl LocalFrame {
         Geodetic::from_ecef(self.ecef_from_ned(ned_m))
     }
 
+    /// A vector of earth-centred axes in the axes of this frame.
+    pub(crate) fn ned_from_ecef_vector(&self, ecef: DVec3) -> DVec3 {
+        self.ned_from_ecef_axes * ecef
+    }
+
+    /// Direction of down at `at`, along the normal of the ellipsoid, in the axes of this frame.
+    pub(crate) fn down_ned(&self, at: Geodetic) -> DVec3 {
+        let (sin_lat, cos_lat) = at.lat_rad.sin_cos();
+        let (sin_lon, cos_lon) = at.lon_rad.sin_cos();
+        self.ned_from_ecef_vector(-DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat))
+    }
+
     /// Rotation from the tangent NED frame at `at` to the axes of this frame.
     ///
     /// Attitudes in a log are relative to the tangent frame at the aircraft; this converts them to that of

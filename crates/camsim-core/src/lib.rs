@@ -25,6 +25,7 @@
 //! | [`geodesy`], [`flight_log`] | WGS-84 and local frames; a log, cleaned |
 //! | [`tracker`], [`trajectory`], [`mount`], [`pose`] | from a log to the pose of the camera at any instant |
 //! | [`lens`], [`camera`], [`shutter`] | distortion and its inverse, intrinsics with zoom, exposure times of rows |
+//! | [`sensors`] | inertial units, satellite receivers, barometers, magnetometers |
 //! | [`scene`] | terrain, meshes, textures, light, levels of detail, calibration boards |
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
@@ -66,6 +67,7 @@ pub mod reference;
 pub mod row_time;
 pub mod scenario;
 pub mod scene;
+pub mod sensors;
 pub mod sequence;
 pub mod shutter;
 pub mod silhouette;

@@ -11,7 +11,7 @@ pub const SEGMENTS: usize = 16;
 /// Stream of the sensor's additive Gaussian noise.
 pub const NOISE_STREAM: u32 = 1;
 
-/// Seed of a camera's noise. Without a name it is `seed`; with one it is `splitmix64(seed ^ fnv1a64(name))`,
+/// Seed of the noise of a camera or another sensor. Without a name it is `seed`; with one it is `splitmix64(seed ^ fnv1a64(name))`,
 /// the 64-bit FNV-1a hash of the name's UTF-8 bytes and the finaliser of SplitMix64, so that the cameras of
 /// one run have different noise.
 #[must_use]
@@ -99,6 +99,14 @@ pub(crate) fn normal4(pixel: [u32; 2], frame: u32, seed: u64, stream: u32, table
         (seed >> 32) as u32 ^ stream.wrapping_mul(0x9e37_79b9),
     ];
     pcg4d(key).map(|bits| normal_from_bits(bits, table))
+}
+
+/// Four words of sample `index` of a sensor, as [`pcg4d`].
+#[must_use]
+pub(crate) fn sample_words(index: i64, seed: u64, stream: u32) -> [u32; 4] {
+    let index = index as u64;
+    let stream = stream.wrapping_mul(0x9e37_79b9);
+    pcg4d([index as u32, (index >> 32) as u32, seed as u32, (seed >> 32) as u32 ^ stream])
 }
 
 /// `z` with `1 - Phi(z) = p` for `0 < p <= 0.5`: Newton on an erfc continued fraction or series, to f64

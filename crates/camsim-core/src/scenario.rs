@@ -13,6 +13,7 @@ mod camera;
 mod channel;
 mod motion;
 mod scene;
+mod sensors;
 mod tracks;
 mod twin;
 mod validate;
@@ -29,6 +30,9 @@ pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
+pub use sensors::{
+    BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec, PerAxis, SensorAxes, SensorMountSpec, TriadSpec,
+};
 pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
@@ -36,6 +40,9 @@ pub use validate::{
     validate, validate_camera,
 };
 pub use video::{ImageFormat, VideoCodec, VideoSpec};
+
+#[cfg(test)]
+pub(crate) use validate::tests::good as good_scenario;
 
 /// All inputs of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +67,18 @@ pub struct Scenario {
     /// Output channels and formats.
     #[serde(default)]
     pub output: OutputSpec,
+    /// Inertial measurement units.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imu: Vec<ImuSpec>,
+    /// Satellite receivers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gnss: Vec<GnssSpec>,
+    /// Barometers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub barometer: Vec<BarometerSpec>,
+    /// Magnetometers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub magnetometer: Vec<MagnetometerSpec>,
 }
 
 impl Scenario {

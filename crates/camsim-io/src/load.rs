@@ -9,6 +9,7 @@ use camsim_core::{
     scenario::{
         Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Scenario, TrackerKind,
     },
+    sensors::{SensorError, Sensors},
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{TrackResult, TrackerError, track},
@@ -30,12 +31,14 @@ mod ortho_coverage;
 mod placements;
 mod pose_table;
 mod scene;
+mod sensors;
 mod track_points;
 
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_position_ned_m;
 use scene::load_scene;
+pub use sensors::{load_sensors, sensor_warnings};
 pub use track_points::TrackInputs;
 
 /// Maximum number of frames of a sequence: four days at 30 per second. More is a mistake in `camera.fps`.
@@ -178,6 +181,9 @@ pub enum LoadError {
         /// What is wrong.
         problem: String,
     },
+    /// A sensor cannot be simulated.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
     /// A zoom lens without a track, or a track without a zoom lens.
     #[error("camera.zoom and camera.zoom_track belong together: give both, or neither for a fixed lens")]
     ZoomPair,
@@ -207,6 +213,8 @@ pub struct Loaded {
     pub terrain: Option<TerrainSummary>,
     /// Points of `[output.tracks]` that files and keys give.
     pub tracks: TrackInputs,
+    /// The sensors beside the camera.
+    pub sensors: Sensors,
     /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The part of [`Self::warnings`] that concerns the scene.
@@ -242,7 +250,8 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
             (Arc::new(log), tracked.trajectory.clone(), Arc::new(tracked))
         }
     };
-    let path = CameraPath::new(trajectory, &scenario.camera.mount)?;
+    let path = CameraPath::new(trajectory.clone(), &scenario.camera.mount)?;
+    let sensors = load_sensors(scenario, &log, trajectory)?;
     let has_same_scene = |before: &Loaded, old: &Scenario| {
         old.scene == scenario.scene
             && old.flight.height == scenario.flight.height
@@ -287,6 +296,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         zoom_track,
     };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
+    warnings.extend(sensor_warnings(scenario, &log));
     warnings.extend(scene_notes.iter().cloned());
     let output = &scenario.output;
     let has_numbers = output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
@@ -295,7 +305,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
             "output.palette colours nothing: output.channels has neither object nor class".to_owned()
         }),
     );
-    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, warnings, scene_notes })
+    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, sensors, warnings, scene_notes })
 }
 
 /// Whether anything moves by a table of poses, whose times are on the log's clock.

@@ -12,6 +12,7 @@ use thiserror::Error;
 pub(crate) mod check;
 mod paths;
 pub(crate) mod schema;
+mod similar;
 pub(crate) mod tree;
 mod wrong_file_kind;
 

@@ -7,6 +7,8 @@
 //! OUT/trajectory.csv              motion of the platform
 //! OUT/camera_trajectory.csv       motion of the camera, with mount and vibration
 //! OUT/frames.csv                  stamp, pose, ideal frame and files of every written frame
+//! OUT/sensors/imu0.csv            samples of the sensors beside the camera, with their truth
+//! OUT/sensors/imu0.toml           what they are; imu0_kalibr.yaml is for Kalibr
 //! OUT/points.csv                  tracked points, if asked for
 //! OUT/tracks.csv                  where every written frame shows them
 //! OUT/color/frame_000123.exr      R G B A, linear   (.png: in the encoding of camera.photometric.output)
@@ -35,6 +37,7 @@ mod frame_table;
 mod frames;
 mod picture;
 mod png_file;
+mod sensors;
 mod tables;
 mod tracks;
 mod video;
@@ -46,6 +49,10 @@ pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, fram
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
 pub use picture::write_picture;
 pub use png_file::{contact_sheet, palette_rgb8};
+pub use sensors::{
+    BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS, SENSORS_FOLDER, SensorSummary,
+    kalibr_yaml, write_sensors,
+};
 pub use tables::{
     CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,

@@ -204,6 +204,10 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
         scene: SceneSpec::default(),
         quality: QualitySpec::default(),
         output: OutputSpec::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     };
     Ok(Sequence {
         scenario,

@@ -55,6 +55,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let job = Job {
         sequence: &loaded.sequence,
         tracks: &loaded.tracks,
+        sensors: &loaded.sensors,
         folder,
         frames: &frames,
         shard: None,

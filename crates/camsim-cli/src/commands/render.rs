@@ -156,6 +156,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let job = Job {
         sequence: &loaded.sequence,
         tracks: &loaded.tracks,
+        sensors: &loaded.sensors,
         folder: &folder,
         frames: &frames,
         shard: args.shard,

@@ -1,9 +1,10 @@
 //! `camsim track`: the platform's motion, without frames.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use camsim_core::{
+    flight_log::FlightLog,
     mount::CameraPath,
     scenario::Scenario,
     tracker::{
@@ -11,7 +12,10 @@ use camsim_core::{
     },
     trajectory::Trajectory,
 };
-use camsim_io::write::{camera_trajectory_csv, trajectory_csv};
+use camsim_io::{
+    load::{load_sensors, sensor_warnings},
+    write::{SENSORS_FOLDER, camera_trajectory_csv, trajectory_csv, write_sensors},
+};
 use serde::Serialize;
 
 use crate::{
@@ -37,6 +41,7 @@ const MOST_ROWS: f64 = 10e6;
 Examples:
   camsim track flight.toml -o traj.csv
   camsim track flight.toml --of camera --rate 1000 -o poses.csv
+  camsim track flight.toml --sensors out
   camsim track flight.toml --report --set tracker.kind=spline")]
 pub struct TrackArgs {
     #[command(flatten)]
@@ -47,9 +52,12 @@ pub struct TrackArgs {
     /// Rows per second [default: tracker.rate_hz]
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Output file [default: standard output; with --report the motion is not written]
+    /// Output file [default: standard output; with --report or --sensors the motion is not written]
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
+    /// Also write the tables of the scenario's sensors (imu, gnss, barometer, magnetometer) below DIR/sensors
+    #[arg(long, value_name = "DIR")]
+    sensors: Option<PathBuf>,
     /// Print RMS and largest error against the interpolated log, the largest speeds and accelerations used,
     /// and the intervals in which limits were reached
     #[arg(long)]
@@ -88,7 +96,10 @@ pub fn run(args: &TrackArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
     let span_s = span_s(&scenario, &tracked.trajectory);
     let rows = row_count(span_s, rate_hz)?;
-    if args.output.is_some() || !args.report {
+    if let Some(folder) = &args.sensors {
+        write_sensor_tables(folder, &scenario, &log, &tracked, console)?;
+    }
+    if args.output.is_some() || !(args.report || args.sensors.is_some()) {
         let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, window_start_s(&scenario));
         let instants = (0..rows).map(|k| span_s[0] + k as f64 / rate_hz);
         let table = match args.of {
@@ -112,6 +123,33 @@ pub fn run(args: &TrackArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             .or_bad_input()?;
         report(args.json, &tracked, &measured, log.epoch_ns, console)?;
     }
+    Ok(())
+}
+
+fn write_sensor_tables(
+    folder: &Path,
+    scenario: &Scenario,
+    log: &FlightLog,
+    tracked: &TrackResult,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    let sensors = load_sensors(scenario, log, tracked.trajectory.clone()).or_bad_input()?;
+    if sensors.is_empty() {
+        return Err(Failure::bad_input(anyhow!(
+            "--sensors: the scenario has none; add [[imu]], [[gnss]], [[barometer]] or [[magnetometer]] \
+             (docs/SENSORS.md)"
+        )));
+    }
+    for warning in sensor_warnings(scenario, log) {
+        console.warn(warning);
+    }
+    let summary = write_sensors(folder, &sensors).or_failed()?;
+    console.note(format_args!(
+        "{} rows of {} sensors in {}",
+        summary.rows,
+        summary.sensors,
+        folder.join(SENSORS_FOLDER).display()
+    ));
     Ok(())
 }
 

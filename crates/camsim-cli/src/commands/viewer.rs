@@ -43,6 +43,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let run = Job {
         sequence: &loaded.sequence,
         tracks: &loaded.tracks,
+        sensors: &loaded.sensors,
         folder,
         frames: &frames,
         shard: None,

@@ -80,9 +80,10 @@ pub fn folder_state(job: &Job<'_>, pictures: &Pictures) -> Result<FolderState, F
 
 /// Whether a key only selects files, without changing their contents.
 fn is_of_files(difference: &str) -> bool {
-    ["output.channels was ", "output.format was ", "output.palette was ", "output.tracks"]
-        .iter()
-        .any(|key| difference.starts_with(key))
+    const OUTPUT: [&str; 4] =
+        ["output.channels was ", "output.format was ", "output.palette was ", "output.tracks"];
+    const SENSORS: [&str; 4] = ["imu was ", "gnss was ", "barometer was ", "magnetometer was "];
+    OUTPUT.iter().chain(&SENSORS).any(|key| difference.starts_with(key))
 }
 
 /// Refuses a folder with frame files other than those that will be replaced.

@@ -17,7 +17,7 @@ use camsim_io::{
     portable::write_camera,
     write::{
         CameraRecord, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, WriteError,
-        camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic,
+        camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic, write_sensors,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -64,7 +64,7 @@ pub fn write_objects(pictures: &Pictures) -> Result<(), Failure> {
     write_atomic(&pictures.folder.join(OBJECTS_CSV), objects.as_bytes()).or_failed()
 }
 
-/// Writes `camera.toml` and the trajectories, which depend on the scenario only.
+/// Writes `camera.toml`, the trajectories and the tables of sensors, which depend on the scenario only.
 pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
     let sequence = job.sequence;
     let Scenario { camera, tracker, .. } = &sequence.scenario;
@@ -85,6 +85,7 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
     write_atomic(&job.folder.join("trajectory.csv"), body.as_bytes()).or_failed()?;
     let optical = camera_trajectory_csv(ticks().map(|t_s| camera_at(&sequence.path, sequence.epoch_ns, t_s)));
     write_atomic(&job.folder.join("camera_trajectory.csv"), optical.as_bytes()).or_failed()?;
+    write_sensors(job.folder, job.sensors).or_failed()?;
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(

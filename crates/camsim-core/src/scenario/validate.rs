@@ -9,7 +9,9 @@ use super::{
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod motion;
+mod names;
 mod scene;
+mod sensors;
 mod tracks;
 mod twins;
 mod video;
@@ -51,6 +53,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_quality_and_output(&mut check, scenario);
     tracks::check_tracks(&mut check, scenario);
     video::check_video(&mut check, scenario);
+    sensors::check_sensors(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }

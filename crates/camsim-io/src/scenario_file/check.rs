@@ -3,7 +3,8 @@
 use toml::{Table, Value};
 
 use super::{
-    schema::{self, Schema, ValueKind},
+    schema::{Schema, ValueKind},
+    similar,
     tree::{Tree, join},
 };
 
@@ -151,6 +152,9 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         ValueKind::Counts(n, max) => {
             (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {max}"))
         }
+        ValueKind::NumberOrNumbers(n) => {
+            (number(value) || all(value, Some(n), &number), format!("a number or a list of {n} numbers"))
+        }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
         ValueKind::Points(n) => (
             all(value, None, &|point| all(point, Some(n), &number)),
@@ -195,7 +199,7 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         | ValueKind::CountOr(_, words) => written
             .iter()
             .find(|word| !words.contains(word))
-            .and_then(|word| schema::nearest_word(word, words)),
+            .and_then(|word| similar::nearest_word(word, words)),
         _ => None,
     };
     let hint = hint.map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));

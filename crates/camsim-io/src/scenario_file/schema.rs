@@ -10,6 +10,8 @@ use camsim_core::{
 };
 use camsim_plan::MAX_KEYS;
 
+use super::similar::{MIN_KEY_SIMILARITY, similarity};
+
 /// Keys of a file format, with what error messages say about them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schema {
@@ -54,6 +56,8 @@ pub enum ValueKind {
     /// A list of this many whole numbers of at most 32 bits. The second number is the largest useful value,
     /// for the message; ranges are checked later.
     Counts(usize, u32),
+    /// A number, or a list of this many numbers.
+    NumberOrNumbers(usize),
     /// A list of any number of numbers.
     NumberList,
     /// A list of any number of lists of this many numbers.
@@ -102,6 +106,9 @@ const CHANNELS: &[&str] = &[
     "motion",
     "blur_path",
 ];
+const SENSOR_AXES: &[&str] = &["frd", "flu", "rdf"];
+/// One value of all axes, or one of each.
+const PER_AXIS: ValueKind = NumberOrNumbers(3);
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
 /// Keys of a scenario.
@@ -260,6 +267,77 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.twin.instants", Within(1, MAX_INSTANTS)),
     ("output.twin.over", Word(&["exposure", "readout"])),
     ("output.twin.channels", Words(CHANNELS)),
+    ("imu", Tables),
+    ("imu.name", Text),
+    ("imu.rate_hz", Number),
+    ("imu.mount.angles_deg", Numbers(3)),
+    ("imu.mount.offset_m", Numbers(3)),
+    ("imu.axes", Word(SENSOR_AXES)),
+    ("imu.earth_rate", Flag),
+    ("imu.gyro.noise_density", PER_AXIS),
+    ("imu.gyro.random_walk", PER_AXIS),
+    ("imu.gyro.bias", PER_AXIS),
+    ("imu.gyro.bias_sigma", PER_AXIS),
+    ("imu.gyro.drift_sigma", PER_AXIS),
+    ("imu.gyro.drift_tau_s", Number),
+    ("imu.gyro.scale", PER_AXIS),
+    ("imu.gyro.misalignment_deg", Numbers(6)),
+    ("imu.gyro.quantisation", PER_AXIS),
+    ("imu.gyro.range", PER_AXIS),
+    ("imu.accel.noise_density", PER_AXIS),
+    ("imu.accel.random_walk", PER_AXIS),
+    ("imu.accel.bias", PER_AXIS),
+    ("imu.accel.bias_sigma", PER_AXIS),
+    ("imu.accel.drift_sigma", PER_AXIS),
+    ("imu.accel.drift_tau_s", Number),
+    ("imu.accel.scale", PER_AXIS),
+    ("imu.accel.misalignment_deg", Numbers(6)),
+    ("imu.accel.quantisation", PER_AXIS),
+    ("imu.accel.range", PER_AXIS),
+    ("imu.g_sensitivity", PER_AXIS),
+    ("imu.clock_offset_ms", Number),
+    ("imu.jitter_ms", Number),
+    ("gnss", Tables),
+    ("gnss.name", Text),
+    ("gnss.rate_hz", Number),
+    ("gnss.offset_m", Numbers(3)),
+    ("gnss.sigma_m", Numbers(2)),
+    ("gnss.drift_m", Numbers(2)),
+    ("gnss.drift_tau_s", Number),
+    ("gnss.velocity_sigma_m_s", Numbers(2)),
+    ("gnss.dropouts_s", Points(2)),
+    ("gnss.dropout_every_s", Number),
+    ("gnss.dropout_mean_s", Number),
+    ("gnss.delay_ms", Number),
+    ("gnss.clock_offset_ms", Number),
+    ("gnss.jitter_ms", Number),
+    ("barometer", Tables),
+    ("barometer.name", Text),
+    ("barometer.rate_hz", Number),
+    ("barometer.offset_m", Numbers(3)),
+    ("barometer.sea_level_pa", Number),
+    ("barometer.bias_pa", Number),
+    ("barometer.sigma_pa", Number),
+    ("barometer.drift_pa", Number),
+    ("barometer.drift_tau_s", Number),
+    ("barometer.quantisation_pa", Number),
+    ("barometer.clock_offset_ms", Number),
+    ("barometer.jitter_ms", Number),
+    ("magnetometer", Tables),
+    ("magnetometer.name", Text),
+    ("magnetometer.rate_hz", Number),
+    ("magnetometer.mount.angles_deg", Numbers(3)),
+    ("magnetometer.mount.offset_m", Numbers(3)),
+    ("magnetometer.axes", Word(SENSOR_AXES)),
+    ("magnetometer.field_ned_ut", Numbers(3)),
+    ("magnetometer.date", Text),
+    ("magnetometer.hard_iron_ut", Numbers(3)),
+    ("magnetometer.soft_iron", Numbers(9)),
+    ("magnetometer.sigma_ut", PER_AXIS),
+    ("magnetometer.quantisation_ut", Number),
+    ("magnetometer.range_ut", Number),
+    ("magnetometer.clock_offset_ms", Number),
+    ("magnetometer.jitter_ms", Number),
 ];
 
 /// Words that this version does not support.
@@ -281,6 +359,10 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("output.tracks.points", "output.tracks"),
     ("camera.zoom.focal_px", "camera.zoom"),
     ("output.twin.name", "output.twin"),
+    ("imu.name", "imu"),
+    ("gnss.name", "gnss"),
+    ("barometer.name", "barometer"),
+    ("magnetometer.name", "magnetometer"),
 ];
 
 impl ValueKind {
@@ -327,27 +409,4 @@ impl Schema {
         let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
         (score(&best) > MIN_KEY_SIMILARITY).then(|| best.to_owned())
     }
-}
-
-/// Similarity above which a key is suggested: `fsp` and `fps` have 0.82, words of four or five letters with
-/// one letter in common up to 0.79.
-const MIN_KEY_SIMILARITY: f64 = 0.8;
-
-/// Similarity above which a word is suggested.
-const MIN_WORD_SIMILARITY: f64 = 0.65;
-
-/// The word of `words` most similar to `word`, if it is similar enough to suggest.
-pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
-    let score = |candidate: &&str| similarity(word, candidate);
-    words
-        .iter()
-        .copied()
-        .max_by(|a, b| score(a).total_cmp(&score(b)))
-        .filter(|best| score(best) > MIN_WORD_SIMILARITY)
-}
-
-/// Similarity of two words, 0..=1: the larger of Jaro-Winkler, which favours common prefixes, and
-/// Damerau-Levenshtein, which finds swapped letters in short words.
-fn similarity(a: &str, b: &str) -> f64 {
-    strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
 }

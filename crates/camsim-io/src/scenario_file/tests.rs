@@ -1,12 +1,14 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::scenario::{
-    Auto, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr, FlowInstant,
-    HeightUnit, LoopKind, MotionSpec, ObjectsOf, OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec,
-    TwinShutter, TwinSpec,
+    Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
+    FlowInstant, GnssSpec, HeightUnit, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf,
+    OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};
+
+mod sensors;
 
 const GOOD: &str = "[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n";
 
@@ -33,10 +35,10 @@ fn printed_default_has_the_default_values() {
 #[test]
 fn every_word_of_the_schema_deserialises() {
     for (key, kind) in KEYS {
-        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf.", "output.twin."]
-            .iter()
-            .any(|table| key.starts_with(table))
-        {
+        let of_lists =
+            ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf.", "output.twin."];
+        let of_sensors = ["imu.", "gnss.", "barometer.", "magnetometer."];
+        if of_lists.iter().chain(&of_sensors).any(|table| key.starts_with(table)) {
             continue;
         }
         let values: Vec<String> = match kind {
@@ -143,6 +145,14 @@ fn every_key_of_the_structs_is_in_the_schema() {
         spin: vec![SpinSpec { axis: [1.0; 3], hz: 1.0, phase_deg: 1.0, node: Some("a".into()) }],
         animate: true,
     });
+    scenario.imu = vec![ImuSpec { name: "imu0".into(), ..ImuSpec::default() }];
+    scenario.gnss = vec![GnssSpec { dropouts_s: vec![[1.0, 2.0]], ..GnssSpec::default() }];
+    scenario.barometer = vec![BarometerSpec::default()];
+    scenario.magnetometer = vec![MagnetometerSpec {
+        field_ned_ut: Some([20.0, 1.0, 43.0]),
+        date: Some("2026-11-27".into()),
+        ..MagnetometerSpec::default()
+    }];
     let saved = toml::to_string(&scenario).unwrap();
     let mut visited = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut visited);

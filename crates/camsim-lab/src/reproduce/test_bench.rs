@@ -132,6 +132,10 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
         // Frames of independent instants share no ideal frame.
         quality: QualitySpec { frames_per_ideal: 1, ..QualitySpec::default() },
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     }
 }
 

@@ -34,6 +34,10 @@ pub fn scenario() -> Scenario {
         scene: Default::default(),
         quality: Default::default(),
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     };
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
     scenario

@@ -23,7 +23,9 @@ fn full_scenario(folder: &std::path::Path) -> std::path::PathBuf {
     let mut table: toml::Table = text.parse().expect("toml");
     let more: toml::Table = "[board]\nkind = \"chessboard\"\ncolumns = 9\nrows = 6\nsize_m = 1.0\n\
         [[zoom]]\nat = 1.0\nfocal_px = [420.0, 421.0]\ncoefficients = [-0.22, 0.06, 0.0, 0.0]\n\
-        [[twin]]\nname = \"sharp\"\nexposure = false\n"
+        [[twin]]\nname = \"sharp\"\nexposure = false\n\
+        [[imu]]\nname = \"imu0\"\n[[gnss]]\nname = \"gnss0\"\n[[barometer]]\nname = \"baro0\"\n\
+        [[magnetometer]]\nname = \"mag0\"\nfield_ned_ut = [20.0, 1.0, 43.0]\n"
         .parse()
         .expect("toml");
     let put = |table: &mut toml::Table, group: &str, key: &str, value: toml::Value| {
@@ -32,6 +34,9 @@ fn full_scenario(folder: &std::path::Path) -> std::path::PathBuf {
     put(&mut table, "scene", "board", more["board"].clone());
     put(&mut table, "camera", "zoom", more["zoom"].clone());
     put(&mut table, "output", "twin", more["twin"].clone());
+    for list in ["imu", "gnss", "barometer", "magnetometer"] {
+        table.insert(list.into(), more[list].clone());
+    }
     put(&mut table, "camera", "zoom_track", toml::Value::String("zoom.csv".into()));
     let path = folder.join("everything.toml");
     std::fs::write(&path, table.to_string()).expect("written");

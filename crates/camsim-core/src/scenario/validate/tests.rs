@@ -37,6 +37,10 @@ pub(crate) fn good() -> Scenario {
         },
         quality: Default::default(),
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     }
 }
 

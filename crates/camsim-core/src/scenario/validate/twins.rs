@@ -1,13 +1,10 @@
 //! Checks of `[[output.twin]]`.
 
-use super::{Check, validate};
+use super::{Check, names, validate};
 use crate::scenario::{BurstOver, Channel, MAX_INSTANTS, Scenario, TwinSpec};
 
 /// Names below the output folder that are taken, beside those of channels.
-const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette"];
-/// Names that some systems give to devices.
-const DEVICES: &[&str] = &["con", "prn", "aux", "nul"];
-const MOST_LETTERS: usize = 64;
+const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette", "sensors"];
 
 /// Checks the twins of a scenario. Those of a scenario that has other problems are checked by themselves only.
 pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
@@ -30,16 +27,8 @@ pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
 
 fn check_name(check: &mut Check, i: usize, name: &str) {
     let key = format!("output.twin.{i}.name");
-    let is_folder = !name.is_empty()
-        && name.len() <= MOST_LETTERS
-        && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
-        && !DEVICES.iter().any(|device| name.eq_ignore_ascii_case(device));
-    check.require(is_folder, key.as_str(), || {
-        format!(
-            "is the name of a folder: 1 to {MOST_LETTERS} letters, digits, - and _, such as \"sharp\", and not a \
-             device of some systems (con, prn, aux, nul), not \
-             \"{name}\""
-        )
+    check.require(names::is_portable(name), key.as_str(), || {
+        format!("is the name of a folder: {}, such as \"sharp\", not \"{name}\"", names::ADVICE)
     });
     let mut taken = Channel::ALL.iter().map(|channel| channel.name()).chain(TAKEN.iter().copied());
     check.require(!taken.any(|other| name.eq_ignore_ascii_case(other)), key, || {

@@ -66,6 +66,10 @@ fn sequence() -> Arc<Sequence> {
         scene: Default::default(),
         quality: Default::default(),
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     };
     scenario.camera.size_px = SIZE_PX;
     scenario.camera.focal_px = [50.0, 52.0];

@@ -60,6 +60,10 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
         scene: Default::default(),
         quality: Default::default(),
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     };
     scenario.camera.size_px = [80, 60];
     scenario.camera.focal_px = [60.0, 62.0];

@@ -21,6 +21,11 @@ use crate::{
 /// Keys of twins, all of which but the name may be left out.
 const TWINS: &str = "output.twin.";
 
+/// Whether a key is one of a sensor beside the camera, all of which but the name may be left out.
+fn is_of_sensor(key: &str) -> bool {
+    ["imu.", "gnss.", "barometer.", "magnetometer."].iter().any(|table| key.starts_with(table))
+}
+
 /// The edit that a pass over an editor made.
 struct Edit {
     /// The new value; `None` removes the key.
@@ -48,6 +53,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
         ValueKind::Numbered(..) => numbered(ui, key, value, param),
+        ValueKind::NumberOrNumbers(_) => as_written(ui, key, value, param),
+        ValueKind::Points(_) if is_of_sensor(key) => as_written(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
         ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
     };
@@ -101,7 +108,8 @@ fn number(
     let may_be_left_out =
         matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
             || key.starts_with("scene.light.")
-            || key.starts_with(TWINS);
+            || key.starts_with(TWINS)
+            || is_of_sensor(key);
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, is_dragged: false });
     }
@@ -131,9 +139,9 @@ fn remove(ui: &mut Ui, key: &str) -> bool {
     button.clicked()
 }
 
-/// The removal of a key of a twin that is set.
+/// The removal of a key of a twin or sensor that is set.
 fn removal(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
-    let is_asked = key.starts_with(TWINS) && value.is_some() && remove(ui, key);
+    let is_asked = (key.starts_with(TWINS) || is_of_sensor(key)) && value.is_some() && remove(ui, key);
     is_asked.then_some(Edit { value: None, is_dragged: false })
 }
 
@@ -358,6 +366,17 @@ fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Opt
     let Some(Value::String(text)) = edit.value else { return Some(edit) };
     let parsed = toml::from_str::<toml::Table>(&format!("v = {{ {text} }}")).ok();
     // A text that is no table stays a text, which the schema refuses with a message.
+    let value = parsed.and_then(|mut table| table.remove("v")).unwrap_or(Value::String(text));
+    Some(Edit { value: Some(value), ..edit })
+}
+
+/// A value as it stands in the file, such as `0.1` or `[0.1, 0.2, 0.3]`. An empty text removes the key.
+fn as_written(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+    let written = value.map(|value| Value::String(value.to_string()));
+    let edit = text(ui, key, written.as_ref(), param)?;
+    let Some(Value::String(text)) = edit.value else { return Some(edit) };
+    let parsed = toml::from_str::<toml::Table>(&format!("v = {text}")).ok();
+    // A text that is no value stays a text, which the schema refuses with a message.
     let value = parsed.and_then(|mut table| table.remove("v")).unwrap_or(Value::String(text));
     Some(Edit { value: Some(value), ..edit })
 }

@@ -1,4 +1,4 @@
-//! Editors of lists of tables: vibration, zoom calibrations, models, twins.
+//! Editors of lists of tables: vibration, zoom calibrations, models, twins, sensors.
 
 use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{Role, Ui};
@@ -58,8 +58,8 @@ fn is_in_inner_list(list: &str, element: &str) -> bool {
         .any(|(inner, kind)| *kind == ValueKind::Tables && is_below(inner, list) && is_below(element, inner))
 }
 
-/// A new entry: the present camera at the next zoom value, a twin without motion blur, or slight vibration in
-/// pitch.
+/// A new entry: the present camera at the next zoom value, a twin without motion blur, a sensor without errors,
+/// or slight vibration in pitch.
 fn new_entry(document: &Document, key: &str) -> Table {
     let mut table = Table::new();
     let mut put = |name: &str, value: Value| table.insert(name.to_owned(), value);
@@ -76,6 +76,14 @@ fn new_entry(document: &Document, key: &str) -> Table {
         let is_free = |name: &String| twins.iter().all(|twin| !twin.name.eq_ignore_ascii_case(name));
         put("name", Value::String(names.into_iter().find(is_free).unwrap_or_default()));
         put("exposure", Value::Boolean(false));
+    } else if matches!(key, "imu" | "gnss" | "barometer" | "magnetometer") {
+        let taken: Vec<String> =
+            document.scenario.sensor_names().map(|(_, name)| name.to_ascii_lowercase()).collect();
+        let mut names = (0..).map(|number: usize| format!("{key}{number}"));
+        put("name", Value::String(names.find(|name| !taken.contains(name)).unwrap_or_default()));
+        if key == "magnetometer" {
+            put("field_ned_ut", Value::Array([20.0, 1.0, 43.0].map(Value::Float).into()));
+        }
     } else {
         put("axis", Value::String("pitch".into()));
         put("amplitude_deg", Value::Float(0.05));

@@ -1,0 +1,45 @@
+//! `[[imu]]`, `[[gnss]]`, `[[barometer]]`, `[[magnetometer]]`.
+
+use camsim_core::scenario::{PerAxis, SensorAxes};
+
+use super::*;
+
+#[test]
+fn sensors_are_read_and_their_problems_named_by_line() {
+    // The commented tables of the printed default are a scenario too.
+    let text: String = print_default()
+        .lines()
+        .skip_while(|line| !line.starts_with("# [[imu]]"))
+        .map(|line| line.trim_start_matches("# "))
+        .filter(|line| !line.starts_with("..."))
+        .fold(GOOD.to_owned(), |text, line| text + line + "\n");
+    let scenario = parse(&text).unwrap();
+    let names: Vec<(&str, &str)> = scenario.sensor_names().collect();
+    assert_eq!(names, [("imu", "imu0"), ("gnss", "gnss0"), ("barometer", "baro0"), ("magnetometer", "mag0")]);
+    let imu = &scenario.imu[0];
+    assert_eq!((imu.gyro.noise_density, imu.accel.random_walk), (PerAxis::all(1.7e-4), PerAxis::all(3e-3)));
+    assert_eq!(scenario.gnss[0].dropouts_s, [[12.0, 15.0]]);
+    let saved = toml::to_string(&scenario).unwrap();
+    assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario);
+
+    let with = |keys: &str| parse(&format!("{GOOD}[[imu]]\nname = \"a\"\n{keys}\n"));
+    let spec =
+        &with("axes = \"flu\"\ngyro.scale = [1e-3, 0, -1e-3]\naccel = { range = 160 }").unwrap().imu[0];
+    assert_eq!((spec.axes, spec.gyro.scale), (SensorAxes::Flu, PerAxis([1e-3, 0.0, -1e-3])));
+    assert_eq!(spec.accel.range, PerAxis::all(160.0));
+    for (keys, wanted) in [
+        ("rate = 200", "s.toml:8: imu.0.rate: unknown key; did you mean `imu.rate_hz`?"),
+        (
+            "gyro.noise_density = [1, 2]",
+            "s.toml:8: imu.0.gyro.noise_density: expected a number or a list of 3",
+        ),
+        ("gyro.noise_density = -1", "s.toml:8: imu.0.gyro.noise_density: must be finite and 0 or more"),
+        ("axes = \"fru\"", "imu.0.axes: expected one of \"frd\", \"flu\", \"rdf\""),
+        ("[[imu]]", "s.toml:8: imu.1.name: is missing"),
+        ("[[gnss]]\nname = \"A\"", "s.toml:9: gnss.0.name: \"A\" names two sensors"),
+        ("[[magnetometer]]\nname = \"m\"", "s.toml:8: magnetometer.0.field_ned_ut: or date is needed"),
+    ] {
+        let error = with(keys).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+}
