@@ -19,7 +19,7 @@ pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
         check.require(!is_repeated, format!("output.twin.{i}.name"), || {
             format!("\"{}\" names two twins; give each a name of its own, as it is a folder", twin.name)
         });
-        check_name(check, i, &twin.name);
+        check_folder_name(check, &format!("output.twin.{i}.name"), &twin.name);
         check_keys(check, i, twin);
         check_burst(check, i, twin, scenario);
         if is_usable && check.problems.len() == before {
@@ -28,13 +28,13 @@ pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
     }
 }
 
-fn check_name(check: &mut Check, i: usize, name: &str) {
-    let key = format!("output.twin.{i}.name");
+/// Checks the name of a folder beside those of channels.
+pub(super) fn check_folder_name(check: &mut Check, key: &str, name: &str) {
     let is_folder = !name.is_empty()
         && name.len() <= MOST_LETTERS
         && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
         && !DEVICES.iter().any(|device| name.eq_ignore_ascii_case(device));
-    check.require(is_folder, key.as_str(), || {
+    check.require(is_folder, key, || {
         format!(
             "is the name of a folder: 1 to {MOST_LETTERS} letters, digits, - and _, such as \"sharp\", and not a \
              device of some systems (con, prn, aux, nul), not \
