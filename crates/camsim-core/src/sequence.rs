@@ -46,6 +46,13 @@ impl Sequence {
         Ok(Self { scenario, vignette, ..self.clone() })
     }
 
+    /// Stamp of a frame of any number, beyond the sequence as well: path time, seconds.
+    #[must_use]
+    pub fn stamp_s(&self, frame: f64) -> f64 {
+        let camera = &self.scenario.camera;
+        self.start_s + (frame + camera.phase) / camera.fps
+    }
+
     /// Time of the platform's clock at path time 0, nanoseconds: that of trajectories.
     #[must_use]
     pub fn platform_epoch_ns(&self) -> i64 {

@@ -76,8 +76,6 @@ pub struct RigManifest<'a> {
     pub shard: Option<[u64; 2]>,
     /// Whether the runs of all cameras are finished.
     pub finished: bool,
-    /// Warnings for the user.
-    pub warnings: Vec<String>,
 }
 
 impl RigManifest<'_> {
@@ -101,7 +99,6 @@ impl RigManifest<'_> {
             "inputs": portable_inputs(&self.inputs, folder),
             "shard": self.shard,
             "finished": self.finished,
-            "warnings": self.warnings,
         });
         let text = serde_json::to_string_pretty(&manifest).map_err(fail)? + "\n";
         write_runs(folder, self.shard, &text)

@@ -19,7 +19,7 @@ mod wrong_file_kind;
 
 pub(crate) use paths::for_each_path;
 pub use rig::{rig_json, rig_of_table, rig_table};
-pub use schema::ValueKind;
+pub use schema::{CAMERAS, ValueKind};
 use tree::Tree;
 
 /// Why a scenario cannot be used.

@@ -288,7 +288,7 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
 ];
 
 /// The list of cameras of a rig. Its elements have the keys of `camera`.
-pub(crate) const CAMERAS: &str = "cameras";
+pub const CAMERAS: &str = "cameras";
 /// A camera file below an element's own keys.
 const CAMERA_FILE: &str = "cameras.file";
 
