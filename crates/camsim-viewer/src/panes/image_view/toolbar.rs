@@ -71,8 +71,8 @@ fn camera(ui: &mut Ui, state: &State, out: &mut Outbox) {
             ui.selectable_value(&mut chosen, index, name);
         }
     });
-    named(&combo.response, Role::ComboBox, "camera");
-    combo.response.with_tooltip("camera that is shown, and edited as \"camera\"");
+    named(&combo.response, Role::ComboBox, "shown camera");
+    combo.response.with_tooltip("camera that is shown and edited");
     ui.separator();
     if chosen != shown {
         out.push(Message::ShowCamera(chosen));
