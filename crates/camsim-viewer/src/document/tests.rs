@@ -147,7 +147,8 @@ fn keys_of_the_camera_are_those_of_the_shown_one() {
     assert_eq!((document.scenario.camera.name.as_str(), document.camera()), ("right", 1));
     document.set("camera.fps", Some(Value::Float(5.0)), false);
     document.set("camera.lens.model", Some(Value::String("kannala-brandt".into())), false);
-    let fps = |document: &Document| document.rig().scenarios().iter().map(|s| s.camera.fps).collect::<Vec<_>>();
+    let fps =
+        |document: &Document| document.rig().scenarios().iter().map(|s| s.camera.fps).collect::<Vec<_>>();
     assert_eq!(fps(&document), [20.0, 5.0]);
     assert_eq!(document.value("camera.fps"), Some(&Value::Float(5.0)));
     assert!(document.is_changed("camera.fps") && document.removed_keys().is_empty());

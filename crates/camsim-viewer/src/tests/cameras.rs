@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use eframe::egui::{Rect, pos2};
 use egui_kittest::kittest::Queryable;
 use toml::Value;
 
@@ -38,8 +39,9 @@ fn another_camera_shows_the_same_time() {
         (request.scenario.camera.name.clone(), request.frame, timeline.frames)
     };
     assert_eq!(shown(&window), ("left".to_owned(), 30, 60));
-    let bar = window.harness.get_by_label("picture").rect();
-    let bar = eframe::egui::Rect::from_min_max(eframe::egui::pos2(bar.left(), 0.0), bar.right_top());
+    let picture = window.harness.get_by_label("picture").rect();
+    let top = window.harness.get_by_label("shown camera").rect().top() - 3.0;
+    let bar = Rect::from_min_max(pos2(picture.left(), top), picture.right_top());
     window.snapshot("cameras", bar);
     window.click("shown camera");
     window.click("right");
@@ -51,8 +53,16 @@ fn another_camera_shows_the_same_time() {
     // Edits go to the shown camera.
     send(&mut window, Message::Set("camera.fps".into(), Some(Value::Float(5.0)), false));
     window.settle();
-    let fps: Vec<f64> =
-        window.state().document.as_ref().expect("open").rig().scenarios().iter().map(|s| s.camera.fps).collect();
+    let fps: Vec<f64> = window
+        .state()
+        .document
+        .as_ref()
+        .expect("open")
+        .rig()
+        .scenarios()
+        .iter()
+        .map(|s| s.camera.fps)
+        .collect();
     assert_eq!(fps, [30.0, 5.0]);
     send(&mut window, Message::ShowCamera(0));
     window.settle();
