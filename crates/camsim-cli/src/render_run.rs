@@ -70,6 +70,13 @@ pub struct Job<'a> {
     pub resume_command: &'a str,
 }
 
+impl Job<'_> {
+    /// The first frame of all shards, and one past the last.
+    fn frame_range(&self) -> [u64; 2] {
+        [self.frames.first().copied().unwrap_or(0), self.frames.last().map_or(0, |last| last + 1)]
+    }
+}
+
 /// What a finished picture is passed to before it is written, with the names of its camera and its twin
 /// ([`Pictures::label`]); it can stop the run.
 pub type OnFrame<'f> = dyn FnMut(Option<&str>, &Finished) -> ControlFlow<()> + 'f;
@@ -110,13 +117,13 @@ pub fn run(
         console.set_camera(job.camera);
         let tracks = JobTracks::new(job, source.scene_planner(), console)?;
         if i == 0 {
-            rig.map_or(Ok(()), |rig| rig.begin(&inputs, &adapter))?;
+            rig.map_or(Ok(()), |rig| rig.write_begin(jobs, &inputs, &adapter))?;
         }
         let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
         run.render_all(pictures, source)?;
     }
     console.set_camera(None);
-    rig.map_or(Ok(()), |rig| rig.finish(&inputs, &adapter))?;
+    rig.map_or(Ok(()), |rig| rig.write_end(jobs, &inputs, &adapter))?;
     Ok(outcome)
 }
 
@@ -350,7 +357,7 @@ fn manifest(job: &Job<'_>, pictures: &Pictures, adapter: String) -> RunManifest 
         twin: pictures.twin.clone(),
         scenario: scenario.clone(),
         inputs: pictures.inputs.clone(),
-        frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
+        frames: job.frame_range(),
         shard: job.shard.map(|shard| shard.0),
         written: 0,
         skipped: 0,

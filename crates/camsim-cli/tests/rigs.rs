@@ -206,6 +206,16 @@ fn parts_of_a_rig_make_the_whole() {
     }
     assert_alike(&results(&path("shards")), &results(&path("whole")));
     assert!(path("shards/run.1-of-2.json").is_file() && path("shards/left/run.2-of-2.json").is_file());
+    // Shards in folders of their own.
+    for (folder, shard) in [("a", "1/2"), ("b", "2/2")] {
+        let (code, _, err) = render(&scenario, &path(folder), &[&some[..], &["--shard", shard]].concat());
+        assert_eq!(code, 0, "{err}");
+    }
+    let [a, b, merged] = ["a", "b", "merged"].map(|name| path(name).display().to_string());
+    let (code, out, err) = camsim(&["merge", &b, &a, "-o", &merged]);
+    assert!(code == 0 && out.starts_with("12 frames of 2 shards in "), "{out} {err}");
+    assert_alike(&results(&path("merged")), &results(&path("whole")));
+    assert_eq!(run_json(&path("merged")), run_json(&path("whole")));
     // One camera after the other.
     let (code, out, err) = render(&scenario, &path("turns"), &[&some[..], &["--camera", "right"]].concat());
     assert!(code == 0 && out.starts_with("6 frames of 1 camera in "), "{out} {err}");

@@ -72,6 +72,8 @@ pub struct RigManifest<'a> {
     pub rig: &'a Rig,
     /// Fingerprints of the files that it names.
     pub inputs: Inputs,
+    /// Frames of the run of each camera that it renders: the first, and one past the last.
+    pub frames: BTreeMap<String, [u64; 2]>,
     /// `[I, N]` of `--shard I/N`, from 1.
     pub shard: Option<[u64; 2]>,
     /// Whether the runs of all cameras are finished.
@@ -97,6 +99,7 @@ impl RigManifest<'_> {
             "cameras": runs,
             "scenario": portable_rig(self.rig, folder).map_err(fail)?,
             "inputs": portable_inputs(&self.inputs, folder),
+            "frames": self.frames,
             "shard": self.shard,
             "finished": self.finished,
         });

@@ -125,27 +125,35 @@ impl RigFolder<'_> {
     }
 
     /// Writes the files before the first frame.
-    pub fn begin(&self, inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
+    pub fn write_begin(&self, jobs: &[Job<'_>], inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
         let _lock = Lock::take(self.folder)?;
         write_rig(self.folder, self.rig).or_failed()?;
         let sequences: Vec<_> = self.loaded.iter().map(|loaded| &*loaded.sequence).collect();
         tables::write_platform(self.folder, &sequences)?;
-        self.write_run(inputs, adapter, false)
+        self.write_run(jobs, inputs, adapter, false)
     }
 
     /// Writes the files after the last frame.
-    pub fn finish(&self, inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
+    pub fn write_end(&self, jobs: &[Job<'_>], inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
         let _lock = Lock::take(self.folder)?;
         let finished = self.rig.names().all(|name| is_finished(&self.of_camera(name)));
-        self.write_run(inputs, adapter, finished)
+        self.write_run(jobs, inputs, adapter, finished)
     }
 
-    fn write_run(&self, inputs: &Inputs, adapter: &str, finished: bool) -> Result<(), Failure> {
+    fn write_run(
+        &self,
+        jobs: &[Job<'_>],
+        inputs: &Inputs,
+        adapter: &str,
+        finished: bool,
+    ) -> Result<(), Failure> {
+        let frames = jobs.iter().filter_map(|job| Some((job.camera?.to_owned(), job.frame_range())));
         let manifest = RigManifest {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             adapter: adapter.to_owned(),
             rig: self.rig,
             inputs: inputs.clone(),
+            frames: frames.collect(),
             shard: self.shard.map(|shard| shard.0),
             finished,
         };

@@ -1,5 +1,7 @@
 //! The command line in a child process, which can be killed.
 
+#![allow(dead_code, reason = "no test uses all of it")]
+
 use std::{
     ffi::OsString,
     path::Path,
