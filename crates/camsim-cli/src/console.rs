@@ -21,6 +21,8 @@ pub struct Console<'a> {
     typed: Vec<OsString>,
     /// The scenario file, and the options of the command line that change it.
     scenario: Option<(PathBuf, Vec<String>)>,
+    /// The camera of several that messages are about.
+    camera: Option<String>,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -42,6 +44,7 @@ impl<'a> Console<'a> {
             verbose: false,
             typed: Vec::new(),
             scenario: None,
+            camera: None,
         }
     }
 
@@ -53,6 +56,11 @@ impl<'a> Console<'a> {
     /// Sets the scenario of the command, and the options that change it.
     pub fn set_scenario(&mut self, scenario: &Path, changes: Vec<String>) {
         self.scenario = Some((scenario.into(), changes));
+    }
+
+    /// Sets the camera of several that messages are about.
+    pub fn set_camera(&mut self, name: Option<&str>) {
+        self.camera = name.map(str::to_owned);
     }
 
     /// The command line as typed.
@@ -73,7 +81,8 @@ impl<'a> Console<'a> {
     #[must_use]
     pub fn whole(&self, text: &str) -> String {
         let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
-        let path = quoted(scenario.as_os_str());
+        let camera = self.camera.as_ref().map(|name| format!(" --camera {name}")).unwrap_or_default();
+        let path = quoted(scenario.as_os_str()) + &camera;
         let words = changes.iter().map(|word| quoted(word.as_ref()));
         let with_changes = std::iter::once(path.clone()).chain(words).collect::<Vec<_>>().join(" ");
         text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}"))
@@ -195,6 +204,11 @@ mod tests {
         let whole = "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' \
                      --set 'camera.size_px=[9, 9]' --frame 5`";
         assert_eq!(console.whole(hint), whole);
+        console.set_camera(Some("left"));
+        assert_eq!(
+            console.whole("`camsim lens SCENARIO.toml check`"),
+            "`camsim lens 'my flights/a.toml' --camera left check`"
+        );
         console.set_typed(["target/camsim", "render", "it's.toml", "-o", "out"].map(OsString::from).to_vec());
         assert_eq!(console.command_with("--resume"), "target/camsim render 'it'\\''s.toml' -o out --resume");
         console.set_typed(["camsim", "render", "a.toml", "--resume", "-q"].map(OsString::from).to_vec());

@@ -1,15 +1,16 @@
 //! Input that several commands share: a scenario with changes, and loading of its files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::anyhow;
 use camsim_core::{
     flight_log::FlightLog,
-    scenario::{Preset, Scenario},
+    scenario::{Preset, Rig, Scenario},
     tracker::TrackResult,
 };
 use camsim_io::{
-    load::{Loaded, flight_warnings, load_flight, load_sequence},
-    scenario_file::read_scenario,
+    load::{Loaded, flight_warnings, load_flight, load_rig, load_sequence},
+    scenario_file::read_rig,
 };
 
 use crate::{
@@ -24,6 +25,9 @@ pub struct ScenarioArgs {
     pub scenario: PathBuf,
     #[command(flatten)]
     pub changes: Changes,
+    /// Camera of a scenario with [[cameras]], by its name [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
 }
 
 /// Changes of a scenario by the command line.
@@ -66,15 +70,60 @@ fn parse_set(text: &str) -> Result<(String, String), String> {
 }
 
 impl ScenarioArgs {
-    /// Reads the scenario and applies the changes; hints name it from then on.
+    /// Reads the scenario, of one of its cameras, and applies the changes; hints name both from then on.
     pub fn read(&self, console: &mut Console<'_>) -> Result<Scenario, Failure> {
-        console.set_scenario(&self.scenario, self.changes.words());
-        let preset = self.changes.preset.map(|preset| match preset {
-            PresetArg::Default => Preset::Default,
-            PresetArg::Paper => Preset::Paper,
-        });
-        read_scenario(&self.scenario, &self.changes.sets, preset).or_bad_input()
+        let rig = read_changed_rig(&self.scenario, &self.changes, console)?;
+        choose_camera(&rig, self.camera.as_deref(), console).cloned()
     }
+}
+
+/// Reads a scenario of one camera or several, and applies the changes; hints name it from then on.
+pub fn read_changed_rig(path: &Path, changes: &Changes, console: &mut Console<'_>) -> Result<Rig, Failure> {
+    console.set_scenario(path, changes.words());
+    let preset = changes.preset.map(|preset| match preset {
+        PresetArg::Default => Preset::Default,
+        PresetArg::Paper => Preset::Paper,
+    });
+    read_rig(path, &changes.sets, preset).or_bad_input()
+}
+
+/// The scenario of the camera with a name. Without a name it is that of the first one; of several, a note says
+/// so.
+pub fn choose_camera<'r>(
+    rig: &'r Rig,
+    name: Option<&str>,
+    console: &mut Console<'_>,
+) -> Result<&'r Scenario, Failure> {
+    let scenario = match name {
+        Some(name) => &rig.scenarios()[camera_position(rig, name)?],
+        None => rig.first(),
+    };
+    if rig.is_list() {
+        console.set_camera(Some(&scenario.camera.name));
+        if name.is_none() && rig.scenarios().len() > 1 {
+            let names: Vec<&str> = rig.names().collect();
+            console.note(format_args!(
+                "camera {}, the first of {}: --camera NAME chooses another",
+                names[0],
+                names.join(", ")
+            ));
+        }
+    }
+    Ok(scenario)
+}
+
+/// Number of the camera with a name, of `--camera`.
+pub fn camera_position(rig: &Rig, name: &str) -> Result<usize, Failure> {
+    let names = || rig.names().collect::<Vec<_>>().join(", ");
+    rig.position(name).ok_or_else(|| {
+        Failure::bad_input(match (rig.is_list(), rig.first().camera.name.as_str()) {
+            (true, _) => anyhow!("--camera {name}: there is no such camera; the cameras are {}", names()),
+            (false, "") => {
+                anyhow!("--camera {name}: the scenario has one [camera], without a name; leave it out")
+            }
+            (false, only) => anyhow!("--camera {name}: the scenario has one [camera], named {only}"),
+        })
+    })
 }
 
 /// Loads the files of a scenario, and prints warnings.
@@ -86,6 +135,32 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
     }
     print_details(scenario, &loaded.log, console);
     Ok(loaded)
+}
+
+/// As [`load`], for all cameras of a rig. Warnings that all of them have are printed once.
+pub fn load_cameras(rig: &Rig, console: &mut Console<'_>) -> Result<Vec<Loaded>, Failure> {
+    if !rig.is_list() {
+        return Ok(vec![load(rig.first(), console)?]);
+    }
+    let mut all = load_rig(rig).or_bad_input()?;
+    let is_shared = |warning: &String| all.iter().all(|loaded| loaded.warnings.contains(warning));
+    let shared: Vec<String> = all[0].warnings.iter().filter(|warning| is_shared(warning)).cloned().collect();
+    for warning in &shared {
+        console.warn(console.whole(warning));
+    }
+    for (loaded, name) in all.iter_mut().zip(rig.names()) {
+        console.set_camera(Some(name));
+        for warning in &mut loaded.warnings {
+            let is_own = !shared.contains(warning);
+            *warning = console.whole(warning);
+            if is_own {
+                console.warn(format_args!("camera {name}: {warning}"));
+            }
+        }
+    }
+    console.set_camera(None);
+    print_details(rig.first(), &all[0].log, console);
+    Ok(all)
 }
 
 /// Loads and tracks the log, without the scene.

@@ -29,20 +29,28 @@ use crate::{
 
 mod findings;
 mod folder;
+mod outcome;
 mod pictures;
+mod rig;
 mod tables;
 mod tracks;
 
 use findings::Findings;
 use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
-use pictures::{Pictures, Series};
+pub use outcome::Outcome;
+use pictures::{JobPictures, Pictures, Series};
+#[cfg(feature = "viewer")]
+pub use rig::resume_command;
+pub use rig::{RigFolder, Selected};
 pub use tables::{body_at, camera_at, source_frame};
 use tracks::JobTracks;
 
 /// A rendering job.
 #[derive(Debug)]
 pub struct Job<'a> {
+    /// Name of the camera, if it is one of several.
+    pub camera: Option<&'a str>,
     /// The loaded sequence.
     pub sequence: &'a Arc<Sequence>,
     /// Output folder.
@@ -55,7 +63,7 @@ pub struct Job<'a> {
     /// no tracks.
     pub tracks: &'a TrackInputs,
     /// Sensors beside the camera.
-    pub sensors: &'a Sensors,
+    pub sensors: Option<&'a Sensors>,
     /// Whether existing frames are kept.
     pub resume: bool,
     /// Warnings of loading, stored in `run.json`.
@@ -64,90 +72,69 @@ pub struct Job<'a> {
     pub resume_command: &'a str,
 }
 
-/// Result of a run.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Outcome {
-    /// Frames rendered.
-    pub frames: u64,
-    /// Pictures of twins rendered.
-    pub twins: u64,
-    /// Frames that existed already.
-    pub skipped: u64,
-    /// Bytes of frame files.
-    pub bytes: u64,
-    /// From the first submission until the last file was written, without the tables of twins.
-    pub time: Duration,
-    /// Time of planning the first frame, before that.
-    pub first_plan: Duration,
-}
-
-impl Outcome {
-    /// Frames and pictures of twins per second; 0 if there was nothing to do.
-    #[must_use]
-    pub fn pictures_per_s(&self) -> f64 {
-        let pictures = self.frames + self.twins;
-        if pictures == 0 { 0.0 } else { pictures as f64 / self.time.as_secs_f64().max(1e-9) }
-    }
-
-    /// What was rendered, for users: `10 frames and 20 pictures of twins`.
-    #[must_use]
-    pub fn pictures(&self) -> String {
-        let kept = if self.skipped > 0 { format!(" ({} existed)", self.skipped) } else { String::new() };
-        let twins =
-            if self.twins > 0 { format!(" and {} pictures of twins", self.twins) } else { String::new() };
-        format!("{} frames{kept}{twins}", self.frames)
-    }
-
-    /// Pictures per second, for users.
-    #[must_use]
-    pub fn rate(&self) -> String {
-        let unit = if self.twins > 0 { "pictures/s" } else { "frames/s" };
-        format!("{:.1} {unit}", self.pictures_per_s())
+impl Job<'_> {
+    /// The first frame of all shards, and one past the last.
+    fn frame_range(&self) -> [u64; 2] {
+        [self.frames.first().copied().unwrap_or(0), self.frames.last().map_or(0, |last| last + 1)]
     }
 }
 
-/// What a finished picture is passed to before it is written, with the name of its twin; it can stop the run.
+/// What a finished picture is passed to before it is written, with the names of its camera and its twin
+/// ([`Pictures::label`]); it can stop the run.
 pub type OnFrame<'f> = dyn FnMut(Option<&str>, &Finished) -> ControlFlow<()> + 'f;
 
-/// Renders a job: the frames, then their twins one after the other. `on_frame` receives each finished frame
-/// before it is written and can stop the run, as Ctrl-C can. Written frames are kept then, the tables list
-/// them, and `run.json` marks the run as unfinished.
+/// Renders a job, or one for each camera of a rig. `source` is that of the first. `on_frame` receives each
+/// finished frame before it is written and can stop the run, as Ctrl-C can. Written frames are kept then, the
+/// tables list them, and `run.json` marks the run as unfinished.
 pub fn run(
-    job: &Job<'_>,
+    jobs: &[Job<'_>],
+    rig: Option<&RigFolder<'_>>,
     source: &mut dyn FrameSource,
     console: &mut Console<'_>,
     on_frame: &mut OnFrame<'_>,
 ) -> Result<Outcome, Failure> {
-    let frames = Pictures::of_frames(job);
-    let twins = job.sequence.scenario.output.twin.iter();
-    let twins: Vec<Pictures> = twins.map(|twin| Pictures::of_twin(job, twin)).collect::<Result<_, _>>()?;
+    let pictures: Vec<JobPictures> = jobs.iter().map(JobPictures::new).collect::<Result<_, _>>()?;
     let adapter = source.adapter();
-    for pictures in std::iter::once(&frames).chain(&twins) {
-        folder::check(job, pictures, &adapter, console)?;
+    match rig {
+        Some(rig) => rig.check()?,
+        None => jobs.iter().try_for_each(rig::refuse_rig)?,
     }
+    for (job, pictures) in jobs.iter().zip(&pictures) {
+        pictures.all().try_for_each(|pictures| folder::check(job, pictures, &adapter, console))?;
+    }
+    let mut outcome = Outcome { cameras: rig.map_or(0, |_| jobs.len() as u64), ..Outcome::default() };
     // Planning errors are reported before anything is written.
-    let mut outcome =
-        Outcome { first_plan: plan_first(job, &frames, source, console)?, ..Outcome::default() };
-    for twin in &twins {
-        plan_first(job, twin, source, console)?;
+    for (i, (job, pictures)) in jobs.iter().zip(&pictures).enumerate() {
+        for pictures in pictures.all() {
+            let is_planned = i == 0 && pictures.twin.is_none();
+            let time = plan_first(job, pictures, is_planned, source, console)?;
+            outcome.first_plan += if pictures.twin.is_none() { time } else { Duration::ZERO };
+        }
     }
-    let tracks = JobTracks::new(job, source.scene_planner(), console)?;
-    let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
-    let mut manifest = run.render(&frames, twins.is_empty(), source)?;
-    for twin in &twins {
-        run.render(twin, true, source)?;
+    let inputs = rig::all_inputs(pictures.iter().map(|pictures| &pictures.frames));
+    for (i, (job, pictures)) in jobs.iter().zip(&pictures).enumerate() {
+        if i > 0 {
+            source.renew(job.sequence)?;
+        }
+        console.set_camera(job.camera);
+        let tracks = JobTracks::new(job, source.scene_planner(), console)?;
+        if i == 0 {
+            rig.map_or(Ok(()), |rig| rig.write_begin(jobs, &inputs, &adapter))?;
+        }
+        let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
+        run.render_all(pictures, source)?;
     }
-    if !twins.is_empty() {
-        manifest.finished = true;
-        manifest.write(job.folder).or_failed()?;
-    }
+    console.set_camera(None);
+    rig.map_or(Ok(()), |rig| rig.write_end(jobs, &inputs, &adapter))?;
     Ok(outcome)
 }
 
-/// Plans the first of the pictures that a run renders; returns the time it takes.
+/// Plans the first of the pictures that a run renders; returns the time it takes. `is_planned`: the planner of
+/// `source` is theirs.
 fn plan_first(
     job: &Job<'_>,
     pictures: &Pictures,
+    is_planned: bool,
     source: &dyn FrameSource,
     console: &Console<'_>,
 ) -> Result<Duration, Failure> {
@@ -155,9 +142,9 @@ fn plan_first(
     let first = |series: &Series| todo(job, series).first().copied();
     if let Some((series, frame)) = pictures.series.iter().find_map(|series| Some((series, first(series)?))) {
         let waiting = waiting("planning the first frame", console.is_quiet());
-        let planned = match pictures.twin {
-            None => source.planner().plan(frame),
-            Some(_) => source.planner_of(&series.sequence).and_then(|planner| planner.plan(frame)),
+        let planned = match is_planned {
+            true => source.planner().plan(frame),
+            false => source.planner_of(&series.sequence).and_then(|planner| planner.plan(frame)),
         };
         waiting.finish_and_clear();
         planned.or_bad_input()?;
@@ -200,6 +187,20 @@ struct Collected {
 }
 
 impl Run<'_, '_, '_, '_> {
+    /// Renders the frames of a job and their twins.
+    fn render_all(&mut self, pictures: &JobPictures, source: &mut dyn FrameSource) -> Result<(), Failure> {
+        let JobPictures { frames, twins } = pictures;
+        let mut manifest = self.render(frames, twins.is_empty(), source)?;
+        for twin in twins {
+            self.render(twin, true, source)?;
+        }
+        if !twins.is_empty() {
+            manifest.finished = true;
+            manifest.write(self.job.folder).or_failed()?;
+        }
+        Ok(())
+    }
+
     /// Renders the pictures of a folder; they complete the run if `is_all`.
     fn render(
         &mut self,
@@ -215,7 +216,7 @@ impl Run<'_, '_, '_, '_> {
         let tracks = tracks_of(&self.tracks, pictures);
         manifest.tracked_points = tracks.map(JobTracks::points);
         manifest.warnings.extend(tracks.into_iter().flat_map(JobTracks::notes).cloned());
-        prepare(job, pictures, &todo, &manifest, tracks, source, self.console)?;
+        prepare(job, pictures, &todo, &manifest, tracks, self.console)?;
         let findings = Findings::new(&pictures.sequence.scenario.quality);
         let mut collected = Collected { made: BTreeMap::new(), findings, manifest };
         let last = pictures.series.len() - 1;
@@ -228,7 +229,10 @@ impl Run<'_, '_, '_, '_> {
         }
         let manifest = collected.manifest;
         match pictures.twin {
-            None => (self.outcome.frames, self.outcome.skipped) = (manifest.written, manifest.skipped),
+            None => {
+                self.outcome.frames += manifest.written;
+                self.outcome.skipped += manifest.skipped;
+            }
             Some(_) => self.outcome.twins += manifest.written,
         }
         Ok(manifest)
@@ -254,12 +258,13 @@ impl Run<'_, '_, '_, '_> {
         let mut writer = writes_frames.then(start).transpose().or_bad_input()?;
         let bar = frames_bar(todo.len() as u64, self.console.is_quiet());
         bar.set_message(label(pictures, series));
+        let name = pictures.label();
         let begin = Instant::now();
         let watch = interrupt::watch();
         let Collected { made, findings, manifest } = collected;
         let tracks = tracks_of(&self.tracks, pictures);
         let rendered = source.render(todo, &mut |finished| {
-            if (self.on_frame)(pictures.name(), &finished).is_break() {
+            if (self.on_frame)(name.as_deref(), &finished).is_break() {
                 return Err(WriteError::Stopped);
             }
             findings.add(&finished);
@@ -325,7 +330,9 @@ fn tracks_of<'t, 'r>(tracks: &'t Option<JobTracks<'r>>, pictures: &Pictures) -> 
 
 /// Prints what was found, and returns it for `run.json`.
 fn warn(console: &mut Console<'_>, pictures: &Pictures, findings: &Findings) -> Vec<String> {
-    let of = pictures.name().map_or_else(String::new, |name| format!("twin {name}: "));
+    let of_camera = pictures.camera.as_ref().map_or_else(String::new, |name| format!("camera {name}: "));
+    let of_twin = pictures.name().map_or_else(String::new, |name| format!("twin {name}: "));
+    let of = of_camera + &of_twin;
     let warnings: Vec<String> =
         findings.warnings().map(|warning| console.whole(&format!("{of}{warning}"))).collect();
     warnings.iter().for_each(|warning| console.warn(warning));
@@ -334,7 +341,7 @@ fn warn(console: &mut Console<'_>, pictures: &Pictures, findings: &Findings) -> 
 
 /// What is in front of a progress bar.
 fn label(pictures: &Pictures, series: &Series) -> String {
-    match (pictures.name(), series.files.instant()) {
+    match (pictures.label(), series.files.instant()) {
         (None, _) => String::new(),
         (Some(name), None) => format!("{name} "),
         (Some(name), Some(k)) => format!("{name} {} of {} ", k + 1, pictures.series.len()),
@@ -352,7 +359,7 @@ fn manifest(job: &Job<'_>, pictures: &Pictures, adapter: String) -> RunManifest 
         twin: pictures.twin.clone(),
         scenario: scenario.clone(),
         inputs: pictures.inputs.clone(),
-        frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
+        frames: job.frame_range(),
         shard: job.shard.map(|shard| shard.0),
         written: 0,
         skipped: 0,
@@ -369,7 +376,6 @@ fn prepare(
     todo: &[Vec<u64>],
     manifest: &RunManifest,
     tracks: Option<&JobTracks<'_>>,
-    source: &dyn FrameSource,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
     let _lock = Lock::take(&pictures.folder)?;
@@ -388,7 +394,7 @@ fn prepare(
     }
     manifest.write(&pictures.folder).or_failed()?;
     match pictures.twin {
-        None => tables::write_fixed(job, source.planner(), console)?,
+        None => tables::write_fixed(job, console)?,
         Some(_) => write_camera(&pictures.folder, &pictures.sequence.scenario.camera).or_failed()?,
     }
     tables::write_objects(pictures)?;
@@ -409,18 +415,6 @@ fn finish(
     let frames = tables::end_frames(pictures, series, source.planner(), made)?;
     tracks.map_or(Ok(()), |tracks| tracks.finish(&frames))?;
     manifest.write(&pictures.folder).or_failed()
-}
-
-/// Command that renders the missing frames of a folder's scenario.
-#[cfg(feature = "viewer")]
-pub fn resume_command(folder: &Path) -> String {
-    use crate::console::quoted;
-
-    format!(
-        "camsim render {} -o {} --resume",
-        quoted(folder.join("run.json").as_os_str()),
-        quoted(folder.as_os_str())
-    )
 }
 
 fn threads() -> usize {

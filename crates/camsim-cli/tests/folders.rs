@@ -2,61 +2,16 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod program;
+
 use std::{
     collections::BTreeMap,
-    ffi::OsString,
     fs,
     path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
 
-/// Environment variable with the arguments of a child process that runs the command line, and their
-/// separator.
-const ARGS: &str = "CAMSIM_TEST_ARGS";
-const BETWEEN: char = '\u{1f}';
-
-/// Runs the command line in the child process; in the parent it is an empty test.
-#[test]
-fn runs_as_the_program() {
-    let Ok(args) = std::env::var(ARGS) else { return };
-    let (mut out, mut err) = (std::io::stdout(), std::io::stderr());
-    let code = camsim_cli::run(
-        std::iter::once("camsim").chain(args.split(BETWEEN)).map(OsString::from),
-        &mut out,
-        &mut err,
-    );
-    #[allow(
-        clippy::disallowed_methods,
-        reason = "the exit code is what is tested, and nothing is left to be dropped"
-    )]
-    std::process::exit(i32::from(code));
-}
-
-fn spawn(folder: &Path, args: &[&str]) -> Child {
-    program(folder, args).spawn().unwrap()
-}
-
-fn program(folder: &Path, args: &[&str]) -> Command {
-    let mut program = Command::new(std::env::current_exe().unwrap());
-    program
-        .args(["--exact", "runs_as_the_program", "--nocapture"])
-        .env(ARGS, args.join(&BETWEEN.to_string()))
-        .current_dir(folder);
-    program.stdout(Stdio::piped()).stderr(Stdio::piped());
-    program
-}
-
-/// Waits for the program. Returns exit code and standard error.
-fn wait(child: Child) -> (i32, String) {
-    let output = child.wait_with_output().unwrap();
-    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
-}
-
-/// `camsim` in a working directory.
-fn camsim(folder: &Path, args: &[&str]) -> (i32, String) {
-    wait(spawn(folder, args))
-}
+use program::{camsim, program, spawn, wait};
 
 /// A camera so small that the reference renders it quickly.
 const SMALL: [&str; 10] = [

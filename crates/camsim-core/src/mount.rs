@@ -190,7 +190,8 @@ impl CameraPath {
 }
 
 /// Rotation from optical camera axes to body axes for roll, pitch, yaw in degrees.
-fn body_from_camera([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> DQuat {
+#[must_use]
+pub fn body_from_camera([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> DQuat {
     let body_from_forward_camera = DQuat::from_mat3(&DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
     let turned = DQuat::from_rotation_z(yaw_deg.to_radians())
         * DQuat::from_rotation_y(pitch_deg.to_radians())

@@ -12,6 +12,7 @@ mod auto;
 mod camera;
 mod channel;
 mod motion;
+mod rig;
 mod scene;
 mod sensors;
 mod tracks;
@@ -26,6 +27,7 @@ pub use camera::{
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
+pub use rig::Rig;
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
@@ -37,7 +39,7 @@ pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
-    validate, validate_camera,
+    validate, validate_camera, validate_rig,
 };
 pub use video::{ImageFormat, VideoCodec, VideoSpec};
 

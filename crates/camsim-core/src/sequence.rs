@@ -18,8 +18,8 @@ pub struct Sequence {
     /// Camera pose at any instant of path time: seconds since the first good row of the log, after
     /// `flight.speed`.
     pub path: Arc<CameraPath>,
-    /// Time of the written stamps at path time 0, nanoseconds: on the log's clock, or that of
-    /// `output.stamps`.
+    /// Time of the camera's stamps at path time 0, nanoseconds: on the log's clock, or that of
+    /// `output.stamps`, with `camera.clock_offset_ms`.
     pub epoch_ns: i64,
     /// Path time at which the period of frame 0 begins, seconds (the begin of `flight.window_s`).
     pub start_s: f64,
@@ -44,6 +44,19 @@ impl Sequence {
         let has_vignette = scenario.camera.photometric.vignette.is_some();
         let vignette = self.vignette.clone().filter(|_| has_vignette);
         Ok(Self { scenario, vignette, ..self.clone() })
+    }
+
+    /// Stamp of a frame of any number, beyond the sequence as well: path time, seconds.
+    #[must_use]
+    pub fn stamp_s(&self, frame: f64) -> f64 {
+        let camera = &self.scenario.camera;
+        self.start_s + (frame + camera.phase) / camera.fps
+    }
+
+    /// Time of the platform's clock at path time 0, nanoseconds: that of trajectories.
+    #[must_use]
+    pub fn platform_epoch_ns(&self) -> i64 {
+        self.epoch_ns.saturating_sub(self.scenario.camera.clock_offset_ns())
     }
 
     /// Weights of the vignette map at every pixel, and the size of their picture; a single 1 without a map.

@@ -7,7 +7,8 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
     scenario::{
-        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Scenario, TrackerKind,
+        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Rig, Scenario,
+        TrackerKind,
     },
     sensors::{SensorError, Sensors},
     sequence::Sequence,
@@ -50,6 +51,14 @@ pub enum LoadError {
     /// The flight log cannot be read.
     #[error(transparent)]
     Log(#[from] FlightLogError),
+    /// A camera of several cannot be loaded.
+    #[error("camera {name}: {source}")]
+    Camera {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        source: Box<LoadError>,
+    },
     /// The log cannot be tracked.
     #[error(transparent)]
     Tracker(#[from] TrackerError),
@@ -229,6 +238,22 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
     load_or_reuse(scenario, None)
 }
 
+/// As [`load_sequence`], for each camera of a rig. Log, trajectory and scene are read once, and shared.
+///
+/// # Errors
+/// As [`load_sequence`]; those of a camera of several name it.
+pub fn load_rig(rig: &Rig) -> Result<Vec<Loaded>, LoadError> {
+    let mut all: Vec<Loaded> = Vec::new();
+    for scenario in rig.scenarios() {
+        let of_camera = |source| match rig.is_list() {
+            true => LoadError::Camera { name: scenario.camera.name.clone(), source: Box::new(source) },
+            false => source,
+        };
+        all.push(load_or_reuse(scenario, all.first()).map_err(of_camera)?);
+    }
+    Ok(all)
+}
+
 /// As [`load_sequence`], but reuses the parts of `before` whose keys are unchanged, even if their files have
 /// changed since. For programs that edit a scenario. Reused parts are shared by `Arc`, so that renderers can
 /// compare pointers.
@@ -284,7 +309,8 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     let zoom_track = load_zoom_track(scenario, &log)?;
     let tracks = TrackInputs::load(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
-    let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
+    let platform_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
+    let epoch_ns = platform_ns.saturating_add(scenario.camera.clock_offset_ns());
     let sequence = Sequence {
         scenario: scenario.clone(),
         path: Arc::new(path),

@@ -114,8 +114,10 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<MergeReport, MergeError> 
             adapters.join("; ")
         ));
     }
-    // Those of twins first: the run is merged when its own is there.
-    for file in run_files.iter().rev() {
+    // Those of twins and cameras first: the run is merged when its own is there.
+    let mut run_files: Vec<&PathBuf> = run_files.iter().collect();
+    run_files.sort_by_key(|file| std::cmp::Reverse(file.components().count()));
+    for file in run_files {
         report.frames = runs::write_joined(&folders_of[file], file, out)?;
     }
     Ok(report)

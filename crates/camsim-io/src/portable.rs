@@ -2,10 +2,10 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use camsim_core::scenario::{CameraSpec, Scenario};
+use camsim_core::scenario::{CameraSpec, Rig, Scenario};
 
 use crate::{
-    scenario_file::for_each_path,
+    scenario_file::{for_each_path, rig_json},
     write::{WriteError, write_atomic},
 };
 
@@ -68,6 +68,14 @@ pub fn portable_scenario(scenario: &Scenario, folder: &Path) -> Result<Scenario,
         *path = relative_to(Path::new(path), folder).to_string_lossy().into_owned()
     });
     serde_json::from_value(tree)
+}
+
+/// As [`portable_scenario`], for all cameras of a rig, as JSON.
+///
+/// # Errors
+/// As [`portable_scenario`].
+pub fn portable_rig(rig: &Rig, folder: &Path) -> Result<serde_json::Value, serde_json::Error> {
+    rig_json(&rig.clone().try_map(|scenario| portable_scenario(&scenario, folder))?)
 }
 
 /// Writes `folder/camera.toml`. Vignette and zoom track that are not in the folder are copied to `inputs/`,

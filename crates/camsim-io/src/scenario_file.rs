@@ -1,23 +1,26 @@
 //! Scenario and camera files: TOML, changed by `--set`. Errors name file, line and key.
 //!
-//! The steps are: parse; replace `camera = "file.toml"` by the content of that file; apply `--set`; check
+//! The steps are: parse; replace `camera = "file.toml"`, and `file` of `[[cameras]]`, by the content of that
+//! file; apply `--set`; check
 //! keys and types against the schema; resolve paths against the folder of the file that names them (those of
 //! `--set` against the working directory); deserialise; check ranges.
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::scenario::{CameraSpec, Preset, Problem, Scenario, validate, validate_camera};
+use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario, validate_camera, validate_rig};
 use thiserror::Error;
 
 pub(crate) mod check;
 mod paths;
+mod rig;
 pub(crate) mod schema;
 mod similar;
 pub(crate) mod tree;
 mod wrong_file_kind;
 
 pub(crate) use paths::for_each_path;
-pub use schema::ValueKind;
+pub use rig::{rig_json, rig_of_table, rig_table};
+pub use schema::{CAMERAS, ValueKind};
 use tree::Tree;
 
 /// Why a scenario cannot be used.
@@ -41,9 +44,11 @@ pub enum ScenarioError {
         offset: usize,
     },
     /// A camera file that a scenario names cannot be read.
-    #[error("camera: cannot read {}: {source}; the key `camera` of {} names it, relative to that file's \
+    #[error("{key}: cannot read {}: {source}; the key `{key}` of {} names it, relative to that file's \
         folder", path.display(), scenario.display())]
     ReadCamera {
+        /// The key that names it.
+        key: String,
         /// The camera file.
         path: PathBuf,
         /// The scenario that names it.
@@ -69,23 +74,51 @@ pub enum ScenarioError {
         /// What is wrong.
         message: String,
     },
+    /// A scenario of several cameras where one is needed.
+    #[error("{}: has [[cameras]], and one of them is needed here: choose {}", path.display(), names.join(" or "))]
+    SeveralCameras {
+        /// The file.
+        path: PathBuf,
+        /// Names of the cameras.
+        names: Vec<String>,
+    },
     /// Wrong keys, types or ranges: one line each, with file and line.
     #[error("{}", .0.join("\n"))]
     Problems(Vec<String>),
 }
 
-/// Reads a scenario, or that of a `run.json`, with `sets` (`--set key=value`, in order) and `preset` on top,
-/// and checks all of it.
+/// Reads a scenario of one camera or of several, or that of a `run.json`, with `sets` (`--set key=value`, in
+/// order) and `preset` on top, and checks all of it.
 ///
 /// # Errors
 /// The file or its camera file cannot be read or is not TOML; a key is unknown, of the wrong type or out of
 /// range.
+pub fn read_rig(
+    path: &Path,
+    sets: &[(String, String)],
+    preset: Option<Preset>,
+) -> Result<Rig, ScenarioError> {
+    finish(Tree::read_scenario(path)?, sets, preset)
+}
+
+/// As [`read_rig`], from the text of the file `path`, which is not read.
+///
+/// # Errors
+/// As [`read_rig`].
+pub fn parse_rig(text: &str, path: &Path, sets: &[(String, String)]) -> Result<Rig, ScenarioError> {
+    finish(Tree::parse(text, path, "")?, sets, None)
+}
+
+/// As [`read_rig`], for a scenario with `[camera]`.
+///
+/// # Errors
+/// As [`read_rig`], or the scenario has `[[cameras]]`.
 pub fn read_scenario(
     path: &Path,
     sets: &[(String, String)],
     preset: Option<Preset>,
 ) -> Result<Scenario, ScenarioError> {
-    finish(Tree::read_scenario(path)?, sets, preset)
+    single(read_rig(path, sets, preset)?, path)
 }
 
 /// As [`read_scenario`], from the text of the file `path`, which is not read.
@@ -93,7 +126,15 @@ pub fn read_scenario(
 /// # Errors
 /// As [`read_scenario`].
 pub fn parse_scenario(text: &str, path: &Path, sets: &[(String, String)]) -> Result<Scenario, ScenarioError> {
-    finish(Tree::parse(text, path, "")?, sets, None)
+    single(parse_rig(text, path, sets)?, path)
+}
+
+fn single(rig: Rig, path: &Path) -> Result<Scenario, ScenarioError> {
+    if rig.is_list() {
+        let names = rig.names().map(str::to_owned).collect();
+        return Err(ScenarioError::SeveralCameras { path: path.into(), names });
+    }
+    Ok(rig.first().clone())
 }
 
 /// Reads a camera file, which has the keys of `[camera]` at its root. Paths are resolved; ranges are not
@@ -102,7 +143,7 @@ pub fn parse_scenario(text: &str, path: &Path, sets: &[(String, String)]) -> Res
 /// # Errors
 /// As [`read_scenario`].
 pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
-    let mut tree = Tree::read_camera(path)?;
+    let mut tree = Tree::read_camera(path, "camera")?;
     let problems = check::check(&mut tree, &schema::SCENARIO, "camera");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
@@ -139,27 +180,28 @@ pub fn keys() -> &'static [(&'static str, ValueKind)] {
     schema::SCENARIO.keys
 }
 
-/// Turns a tree into a checked scenario.
-fn finish(
-    mut tree: Tree,
-    sets: &[(String, String)],
-    preset: Option<Preset>,
-) -> Result<Scenario, ScenarioError> {
-    tree.resolve_camera()?;
+/// Turns a tree into checked scenarios.
+fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> Result<Rig, ScenarioError> {
+    tree.resolve_cameras()?;
     for (key, text) in sets {
         tree.set(key, text)?;
     }
+    tree.check_cameras()?;
     let problems = check::check(&mut tree, &schema::SCENARIO, "");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
     }
-    let mut scenario: Scenario = deserialize(&tree)?;
+    let mut rig = rig_of_table(tree.root.clone()).map_err(|error| unexpected(&tree, &error))?;
     if let Some(preset) = preset {
-        scenario.quality.preset = preset;
+        let with_preset = |mut scenario: Scenario| {
+            scenario.quality.preset = preset;
+            Ok(scenario)
+        };
+        rig = rig.try_map(with_preset)?;
     }
-    let problems = validate(&scenario);
+    let problems = validate_rig(&rig);
     if problems.is_empty() {
-        return Ok(scenario);
+        return Ok(rig);
     }
     Err(ScenarioError::Problems(
         problems.iter().map(|problem| format!("{}: {problem}", tree.location(&problem.key))).collect(),
@@ -169,10 +211,11 @@ fn finish(
 /// Deserialises a checked tree. The schema and the structs agree, so an error here is unexpected and names no
 /// line.
 pub(crate) fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
-    let problem = |error: toml::de::Error| {
-        ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())])
-    };
-    toml::Value::Table(tree.root.clone()).try_into().map_err(problem)
+    toml::Value::Table(tree.root.clone()).try_into().map_err(|error| unexpected(tree, &error))
+}
+
+fn unexpected(tree: &Tree, error: &toml::de::Error) -> ScenarioError {
+    ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())])
 }
 
 #[cfg(test)]

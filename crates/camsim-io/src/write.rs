@@ -21,6 +21,15 @@
 //! OUT/burst/color/frame_000123_7.png   a burst of each frame
 //! ```
 //!
+//! Of a rig (`[[cameras]]`) each camera has such a folder:
+//!
+//! ```text
+//! OUT/run.json                    the scenario with all cameras
+//! OUT/rig.toml                    extrinsics, optics and times of all cameras
+//! OUT/trajectory.csv              motion of the platform
+//! OUT/left/...                    all of the above, of the camera `left`
+//! ```
+//!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
 //!
 //! `output.format` selects the formats of colour; the other channels have one format each. If it is empty, no
@@ -38,6 +47,7 @@ mod frames;
 mod picture;
 mod png_file;
 mod sensors;
+mod rig;
 mod tables;
 mod tracks;
 mod video;
@@ -53,6 +63,7 @@ pub use sensors::{
     BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS, SENSORS_FOLDER, SensorSummary,
     kalibr_yaml, write_sensors,
 };
+pub use rig::{RIG_TOML, rig_names, rig_toml, write_rig};
 pub use tables::{
     CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,

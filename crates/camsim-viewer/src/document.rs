@@ -4,13 +4,14 @@
 //! file would be; while it is not legal, the last legal scenario is rendered.
 
 use std::{
+    borrow::Cow,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use camsim_core::scenario::{CameraSpec, Problem, Scenario, validate};
+use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, validate_rig};
 use camsim_io::{
-    scenario_file::{ValueKind, keys, read_scenario},
+    scenario_file::{CAMERAS, ValueKind, keys, read_rig, rig_of_table, rig_table},
     write::write_atomic,
 };
 use toml::{Table, Value};
@@ -23,12 +24,16 @@ const MAX_UNDO_STEPS: usize = 500;
 pub struct Document {
     /// The file that the scenario was read from or last saved to.
     pub path: PathBuf,
-    /// The last legal scenario, with resolved paths.
+    /// The last legal scenario of the shown camera, with resolved paths.
     pub scenario: Arc<Scenario>,
     /// Why the edited values are not a legal scenario; empty if they are.
     pub problems: Vec<Problem>,
     /// Incremented when files are to be read again.
     pub reload_count: u64,
+    /// The last legal scenario with all cameras.
+    rig: Rig,
+    /// Number of the shown camera. Keys of `camera` are its own.
+    camera: usize,
     /// The edited values.
     tree: Table,
     /// Values when the file was opened.
@@ -49,11 +54,13 @@ impl Document {
     /// # Errors
     /// Message with file, line and remedy.
     pub fn open(path: &Path) -> Result<Self, String> {
-        let scenario = read_scenario(path, &[], None).map_err(|error| error.to_string())?;
-        let tree = tree_of(&scenario).map_err(|error| format!("{}: {error}", path.display()))?;
+        let rig = read_rig(path, &[], None).map_err(|error| error.to_string())?;
+        let tree = tree_of(&rig).map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(Self {
             path: path.into(),
-            scenario: Arc::new(scenario),
+            scenario: Arc::new(rig.first().clone()),
+            rig,
+            camera: 0,
             problems: Vec::new(),
             reload_count: 0,
             opened: tree.clone(),
@@ -67,12 +74,39 @@ impl Document {
 
     /// The value of a dotted key, with elements of lists by index; `None` if the key is absent.
     pub fn value(&self, key: &str) -> Option<&Value> {
-        get_key(&self.tree, key)
+        get_key(&self.tree, &self.full_key(key))
+    }
+
+    /// The key in the tree: in that of a rig, keys of `camera` are those of the shown camera.
+    fn full_key<'k>(&self, key: &'k str) -> Cow<'k, str> {
+        let below = key.strip_prefix("camera").filter(|rest| rest.is_empty() || rest.starts_with('.'));
+        match below.filter(|_| self.rig.is_list()) {
+            Some(rest) => format!("{CAMERAS}.{}{rest}", self.camera).into(),
+            None => key.into(),
+        }
+    }
+
+    /// The last legal scenario with all cameras.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Number of the shown camera.
+    pub fn camera(&self) -> usize {
+        self.camera
+    }
+
+    /// Shows another camera; a number beyond the last has no effect.
+    pub fn show_camera(&mut self, camera: usize) {
+        if let Some(scenario) = self.rig.scenarios().get(camera) {
+            (self.camera, self.scenario) = (camera, Arc::new(scenario.clone()));
+            self.end_gesture();
+        }
     }
 
     /// The value of a key when the file was opened.
     pub fn opened_value(&self, key: &str) -> Option<&Value> {
-        get_key(&self.opened, key)
+        get_key(&self.opened, &self.full_key(key))
     }
 
     /// Whether a key has changed since the file was opened.
@@ -87,8 +121,9 @@ impl Document {
 
     /// The problem of a key, or of a key below it.
     pub fn problem(&self, key: &str) -> Option<&Problem> {
+        let key = self.full_key(key);
         self.problems.iter().find(|problem| {
-            problem.key.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+            problem.key.strip_prefix(&*key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         })
     }
 
@@ -106,10 +141,11 @@ impl Document {
 
     /// Sets a key, or removes it. Edits of one key with `is_dragged` are one undo step.
     pub fn set(&mut self, key: &str, value: Option<Value>, is_dragged: bool) {
+        let key = self.full_key(key).into_owned();
         let mut tree = self.tree.clone();
-        set_key(&mut tree, key, value);
-        let continues_drag = self.dragged_key.as_deref() == Some(key);
-        self.dragged_key = is_dragged.then(|| key.to_owned());
+        set_key(&mut tree, &key, value);
+        let continues_drag = self.dragged_key.as_ref() == Some(&key);
+        self.dragged_key = is_dragged.then_some(key);
         self.replace_tree(tree, !continues_drag);
     }
 
@@ -124,7 +160,8 @@ impl Document {
         self.set(key, value, false);
     }
 
-    /// Replaces the camera but for mount, frame rate and phase, which calibrations do not have.
+    /// Replaces the camera but for mount, frame rate and clock, which calibrations do not have, and for the name
+    /// in a rig.
     ///
     /// # Errors
     /// Values that TOML cannot store.
@@ -134,6 +171,8 @@ impl Document {
             mount: current.mount.clone(),
             fps: current.fps,
             phase: current.phase,
+            clock_offset_ms: current.clock_offset_ms,
+            name: if self.rig.is_list() { &current.name } else { &camera.name }.clone(),
             ..camera.clone()
         };
         let value = Value::try_from(camera).map_err(|error| error.to_string())?;
@@ -220,6 +259,9 @@ impl Document {
             words.push(shell_quoted(&format!("{key}={value}")));
         }
         if let Some([first, end]) = frames {
+            if self.rig.is_list() {
+                words.extend(["--camera".to_owned(), self.scenario.camera.name.clone()]);
+            }
             words.extend(["--frames".to_owned(), format!("{first}..{end}")]);
         }
         words.extend(["-o".to_owned(), shell_quoted(&folder.display().to_string())]);
@@ -250,19 +292,21 @@ impl Document {
 
     /// Validates the tree, and takes it as the scenario if it is legal.
     fn validate_tree(&mut self) {
-        let read = Value::Table(self.tree.clone()).try_into::<Scenario>();
+        let read = rig_of_table(self.tree.clone());
         self.problems = match &read {
-            Ok(scenario) => validate(scenario),
+            Ok(rig) => validate_rig(rig),
             Err(error) => vec![Problem { key: String::new(), message: error.message().to_owned() }],
         };
-        if let (Ok(scenario), true) = (read, self.problems.is_empty()) {
-            self.scenario = Arc::new(scenario);
+        if let (Ok(rig), true) = (read, self.problems.is_empty()) {
+            self.rig = rig;
+            self.camera = self.camera.min(self.rig.scenarios().len() - 1);
+            self.scenario = Arc::new(self.rig.scenarios()[self.camera].clone());
         }
     }
 }
 
-fn tree_of(scenario: &Scenario) -> Result<Table, String> {
-    Table::try_from(scenario).map_err(|error| format!("{error}; TOML integers are below 2^63"))
+fn tree_of(rig: &Rig) -> Result<Table, String> {
+    rig_table(rig).map_err(|error| format!("{error}; TOML integers are below 2^63"))
 }
 
 /// Keys of all paths in a tree, with elements of lists by index.
@@ -275,8 +319,12 @@ fn path_keys(tree: &Table) -> Vec<String> {
             .next()
     };
     let paths = keys().iter().filter(|(_, kind)| *kind == ValueKind::Path);
+    let cameras = tree.get(CAMERAS).and_then(Value::as_array).map_or(0, Vec::len);
     let expanded = paths.flat_map(|(key, _)| match split_list_key(key) {
-        None => vec![(*key).to_owned()],
+        None => match key.strip_prefix("camera.").filter(|_| cameras > 0) {
+            Some(rest) => (0..cameras).map(|index| format!("{CAMERAS}.{index}.{rest}")).collect(),
+            None => vec![(*key).to_owned()],
+        },
         Some((list, leaf)) => {
             let count = get_key(tree, &list).and_then(Value::as_array).map_or(0, Vec::len);
             (0..count).map(|index| format!("{list}.{index}.{leaf}")).collect()
@@ -351,10 +399,15 @@ fn set_in_array(array: &mut Vec<Value>, key: &str, value: Option<Value>) {
 /// Collects keys of `now` that are new or differ from `before`, with their values.
 fn collect_changes(now: &Table, before: &Table, prefix: &str, into: &mut Vec<(String, Value)>) {
     for (name, value) in now {
-        let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        let key = joined(prefix, name);
         match (value, before.get(name)) {
             (Value::Table(now), Some(Value::Table(before))) => collect_changes(now, before, &key, into),
-            (value, before) if before != Some(value) => into.push((key, value.clone())),
+            (value, before) if before != Some(value) => match camera_tables(&key, value, before) {
+                Some(cameras) => cameras.iter().for_each(|(key, now, before)| {
+                    collect_changes(now, before, key, into);
+                }),
+                None => into.push((key, value.clone())),
+            },
             _ => {}
         }
     }
@@ -363,13 +416,34 @@ fn collect_changes(now: &Table, before: &Table, prefix: &str, into: &mut Vec<(St
 /// Collects keys of `before` that `now` lacks.
 fn collect_removed(before: &Table, now: &Table, prefix: &str, into: &mut Vec<String>) {
     for (name, value) in before {
-        let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        let key = joined(prefix, name);
         match (value, now.get(name)) {
             (Value::Table(before), Some(Value::Table(now))) => collect_removed(before, now, &key, into),
             (_, None) => into.push(key),
-            _ => {}
+            (value, now) => {
+                for (key, before, now) in camera_tables(&key, value, now).unwrap_or_default() {
+                    collect_removed(before, now, &key, into);
+                }
+            }
         }
     }
+}
+
+fn joined(prefix: &str, name: &str) -> String {
+    if prefix.is_empty() { name.to_owned() } else { format!("{prefix}.{name}") }
+}
+
+/// The cameras of two rigs of as many, with their keys; `None` for the values of another key.
+fn camera_tables<'a>(
+    key: &str,
+    a: &'a Value,
+    b: Option<&'a Value>,
+) -> Option<Vec<(String, &'a Table, &'a Table)>> {
+    let (Value::Array(a), Some(Value::Array(b)), true) = (a, b, key == CAMERAS) else { return None };
+    let pair = |(i, (a, b)): (usize, (&'a Value, &'a Value))| {
+        Some((format!("{CAMERAS}.{i}"), a.as_table()?, b.as_table()?))
+    };
+    (a.len() == b.len()).then(|| a.iter().zip(b).enumerate().map(pair).collect())?
 }
 
 /// Quotes a text as one word of a POSIX shell.

@@ -169,9 +169,7 @@ impl EngineState {
 
     /// Path time of a frame's stamp, seconds.
     pub fn stamp_s(&self, frame: u64) -> Option<f64> {
-        let sequence = self.sequence()?;
-        let camera = &sequence.scenario.camera;
-        Some(sequence.start_s + (frame as f64 + camera.phase) / camera.fps)
+        Some(self.sequence()?.stamp_s(frame as f64))
     }
 
     /// The surface point that a pixel of the shown frame sees; `None` for the sky, and until the oracle is

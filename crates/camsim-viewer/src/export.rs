@@ -11,13 +11,15 @@ use std::{
     time::Instant,
 };
 
-use camsim_core::scenario::Scenario;
+use camsim_core::scenario::Rig;
 
 /// An export: what to render, and its progress.
 #[derive(Debug)]
 pub struct ExportJob {
-    /// The scenario, legal and with resolved paths.
-    pub scenario: Scenario,
+    /// The cameras of the scenario, legal and with resolved paths.
+    pub rig: Rig,
+    /// Number of the camera whose frames are rendered.
+    pub camera: usize,
     /// Output folder.
     pub folder: PathBuf,
     /// First frame, and the frame after the last.
@@ -43,20 +45,14 @@ pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sy
 
 impl ExportJob {
     /// A job that is not started.
-    pub fn new(scenario: Scenario, folder: PathBuf, frames: [u64; 2]) -> Self {
+    pub fn new(rig: Rig, camera: usize, folder: PathBuf, frames: [u64; 2]) -> Self {
         let (cancelled, progress) = (AtomicBool::new(false), Mutex::default());
-        Self { scenario, folder, frames, cancelled, progress, began: Instant::now(), repaint: None }
+        Self { rig, camera, folder, frames, cancelled, progress, began: Instant::now(), repaint: None }
     }
 
-    /// Starts `exporter` on its own thread.
-    pub(crate) fn start(
-        exporter: &Exporter,
-        scenario: Scenario,
-        folder: PathBuf,
-        frames: [u64; 2],
-        context: &eframe::egui::Context,
-    ) -> Arc<Self> {
-        let job = Arc::new(Self { repaint: Some(context.clone()), ..Self::new(scenario, folder, frames) });
+    /// Starts `exporter` for a job, on its own thread.
+    pub(crate) fn start(exporter: &Exporter, new: Self, context: &eframe::egui::Context) -> Arc<Self> {
+        let job = Arc::new(Self { repaint: Some(context.clone()), ..new });
         let (exporter, thread_job) = (exporter.clone(), job.clone());
         let spawned = std::thread::Builder::new().name("camsim export".into()).spawn(move || {
             let run = std::panic::AssertUnwindSafe(|| exporter(&thread_job));
@@ -75,7 +71,7 @@ impl ExportJob {
     /// Number of pictures: the frames, and those of their twins.
     pub fn pictures(&self) -> u64 {
         let frames = self.frames[1].saturating_sub(self.frames[0]);
-        let twins = self.scenario.output.twin.iter();
+        let twins = self.rig.first().output.twin.iter();
         frames * (1 + twins.map(|twin| u64::from(twin.instants.unwrap_or(1))).sum::<u64>())
     }
 

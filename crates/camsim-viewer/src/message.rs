@@ -37,6 +37,8 @@ pub enum Message {
     EndGesture,
     /// Resets a key to its value when the file was opened.
     Reset(String),
+    /// Shows another camera of the rig, by its number.
+    ShowCamera(usize),
     /// Replaces the camera.
     Camera(Box<CameraSpec>),
     /// Undoes one step.

@@ -118,6 +118,13 @@ pub const PARAMS: &[Param] = &[
     param("camera.fps", "1/s", [0.01, 1000.0], 0.1, "frames a second"),
     param("camera.phase", "frames", [-10.0, 10.0], 0.01, "fraction of a frame period added to every stamp"),
     param(
+        "camera.clock_offset_ms",
+        "ms",
+        [-1e9, 1e9],
+        0.1,
+        "how much the camera's clock is ahead: added to every stamp that it writes",
+    ),
+    param(
         "camera.mount.angles_deg",
         "deg",
         [-180.0, 180.0],

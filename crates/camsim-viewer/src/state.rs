@@ -5,6 +5,7 @@ use std::{
     sync::Arc,
 };
 
+use camsim_core::{scenario::Scenario, sequence::Sequence};
 use eframe::egui;
 
 use crate::{
@@ -152,7 +153,11 @@ impl State {
             Reply::Notice(text) => self.notice(text),
             reply => self.engine.receive(reply, context),
         }
-        if let Some(sequence) = self.engine.sequence() {
+        // While a scenario with another frame rate is loaded, the timeline is that of the new one already.
+        let is_shown = |sequence: &Sequence| {
+            self.document.as_ref().is_some_and(|document| *document.scenario == sequence.scenario)
+        };
+        if let Some(sequence) = self.engine.sequence().filter(|sequence| is_shown(sequence)) {
             self.timeline.set_sequence(sequence.frames, sequence.scenario.camera.fps);
         }
     }
@@ -275,9 +280,9 @@ impl State {
             }
             Message::Export(request) => {
                 if let (Some(document), Some(exporter)) = (&self.document, &self.exporter) {
-                    let scenario = (*document.scenario).clone();
-                    self.export =
-                        Some(ExportJob::start(exporter, scenario, request.folder, request.frames, context));
+                    let (rig, camera) = (document.rig().clone(), document.camera());
+                    let job = ExportJob::new(rig, camera, request.folder, request.frames);
+                    self.export = Some(ExportJob::start(exporter, job, context));
                 }
             }
             Message::CancelExport => {
@@ -312,6 +317,14 @@ impl State {
             }
             Message::Reset(key) => {
                 document.reset(key);
+                Ok(None)
+            }
+            Message::ShowCamera(camera) => {
+                let before = document.scenario.clone();
+                document.show_camera(*camera);
+                let clock = |scenario: &Scenario| [scenario.camera.fps, scenario.camera.phase];
+                self.timeline.keep_time(clock(&before), clock(&document.scenario));
+                (self.pinned, self.hovered) = (None, None);
                 Ok(None)
             }
             Message::Camera(camera) => document.set_camera(camera).map(|()| None),

@@ -1,6 +1,7 @@
 //! Tests of the whole window, headless, with the real engine on a software adapter.
 
 mod accessibility;
+mod cameras;
 mod dropped_files;
 mod editing;
 pub mod harness;

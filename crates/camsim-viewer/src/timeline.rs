@@ -54,6 +54,19 @@ impl Timeline {
             self.range.map(|range| range.map(|frame| frame.min(last))).filter(|[first, end]| first < end);
     }
 
+    /// Goes from the frames of one camera to those of another that are nearest in time, given the frames per
+    /// second and the phase of both. The length is estimated until [`Self::set_sequence`].
+    pub fn keep_time(&mut self, [fps, phase]: [f64; 2], [new_fps, new_phase]: [f64; 2]) {
+        let same_time = |frame: u64| {
+            let frame = (frame as f64 + phase) / fps * new_fps - new_phase;
+            frame.round().max(0.0) as u64
+        };
+        self.frame = same_time(self.frame);
+        self.frames = same_time(self.frames).max(self.frame + 1);
+        self.range = self.range.map(|range| range.map(same_time)).filter(|[first, end]| first < end);
+        (self.fps, self.carry) = (new_fps, 0.0);
+    }
+
     /// Goes to a frame, clamped to the last one.
     pub fn seek(&mut self, frame: u64) {
         self.frame = frame.min(self.last());
@@ -153,6 +166,17 @@ mod tests {
         assert_eq!((timeline.frame, timeline.playing), (0, false));
         timeline.step(7);
         assert_eq!(timeline.frame, 2);
+    }
+
+    #[test]
+    fn another_camera_shows_the_same_time() {
+        let mut timeline = Timeline { fps: 20.0, frame: 60, range: Some([20, 80]), ..with_frames(100) };
+        timeline.keep_time([20.0, 0.0], [10.0, 0.5]);
+        // 3 s are 29.5 periods of 0.1 s after the first stamp.
+        assert_eq!((timeline.frame, timeline.fps, timeline.range), (30, 10.0, Some([10, 40])));
+        assert_eq!(timeline.frames, 50);
+        timeline.set_sequence(25, 10.0);
+        assert_eq!((timeline.frame, timeline.range), (24, Some([10, 24])));
     }
 
     #[test]

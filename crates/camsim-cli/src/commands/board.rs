@@ -11,7 +11,7 @@ use camsim_core::{
 use camsim_io::{
     board_file::read_board,
     load::{board_position_ned_m, load_flight},
-    scenario_file::read_scenario,
+    scenario_file::read_rig,
     write::write_picture,
 };
 
@@ -53,12 +53,14 @@ pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             None,
         )
     } else {
-        let scenario = read_scenario(&args.board, &[], None).or_bad_input()?;
+        let rig = read_rig(&args.board, &[], None).or_bad_input()?;
+        // The board is the same for all cameras.
+        let scenario = rig.first();
         let spec = scenario.scene.board.as_ref();
         let spec =
             spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
-        let (log, _) = load_flight(&scenario).or_bad_input()?;
-        let centre_ned_m = board_position_ned_m(&scenario, spec, &log).or_bad_input()?;
+        let (log, _) = load_flight(scenario).or_bad_input()?;
+        let centre_ned_m = board_position_ned_m(scenario, spec, &log).or_bad_input()?;
         (read_board(spec).or_bad_input()?, Some((centre_ned_m, ned_from_board(spec.angles_deg))))
     };
     if let Some(path) = &args.output {

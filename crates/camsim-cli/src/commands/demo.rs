@@ -47,15 +47,17 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     console.note(format_args!("rendering on {engine}"));
     let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
     let scenario =
-        ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
+        ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default(), camera: None }
+            .read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
     let resume_command = console.command();
     let warnings = &loaded.warnings;
     let job = Job {
+        camera: None,
         sequence: &loaded.sequence,
         tracks: &loaded.tracks,
-        sensors: &loaded.sensors,
+        sensors: Some(&loaded.sensors),
         folder,
         frames: &frames,
         shard: None,
@@ -67,7 +69,8 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;
     let outcome = render_run::run(
-        &job,
+        &[job],
+        None,
         &mut EngineSource::new(&engine, &loaded.sequence)?,
         console,
         &mut |_, finished| {

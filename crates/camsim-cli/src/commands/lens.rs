@@ -8,12 +8,13 @@ use std::{
 
 use anyhow::{Context, anyhow, bail};
 use camsim_core::camera::{CameraModel, LensCheck};
-use camsim_io::{camera_file::read_camera_toml, scenario_file::read_scenario};
+use camsim_io::{camera_file::read_camera_toml, scenario_file::read_rig};
 use glam::DVec2;
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
+    inputs::choose_camera,
     output::write_output,
 };
 
@@ -26,8 +27,11 @@ Examples:
   319.5,239.5' | camsim lens flight.toml undistort
   camsim lens CAMERA.toml check --json")]
 pub struct LensArgs {
-    /// Camera file, or a scenario: its [camera] is used
+    /// Camera file, or a scenario: its [camera] is used, or one of its [[cameras]]
     camera: PathBuf,
+    /// Camera of a scenario with [[cameras]], by its name [default: the first]
+    #[arg(long = "camera", value_name = "NAME")]
+    name: Option<String>,
     #[command(subcommand)]
     command: LensCommand,
 }
@@ -58,7 +62,7 @@ struct PointsArgs {
 
 /// Runs a lens command.
 pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
-    let camera = read_camera(&args.camera)?;
+    let camera = read_camera(args, console)?;
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
@@ -66,15 +70,21 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     }
 }
 
-/// A camera file has its keys at the root, a scenario has them in `[camera]`.
-fn read_camera(path: &Path) -> Result<CameraModel, Failure> {
+/// A camera file has its keys at the root, a scenario has them in `[camera]` or `[[cameras]]`.
+fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel, Failure> {
+    let (path, name) = (&args.camera, args.name.as_deref());
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("{}: cannot be read", path.display()))
         .or_bad_input()?;
     // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
-    let spec = if root.contains_key("camera") || root.contains_key("flight") {
-        read_scenario(path, &[], None).or_bad_input()?.camera
+    let spec = if ["camera", "cameras", "flight"].iter().any(|key| root.contains_key(*key)) {
+        choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone()
+    } else if let Some(name) = name {
+        return Err(Failure::bad_input(anyhow!(
+            "--camera {name} chooses one of the [[cameras]] of a scenario, and {} is a camera file: leave it out",
+            path.display()
+        )));
     } else {
         read_camera_toml(path).or_bad_input()?
     };

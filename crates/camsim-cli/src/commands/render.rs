@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Scenario, Solver, validate};
+use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Rig, Scenario, Solver, validate};
 use camsim_engine::Finished;
 use camsim_io::{merge::write_checksums, scenario_file::print_default, write::Y4mStream};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -17,10 +17,14 @@ use crate::{
     failure::{FAILED, Failure, OrFail},
     frame_list::{FrameList, Shard},
     frame_source::{EngineSource, FrameSource, ReferenceSource},
-    inputs::{self, Changes, ScenarioArgs},
-    render_run::{self, Job},
+    inputs::{self, Changes},
+    render_run::Selected,
     times_table::TimesTable,
 };
+
+mod cameras;
+
+use cameras::{chosen_cameras, frames_of_cameras, piped_camera};
 
 /// Render the frames of a scenario
 ///
@@ -28,7 +32,8 @@ use crate::{
 /// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json,
 /// which repeats the run: `camsim render DIR/run.json`; with [output.tracks], points.csv and tracks.csv (the
 /// exact pixel of points of the scene in each frame). Each twin of the frames ([[output.twin]]) has a folder of
-/// its own among them, with frames.csv, camera.toml and run.json. Paths in these files are relative to them, so
+/// its own among them, with frames.csv, camera.toml and run.json. Each camera of a rig ([[cameras]]) has such a
+/// folder, DIR/NAME, and DIR has run.json, rig.toml and trajectory.csv. Paths in these files are relative to them, so
 /// a folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
 /// command that resumes the run.
 #[derive(Debug, clap::Args)]
@@ -39,6 +44,7 @@ Examples:
   camsim render flight.toml --set camera.lens.model=pinhole --set 'camera.lens.coefficients=[]'
   camsim render flight.toml -o out --shard 2/4        the second of four machines
   camsim render flight.toml -o out --resume           only what is missing
+  camsim render rig.toml -o out --camera left         one camera of several
   camsim render flight.toml --backend cpu             without a graphics adapter
   camsim render flight.toml --backend reference --frames 7
                                                       exactly and slowly
@@ -55,9 +61,12 @@ pub struct RenderArgs {
     /// Output folder [default: the scenario's name + "-frames"]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: all]
+    /// Frames of each camera: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: all]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
+    /// Cameras of a scenario with [[cameras]], by their names [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    camera: Vec<String>,
     #[command(flatten)]
     changes: Changes,
     /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "oracle"]
@@ -142,58 +151,57 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         return Ok(console.print(&print_default())?);
     };
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
-    let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read(console)?;
-    let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
-    refuse_parts_of_videos(&scenario, args.shard)?;
+    let rig = inputs::read_changed_rig(&path, &args.changes, console)?
+        .try_map(|scenario| with_backend(with_outputs(scenario, args)?, args.backend))?;
+    let cameras = chosen_cameras(&rig, &args.camera)?;
+    refuse_parts_of_videos(&rig, args.shard)?;
+    let piped = piped_camera(args.pipe, &rig, &cameras)?;
     let mut times = TimesTable::default();
     let is_quiet = console.is_quiet();
-    let loaded = times.timed("scenario files", is_quiet, || inputs::load(&scenario, console))?;
-    let frames = match &args.frames {
-        None => (0..loaded.sequence.frames).collect(),
-        Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
-    };
-    let resume_command = console.command_with("--resume");
-    let job = Job {
-        sequence: &loaded.sequence,
-        tracks: &loaded.tracks,
-        sensors: &loaded.sensors,
+    let loaded = times.timed("scenario files", is_quiet, || inputs::load_cameras(&rig, console))?;
+    let selected = Selected {
+        rig: &rig,
+        loaded: &loaded,
         folder: &folder,
-        frames: &frames,
+        frames: frames_of_cameras(args.frames.as_ref(), &cameras, &loaded, console)?,
+        cameras,
         shard: args.shard,
         resume: args.resume,
-        warnings: &loaded.warnings,
-        resume_command: &resume_command,
+        resume_command: console.command_with("--resume"),
     };
+    let sequence = selected.first();
     let renderer = args.backend.and_then(RenderBackend::renderer);
     let engine;
-    let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        Box::new(times.timed("ray-casting structures", is_quiet, || ReferenceSource::new(&loaded.sequence))?)
+    let is_exact = rig.first().quality.solver == Auto::Value(Solver::Oracle);
+    let mut source: Box<dyn FrameSource + '_> = if is_exact {
+        Box::new(times.timed("ray-casting structures", is_quiet, || ReferenceSource::new(sequence))?)
     } else {
         engine = times.timed("adapter", is_quiet, || backend::open(renderer))?;
         let mut engine_source =
-            times.timed("scene upload", is_quiet, || EngineSource::new(&engine, &loaded.sequence))?;
+            times.timed("scene upload", is_quiet, || EngineSource::new(&engine, sequence))?;
         if args.times {
             engine_source.time_passes();
         }
         Box::new(engine_source)
     };
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let (fps, bits) = (scenario.camera.fps, scenario.output.video.bits);
+    let (fps, bits) = (sequence.scenario.camera.fps, sequence.scenario.output.video.bits);
     let mut pipe = args.pipe.then(|| Y4mStream::new(std::io::stdout(), fps, bits));
     let mut broken_pipe = None;
-    let mut on_frame = |twin: Option<&str>, finished: &Finished| {
-        times.add(twin, &finished.times);
-        let pipe = pipe.as_mut().filter(|_| twin.is_none());
+    let mut on_frame = |name: Option<&str>, finished: &Finished| {
+        times.add(name, &finished.times);
+        let pipe = pipe.as_mut().filter(|_| name == piped);
         broken_pipe = pipe.and_then(|pipe| pipe.write(&finished.frame).err());
         if broken_pipe.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let outcome = render_run::run(&job, &mut *source, console, &mut on_frame);
+    let outcome = selected.run(&mut *source, console, &mut on_frame);
     if let Some(error) = broken_pipe {
         return Err(anyhow!("--pipe: standard output takes no more frames: {error}")).or_failed();
     }
     let outcome = outcome.inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
-            console.note(format_args!("written frames are kept; to resume: {resume_command}"));
+            let command = &selected.resume_command;
+            console.note(format_args!("written frames are kept; to resume: {command}"));
         }
     })?;
     if args.checksums {
@@ -217,7 +225,8 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
 }
 
 /// A shard has a part of the frames, and its video would have the name of all others.
-fn refuse_parts_of_videos(scenario: &Scenario, shard: Option<Shard>) -> Result<(), Failure> {
+fn refuse_parts_of_videos(rig: &Rig, shard: Option<Shard>) -> Result<(), Failure> {
+    let scenario = rig.first();
     match scenario.output.format.iter().find(|format| format.is_video()) {
         Some(video) if shard.is_some() => Err(Failure::bad_input(anyhow!(
             "--shard makes a part of the frames, and an {} holds all of them: render the shards as png, then make \

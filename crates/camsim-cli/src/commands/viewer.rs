@@ -4,14 +4,14 @@ use std::{io, ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use camsim_core::scenario::{Auto, Solver};
 use camsim_engine::{Backend, Engine};
-use camsim_io::load::load_sequence;
+use camsim_io::load::load_rig;
 use camsim_viewer::ExportJob;
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
     frame_source::{EngineSource, FrameSource, ReferenceSource},
-    render_run::{self, Job, resume_command},
+    render_run::{Selected, resume_command},
 };
 
 /// Open the viewer
@@ -34,47 +34,43 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let (mut out, mut err) = (io::sink(), io::sink());
     let mut console = Console::new(&mut out, &mut err);
     console.set_volume(true, false);
-    let loaded = load_sequence(&job.scenario).or_bad_input()?;
+    let loaded = load_rig(&job.rig).or_bad_input()?;
     let [first, end] = job.frames;
-    let frames: Vec<u64> = (first..end.min(loaded.sequence.frames)).collect();
-    let folder = &job.folder;
-    let resume_command = resume_command(folder);
-    let warnings = &loaded.warnings;
-    let run = Job {
-        sequence: &loaded.sequence,
-        tracks: &loaded.tracks,
-        sensors: &loaded.sensors,
-        folder,
-        frames: &frames,
+    let frames: Vec<u64> = (first..end.min(loaded[job.camera].sequence.frames)).collect();
+    let selected = Selected {
+        rig: &job.rig,
+        loaded: &loaded,
+        folder: &job.folder,
+        cameras: vec![job.camera],
+        frames: vec![frames],
         shard: None,
         resume: false,
-        warnings,
-        resume_command: &resume_command,
+        resume_command: resume_command(&job.folder),
     };
     let engine;
-    let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle)
-    {
-        Box::new(ReferenceSource::new(&loaded.sequence)?)
+    let is_exact = job.rig.first().quality.solver == Auto::Value(Solver::Oracle);
+    let mut source: Box<dyn FrameSource + '_> = if is_exact {
+        Box::new(ReferenceSource::new(selected.first())?)
     } else {
         engine = Engine::open(Backend::Auto)?;
-        Box::new(EngineSource::new(&engine, &loaded.sequence)?)
+        Box::new(EngineSource::new(&engine, selected.first())?)
     };
     let mut on_frame =
         |_: Option<&str>, _: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let outcome = render_run::run(&run, &mut *source, &mut console, &mut on_frame)?;
+    let outcome = selected.run(&mut *source, &mut console, &mut on_frame)?;
     let seconds = outcome.time.as_secs_f64();
-    Ok(format!("{} in {seconds:.1} s, {}, in {}", outcome.pictures(), outcome.rate(), folder.display()))
+    Ok(format!("{} in {seconds:.1} s, {}, in {}", outcome.pictures(), outcome.rate(), job.folder.display()))
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use camsim_io::scenario_file::read_scenario;
+    use camsim_io::scenario_file::read_rig;
 
     use super::*;
 
-    fn small() -> camsim_core::scenario::Scenario {
+    fn small() -> camsim_core::scenario::Rig {
         let sets = [
             ("camera.size_px", "[64, 48]"),
             ("camera.focal_px", "[50.0, 50.0]"),
@@ -82,7 +78,7 @@ mod tests {
             ("output.format", "[\"png\"]"),
         ];
         let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
-        read_scenario(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None)
+        read_rig(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None)
             .expect("legal")
     }
 
@@ -90,14 +86,14 @@ mod tests {
     #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
     fn export_matches_render_and_can_be_stopped() {
         let folder = tempfile::tempdir().expect("a folder");
-        let job = ExportJob::new(small(), folder.path().join("all"), [3, 6]);
+        let job = ExportJob::new(small(), 0, folder.path().join("all"), [3, 6]);
         export(&job).expect("written");
         assert_eq!(job.progress().done, 3);
         assert!(folder.path().join("all/run.json").is_file());
         let names: Vec<String> = (3..6).map(|frame| format!("all/color/frame_{frame:06}.png")).collect();
         assert!(names.iter().all(|name| folder.path().join(name).is_file()), "{names:?}");
 
-        let stopped = ExportJob::new(small(), folder.path().join("stopped"), [0, 40]);
+        let stopped = ExportJob::new(small(), 0, folder.path().join("stopped"), [0, 40]);
         stopped.cancel();
         let told = export(&stopped).expect_err("stopped").to_string();
         assert!(told.contains("stopped on request"), "{told}");

@@ -15,6 +15,8 @@ use crate::failure::{Failure, OrFail};
 /// Pictures that belong into one folder.
 #[derive(Debug)]
 pub struct Pictures {
+    /// Name of the camera, if it is one of several.
+    pub camera: Option<String>,
     /// The folder.
     pub folder: PathBuf,
     /// The twin that they are; `None` for the frames.
@@ -25,6 +27,29 @@ pub struct Pictures {
     pub inputs: Inputs,
     /// Series of pictures: one, or one for each instant of a burst.
     pub series: Vec<Series>,
+}
+
+/// What a job renders: the frames, then their twins one after the other.
+#[derive(Debug)]
+pub struct JobPictures {
+    /// The frames.
+    pub frames: Pictures,
+    /// Each twin of them.
+    pub twins: Vec<Pictures>,
+}
+
+impl JobPictures {
+    /// Those of a job.
+    pub fn new(job: &Job<'_>) -> Result<Self, Failure> {
+        let twins = job.sequence.scenario.output.twin.iter();
+        let twins = twins.map(|twin| Pictures::of_twin(job, twin)).collect::<Result<_, _>>()?;
+        Ok(Self { frames: Pictures::of_frames(job), twins })
+    }
+
+    /// The frames and their twins.
+    pub fn all(&self) -> impl Iterator<Item = &Pictures> {
+        std::iter::once(&self.frames).chain(&self.twins)
+    }
 }
 
 /// One picture of each frame.
@@ -42,6 +67,7 @@ impl Pictures {
         let sequence = job.sequence.clone();
         let files = files_of(&sequence.scenario, job.folder);
         Self {
+            camera: job.camera.map(str::to_owned),
             folder: job.folder.into(),
             twin: None,
             inputs: inputs::scenario_fingerprints(&sequence.scenario),
@@ -62,12 +88,19 @@ impl Pictures {
             series.push(Series { sequence, files });
         }
         let inputs = inputs::scenario_fingerprints(&sequence.scenario);
-        Ok(Self { folder, twin: Some(TwinRecord::new(twin)), sequence, inputs, series })
+        let camera = job.camera.map(str::to_owned);
+        Ok(Self { camera, folder, twin: Some(TwinRecord::new(twin)), sequence, inputs, series })
     }
 
     /// Name of the twin.
     pub fn name(&self) -> Option<&str> {
         self.twin.as_ref().map(|twin| twin.name.as_str())
+    }
+
+    /// Names of camera and twin, `left/sharp`; `None` for the frames of the only camera.
+    pub fn label(&self) -> Option<String> {
+        let parts: Vec<&str> = self.camera.as_deref().into_iter().chain(self.name()).collect();
+        (!parts.is_empty()).then(|| parts.join("/"))
     }
 
     /// Whether they are bursts.

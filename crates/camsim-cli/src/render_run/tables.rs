@@ -65,27 +65,16 @@ pub fn write_objects(pictures: &Pictures) -> Result<(), Failure> {
 }
 
 /// Writes `camera.toml`, the trajectories and the tables of sensors, which depend on the scenario only.
-pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
+pub fn write_fixed(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
     let sequence = job.sequence;
-    let Scenario { camera, tracker, .. } = &sequence.scenario;
-    write_camera(job.folder, camera).or_failed()?;
-    let rate_hz = tracker.rate_hz;
-    let rows = (planner.stamp_s(sequence.frames - 1) - planner.stamp_s(0)) * rate_hz;
-    if rows > MOST_TRAJECTORY_ROWS {
-        return Err(Failure::bad_input(anyhow!(
-            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make \
-             flight.window_s shorter or tracker.rate_hz lower"
-        )));
-    }
-    let (first_s, last_s) =
-        Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
-    let seen_s = [planner.stamp_s(0) + first_s, planner.stamp_s(sequence.frames - 1) + last_s];
-    let ticks = || ticks(&sequence.path.trajectory, rate_hz, seen_s);
-    let body = trajectory_csv(ticks().map(|t_s| body_at(&sequence.path.trajectory, sequence.epoch_ns, t_s)));
-    write_atomic(&job.folder.join("trajectory.csv"), body.as_bytes()).or_failed()?;
-    let optical = camera_trajectory_csv(ticks().map(|t_s| camera_at(&sequence.path, sequence.epoch_ns, t_s)));
+    write_camera(job.folder, &sequence.scenario.camera).or_failed()?;
+    write_platform(job.folder, &[sequence])?;
+    let rate_hz = sequence.scenario.tracker.rate_hz;
+    let ticks = ticks(&sequence.path.trajectory, rate_hz, seen_s(sequence)?);
+    let epoch_ns = sequence.platform_epoch_ns();
+    let optical = camera_trajectory_csv(ticks.map(|t_s| camera_at(&sequence.path, epoch_ns, t_s)));
     write_atomic(&job.folder.join("camera_trajectory.csv"), optical.as_bytes()).or_failed()?;
-    write_sensors(job.folder, job.sensors).or_failed()?;
+    job.sensors.map_or(Ok(()), |sensors| write_sensors(job.folder, sensors)).or_failed()?;
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(
@@ -96,6 +85,38 @@ pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) 
         ));
     }
     Ok(())
+}
+
+/// Writes `trajectory.csv` for the time that the frames of all these cameras of one platform see.
+pub fn write_platform(folder: &Path, sequences: &[&Sequence]) -> Result<(), Failure> {
+    let mut all_s = [f64::INFINITY, f64::NEG_INFINITY];
+    for sequence in sequences {
+        let [first_s, last_s] = seen_s(sequence)?;
+        all_s = [all_s[0].min(first_s), all_s[1].max(last_s)];
+    }
+    let Some(sequence) = sequences.first() else { return Ok(()) };
+    let rate_hz = sequence.scenario.tracker.rate_hz;
+    let rows = (all_s[1] - all_s[0]) * rate_hz;
+    if rows > MOST_TRAJECTORY_ROWS {
+        return Err(Failure::bad_input(anyhow!(
+            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make \
+             flight.window_s shorter or tracker.rate_hz lower"
+        )));
+    }
+    let trajectory = &sequence.path.trajectory;
+    let epoch_ns = sequence.platform_epoch_ns();
+    let body =
+        trajectory_csv(ticks(trajectory, rate_hz, all_s).map(|t_s| body_at(trajectory, epoch_ns, t_s)));
+    write_atomic(&folder.join("trajectory.csv"), body.as_bytes()).or_failed()
+}
+
+/// Path times that the frames of a sequence see, the first and the last.
+fn seen_s(sequence: &Sequence) -> Result<[f64; 2], Failure> {
+    let camera = &sequence.scenario.camera;
+    let (first_s, last_s) =
+        Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
+    let last_frame = sequence.frames.saturating_sub(1) as f64;
+    Ok([sequence.stamp_s(0.0) + first_s, sequence.stamp_s(last_frame) + last_s])
 }
 
 /// Rows of this scenario in the folder's `frames.csv`.

@@ -26,6 +26,10 @@ pub struct CameraSpec {
     pub fps: f64,
     /// Fraction of a frame period added to every stamp.
     pub phase: f64,
+    /// How much the camera's clock is ahead of the platform's: added to the stamps that the camera writes.
+    /// Poses stay those of the true instants.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub clock_offset_ms: f64,
     /// Position and orientation on the platform.
     pub mount: MountSpec,
     /// Distortion.
@@ -51,6 +55,7 @@ impl Default for CameraSpec {
             principal_point_px: None,
             fps: 30.0,
             phase: 0.0,
+            clock_offset_ms: 0.0,
             mount: MountSpec::default(),
             lens: LensSpec::default(),
             zoom: Vec::new(),
@@ -59,6 +64,19 @@ impl Default for CameraSpec {
             photometric: PhotometricSpec::default(),
         }
     }
+}
+
+impl CameraSpec {
+    /// [`Self::clock_offset_ms`] in whole nanoseconds.
+    #[must_use]
+    pub fn clock_offset_ns(&self) -> i64 {
+        (self.clock_offset_ms * 1e6).round() as i64
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// `[camera.mount]`: the camera in the body frame.

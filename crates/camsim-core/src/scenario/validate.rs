@@ -10,11 +10,14 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod motion;
 mod names;
+mod rig;
 mod scene;
 mod sensors;
 mod tracks;
 mod twins;
 mod video;
+
+pub use rig::validate_rig;
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.
@@ -26,6 +29,9 @@ pub const MAX_BLUR_SAMPLES: u32 = 4096;
 pub const MAX_FOOTPRINT_TAPS: u32 = 64;
 /// Largest number of output frames per ideal frame.
 pub const MAX_FRAMES_PER_IDEAL: u32 = 64;
+
+/// Largest offset of a camera's clock, 127 years: stamps of this century stay within 64 bits.
+const MAX_CLOCK_OFFSET_MS: f64 = 4e12;
 
 /// An invalid value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -156,6 +162,13 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.finite("camera.principal_point_px", &camera.principal_point_px.unwrap_or_default());
     check.positive("camera.fps", camera.fps, "give frames per second, for example 30");
     check.finite("camera.phase", &[camera.phase]);
+    check.require(camera.clock_offset_ms.abs() <= MAX_CLOCK_OFFSET_MS, "camera.clock_offset_ms", || {
+        format!(
+            "must lie within {MAX_CLOCK_OFFSET_MS:e} milliseconds of 0, not {}; it is how much the camera's clock \
+             is ahead",
+            camera.clock_offset_ms
+        )
+    });
 
     check.finite("camera.mount.angles_deg", &camera.mount.angles_deg);
     check.finite("camera.mount.offset_m", &camera.mount.offset_m);

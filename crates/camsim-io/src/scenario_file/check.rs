@@ -78,7 +78,7 @@ fn check_table(
     }
     for (required, parent) in schema.required {
         let path = required.strip_prefix(parent).unwrap_or(required).trim_start_matches('.');
-        if *parent == key && !has(table, path) {
+        if *parent == schema::like_camera(key) && !has(table, path) {
             problems.push((join(indexed_key, path), "is missing, and has no default; add it".into()));
         }
     }

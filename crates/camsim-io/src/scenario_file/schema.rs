@@ -1,6 +1,8 @@
 //! The schema of scenario files: every key and the values it takes. A test compares it with the structs.
 //! `frame_file` has the schema of FRAME.toml.
 
+use std::borrow::Cow;
+
 use camsim_core::{
     scenario::{
         MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
@@ -136,6 +138,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("camera.principal_point_px", Numbers(2)),
     ("camera.fps", Number),
     ("camera.phase", Number),
+    ("camera.clock_offset_ms", Number),
     ("camera.mount.angles_deg", Numbers(3)),
     ("camera.mount.offset_m", Numbers(3)),
     ("camera.mount.vibration", Tables),
@@ -363,7 +366,21 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("gnss.name", "gnss"),
     ("barometer.name", "barometer"),
     ("magnetometer.name", "magnetometer"),
+    ("cameras.name", CAMERAS),
 ];
+
+/// The list of cameras of a rig. Its elements have the keys of `camera`.
+pub const CAMERAS: &str = "cameras";
+/// A camera file below an element's own keys.
+const CAMERA_FILE: &str = "cameras.file";
+
+/// The key of `camera` that a key of `cameras`, without index, is like; other keys as they are.
+pub(super) fn like_camera(key: &str) -> Cow<'_, str> {
+    match key.strip_prefix(CAMERAS).and_then(|rest| rest.strip_prefix('.')) {
+        Some(rest) => format!("camera.{rest}").into(),
+        None => key.into(),
+    }
+}
 
 impl ValueKind {
     /// Whether a text at a key of this kind is a path.
@@ -380,21 +397,37 @@ impl ValueKind {
 impl Schema {
     /// The values that `key` takes; `None` if it is unknown.
     pub(crate) fn kind(&self, key: &str) -> Option<ValueKind> {
+        match key {
+            CAMERAS if self.keys == KEYS => return Some(Tables),
+            CAMERA_FILE if self.keys == KEYS => return Some(Path),
+            _ => {}
+        }
+        let key = like_camera(key);
         self.keys.iter().find(|(name, _)| *name == key).map(|(_, kind)| *kind)
     }
 
     /// Whether `key` is a table of the schema (`camera.lens`).
     pub(crate) fn is_table(&self, key: &str) -> bool {
+        let key = like_camera(key);
         key.is_empty()
             || self
                 .keys
                 .iter()
-                .any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
+                .any(|(name, _)| name.strip_prefix(&*key).is_some_and(|rest| rest.starts_with('.')))
     }
 
     /// The known key most similar to `key`, for "did you mean". Siblings are preferred, but a key of another
     /// table may win.
     pub(crate) fn nearest(&self, key: &str) -> Option<String> {
+        let near = self.nearest_like(&like_camera(key))?;
+        match near.strip_prefix("camera.").filter(|_| key.starts_with("cameras.")) {
+            Some(rest) => Some(format!("cameras.{rest}")),
+            None => Some(near),
+        }
+    }
+
+    /// [`Self::nearest`] for keys of one camera.
+    fn nearest_like(&self, key: &str) -> Option<String> {
         let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
         let mut names: Vec<&str> = Vec::new();
         for (name, _) in self.keys {

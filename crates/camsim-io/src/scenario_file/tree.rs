@@ -11,7 +11,13 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::{ScenarioError, schema::KEYS, wrong_file_kind::wrong_kind_message};
+use super::{
+    ScenarioError,
+    schema::{CAMERAS, KEYS},
+    wrong_file_kind::wrong_kind_message,
+};
+
+mod cameras;
 
 /// Where a key is written.
 #[derive(Clone, Debug)]
@@ -94,11 +100,11 @@ impl Tree {
         Ok(Self { file: path.into(), root, locations })
     }
 
-    /// Reads a camera file, with `camera.` before the keys of locations. A scenario, or `[camera]` copied
-    /// with its header, is refused.
-    pub(crate) fn read_camera(path: &Path) -> Result<Self, ScenarioError> {
-        let tree = Self::read(path, "camera")?;
-        let mut scenario_keys = KEYS.iter().filter_map(|(key, _)| key.split('.').next());
+    /// Reads a camera file. Locations are stored with `prefix`, `camera` or that of a camera of a rig, before
+    /// their key. A scenario, or `[camera]` copied with its header, is refused.
+    pub(crate) fn read_camera(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
+        let tree = Self::read(path, prefix)?;
+        let mut scenario_keys = KEYS.iter().filter_map(|(key, _)| key.split('.').next()).chain([CAMERAS]);
         match scenario_keys.find(|name| tree.root.contains_key(*name)) {
             None => Ok(tree),
             Some(name) => {
@@ -107,7 +113,7 @@ impl Tree {
                 } else {
                     "the rest belongs into a scenario"
                 };
-                let location = tree.location(&join("camera", name));
+                let location = tree.location(&join(prefix, name));
                 Err(ScenarioError::Problems(vec![format!(
                     "{location}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}"
                 )]))
@@ -149,22 +155,6 @@ impl Tree {
         }
     }
 
-    /// Replaces `camera = "file.toml"` by the content of that file.
-    pub(super) fn resolve_camera(&mut self) -> Result<(), ScenarioError> {
-        let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
-        let path = self.resolve("camera", name);
-        let camera = Self::read_camera(&path).map_err(|error| match error {
-            ScenarioError::Read { path, source } => {
-                ScenarioError::ReadCamera { path, scenario: self.file.clone(), source }
-            }
-            other => other,
-        })?;
-        self.root.insert("camera".into(), Value::Table(camera.root));
-        self.locations.insert("camera".into(), KeyLocation::File(path, 1));
-        self.locations.extend(camera.locations);
-        Ok(())
-    }
-
     /// Resolves a path written at `key` against the folder of its file. Paths of `--set` stay relative to the
     /// working directory.
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
@@ -183,6 +173,12 @@ impl Tree {
         if key.is_empty() || key.split('.').any(str::is_empty) {
             return Err(fail("the key is empty; write --set camera.fps=25".into()));
         }
+        let key = &*self.numbered(key).map_err(fail)?;
+        if let Some(camera) = key.strip_prefix("cameras.").and_then(|index| index.parse().ok()) {
+            return self.set_camera(camera, value(text), shown);
+        }
+        let parents = key.match_indices('.').map(|(end, _)| &key[..end]);
+        let new_tables: Vec<&str> = parents.filter(|parent| !self.has(parent)).collect();
         let mut steps: Vec<&str> = key.split('.').collect();
         let leaf = steps.pop().unwrap_or_default();
         let mut table = &mut self.root;
@@ -203,13 +199,33 @@ impl Tree {
                 .ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
         }
         table.insert(leaf.into(), value(text));
-        let below = format!("{key}.");
-        self.locations.retain(|key, _| !key.starts_with(&below));
-        for (end, _) in key.match_indices('.') {
-            self.locations.entry(key[..end].into()).or_insert_with(|| KeyLocation::Set(shown.clone()));
+        self.forget_below(key);
+        // Tables that were there keep the location of what contains them.
+        for table in new_tables {
+            self.locations.entry(table.into()).or_insert_with(|| KeyLocation::Set(shown.clone()));
         }
         self.locations.insert(key.into(), KeyLocation::Set(shown));
-        if key == "camera" { self.resolve_camera() } else { Ok(()) }
+        if ["camera", CAMERAS].contains(&key) { self.resolve_cameras() } else { Ok(()) }
+    }
+
+    /// Whether there is a value at a dotted key.
+    fn has(&self, key: &str) -> bool {
+        let mut steps = key.split('.');
+        let first = steps.next().and_then(|step| self.root.get(step));
+        first.is_some_and(|first| {
+            steps
+                .try_fold(first, |value, step| match value {
+                    Value::Array(list) => list.get(step.parse::<usize>().ok()?),
+                    value => value.get(step),
+                })
+                .is_some()
+        })
+    }
+
+    /// Removes the locations below a key whose value is replaced.
+    fn forget_below(&mut self, key: &str) {
+        let below = format!("{key}.");
+        self.locations.retain(|key, _| !key.starts_with(&below));
     }
 }
 

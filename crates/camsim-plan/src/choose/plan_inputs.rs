@@ -123,8 +123,7 @@ impl PlanInputs {
 
     /// Stamp of a frame of any number, beyond the sequence as well.
     pub fn stamp_s_of(&self, frame: f64) -> f64 {
-        let camera = &self.sequence.scenario.camera;
-        self.sequence.start_s + (frame + camera.phase) / camera.fps
+        self.sequence.stamp_s(frame)
     }
 
     /// Probes of frames of a group: neighbours in time are nearly alike, and have other probes each.

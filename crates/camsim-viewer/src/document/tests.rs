@@ -126,3 +126,54 @@ fn removing_the_last_key_of_a_table_removes_the_table() {
     // An empty table would be the default light.
     assert_eq!((document.scenario.scene.light, document.value("scene.light")), (None, None));
 }
+
+/// A rig of two cameras in `folder`.
+fn pair(folder: &Path) -> PathBuf {
+    let path = folder.join("pair.toml");
+    let text = "[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10.0\n\
+        [[cameras]]\nname = \"left\"\nfps = 20.0\n[[cameras]]\nname = \"right\"\n\
+        photometric = { vignette = \"v.png\" }\n";
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn keys_of_the_camera_are_those_of_the_shown_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut document = Document::open(&pair(folder.path())).expect("legal");
+    assert_eq!((document.scenario.camera.name.as_str(), document.camera()), ("left", 0));
+    document.show_camera(1);
+    document.show_camera(7);
+    assert_eq!((document.scenario.camera.name.as_str(), document.camera()), ("right", 1));
+    document.set("camera.fps", Some(Value::Float(5.0)), false);
+    document.set("camera.lens.model", Some(Value::String("kannala-brandt".into())), false);
+    let fps =
+        |document: &Document| document.rig().scenarios().iter().map(|s| s.camera.fps).collect::<Vec<_>>();
+    assert_eq!(fps(&document), [20.0, 5.0]);
+    assert_eq!(document.value("camera.fps"), Some(&Value::Float(5.0)));
+    assert!(document.is_changed("camera.fps") && document.removed_keys().is_empty());
+    let command = document.render_command(Path::new("out"), Some([0, 3]));
+    assert!(
+        command.contains("--set cameras.1.fps=5.0 ")
+            && command.contains("--set 'cameras.1.lens.model=\"kannala-brandt\"'")
+            && command.contains("--camera right"),
+        "{command}"
+    );
+    document.show_camera(0);
+    assert!(!document.is_changed("camera.fps"));
+    document.set("camera.fps", Some(Value::Float(-5.0)), false);
+    let problem = document.problem("camera.fps").expect("a problem").to_string();
+    assert!(problem.starts_with("cameras.0.fps: must be"), "{problem}");
+    assert!(document.undo());
+    assert!(document.problem("camera.fps").is_none());
+
+    let camera = CameraSpec { name: "other".into(), fps: 1.0, size_px: [9, 9], ..CameraSpec::default() };
+    document.set_camera(&camera).expect("set");
+    let left = &document.scenario.camera;
+    assert_eq!((left.name.as_str(), left.fps, left.size_px), ("left", 20.0, [9, 9]));
+    let saved = folder.path().join("saved.toml");
+    document.save(&saved).expect("saved");
+    let text = std::fs::read_to_string(&saved).expect("text");
+    assert!(text.contains("vignette = \"v.png\"") && !text.contains("[camera]"), "{text}");
+    assert_eq!(Document::open(&saved).expect("what was saved").rig(), document.rig());
+}

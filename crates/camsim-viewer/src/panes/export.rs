@@ -141,7 +141,7 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let Some(job) = &state.export else { return };
     let progress = job.progress();
     let all = job.pictures().max(1);
-    let what = if job.scenario.output.twin.is_empty() { "frames" } else { "pictures" };
+    let what = if job.rig.first().output.twin.is_empty() { "frames" } else { "pictures" };
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;

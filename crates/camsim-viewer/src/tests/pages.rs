@@ -141,7 +141,7 @@ fn an_export_uses_channels_formats_frames_and_folder_of_its_page() {
     let exporter_calls = calls.clone();
     let exporter: crate::Exporter = Arc::new(move |job| {
         exporter_calls.lock().expect("one at a time").push((
-            job.scenario.output.clone(),
+            job.rig.first().output.clone(),
             job.frames,
             job.folder.clone(),
         ));

@@ -4,7 +4,7 @@ use super::{Check, names, validate};
 use crate::scenario::{BurstOver, Channel, MAX_INSTANTS, Scenario, TwinSpec};
 
 /// Names below the output folder that are taken, beside those of channels.
-const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette", "sensors"];
+const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette", "sensors", "datasets"];
 
 /// Checks the twins of a scenario. Those of a scenario that has other problems are checked by themselves only.
 pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
@@ -16,7 +16,7 @@ pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
         check.require(!is_repeated, format!("output.twin.{i}.name"), || {
             format!("\"{}\" names two twins; give each a name of its own, as it is a folder", twin.name)
         });
-        check_name(check, i, &twin.name);
+        check_folder_name(check, &format!("output.twin.{i}.name"), &twin.name);
         check_keys(check, i, twin);
         check_burst(check, i, twin, scenario);
         if is_usable && check.problems.len() == before {
@@ -25,9 +25,9 @@ pub(super) fn check_twins(check: &mut Check, scenario: &Scenario) {
     }
 }
 
-fn check_name(check: &mut Check, i: usize, name: &str) {
-    let key = format!("output.twin.{i}.name");
-    check.require(names::is_portable(name), key.as_str(), || {
+/// Checks the name of a folder beside those of channels.
+pub(super) fn check_folder_name(check: &mut Check, key: &str, name: &str) {
+    check.require(names::is_portable(name), key, || {
         format!("is the name of a folder: {}, such as \"sharp\", not \"{name}\"", names::ADVICE)
     });
     let mut taken = Channel::ALL.iter().map(|channel| channel.name()).chain(TAKEN.iter().copied());

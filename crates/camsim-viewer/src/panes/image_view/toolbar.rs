@@ -26,6 +26,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let height: f32 = ui.data(|data| data.get_temp(height())).unwrap_or_default();
     TooltipPlacement::Below(Rangef::new(top, top + height)).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
+        camera(ui, state, out);
         for compare in Compare::ALL {
             choice(ui, view.compare == compare, compare.label(), compare.label(), "how A and B are compared")
                 .clicked()
@@ -56,6 +57,25 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     ui.data_mut(|data| data.insert_temp(self::height(), bottom - top));
     if view != state.view {
         out.push(Message::View(view));
+    }
+}
+
+/// The choice of a camera, if there are several.
+fn camera(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    let Some(document) = state.document.as_ref().filter(|document| document.rig().is_list()) else { return };
+    let shown = document.camera();
+    let mut chosen = shown;
+    let name = document.scenario.camera.name.as_str();
+    let combo = egui::ComboBox::from_id_salt("shown camera").selected_text(name).show_ui(ui, |ui| {
+        for (index, name) in document.rig().names().enumerate() {
+            ui.selectable_value(&mut chosen, index, name);
+        }
+    });
+    named(&combo.response, Role::ComboBox, "shown camera");
+    combo.response.with_tooltip("camera that is shown and edited");
+    ui.separator();
+    if chosen != shown {
+        out.push(Message::ShowCamera(chosen));
     }
 }
 
