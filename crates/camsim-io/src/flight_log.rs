@@ -15,7 +15,9 @@
 //! BOM and CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only
 //! columns that are used must be numbers.
 //!
-//! GPX files are read too (`gpx`). Other formats are refused with the tool that converts them
+//! Other files are recognised by their content, else by their ending (`kinds`): PX4 logs (`ulog`), ArduPilot
+//! logs (`dataflash`), ROS poses (`mcap_file`), flight records of gliders (`igc`), GPX (`gpx`) and KML (`kml`).
+//! Their positions and attitudes may be in streams of their own (`streams`). Further formats are refused with the tool that converts them
 //! (`foreign_formats`). Ambiguities are refused, or resolved with a note in the log: units that no header
 //! names (`time_unit`, `angle_unit`), clocks that roll over (`clock_rollover`), tables merged from several
 //! streams (`sparse_rows`). docs/inputs/LOGS.md lists all names and units; it is generated from the tables in
@@ -43,22 +45,30 @@ mod column_meaning;
 mod column_names;
 mod column_selection;
 mod columns;
+mod dataflash;
 mod detect;
 mod foreign_formats;
 mod gpx;
 mod header;
 mod height_column;
+mod igc;
+mod kinds;
+mod kml;
 mod layout;
+mod mcap_file;
 mod quaternions;
 mod reference;
 mod rows;
+mod scalars;
 mod sparse_rows;
+mod streams;
 mod text_table;
 mod time_fields;
 mod time_unit;
+mod ulog;
 mod units;
 
-use columns::{AttitudeColumns, Frame};
+use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
 
 pub use reference::reference;
@@ -298,6 +308,9 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
 pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
     let bytes =
         std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
+    if let Some(format) = kinds::detect(path, &bytes, spec) {
+        return kinds::read(format, path, &bytes, spec);
+    }
     if let Some((what, advice)) = foreign_formats::detect(&bytes) {
         return Err(FlightLogError::OtherFormat { path: path.to_owned(), what, advice });
     }
@@ -308,14 +321,18 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         return gpx::read(path, content.trim_start(), spec);
     }
     let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    if spec.format == LogFormat::Gpx {
-        return Err(problem("flight.format is \"gpx\" but the file is no XML; remove the key".to_owned()));
+    if matches!(spec.format, LogFormat::Gpx | LogFormat::Kml) {
+        return Err(problem(format!(
+            "flight.format is \"{}\" but the file is no XML; remove the key",
+            columns::format_name(spec.format)
+        )));
     }
     let table = text_table::Table::new(content);
     if table.rows.is_empty() {
         return Err(FlightLogError::Empty { path: path.to_owned() });
     }
     let mut notes = Vec::new();
+    notes.extend(unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     let mut rows = rows::read(path, &table, &layout)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
@@ -338,14 +355,25 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         );
     }
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
-    sparse_rows::interpolate_positions(&mut rows.rows, layout.attitude != AttitudeColumns::None, &mut notes);
+    let (is_geodetic, reads_attitude) =
+        (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
+    sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
     if table.has_decimal_commas {
         notes.push(Note {
             is_warning: false,
             text: "commas are read as the beginning of decimals".to_owned(),
         });
     }
-    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, &layout)).collect(), notes })
+    let kind = layout.attitude.kind();
+    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
+}
+
+/// A warning if `flight.topic` is set for a file that has no topics.
+fn unused_topic_note(spec: &FlightSpec) -> Option<Note> {
+    spec.topic.as_ref().map(|topic| Note {
+        is_warning: true,
+        text: format!("flight.topic = \"{topic}\" is not used: the file has one stream"),
+    })
 }
 
 /// Rotation by half a turn about x, which negates y and z.
@@ -357,24 +385,24 @@ fn ned_from_enu() -> DQuat {
 }
 
 /// A row in the frames of camsim: geodetic or north-east-down positions, forward-right-down bodies.
-fn raw_row(row: &rows::ParsedRow, layout: &TableLayout) -> RawRow {
+fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
     let [a, b, c] = row.position;
-    let position = match layout.frame {
+    let position = match frame {
         Frame::Geodetic => RawPosition::Geodetic(Geodetic::from_deg(a, b, c)),
         Frame::NorthEastUp => RawPosition::Ned(DVec3::new(a, b, -c)),
         Frame::NorthEastDown => RawPosition::Ned(DVec3::new(a, b, c)),
         Frame::EastNorthUp => RawPosition::Ned(DVec3::new(b, a, -c)),
     };
-    let attitude = match layout.attitude {
+    let attitude = match kind {
         // A partial attitude is kept, with NaN: the cleaning treats it as faulty.
         _ if !row.has_attitude() => RawAttitude::None,
-        AttitudeColumns::None => RawAttitude::None,
-        AttitudeColumns::Euler(_) => {
+        AttitudeKind::None => RawAttitude::None,
+        AttitudeKind::Euler => {
             RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]])
         }
-        AttitudeColumns::Quaternion(_) => {
+        AttitudeKind::Quaternion => {
             let world_from_body = DQuat::from_array(row.attitude);
-            RawAttitude::Quaternion(match layout.frame {
+            RawAttitude::Quaternion(match frame {
                 Frame::EastNorthUp => ned_from_enu() * world_from_body * FLU_FROM_FRD,
                 _ => world_from_body,
             })

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin, TimeUnit,
+        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin, TimeUnit,
     },
 };
 use camsim_io::flight_log::read_flight_log;
@@ -24,6 +24,8 @@ fn spec() -> FlightSpec {
         attitude: AttitudeSource::Log,
         origin: Origin::First,
         height: HeightReference::Ellipsoid,
+        height_from: HeightSource::Auto,
+        topic: None,
         window_s: None,
         speed: 1.0,
     }

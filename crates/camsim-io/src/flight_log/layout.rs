@@ -64,9 +64,8 @@ impl TableLayout {
             LogFormat::CsvXya => (Frame::NorthEastUp, ["north", "east", "altitude"]),
             LogFormat::CsvNed => (Frame::NorthEastDown, ["north", "east", "down"]),
             LogFormat::Tum | LogFormat::Euroc => (Frame::EastNorthUp, ["x", "y", "z"]),
-            LogFormat::CsvLla | LogFormat::Auto | LogFormat::Gpx => {
-                (Frame::Geodetic, ["latitude", "longitude", "height"])
-            }
+            // The other formats are no tables.
+            _ => (Frame::Geodetic, ["latitude", "longitude", "height"]),
         };
         let (attitude, attitude_names) = match format {
             LogFormat::Tum => (AttitudeColumns::Quaternion([4, 5, 6, 7]), &["qx", "qy", "qz", "qw"][..]),

@@ -9,7 +9,12 @@ use camsim_core::flight_log::Note;
 use super::rows::ParsedRow;
 
 /// Interpolates the missing positions of a sparse table. Times are nanoseconds.
-pub(super) fn interpolate_positions(rows: &mut Vec<ParsedRow>, reads_attitude: bool, notes: &mut Vec<Note>) {
+pub(super) fn interpolate_positions(
+    rows: &mut Vec<ParsedRow>,
+    is_geodetic: bool,
+    reads_attitude: bool,
+    notes: &mut Vec<Note>,
+) {
     let has_plane =
         |row: &ParsedRow| row.time.is_some() && row.position[0].is_finite() && row.position[1].is_finite();
     let has_height = |row: &ParsedRow| row.time.is_some() && row.position[2].is_finite();
@@ -20,7 +25,7 @@ pub(super) fn interpolate_positions(rows: &mut Vec<ParsedRow>, reads_attitude: b
     let (planes, heights) = (count(rows, &has_plane), count(rows, &has_height));
     let both = count(rows, &|row| has_plane(row) && has_height(row));
     if planes > 0 && heights > 1 && both * 2 < planes {
-        interpolate(rows, 2..3, &has_height, &|row: &ParsedRow| has_plane(row) && !has_height(row));
+        interpolate(rows, 2..3, is_geodetic, &has_height, &|row: &ParsedRow| has_plane(row) && !has_height(row));
         filled.push("heights");
     }
     let has_position = |row: &ParsedRow| row.time.is_some() && row.has_position();
@@ -29,7 +34,7 @@ pub(super) fn interpolate_positions(rows: &mut Vec<ParsedRow>, reads_attitude: b
     let lone_attitudes = count(rows, &|row| has_attitude(row) && !has_position(row));
     let positions = count(rows, &has_position);
     if reads_attitude && positions > 1 && lone_attitudes * 2 > attitudes {
-        interpolate(rows, 0..3, &has_position, &|row: &ParsedRow| has_attitude(row) && !has_position(row));
+        interpolate(rows, 0..3, is_geodetic, &has_position, &|row: &ParsedRow| has_attitude(row) && !has_position(row));
         filled.push("positions");
     }
     let is_empty_row = |row: &ParsedRow| !has_position(row) && !row.has_attitude();
@@ -55,10 +60,12 @@ pub(super) fn interpolate_positions(rows: &mut Vec<ParsedRow>, reads_attitude: b
 }
 
 /// Interpolates `axes` of the positions of the rows that `is_wanted` selects, between those that `is_known`
-/// selects. Outside of their time span the value becomes NaN.
-fn interpolate(
+/// selects. Outside of their time span the value becomes NaN. Longitudes, of geodetic positions, go the
+/// shorter way.
+pub(super) fn interpolate(
     rows: &mut [ParsedRow],
     axes: std::ops::Range<usize>,
+    is_geodetic: bool,
     is_known: &dyn Fn(&ParsedRow) -> bool,
     is_wanted: &dyn Fn(&ParsedRow) -> bool,
 ) {
@@ -78,7 +85,10 @@ fn interpolate(
                 (Some((_, position)), _) => position[axis],
                 (None, Some((a, b))) => {
                     let fraction = (time - a.0) as f64 / (b.0 - a.0) as f64;
-                    a.1[axis] + (b.1[axis] - a.1[axis]) * fraction
+                    let change = b.1[axis] - a.1[axis];
+                    let turns =
+                        if is_geodetic && axis == 1 { (change / 360.0).round() * 360.0 } else { 0.0 };
+                    a.1[axis] + (change - turns) * fraction
                 }
                 (None, None) => f64::NAN,
             };
