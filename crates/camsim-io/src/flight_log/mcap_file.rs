@@ -42,10 +42,11 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
     streams::check_format(path, spec, LogFormat::Mcap)?;
     let mut topics = records::read(bytes).map_err(problem)?;
+    let (position_name, attitude_name) = streams::named_topics(spec);
+    let (key, kind) = choose(&topics, position_name, &|kind| kind.has_position(), "positions")
+        .map_err(|text| problem([&[text][..], &topics.damage].concat().join("; ")))?;
     let mut notes: Vec<Note> =
         topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
-    let (position_name, attitude_name) = streams::named_topics(spec);
-    let (key, kind) = choose(&topics, position_name, &|kind| kind.has_position(), "positions").map_err(problem)?;
     let samples = topics.samples.remove(&key).unwrap_or_default();
     let is_geodetic = kind == Kind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {

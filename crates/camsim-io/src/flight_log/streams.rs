@@ -20,8 +20,6 @@ use super::{
 
 /// A position and an attitude closer than this share a row.
 const SAME_INSTANT_NS: i128 = 1_000_000;
-/// A longer step between two positions is a gap.
-const GAP_NS: i128 = 1_000_000_000;
 
 /// Samples of one stream. Times are nanoseconds; `line` counts messages.
 #[derive(Clone, Debug, Default)]
@@ -149,14 +147,16 @@ fn merge(position: Stream, attitude: Stream, is_geodetic: bool, notes: &mut Vec<
 fn gap_note(position: &Stream, notes: &mut Vec<Note>) {
     let times: Vec<i128> =
         position.rows.iter().filter(|row| row.has_position()).filter_map(|row| row.time).collect();
+    let gap_ns = sparse_rows::gap_ns(&times);
     let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let gaps = steps.clone().filter(|step| *step > GAP_NS).count();
+    let gaps = steps.clone().filter(|step| *step > gap_ns).count();
     if gaps > 0 {
         notes.push(Note {
             is_warning: true,
             text: format!(
-                "`{}` has {gaps} gaps of more than 1 s, the longest {:.1} s: straight lines lead over them",
+                "`{}` has {gaps} gaps of more than {:.1} s, the longest {:.1} s: straight lines lead over them",
                 position.name,
+                gap_ns as f64 * 1e-9,
                 steps.max().unwrap_or(0) as f64 * 1e-9
             ),
         });

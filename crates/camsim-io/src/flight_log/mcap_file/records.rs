@@ -8,12 +8,13 @@ use std::{
 };
 
 use mcap::{
-    MAGIC, McapError,
-    read::LinearReader,
+    MAGIC,
+    read::parse_record,
     records::{ChunkHeader, Record},
 };
 
 use super::{
+    super::scalars::array,
     cdr::Decoder,
     messages::{self, Kind, Sample},
 };
@@ -77,12 +78,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Topics, String> {
     let is_whole = body.ends_with(MAGIC);
     let body = body.strip_suffix(MAGIC).unwrap_or(body);
     let mut reader = RecordReader::default();
-    for record in LinearReader::sans_magic(body) {
+    let mut rest = body;
+    while let Some(record) = next_record(&mut rest) {
         match record {
             Ok(Record::Footer(_)) => break,
             Ok(record) => reader.record(record)?,
-            Err(error) => {
-                reader.topics.damage.push(damage(&error));
+            Err(problem) => {
+                reader.topics.damage.push(problem);
                 break;
             }
         }
@@ -97,13 +99,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<Topics, String> {
     Ok(reader.topics)
 }
 
-fn damage(error: &McapError) -> String {
-    match error {
-        McapError::UnexpectedEof | McapError::UnexpectedEoc => {
-            "the MCAP file is cut off: what follows is not read".to_owned()
-        }
-        error => format!("the MCAP file is damaged ({error}): what follows is not read"),
-    }
+/// Takes the next record off the bytes; `None` at their end.
+fn next_record<'a>(rest: &mut &'a [u8]) -> Option<Result<Record<'a>, String>> {
+    let (&opcode, _) = rest.split_first()?;
+    let length = array(rest, 1).map(u64::from_le_bytes).and_then(|length| usize::try_from(length).ok());
+    let record = length.and_then(|length| rest.get(9..)?.split_at_checked(length));
+    let Some((body, after)) = record else {
+        return Some(Err("the MCAP file is cut off: its last messages are missing".to_owned()));
+    };
+    *rest = after;
+    Some(
+        parse_record(opcode, body)
+            .map_err(|error| format!("the MCAP file is damaged ({error}): what follows is not read")),
+    )
 }
 
 impl RecordReader {
@@ -163,12 +171,15 @@ impl RecordReader {
             self.topics.damage.push("a chunk is left out: its checksum is wrong".to_owned());
             return Ok(());
         }
-        for record in LinearReader::sans_magic(&content) {
+        let mut rest = &content[..];
+        while let Some(record) = next_record(&mut rest) {
             match record {
-                Ok(Record::Chunk { .. }) => return Err("a chunk holds a chunk: the MCAP file is damaged".to_owned()),
+                Ok(Record::Chunk { .. }) => {
+                    return Err("a chunk holds a chunk: the MCAP file is damaged".to_owned());
+                }
                 Ok(record) => self.record(record)?,
-                Err(error) => {
-                    self.topics.damage.push(damage(&error));
+                Err(problem) => {
+                    self.topics.damage.push(problem);
                     break;
                 }
             }
