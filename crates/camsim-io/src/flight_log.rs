@@ -35,7 +35,7 @@ use camsim_core::{
         FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
     },
     geodesy::Geodetic,
-    scenario::{FlightSpec, LogFormat},
+    scenario::{FlightSpec, HeightSource, LogFormat},
 };
 use glam::{DQuat, DVec3};
 
@@ -368,6 +368,15 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
 }
 
+/// A warning if `flight.height_from` is set for a file whose heights have one instrument.
+fn unused_height_note(spec: &FlightSpec) -> Option<Note> {
+    (spec.height_from == HeightSource::Pressure).then(|| Note {
+        is_warning: true,
+        text: "flight.height_from = \"pressure\" is not used: heights of this format are no such heights"
+            .to_owned(),
+    })
+}
+
 /// A warning if `flight.topic` is set for a file that has no topics.
 fn unused_topic_note(spec: &FlightSpec) -> Option<Note> {
     spec.topic.as_ref().map(|topic| Note {
@@ -397,9 +406,7 @@ fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
         // A partial attitude is kept, with NaN: the cleaning treats it as faulty.
         _ if !row.has_attitude() => RawAttitude::None,
         AttitudeKind::None => RawAttitude::None,
-        AttitudeKind::Euler => {
-            RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]])
-        }
+        AttitudeKind::Euler => RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]]),
         AttitudeKind::Quaternion => {
             let world_from_body = DQuat::from_array(row.attitude);
             RawAttitude::Quaternion(match frame {

@@ -101,14 +101,31 @@ fn every_format_gives_the_circle() {
         case("ardupilot.bin", topic("GPS, AHR2"), 201, [f64::INFINITY; 3]),
         case("track.kml", spec(), 201, [0.002, 0.002, 0.01]),
         // Metres of height, hundredths of 1.85 m of place.
-        Case { seconds: 20.0, warnings: &["1 of 22 fixes have no GNSS height"], ..case("glider.igc", FlightSpec { height: HeightReference::Ellipsoid, ..track() }, 21, [0.05, 0.51, 2.0]) },
+        Case {
+            seconds: 20.0,
+            warnings: &["1 of 22 fixes have no GNSS height"],
+            ..case(
+                "glider.igc",
+                FlightSpec { height: HeightReference::Ellipsoid, ..track() },
+                21,
+                [0.05, 0.51, 2.0],
+            )
+        },
         case("pose_zstd.mcap", spec(), 201, [0.001, 0.001, 0.01]),
         case("pose_lz4.mcap", spec(), 201, [0.001, 0.001, 0.01]),
         case("pose_plain.mcap", spec(), 201, [0.001, 0.001, 0.01]),
         case("odometry.mcap", topic("/odom"), 21, [0.001, 0.001, 0.01]),
         case("odometry.mcap", topic("/pose_cov"), 21, [0.001, 0.001, 0.01]),
         case("odometry.mcap", topic("/tf#base_link"), 21, [0.001, 0.001, 0.01]),
-        Case { warnings: &["1 messages of `/fix` have no fix"], ..case("fix_imu.mcap", FlightSpec { height: HeightReference::Ellipsoid, ..spec() }, 81, [0.51, 0.001, 0.02]) },
+        Case {
+            warnings: &["1 messages of `/fix` have no fix"],
+            ..case(
+                "fix_imu.mcap",
+                FlightSpec { height: HeightReference::Ellipsoid, ..spec() },
+                81,
+                [0.51, 0.001, 0.02],
+            )
+        },
     ];
     let mut faults = Vec::new();
     for Case { file, spec, rows, seconds, limits, warnings } in cases {

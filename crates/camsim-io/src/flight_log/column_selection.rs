@@ -9,7 +9,7 @@ use super::{
     column_meaning::ColumnMeaning,
     column_names,
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns, format_name},
-    header::HeaderColumns,
+    header::{HeaderColumns, unknown_unit},
     height_column::{height_column, is_height},
     text_table::{Separator, Table},
 };
@@ -36,9 +36,26 @@ pub(super) fn missing_columns_message(header: &HeaderColumns) -> String {
     let names: Vec<&str> = header.0.iter().map(|column| column.name.as_str()).collect();
     format!(
         "the columns `{}` name no time and position; name t and lat, lon, alt, or t and north, east, down \
-            (or alt), or t and x, y, z",
-        names.join(", ")
+            (or alt), or t and x, y, z{}",
+        names.join(", "),
+        unknown_units(header).into_iter().map(|(_, text)| format!("; {text}")).collect::<String>()
     )
+}
+
+/// The columns that have a known name with an unknown unit, each with a sentence that says so.
+fn unknown_units(header: &HeaderColumns) -> Vec<(ColumnMeaning, String)> {
+    let unknown = (0..header.0.len()).filter(|&column| header.parsed(column).is_none());
+    unknown
+        .filter_map(|column| {
+            let (meaning, word) = unknown_unit(header.name(column))?;
+            let text = format!(
+                "column {} (`{}`) is not read: `{word}` is no unit known (docs/inputs/LOGS.md lists them)",
+                column + 1,
+                header.name(column)
+            );
+            Some((meaning, text))
+        })
+        .collect()
 }
 
 /// Adds a note.
@@ -102,7 +119,11 @@ pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Res
     // ROS stamps are split into seconds and nanoseconds.
     let nanoseconds = match (&parts[..], times.is_empty()) {
         ([], _) | (_, true) => None,
-        ([part], false) if header.stem(column).starts_with("sec") => Some(*part),
+        ([part], false)
+            if header.stem(column).starts_with("sec") || header.stem(column).contains("stamp_sec") =>
+        {
+            Some(*part)
+        }
         _ => return Err(header.ambiguity_message(&[&times[..], &parts[..]].concat())),
     };
     let date = header.unique(ColumnMeaning::Date)?;
@@ -140,9 +161,7 @@ pub(super) fn attitude_columns(
                 ),
             );
         }
-        let numbered = columns_by_name(header, |name| {
-            ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name)
-        });
+        let numbered = columns_by_name(header, |name| ["q0", "q1", "q2", "q3", "q4"].contains(&name));
         if !numbered.is_empty() {
             push_warning(
                 notes,
@@ -155,7 +174,7 @@ pub(super) fn attitude_columns(
         }
         return Ok(AttitudeColumns::None);
     }
-    let &[yaw] = &yaws[..] else { return Err(header.ambiguity_message(&yaws)) };
+    let yaw = one_yaw(header, &yaws, notes)?;
     header.check_usable(yaw)?;
     if has(MagneticYaw) {
         push_warning(
@@ -170,6 +189,26 @@ pub(super) fn attitude_columns(
     Ok(AttitudeColumns::Euler(
         [roll, pitch, yaw].map(|column| FieldSource::whole(column, header.factor(column))),
     ))
+}
+
+/// The column of the yaw. Of two of which one counts from 0 to 360 in its name, the other one counts: DJI's
+/// exports state both.
+fn one_yaw(header: &HeaderColumns, yaws: &[usize], notes: &mut Vec<Note>) -> Result<usize, String> {
+    if let &[yaw] = yaws {
+        return Ok(yaw);
+    }
+    let plain: Vec<usize> =
+        yaws.iter().copied().filter(|&yaw| !header.name(yaw).trim_end().ends_with("[360]")).collect();
+    match plain[..] {
+        [yaw] if yaws.len() == 2 => {
+            push_information(
+                notes,
+                format!("of the yaws {} `{}` counts", header.describe(yaws), header.name(yaw)),
+            );
+            Ok(yaw)
+        }
+        _ => Err(header.ambiguity_message(yaws)),
+    }
 }
 
 /// The axes of the positions and their three columns.
@@ -216,7 +255,7 @@ pub(super) fn position_columns(
                 header.describe(&parts)
             ));
         }
-        let height = height_column(header, Some(spec.height), notes)?;
+        let height = height_column(header, Some(spec.height), spec.height_from, notes)?;
         let horizontal = match (header.unique_each([Latitude, Longitude])?, header.unique(LatitudeLongitude)?)
         {
             (Some(pair), None) => pair.map(source),
@@ -244,10 +283,10 @@ pub(super) fn position_columns(
         };
         let (frame, vertical) = match header.unique(Down)? {
             Some(_) if has_height && format == LogFormat::CsvXya => {
-                (Frame::NorthEastUp, height_column(header, None, notes)?)
+                (Frame::NorthEastUp, height_column(header, None, spec.height_from, notes)?)
             }
             Some(down) => (Frame::NorthEastDown, down),
-            None => (Frame::NorthEastUp, height_column(header, None, notes)?),
+            None => (Frame::NorthEastUp, height_column(header, None, spec.height_from, notes)?),
         };
         let fits = match format {
             LogFormat::Auto => true,
@@ -282,7 +321,7 @@ pub(super) fn position_columns(
         }
         let vertical = match z {
             Some(z) => z,
-            None => height_column(header, None, notes)?,
+            None => height_column(header, None, spec.height_from, notes)?,
         };
         return Ok((frame, [x, y, vertical].map(source)));
     }
@@ -343,7 +382,8 @@ pub(super) fn note_unused_columns(
     let describes_another = |name: &str| {
         let stem =
             ["_unit", "_units", "_datum", "_frame"].iter().find_map(|suffix| name.strip_suffix(suffix));
-        stem.is_some_and(|stem| column_names::find(stem).is_some())
+        matches!(name, "unit" | "units" | "datum")
+            || stem.is_some_and(|stem| column_names::find(stem).is_some())
     };
     let descriptions = columns_by_name(header, describes_another);
     if !descriptions.is_empty() {
@@ -355,6 +395,11 @@ pub(super) fn note_unused_columns(
                 header.describe(&descriptions)
             ),
         );
+    }
+    for (meaning, text) in unknown_units(header) {
+        if header.columns_where(|other| other == meaning).is_empty() {
+            push_warning(notes, text);
+        }
     }
     let declination = columns_by_name(header, |name| {
         name.starts_with("declination") || name.starts_with("magnetic_declination")

@@ -24,6 +24,7 @@ use super::{
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
     streams::{self, Stream, Streams},
+    unused_height_note,
 };
 
 mod file;
@@ -45,6 +46,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let file = DataflashFile::parse(bytes).map_err(problem)?;
     let mut notes: Vec<Note> =
         file.damage.iter().map(|text| Note { is_warning: true, text: text.clone() }).collect();
+    notes.extend(unused_height_note(spec));
     let (position_name, attitude_name) = streams::named_topics(spec);
     let chosen = choose(&file, position_name).map_err(problem)?;
     let mut position = chosen.stream(&file, &mut notes).map_err(problem)?;
@@ -110,7 +112,7 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
         ),
         (None, true) => "the ArduPilot log has no positions (POS, AHR2, XKF1, GPS): set LOG_BITMASK to log \
             them"
-        .to_owned(),
+            .to_owned(),
         (None, false) => format!("flight.topic must name the positions to fly: {}", all.join(", ")),
     })
 }
@@ -130,8 +132,7 @@ fn first_instance(message: &Message<'_>) -> u32 {
 /// Records of one instance.
 fn of_instance<'a>(message: &Message<'a>, instance: u32) -> Vec<(usize, &'a [u8])> {
     let column = instance_column(message);
-    let is_wanted =
-        |record: &[u8]| column.is_none_or(|column| column.read(record) == f64::from(instance));
+    let is_wanted = |record: &[u8]| column.is_none_or(|column| column.read(record) == f64::from(instance));
     message.records.iter().copied().filter(|(_, record)| is_wanted(record)).collect()
 }
 
@@ -141,7 +142,8 @@ fn origin(file: &DataflashFile<'_>) -> Option<[f64; 3]> {
     let columns = message.columns(["Lat", "Lng", "Alt"])?;
     let kind = message.column(&["Type"]);
     // Type 0 is the origin of the filter, 1 the place of the home.
-    let record = message.records.iter().find(|(_, record)| kind.is_none_or(|kind| kind.read(record) == 0.0))?;
+    let record =
+        message.records.iter().find(|(_, record)| kind.is_none_or(|kind| kind.read(record) == 0.0))?;
     Some(columns.map(|column| column.read(record.1)))
 }
 
@@ -170,8 +172,10 @@ impl Chosen<'_, '_> {
         }
         let origin = match self.place {
             PlaceColumns::Local(_) => Some(origin(file).ok_or_else(|| {
-                format!("`{name}` counts metres from an origin that the log does not have (ORGN): choose another \
-                    by flight.topic")
+                format!(
+                    "`{name}` counts metres from an origin that the log does not have (ORGN): choose another \
+                    by flight.topic"
+                )
             })?),
             PlaceColumns::Geodetic(_) => None,
         };
@@ -221,7 +225,8 @@ fn attitude_stream(
     let (stem, instance) = streams::split_instance(name.unwrap_or("ATT"));
     let quaternion = |message: &Message<'_>| message.columns(["Q1", "Q2", "Q3", "Q4"]);
     let euler = |message: &Message<'_>| message.columns(["Roll", "Pitch", "Yaw"]);
-    let Some(message) = file.find(stem).filter(|&message| euler(message).is_some() || quaternion(message).is_some())
+    let Some(message) =
+        file.find(stem).filter(|&message| euler(message).is_some() || quaternion(message).is_some())
     else {
         let Some(name) = name else { return Ok((None, AttitudeKind::None)) };
         let all: Vec<&str> = file

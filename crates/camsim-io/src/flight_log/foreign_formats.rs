@@ -67,7 +67,8 @@ pub(super) const SUBTITLES: (&str, &str) = (
         flight record), and set flight.attitude = \"track\"",
 );
 /// Name and advice of XML files with any other root element.
-pub(super) const OTHER_XML: (&str, &str) = ("XML other than GPX and KML", "write a CSV with a header line, or GPX");
+pub(super) const OTHER_XML: (&str, &str) =
+    ("XML other than GPX and KML", "write a CSV with a header line, or GPX");
 
 /// Name and advice of the format of a file that cannot be a flight log; `None` if it may be one.
 pub(super) fn detect(bytes: &[u8]) -> Option<(&'static str, &'static str)> {

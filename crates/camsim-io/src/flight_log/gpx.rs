@@ -15,7 +15,10 @@ use camsim_core::{
 };
 use roxmltree::{Document, Node};
 
-use super::{FlightLogError, RawLog, columns::format_name, foreign_formats, kml, time_fields, unused_topic_note};
+use super::{
+    FlightLogError, RawLog, columns::format_name, foreign_formats, kml, time_fields, unused_height_note,
+    unused_topic_note,
+};
 
 /// Reads the track points of a GPX file.
 ///
@@ -101,7 +104,7 @@ fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, Fli
 /// Notes on keys and tags that are not used.
 fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
     let mut notes = Vec::new();
-    notes.extend(unused_topic_note(spec));
+    notes.extend(unused_topic_note(spec).into_iter().chain(unused_height_note(spec)));
     if spec.height == HeightReference::Ellipsoid {
         let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
             flight.height = \"msl\" unless you know better";

@@ -162,6 +162,10 @@ fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
 // Long because the rules for qualifiers share the meaning, unit and problem found so far.
 fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
+    if let Some(meaning) = px4_quaternion(name) {
+        let (stem, unit, is_bare_unit) = ("q".to_owned(), None, false);
+        return Some(ParsedName { meaning, stem, unit, is_bare_unit, problem: None });
+    }
     let (bare, mut qualifier_texts) = split_brackets(name);
     let (bare, after_comma) = bare.split_once(',').map_or((bare.as_str(), ""), |(bare, rest)| (bare, rest));
     let unit_line = unit_line.unwrap_or("").trim_matches(['[', ']', '(', ')']);
@@ -213,7 +217,38 @@ fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
             Qualifier::Magnetic | Qualifier::Ignored => {}
         }
     }
-    Some(ParsedName { meaning, stem, unit, is_bare_unit: known.unit.is_some(), problem })
+    // `header.stamp.sec` says whose seconds it counts, unlike `sec`.
+    let is_bare_unit = known.unit.is_some() && !stem.contains("stamp");
+    Some(ParsedName { meaning, stem, unit, is_bare_unit, problem })
+}
+
+/// The part of a quaternion that PX4's exports number: `q[0]`, `vehicle_attitude.q[3]`.
+fn px4_quaternion(name: &str) -> Option<ColumnMeaning> {
+    let (before, number) = name.strip_suffix(']')?.rsplit_once("q[")?;
+    if !(before.is_empty() || before.ends_with(['.', '/', ':']) || before.ends_with("attitude_")) {
+        return None;
+    }
+    use ColumnMeaning::{Qw, Qx, Qy, Qz};
+    let index: usize = number.parse().ok()?;
+    [Qw, Qx, Qy, Qz].get(index).copied()
+}
+
+/// The last word of a name that looks like a unit and is none known, behind the name of a known quantity:
+/// `kft` of `alt_kft`.
+pub(super) fn unknown_unit(name: &str) -> Option<(ColumnMeaning, String)> {
+    const OTHER_WORDS: &[&str] = &[
+        "acc", "bias", "cmd", "cov", "dem", "des", "diff", "err", "lim", "max", "mean", "min", "ok", "rate",
+        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "v", "valid", "var",
+        "vel",
+    ];
+    let normal = normal_form(name.trim_matches(['"', '\'', ' ']));
+    let (stem, word) = normal.rsplit_once('_')?;
+    let meaning = column_names::find(stem).map(|known| known.meaning)?;
+    let looks_like_unit = (1..=4).contains(&word.len())
+        && word.chars().all(char::is_alphabetic)
+        && !OTHER_WORDS.contains(&word)
+        && parse_qualifier(word).is_none();
+    (dimension(meaning).is_some() && looks_like_unit).then(|| (meaning, word.to_owned()))
 }
 
 /// Splits a name into the text outside of brackets and the texts inside.

@@ -4,10 +4,13 @@
 #![allow(clippy::unwrap_used)]
 
 mod files;
+mod formats;
 mod times;
 mod units;
 
-use camsim_core::scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, LogFormat, TimeUnit};
+use camsim_core::scenario::{
+    AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, LogFormat, TimeUnit,
+};
 
 use super::{tests::spec, *};
 

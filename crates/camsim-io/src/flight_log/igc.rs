@@ -22,7 +22,7 @@ use super::{
     FlightLogError, RawLog,
     columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
-    time_fields,
+    time_fields, unused_topic_note,
 };
 
 const SECOND_NS: i128 = 1_000_000_000;
@@ -59,8 +59,13 @@ pub(super) fn is_igc(bytes: &[u8]) -> bool {
             && matches!(line[14], b'N' | b'S')
             && matches!(line[23], b'E' | b'W')
     };
-    let first_letter = bytes.first().is_some_and(|&byte| matches!(byte, b'A' | b'H' | b'B' | b'I'));
-    first_letter && bytes.split(|&byte| byte == b'\n').take(500).any(is_fix)
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut lines = bytes.split(|&byte| byte == b'\n').take(500);
+    match bytes.first() {
+        Some(b'A') => lines.any(|line| is_fix(line) || line.starts_with(b"HFDTE")),
+        Some(b'H' | b'B' | b'I') => lines.any(is_fix),
+        _ => false,
+    }
 }
 
 /// Reads a flight record.
@@ -72,9 +77,10 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     streams::check_format(path, spec, LogFormat::Igc)?;
     let bad_line =
         |line: usize, problem: String| FlightLogError::Header { path: path.to_owned(), line, problem };
-    let mut notes = Vec::new();
-    let (mut fixes, mut extensions, mut day_ns, mut is_msl) = (Vec::<Fix>::new(), Extensions::default(), 0, false);
-    for (index, line) in text.lines().enumerate() {
+    let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().collect();
+    let (mut fixes, mut extensions, mut day_ns, mut is_msl) =
+        (Vec::<Fix>::new(), Extensions::default(), 0, false);
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line_number = index + 1;
         let line = line.trim();
         if line.starts_with('I') {
@@ -85,7 +91,8 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         } else if line.starts_with("HFALG") {
             is_msl = line.contains("GEO");
         } else if line.starts_with('B') {
-            let fix = Fix::parse(line, line_number, &extensions).map_err(|text| bad_line(line_number, text))?;
+            let fix =
+                Fix::parse(line, line_number, &extensions).map_err(|text| bad_line(line_number, text))?;
             fixes.push(fix);
         }
     }
@@ -102,7 +109,8 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         fixes.retain(|fix| fix.is_3d);
     }
     if fixes.len() < count {
-        let text = format!("{} of {count} fixes have no GNSS height (V), and are left out", count - fixes.len());
+        let text =
+            format!("{} of {count} fixes have no GNSS height (V), and are left out", count - fixes.len());
         notes.push(Note { is_warning: true, text });
     }
     let rows = fixes.iter().map(|fix| {
@@ -160,7 +168,9 @@ fn unroll_midnight(fixes: &mut [Fix], day_ns: i128, notes: &mut Vec<Note>) {
 impl Fix {
     fn parse(line: &str, number: usize, extensions: &Extensions) -> Result<Self, String> {
         let bad = |what: &str| {
-            format!("`{line}` is a damaged fix ({what}): remove the line, or copy the record again from the logger")
+            format!(
+                "`{line}` is a damaged fix ({what}): remove the line, or copy the record again from the logger"
+            )
         };
         if line.len() < FIX_CHARACTERS || !line.is_ascii() {
             return Err(bad("it is cut off"));
@@ -182,7 +192,8 @@ impl Fix {
             let minutes = (thousandths? as f64 + decimals(line, place)) / 1000.0;
             (minutes < 60.0).then(|| degrees.map(|degrees| degrees as f64 + minutes / 60.0)).flatten()
         };
-        let latitude = angle(whole(7, 9), whole(9, 14), extensions.latitude).ok_or_else(|| bad("latitude"))?;
+        let latitude =
+            angle(whole(7, 9), whole(9, 14), extensions.latitude).ok_or_else(|| bad("latitude"))?;
         let longitude =
             angle(whole(15, 18), whole(18, 23), extensions.longitude).ok_or_else(|| bad("longitude"))?;
         let (south, west) = match (&line[14..15], &line[23..24]) {

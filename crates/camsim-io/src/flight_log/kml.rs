@@ -23,20 +23,25 @@ use super::{
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
     streams::{self, Stream, Streams},
-    time_fields,
+    time_fields, unused_height_note, unused_topic_note,
 };
 
 /// Reads the tracks of a parsed KML file.
 ///
 /// # Errors
 /// There is no track with times, several overlap, or heights are above no datum.
-pub(super) fn read(path: &Path, document: &Document<'_>, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
+pub(super) fn read(
+    path: &Path,
+    document: &Document<'_>,
+    spec: &FlightSpec,
+) -> Result<RawLog, FlightLogError> {
     let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
     streams::check_format(path, spec, LogFormat::Kml)?;
     let reader = KmlReader { document };
     let tracks: Vec<Node<'_, '_>> = elements(document.root_element(), "Track").collect();
-    let rows = if tracks.is_empty() { reader.placemarks() } else { reader.tracks(&tracks) }.map_err(problem)?;
-    let mut notes = Vec::new();
+    let rows =
+        if tracks.is_empty() { reader.placemarks() } else { reader.tracks(&tracks) }.map_err(problem)?;
+    let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().chain(unused_height_note(spec)).collect();
     notes.extend(streams::height_note("heights of KML", true, spec));
     let has_angles = rows.iter().any(ParsedRow::has_attitude);
     if has_angles {
@@ -120,7 +125,9 @@ impl KmlReader<'_, '_> {
             row.position = place(coord.text().unwrap_or(""), char::is_whitespace, line)?;
             if let Some(&angles) = angles.get(index) {
                 let line = self.line(angles);
-                if let Some([heading, tilt, roll]) = three(angles.text().unwrap_or(""), char::is_whitespace, line)? {
+                if let Some([heading, tilt, roll]) =
+                    three(angles.text().unwrap_or(""), char::is_whitespace, line)?
+                {
                     row.attitude = [roll, tilt, heading, f64::NAN];
                 }
             }
@@ -138,7 +145,8 @@ impl KmlReader<'_, '_> {
             else {
                 continue;
             };
-            let (Some(when), Some(text)) = (elements(stamp, "when").next(), text_of(point, "coordinates")) else {
+            let (Some(when), Some(text)) = (elements(stamp, "when").next(), text_of(point, "coordinates"))
+            else {
                 continue;
             };
             let line = self.line(point);
@@ -204,5 +212,7 @@ fn three(text: &str, separator: fn(char) -> bool, line: usize) -> Result<Option<
         .filter(|part| !part.is_empty())
         .map_while(|part| part.parse().ok())
         .collect();
-    <[f64; 3]>::try_from(numbers).map(Some).map_err(|_| format!("line {line}: `{text}` are not three numbers"))
+    <[f64; 3]>::try_from(numbers)
+        .map(Some)
+        .map_err(|_| format!("line {line}: `{text}` are not three numbers"))
 }

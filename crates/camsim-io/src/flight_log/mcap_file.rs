@@ -25,6 +25,7 @@ use super::{
     columns::{AttitudeKind, Frame},
     ned_from_enu,
     streams::{self, Stream, Streams},
+    unused_height_note,
 };
 
 mod cdr;
@@ -32,7 +33,7 @@ mod messages;
 mod records;
 
 use messages::{Kind, Sample};
-use records::{Topics, TopicKey};
+use records::{TopicKey, Topics};
 
 /// Reads the poses of an MCAP file.
 ///
@@ -45,8 +46,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let (position_name, attitude_name) = streams::named_topics(spec);
     let (key, kind) = choose(&topics, position_name, &|kind| kind.has_position(), "positions")
         .map_err(|text| problem([&[text][..], &topics.damage].concat().join("; ")))?;
-    let mut notes: Vec<Note> =
-        topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
+    let mut notes: Vec<Note> = topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
+    notes.extend(unused_height_note(spec));
     let samples = topics.samples.remove(&key).unwrap_or_default();
     let is_geodetic = kind == Kind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {
@@ -78,7 +79,8 @@ fn choose(
     let fitting: BTreeMap<&TopicKey, Kind> =
         topics.kinds.iter().filter(|(_, kind)| fits(**kind)).map(|(key, kind)| (key, *kind)).collect();
     let list = || {
-        let names: Vec<String> = fitting.iter().map(|(key, kind)| format!("{key} ({})", kind.name())).collect();
+        let names: Vec<String> =
+            fitting.iter().map(|(key, kind)| format!("{key} ({})", kind.name())).collect();
         names.join(", ")
     };
     if let Some(name) = name {
@@ -86,7 +88,9 @@ fn choose(
             fitting.iter().filter(|(key, _)| key.to_string() == name || key.topic == name).collect();
         return match named[..] {
             [(key, kind)] => Ok(((*key).clone(), *kind)),
-            [] if fitting.is_empty() => Err(format!("flight.topic: `{name}` has no {what}, nor has any other topic")),
+            [] if fitting.is_empty() => {
+                Err(format!("flight.topic: `{name}` has no {what}, nor has any other topic"))
+            }
             [] => Err(format!("flight.topic: `{name}` is no topic with {what}; there are: {}", list())),
             _ => Err(format!("flight.topic: `{name}` is of several frames; name one of: {}", list())),
         };
@@ -97,7 +101,8 @@ fn choose(
     match (&poses[..], fitting.len()) {
         ([(key, kind)], _) => Ok(((**key).clone(), **kind)),
         (_, 0) => {
-            let all: Vec<String> = topics.others.iter().map(|(topic, kind)| format!("{topic} ({kind})")).collect();
+            let all: Vec<String> =
+                topics.others.iter().map(|(topic, kind)| format!("{topic} ({kind})")).collect();
             Err(format!(
                 "the MCAP file has no {what} (PoseStamped, PoseWithCovarianceStamped, Odometry, NavSatFix, \
                     TFMessage){}",
@@ -111,13 +116,19 @@ fn choose(
 
 /// The topic of orientations beside positions without any: the named one, or the only one.
 fn choose_imu(topics: &Topics, name: Option<&str>) -> Result<Option<TopicKey>, String> {
-    let has_orientation = |key: &TopicKey| topics.samples.get(key).is_some_and(|all| all.iter().any(|s| s.rotation.is_some()));
+    let has_orientation =
+        |key: &TopicKey| topics.samples.get(key).is_some_and(|all| all.iter().any(|s| s.rotation.is_some()));
     let fitting = |kind: Kind| kind == Kind::Imu;
     if name.is_some() {
-        return choose(topics, name, &|kind| kind != Kind::NavSatFix, "orientations").map(|(key, _)| Some(key));
+        return choose(topics, name, &|kind| kind != Kind::NavSatFix, "orientations")
+            .map(|(key, _)| Some(key));
     }
-    let all: Vec<&TopicKey> =
-        topics.kinds.iter().filter(|(key, kind)| fitting(**kind) && has_orientation(key)).map(|(key, _)| key).collect();
+    let all: Vec<&TopicKey> = topics
+        .kinds
+        .iter()
+        .filter(|(key, kind)| fitting(**kind) && has_orientation(key))
+        .map(|(key, _)| key)
+        .collect();
     match all[..] {
         [] => Ok(None),
         [only] => Ok(Some(only.clone())),

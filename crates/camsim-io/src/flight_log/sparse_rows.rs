@@ -27,7 +27,9 @@ pub(super) fn interpolate_positions(
     let (planes, heights) = (count(rows, &has_plane), count(rows, &has_height));
     let both = count(rows, &|row| has_plane(row) && has_height(row));
     if planes > 0 && heights > 1 && both * 2 < planes {
-        interpolate(rows, 2..3, is_geodetic, &has_height, &|row: &ParsedRow| has_plane(row) && !has_height(row));
+        interpolate(rows, 2..3, is_geodetic, &has_height, &|row: &ParsedRow| {
+            has_plane(row) && !has_height(row)
+        });
         filled.push("heights");
     }
     let has_position = |row: &ParsedRow| row.time.is_some() && row.has_position();
@@ -36,7 +38,9 @@ pub(super) fn interpolate_positions(
     let lone_attitudes = count(rows, &|row| has_attitude(row) && !has_position(row));
     let positions = count(rows, &has_position);
     if reads_attitude && positions > 1 && lone_attitudes * 2 > attitudes {
-        interpolate(rows, 0..3, is_geodetic, &has_position, &|row: &ParsedRow| has_attitude(row) && !has_position(row));
+        interpolate(rows, 0..3, is_geodetic, &has_position, &|row: &ParsedRow| {
+            has_attitude(row) && !has_position(row)
+        });
         filled.push("positions");
     }
     let is_empty_row = |row: &ParsedRow| !has_position(row) && !row.has_attitude();
@@ -126,13 +130,17 @@ fn cubic(knots: &[(i128, [f64; 3])], after: usize, time: i128, axis: usize, gap_
     };
     let Some((here, _)) = slope(before, after) else { return Some(from + (to - from) * u) };
     // Of two neighbouring slopes the one over the shorter step counts more.
-    let blend = |other: Option<(f64, f64)>| {
-        other.map_or(here, |(there, width)| (here * width + there * span) / (width + span))
+    let blend = |(there, width): (f64, f64)| (here * width + there * span) / (width + span);
+    let earlier = before.checked_sub(1).and_then(|earlier| slope(earlier, before)).map(blend);
+    let later = slope(after, after + 1).map(blend);
+    // At an end the parabola of the three knots there goes on.
+    let (at_a, at_b) = match (earlier, later) {
+        (Some(at_a), Some(at_b)) => (at_a, at_b),
+        (None, Some(at_b)) => (2.0 * here - at_b, at_b),
+        (Some(at_a), None) => (at_a, 2.0 * here - at_a),
+        (None, None) => (here, here),
     };
-    let (at_a, at_b) = (
-        blend(before.checked_sub(1).and_then(|earlier| slope(earlier, before))) * span,
-        blend(slope(after, after + 1)) * span,
-    );
+    let (at_a, at_b) = (at_a * span, at_b * span);
     let change = to - from;
     Some(from + u * (at_a + u * (3.0 * change - 2.0 * at_a - at_b + u * (at_a + at_b - 2.0 * change))))
 }

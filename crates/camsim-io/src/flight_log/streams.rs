@@ -7,7 +7,7 @@ use std::path::Path;
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat, TimeUnit},
+    scenario::{AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, TimeUnit},
 };
 
 use super::{
@@ -100,10 +100,7 @@ impl Stream {
 /// Rows at the instants of both streams, which are sorted.
 fn merge(position: Stream, attitude: Stream, is_geodetic: bool, notes: &mut Vec<Note>) -> Vec<ParsedRow> {
     if attitude.rows.is_empty() {
-        notes.push(Note {
-            is_warning: true,
-            text: format!("`{}` has no usable attitude", attitude.name),
-        });
+        notes.push(Note { is_warning: true, text: format!("`{}` has no usable attitude", attitude.name) });
         return position.rows;
     }
     gap_note(&position, notes);
@@ -171,6 +168,12 @@ fn unused_key_notes(spec: &FlightSpec, notes: &mut Vec<Note>) {
             text: "flight.time_unit is not used: the format defines its times".to_owned(),
         });
     }
+    if spec.angle_unit != AngleUnit::Auto {
+        notes.push(Note {
+            is_warning: true,
+            text: "flight.angle_unit is not used: the format defines its angles".to_owned(),
+        });
+    }
 }
 
 /// Refuses a file whose format is another one than `flight.format` says.
@@ -198,7 +201,9 @@ pub(super) fn height_note(what: &str, is_msl: bool, spec: &FlightSpec) -> Option
     };
     (spec.height != stated).then(|| Note {
         is_warning: true,
-        text: format!("{what} are above {place}, flight.height says otherwise: set flight.height = \"{key}\""),
+        text: format!(
+            "{what} are above {place}, flight.height says otherwise: set flight.height = \"{key}\""
+        ),
     })
 }
 

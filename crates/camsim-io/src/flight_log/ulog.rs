@@ -23,6 +23,7 @@ use super::{
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
     streams::{self, Stream, Streams},
+    unused_height_note,
 };
 
 mod file;
@@ -30,8 +31,13 @@ mod file;
 use file::{Topic, UlogField, UlogFile};
 
 /// Topics with positions, the best first.
-const POSITIONS: [&str; 5] =
-    ["vehicle_global_position", "vehicle_local_position", "vehicle_odometry", "vehicle_gps_position", "sensor_gps"];
+const POSITIONS: [&str; 5] = [
+    "vehicle_global_position",
+    "vehicle_local_position",
+    "vehicle_odometry",
+    "vehicle_gps_position",
+    "sensor_gps",
+];
 /// Radius of PX4's projection.
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
 
@@ -45,6 +51,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let file = UlogFile::parse(bytes).map_err(problem)?;
     let mut notes: Vec<Note> =
         file.damage.iter().map(|text| Note { is_warning: true, text: text.clone() }).collect();
+    notes.extend(unused_height_note(spec));
     let (position_name, attitude_name) = streams::named_topics(spec);
     let (topic, reader, position) = positions(&file, position_name, spec, &mut notes).map_err(problem)?;
     let attitude = if spec.attitude == AttitudeSource::Track || reader.quaternion.is_some() {
@@ -108,9 +115,11 @@ fn positions<'a, 'b>(
             listed(&candidates.into_iter().map(full_name).collect::<Vec<_>>()),
             listed(&all)
         ),
-        (None, true, true) => "the PX4 log has no positions (vehicle_global_position, vehicle_local_position, \
+        (None, true, true) => {
+            "the PX4 log has no positions (vehicle_global_position, vehicle_local_position, \
             vehicle_gps_position): log them by SDLOG_PROFILE"
-            .to_owned(),
+                .to_owned()
+        }
         (None, true, false) => format!("flight.topic must name the positions to fly: {}", listed(&all)),
     })
 }
@@ -123,7 +132,13 @@ fn listed(names: &[String]) -> String {
 #[derive(Clone, Copy, Debug)]
 enum Place {
     /// Latitude and longitude with a factor to degrees, and heights with a factor to metres.
-    Geodetic { plane: [UlogField; 2], plane_factor: f64, msl: UlogField, ellipsoid: Option<UlogField>, height_factor: f64 },
+    Geodetic {
+        plane: [UlogField; 2],
+        plane_factor: f64,
+        msl: UlogField,
+        ellipsoid: Option<UlogField>,
+        height_factor: f64,
+    },
     /// North, east, down.
     Local([UlogField; 3]),
 }
@@ -191,8 +206,8 @@ impl PositionReader {
         let quaternion = match place {
             Place::Local(_) if topic.field("position[0]").is_some() => {
                 let frame = topic.field("pose_frame").or(topic.field("local_frame"));
-                let frames: Vec<f64> =
-                    frame.map_or(Vec::new(), |frame| topic.messages.iter().map(|(_, m)| frame.read(m)).collect());
+                let frames: Vec<f64> = frame
+                    .map_or(Vec::new(), |frame| topic.messages.iter().map(|(_, m)| frame.read(m)).collect());
                 refuse_foreign_frame(topic, &frames)?;
                 topic.array_field("q")
             }
@@ -340,15 +355,16 @@ fn refuse_foreign_frame(topic: &Topic<'_>, frames: &[f64]) -> Result<(), String>
 }
 
 fn time_field(topic: &Topic<'_>) -> Result<UlogField, String> {
-    let sample = topic.field("timestamp_sample").filter(|field| {
-        topic.messages.iter().all(|(_, message)| field.read(message) > 0.0)
-    });
+    let sample = topic
+        .field("timestamp_sample")
+        .filter(|field| topic.messages.iter().all(|(_, message)| field.read(message) > 0.0));
     sample.or(topic.field("timestamp")).ok_or_else(|| format!("`{}` has no timestamp", topic.name))
 }
 
 /// Nanoseconds of a time in microseconds.
 fn time_ns(microseconds: f64) -> Option<i128> {
-    (microseconds.is_finite() && microseconds > 0.0 && microseconds < 9e15).then(|| (microseconds * 1e3) as i128)
+    (microseconds.is_finite() && microseconds > 0.0 && microseconds < 9e15)
+        .then(|| (microseconds * 1e3) as i128)
 }
 
 fn xyzw([w, x, y, z]: [f64; 4]) -> [f64; 4] {

@@ -73,7 +73,8 @@ impl<'a> DataflashFile<'a> {
         let (mut at, mut number, mut skipped, mut first_skipped) = (0, 0, 0_usize, None);
         while at < bytes.len() {
             let length = file.length_at(bytes, at);
-            match length.and_then(|length| bytes.get(at + HEAD_BYTES..at + length).map(|body| (length, body))) {
+            match length.and_then(|length| bytes.get(at + HEAD_BYTES..at + length).map(|body| (length, body)))
+            {
                 Some((length, body)) => {
                     number += 1;
                     file.record(bytes[at + 2], number, body);
@@ -94,7 +95,9 @@ impl<'a> DataflashFile<'a> {
             file.damage.push(format!("{skipped} bytes are no messages, first at byte {first}: passed over"));
         }
         if file.messages.is_empty() {
-            return Err("the ArduPilot log defines no messages (FMT): it is damaged, or another file".to_owned());
+            return Err(
+                "the ArduPilot log defines no messages (FMT): it is damaged, or another file".to_owned()
+            );
         }
         Ok(file)
     }

@@ -90,10 +90,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Topics, String> {
         }
     }
     if !is_whole && reader.topics.damage.is_empty() {
-        reader.topics.damage.push("the MCAP file was not closed: its last messages may be missing".to_owned());
+        reader
+            .topics
+            .damage
+            .push("the MCAP file was not closed: its last messages may be missing".to_owned());
     }
     if reader.undecoded > 0 {
-        let text = format!("{} messages are too short or in an unknown encoding, and are left out", reader.undecoded);
+        let text = format!(
+            "{} messages are too short or in an unknown encoding, and are left out",
+            reader.undecoded
+        );
         reader.topics.damage.push(text);
     }
     Ok(reader.topics)
@@ -122,7 +128,9 @@ impl RecordReader {
             }
             Record::Channel(channel) => {
                 let Some(schema) = self.schemas.get(&channel.schema_id) else { return Ok(()) };
-                match Kind::of_schema(schema).filter(|_| matches!(channel.message_encoding.as_str(), "cdr" | "ros1")) {
+                match Kind::of_schema(schema)
+                    .filter(|_| matches!(channel.message_encoding.as_str(), "cdr" | "ros1"))
+                {
                     Some(kind) => {
                         let (topic, encoding) = (channel.topic, channel.message_encoding);
                         self.channels.insert(channel.id, PoseChannel { topic, encoding, kind });
@@ -198,13 +206,21 @@ fn decompress<'a>(header: &ChunkHeader, data: &'a [u8]) -> Result<Cow<'a, [u8]>,
         "" => return Ok(Cow::Borrowed(data)),
         "zstd" => {
             let decoder = ruzstd::decoding::StreamingDecoder::new(data).map_err(|error| error.to_string())?;
-            decoder.take(header.uncompressed_size).read_to_end(&mut content).map_err(|error| error.to_string())?;
+            decoder
+                .take(header.uncompressed_size)
+                .read_to_end(&mut content)
+                .map_err(|error| error.to_string())?;
         }
         "lz4" => {
             let decoder = lz4_flex::frame::FrameDecoder::new(data);
-            decoder.take(header.uncompressed_size).read_to_end(&mut content).map_err(|error| error.to_string())?;
+            decoder
+                .take(header.uncompressed_size)
+                .read_to_end(&mut content)
+                .map_err(|error| error.to_string())?;
         }
-        other => return Err(format!("its compression `{other}` is not known (zstd, lz4): run `mcap recover`")),
+        other => {
+            return Err(format!("its compression `{other}` is not known (zstd, lz4): run `mcap recover`"));
+        }
     }
     Ok(Cow::Owned(content))
 }

@@ -148,7 +148,9 @@ impl<'a> UlogFile<'a> {
                 }
             }
             b'A' => {
-                let (Some([instance, low, high]), Some(name)) = (array(body, 0), body.get(3..)) else { return };
+                let (Some([instance, low, high]), Some(name)) = (array(body, 0), body.get(3..)) else {
+                    return;
+                };
                 let name = String::from_utf8_lossy(name).into_owned();
                 let mut fields = HashMap::new();
                 self.lay_out(&name, "", &mut 0, &mut fields, 0);
@@ -222,8 +224,10 @@ fn appended_offsets(bytes: &[u8]) -> Result<Vec<usize>, String> {
         bits & !known != 0
     });
     if unknown {
-        return Err("the PX4 log is of a kind newer than this reader: convert it (pip install pyulog; ulog2csv)"
-            .to_owned());
+        return Err(
+            "the PX4 log is of a kind newer than this reader: convert it (pip install pyulog; ulog2csv)"
+                .to_owned(),
+        );
     }
     let mut offsets: Vec<usize> = [16, 24, 32]
         .into_iter()
