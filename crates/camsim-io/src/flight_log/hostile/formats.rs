@@ -102,14 +102,14 @@ fn damaged_files_give_no_panic_and_no_silent_loss() {
                 continue;
             }
         };
-        for part in 1..12 {
-            let cut = &whole[..whole.len() * part / 12];
-            if let Ok(log) = read_named(name, cut, &spec)
-                && log.rows.len() < rows
-                && warnings(&log).is_empty()
-                && !name.contains("igc")
-            {
-                fault(format!("{name}: {} of {rows} rows without a word", log.rows.len()));
+        let is_silent = |length: usize| {
+            let log = read_named(name, &whole[..length], &spec);
+            log.is_ok_and(|log| log.rows.len() < rows && warnings(&log).is_empty())
+        };
+        // A cut between two messages leaves a whole file, and a record of lines has no end mark.
+        for length in (1..12).map(|part| whole.len() * part / 12) {
+            if is_silent(length) && is_silent(length + 1) && name != "glider.igc" {
+                fault(format!("{name}: cut at {length} without a word"));
             }
         }
         for _ in 0..60 {
@@ -169,7 +169,7 @@ fn px4_logs_tell_gaps_resets_and_disorder() {
     let clean = read_named("a.ulg", &ulog(&straight(100)), &auto()).unwrap();
     assert_eq!((clean.rows.len(), warnings(&clean).as_str(), clean.report.is_clean()), (100, "", true));
     assert!((clean.rows[99].position_ned_m - DVec3::new(99.0, 0.0, -50.0)).length() < 1e-6);
-    let mut told = |what: &str, change: &dyn Fn(&mut Vec<(u64, [f32; 3], u8, u8)>), word: &str| {
+    let told = |what: &str, change: &dyn Fn(&mut Vec<(u64, [f32; 3], u8, u8)>), word: &str| {
         let mut rows = straight(100);
         change(&mut rows);
         match read_named("a.ulg", &ulog(&rows), &auto()) {
@@ -318,7 +318,7 @@ fn kml_without_times_or_heights_is_refused() {
         (track_of(&format!("{}{}{}", when(0), when(1), at("47"))), &["2 when, 1 gx:coord"][..]),
         (track_of(&format!("<when>soon</when>{}", at("47"))), &["`soon` is no time"]),
         (track_of(&format!("{}{}", when(0), at("97"))), &["latitude 97"]),
-        (track_of(&format!("{}{}", when(0), at("NaN"))), &["time and position"]),
+        (track_of(&format!("{}{}", when(0), at("NaN"))), &["no usable position"]),
         (track_of(&format!("{}<gx:coord>8 47</gx:coord>", when(0))), &["not three numbers"]),
         (track_of(""), &["no points"]),
         (good.replace("absolute", "relativeToGround"), &["relativeToGround", "absolute"]),
