@@ -28,18 +28,19 @@
 //! poses of a sensor with other axes, `camera.mount` corrects them. The JPL quaternion of rotation "global to
 //! body" has the same numbers as the Hamilton "body to global", so files of `open_vins` need no conversion.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_core::{
     flight_log::{
         FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
     },
     geodesy::Geodetic,
-    scenario::{FlightSpec, HeightSource, LogFormat},
+    scenario::{FlightSpec, LogFormat},
 };
 use glam::{DQuat, DVec3};
 
 mod angle_unit;
+mod attitude_columns;
 mod clock_rollover;
 mod column_meaning;
 mod column_names;
@@ -47,6 +48,7 @@ mod column_selection;
 mod columns;
 mod dataflash;
 mod detect;
+mod error;
 mod foreign_formats;
 mod gpx;
 mod header;
@@ -67,168 +69,14 @@ mod time_fields;
 mod time_unit;
 mod ulog;
 mod units;
+mod unknown_unit;
+mod unused_keys;
 
 use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
 
+pub use error::FlightLogError;
 pub use reference::reference;
-
-/// Why a flight log cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum FlightLogError {
-    /// The file cannot be read.
-    #[error("{}: {source}; check flight.log", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// Not UTF-8 text.
-    #[error("{}: not UTF-8 text (bad byte at offset {offset}); flight logs are text, save it as \
-        UTF-8", path.display())]
-    NotText {
-        /// The file.
-        path: PathBuf,
-        /// Offset of the first byte that is not UTF-8.
-        offset: usize,
-    },
-    /// No data rows.
-    #[error("{}: the log has no data rows", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A field is not a number.
-    #[error("{}: line {line}, column {column}{name}: `{text}` is not a number{hint}", path.display())]
-    NotANumber {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// Name of the column in brackets, or nothing.
-        name: String,
-        /// Text of the field.
-        text: String,
-        /// Advice by the look of the text, or nothing.
-        hint: &'static str,
-    },
-    /// A row is too long.
-    #[error(
-        "{}: line {line} has {found} columns, but only {known} are known: a separator within a field shifts \
-            the ones behind it (put the field in quotes)", path.display()
-    )]
-    SurplusColumns {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Number of columns of the row.
-        found: usize,
-        /// Number of columns of the header, or of the other rows.
-        known: usize,
-    },
-    /// A known format that is no flight log.
-    #[error("{}: the file is {what}, no flight log that can be read: {advice}", path.display())]
-    OtherFormat {
-        /// The file.
-        path: PathBuf,
-        /// Name of the format.
-        what: &'static str,
-        /// How to convert it.
-        advice: &'static str,
-    },
-    /// The values of the file as a whole are ambiguous or implausible.
-    #[error("{}: {problem}", path.display())]
-    Values {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong and what to do.
-        problem: String,
-    },
-    /// A row is too short.
-    #[error("{}: line {line} has {found} columns, {format} needs {needed}; complete the line or set \
-        flight.format", path.display())]
-    MissingColumns {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Number of columns of the row.
-        found: usize,
-        /// Number of columns that the format needs.
-        needed: usize,
-        /// Format, as `flight.format` names it.
-        format: &'static str,
-    },
-    /// A latitude, longitude or height out of range.
-    #[error("{}: line {line}, column {column}{name}: {value} is no {what}; {advice}", path.display())]
-    OutOfRange {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// Name of the column in brackets, or nothing.
-        name: String,
-        /// `latitude`, `longitude` or `height in metres`.
-        what: &'static str,
-        /// The value, in degrees or metres.
-        value: f64,
-        /// What the value may be, and what to do.
-        advice: &'static str,
-    },
-    /// Several formats fit.
-    #[error("{}: its columns fit {candidates}; set flight.format to the right one (or name the columns in a \
-        header line)", path.display())]
-    Ambiguous {
-        /// The file.
-        path: PathBuf,
-        /// Formats that fit.
-        candidates: &'static str,
-    },
-    /// No format fits.
-    #[error(
-        "{}: {columns} columns without a header fit no known layout; set flight.format (csv-lla, csv-xya, \
-            csv-ned, tum, euroc) or name the columns in a header line", path.display()
-    )]
-    UnknownLayout {
-        /// The file.
-        path: PathBuf,
-        /// Number of columns of the table.
-        columns: usize,
-    },
-    /// A header that lacks columns, or is ambiguous.
-    #[error("{}: line {line}: {problem}", path.display())]
-    Header {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is missing and what to do.
-        problem: String,
-    },
-    /// KITTI poses.
-    #[error(
-        "{}: rows are 3x4 pose matrices without times (KITTI); convert them to TUM lines `t x y z qx qy qz \
-            qw` first (evo_traj kitti --save_as_tum)", path.display()
-    )]
-    PoseMatrices {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The rows can be read but make no log.
-    #[error("{}: {source}", path.display())]
-    Log {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LogError,
-    },
-}
 
 /// The rows of a file before cleaning, with notes about them.
 #[derive(Clone, Debug, PartialEq)]
@@ -332,7 +180,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         return Err(FlightLogError::Empty { path: path.to_owned() });
     }
     let mut notes = Vec::new();
-    notes.extend(unused_topic_note(spec));
+    notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     let mut rows = rows::read(path, &table, &layout)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
@@ -366,23 +214,6 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     }
     let kind = layout.attitude.kind();
     Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
-}
-
-/// A warning if `flight.height_from` is set for a file whose heights have one instrument.
-fn unused_height_note(spec: &FlightSpec) -> Option<Note> {
-    (spec.height_from == HeightSource::Pressure).then(|| Note {
-        is_warning: true,
-        text: "flight.height_from = \"pressure\" is not used: heights of this format are no such heights"
-            .to_owned(),
-    })
-}
-
-/// A warning if `flight.topic` is set for a file that has no topics.
-fn unused_topic_note(spec: &FlightSpec) -> Option<Note> {
-    spec.topic.as_ref().map(|topic| Note {
-        is_warning: true,
-        text: format!("flight.topic = \"{topic}\" is not used: the file has one stream"),
-    })
 }
 
 /// Rotation by half a turn about x, which negates y and z.

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    flight_log::{FlightLog, HeightConversion},
+    flight_log::{FlightLog, HeightConversion, Note},
     scenario::{
         AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
         TimeUnit,
@@ -408,8 +408,12 @@ fn published_flights_are_read_or_refused_as_expected() {
         ("flights/rpng_neighborhood_01_gps.txt", track(), Ok(1931)),
         ("flights/tumrgbd_fr2_desk_groundtruth.txt", spec(), Ok(20_947)),
         ("flights/tumvi_corridor1_okvis.txt", spec(), Ok(5986)),
-        ("flights/px4/sample_appended_multiple.ulg", msl(), Ok(0)),
-        ("flights/px4/sample_log_small.ulg", msl(), Ok(0)),
+        (
+            "flights/px4/sample_appended_multiple.ulg",
+            msl(),
+            Err("no position is valid in vehicle_local_position"),
+        ),
+        ("flights/px4/sample_log_small.ulg", msl(), Ok(1279)),
         ("camsim/path_lawnmower.csv", spec(), Ok(51_596)),
         ("camsim/path-pure-pattern-rotation.csv", spec(), Err("csv-ned")),
         ("camsim/path-pure-pattern-rotation.csv", ned(), Ok(5)),
@@ -429,6 +433,7 @@ fn published_flights_are_read_or_refused_as_expected() {
         let name = |text: String| text.replace(&format!("{}/", data.display()), "").replace('|', "\\|");
         let key = match (spec.format, spec.attitude) {
             (LogFormat::CsvNed, _) => "`format = \"csv-ned\"`",
+            _ if spec.height == HeightReference::Msl => "`height = \"msl\"`",
             (_, AttitudeSource::Track) => "`attitude = \"track\"`",
             _ => "",
         };
@@ -454,7 +459,9 @@ fn published_flights_are_read_or_refused_as_expected() {
         };
         match (&result, expected) {
             (Ok(log), Ok(rows)) if log.rows.len() == *rows => {
-                if let Some(warning) = log.notes.iter().find(|note| note.is_warning) {
+                // On the bench, the estimator of this log had no position but that of its receiver.
+                let known = |note: &&Note| note.text == "`vehicle_local_position` has no valid position";
+                if let Some(warning) = log.notes.iter().find(|note| note.is_warning && !known(note)) {
                     faults.push(format!("{file}: an unexpected warning: {}", warning.text));
                 }
             }

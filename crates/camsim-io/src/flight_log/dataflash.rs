@@ -24,7 +24,7 @@ use super::{
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
     streams::{self, Stream, Streams},
-    unused_height_note,
+    unused_keys::unused_height_note,
 };
 
 mod file;

@@ -16,8 +16,10 @@ use camsim_core::{
 use roxmltree::{Document, Node};
 
 use super::{
-    FlightLogError, RawLog, columns::format_name, foreign_formats, kml, time_fields, unused_height_note,
-    unused_topic_note,
+    FlightLogError, RawLog,
+    columns::format_name,
+    foreign_formats, kml, time_fields,
+    unused_keys::{unused_height_note, unused_topic_note},
 };
 
 /// Reads the track points of a GPX file.

@@ -143,7 +143,7 @@ impl HeaderColumns {
 }
 
 /// The physical dimension of a column; `None` where it has no unit.
-fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
+pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
     use ColumnMeaning::*;
     match meaning {
         Time | NanosecondsPart => Some(Dimension::Time),
@@ -233,24 +233,6 @@ fn px4_quaternion(name: &str) -> Option<ColumnMeaning> {
     [Qw, Qx, Qy, Qz].get(index).copied()
 }
 
-/// The last word of a name that looks like a unit and is none known, behind the name of a known quantity:
-/// `kft` of `alt_kft`.
-pub(super) fn unknown_unit(name: &str) -> Option<(ColumnMeaning, String)> {
-    const OTHER_WORDS: &[&str] = &[
-        "acc", "bias", "cmd", "cov", "dem", "des", "diff", "err", "lim", "max", "mean", "min", "ok", "rate",
-        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "v", "valid", "var",
-        "vel",
-    ];
-    let normal = normal_form(name.trim_matches(['"', '\'', ' ']));
-    let (stem, word) = normal.rsplit_once('_')?;
-    let meaning = column_names::find(stem).map(|known| known.meaning)?;
-    let looks_like_unit = (1..=4).contains(&word.len())
-        && word.chars().all(char::is_alphabetic)
-        && !OTHER_WORDS.contains(&word)
-        && parse_qualifier(word).is_none();
-    (dimension(meaning).is_some() && looks_like_unit).then(|| (meaning, word.to_owned()))
-}
-
 /// Splits a name into the text outside of brackets and the texts inside.
 fn split_brackets(name: &str) -> (String, Vec<String>) {
     let (mut bare, mut inside) = (String::new(), Vec::new());
@@ -267,7 +249,7 @@ fn split_brackets(name: &str) -> (String, Vec<String>) {
 }
 
 /// The normal form of a name: lower case, words joined by single underscores. `TimeUS` is two words.
-fn normal_form(name: &str) -> String {
+pub(super) fn normal_form(name: &str) -> String {
     let mut normal = String::with_capacity(name.len() + 4);
     let mut before = ' ';
     for c in name.trim().chars() {

@@ -3,8 +3,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod columns;
 mod files;
 mod formats;
+mod records;
 mod times;
 mod units;
 

@@ -22,7 +22,8 @@ use super::{
     FlightLogError, RawLog,
     columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
-    time_fields, unused_topic_note,
+    time_fields,
+    unused_keys::unused_topic_note,
 };
 
 const SECOND_NS: i128 = 1_000_000_000;

@@ -23,7 +23,8 @@ use super::{
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
     streams::{self, Stream, Streams},
-    time_fields, unused_height_note, unused_topic_note,
+    time_fields,
+    unused_keys::{unused_height_note, unused_topic_note},
 };
 
 /// Reads the tracks of a parsed KML file.

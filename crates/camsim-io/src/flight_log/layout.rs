@@ -9,10 +9,10 @@ use camsim_core::{
 
 use super::{
     FlightLogError,
+    attitude_columns::attitude_columns,
     column_meaning::ColumnMeaning,
     column_selection::{
-        attitude_columns, has_time_and_position, missing_columns_message, note_unused_columns,
-        position_columns, time_columns,
+        has_time_and_position, missing_columns_message, note_unused_columns, position_columns, time_columns,
     },
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,

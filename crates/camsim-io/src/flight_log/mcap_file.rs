@@ -25,14 +25,14 @@ use super::{
     columns::{AttitudeKind, Frame},
     ned_from_enu,
     streams::{self, Stream, Streams},
-    unused_height_note,
+    unused_keys::unused_height_note,
 };
 
 mod cdr;
 mod messages;
 mod records;
 
-use messages::{Kind, Sample};
+use messages::{RosKind, Sample};
 use records::{TopicKey, Topics};
 
 /// Reads the poses of an MCAP file.
@@ -49,7 +49,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let mut notes: Vec<Note> = topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
     notes.extend(unused_height_note(spec));
     let samples = topics.samples.remove(&key).unwrap_or_default();
-    let is_geodetic = kind == Kind::NavSatFix;
+    let is_geodetic = kind == RosKind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {
         None
     } else {
@@ -73,10 +73,10 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
 fn choose(
     topics: &Topics,
     name: Option<&str>,
-    fits: &dyn Fn(Kind) -> bool,
+    fits: &dyn Fn(RosKind) -> bool,
     what: &str,
-) -> Result<(TopicKey, Kind), String> {
-    let fitting: BTreeMap<&TopicKey, Kind> =
+) -> Result<(TopicKey, RosKind), String> {
+    let fitting: BTreeMap<&TopicKey, RosKind> =
         topics.kinds.iter().filter(|(_, kind)| fits(**kind)).map(|(key, kind)| (key, *kind)).collect();
     let list = || {
         let names: Vec<String> =
@@ -96,7 +96,7 @@ fn choose(
         };
     }
     // A pose counts more than the transforms that repeat it.
-    let is_pose = |kind: &Kind| *kind != Kind::Transforms;
+    let is_pose = |kind: &RosKind| *kind != RosKind::Transforms;
     let poses: Vec<_> = fitting.iter().filter(|(_, kind)| is_pose(kind)).collect();
     match (&poses[..], fitting.len()) {
         ([(key, kind)], _) => Ok(((**key).clone(), **kind)),
@@ -118,9 +118,9 @@ fn choose(
 fn choose_imu(topics: &Topics, name: Option<&str>) -> Result<Option<TopicKey>, String> {
     let has_orientation =
         |key: &TopicKey| topics.samples.get(key).is_some_and(|all| all.iter().any(|s| s.rotation.is_some()));
-    let fitting = |kind: Kind| kind == Kind::Imu;
+    let fitting = |kind: RosKind| kind == RosKind::Imu;
     if name.is_some() {
-        return choose(topics, name, &|kind| kind != Kind::NavSatFix, "orientations")
+        return choose(topics, name, &|kind| kind != RosKind::NavSatFix, "orientations")
             .map(|(key, _)| Some(key));
     }
     let all: Vec<&TopicKey> = topics

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, TimeUnit},
+    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
 };
 
 use super::{
@@ -15,7 +15,7 @@ use super::{
     columns::{AttitudeKind, Frame, format_name},
     quaternions, raw_row,
     rows::ParsedRow,
-    sparse_rows,
+    sparse_rows, unused_keys,
 };
 
 /// A position and an attitude closer than this share a row.
@@ -52,7 +52,7 @@ impl Streams {
     /// No position is usable, or the values are those of several flights or of no quaternions.
     pub(super) fn into_log(mut self, path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
         let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-        unused_key_notes(spec, &mut self.notes);
+        unused_keys::unused_unit_notes(spec, &mut self.notes);
         if spec.attitude == AttitudeSource::Track {
             self.attitude = None;
             self.position.rows.iter_mut().for_each(|row| row.attitude = [f64::NAN; 4]);
@@ -156,22 +156,6 @@ fn gap_note(position: &Stream, notes: &mut Vec<Note>) {
                 gap_ns as f64 * 1e-9,
                 steps.max().unwrap_or(0) as f64 * 1e-9
             ),
-        });
-    }
-}
-
-/// Warnings about keys of text tables, which files with units and names of their own do not use.
-fn unused_key_notes(spec: &FlightSpec, notes: &mut Vec<Note>) {
-    if spec.time_unit != TimeUnit::Auto {
-        notes.push(Note {
-            is_warning: true,
-            text: "flight.time_unit is not used: the format defines its times".to_owned(),
-        });
-    }
-    if spec.angle_unit != AngleUnit::Auto {
-        notes.push(Note {
-            is_warning: true,
-            text: "flight.angle_unit is not used: the format defines its angles".to_owned(),
         });
     }
 }

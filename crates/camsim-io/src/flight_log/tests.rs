@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
+use std::path::PathBuf;
+
 use camsim_core::{
     flight_log::{RawAttitude, RawPosition, body_from_euler_deg},
     scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, Origin, TimeUnit},

@@ -2,9 +2,9 @@
 
 use super::cdr::Decoder;
 
-/// Kind of a message.
+/// RosKind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum RosKind {
     Pose,
     PoseWithCovariance,
     Odometry,
@@ -14,7 +14,7 @@ pub(super) enum Kind {
     Imu,
 }
 
-impl Kind {
+impl RosKind {
     const ALL: [Self; 7] = [
         Self::Pose,
         Self::PoseWithCovariance,
@@ -70,7 +70,7 @@ pub(super) struct Sample {
 /// The samples of a message, each with its child frame if it is one of several transforms; `None` if the
 /// message is too short.
 pub(super) fn decode(
-    kind: Kind,
+    kind: RosKind,
     mut decoder: Decoder<'_>,
     number: usize,
     recorded_ns: i128,
@@ -85,7 +85,7 @@ pub(super) fn decode(
     };
     let d = &mut decoder;
     match kind {
-        Kind::Transforms => {
+        RosKind::Transforms => {
             let count = d.u32()?;
             let mut samples = Vec::new();
             for _ in 0..count {
@@ -96,22 +96,22 @@ pub(super) fn decode(
             }
             Some(samples)
         }
-        Kind::Pose | Kind::PoseWithCovariance | Kind::Odometry | Kind::Transform => {
+        RosKind::Pose | RosKind::PoseWithCovariance | RosKind::Odometry | RosKind::Transform => {
             let stamp = header_ns(d)?;
-            if matches!(kind, Kind::Odometry | Kind::Transform) {
+            if matches!(kind, RosKind::Odometry | RosKind::Transform) {
                 d.text()?;
             }
             let (position, rotation) = (d.f64s()?, d.f64s()?);
             Some(vec![(None, sample(stamp, Some(position), Some(rotation), true))])
         }
-        Kind::NavSatFix => {
+        RosKind::NavSatFix => {
             let stamp = header_ns(d)?;
             let status = d.u8()?.cast_signed();
             d.u16()?;
             let position = d.f64s()?;
             Some(vec![(None, sample(stamp, Some(position), None, status >= 0))])
         }
-        Kind::Imu => {
+        RosKind::Imu => {
             let stamp = header_ns(d)?;
             let rotation = d.f64s()?;
             let covariance: [f64; 9] = d.f64s()?;

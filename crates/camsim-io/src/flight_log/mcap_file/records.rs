@@ -16,7 +16,7 @@ use mcap::{
 use super::{
     super::scalars::array,
     cdr::Decoder,
-    messages::{self, Kind, Sample},
+    messages::{self, RosKind, Sample},
 };
 
 /// Larger chunks are damage.
@@ -42,7 +42,7 @@ impl fmt::Display for TopicKey {
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     /// Kinds of the known topics that have messages.
-    pub(super) kinds: BTreeMap<TopicKey, Kind>,
+    pub(super) kinds: BTreeMap<TopicKey, RosKind>,
     /// Their samples, in the order of the file.
     pub(super) samples: HashMap<TopicKey, Vec<Sample>>,
     /// Other topics with their types.
@@ -55,7 +55,7 @@ pub(super) struct Topics {
 struct PoseChannel {
     topic: String,
     encoding: String,
-    kind: Kind,
+    kind: RosKind,
 }
 
 #[derive(Default)]
@@ -128,7 +128,7 @@ impl RecordReader {
             }
             Record::Channel(channel) => {
                 let Some(schema) = self.schemas.get(&channel.schema_id) else { return Ok(()) };
-                match Kind::of_schema(schema)
+                match RosKind::of_schema(schema)
                     .filter(|_| matches!(channel.message_encoding.as_str(), "cdr" | "ros1"))
                 {
                     Some(kind) => {
