@@ -38,5 +38,7 @@ fn unknown_unit(name: &str) -> Option<(ColumnMeaning, String)> {
         && word.chars().all(char::is_alphabetic)
         && !OTHER_WORDS.contains(&word)
         && parse_qualifier(word).is_none();
-    (dimension(meaning).is_some() && looks_like_unit).then(|| (meaning, word.to_owned()))
+    // `n_sat` and `gps_num` count satellites.
+    let may_have_unit = stem.len() > 1 && meaning != ColumnMeaning::LatitudeLongitude;
+    (dimension(meaning).is_some() && may_have_unit && looks_like_unit).then(|| (meaning, word.to_owned()))
 }

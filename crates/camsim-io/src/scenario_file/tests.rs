@@ -94,6 +94,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
         "a saved scenario reads back"
     );
     scenario.camera.name = "left".into();
+    scenario.flight.topic = Some("/odom".into());
     scenario.output.twin = vec![TwinSpec {
         name: "sharp".into(),
         exposure: Some(false),
