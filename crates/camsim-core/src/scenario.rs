@@ -118,6 +118,12 @@ pub struct FlightSpec {
     /// Vertical reference of the log's heights.
     #[serde(default)]
     pub height: HeightReference,
+    /// Instrument of the heights, where a log has several.
+    #[serde(default)]
+    pub height_from: HeightSource,
+    /// Stream of a log that has several: that of the positions and, behind a comma, that of the attitudes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// Interval of the log that is flown, in seconds from its first good row; `None` is the whole log.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window_s: Option<[f64; 2]>,
@@ -145,6 +151,29 @@ pub enum LogFormat {
     Euroc,
     /// Track points of a GPX file: latitude, longitude, height, time; no attitude.
     Gpx,
+    /// Tracks of a KML file (`gx:Track`) or its placemarks with times.
+    Kml,
+    /// Flight record of a glider logger; no attitude.
+    Igc,
+    /// Log of PX4.
+    Ulog,
+    /// Binary log of ArduPilot.
+    Dataflash,
+    /// ROS messages in an MCAP file.
+    Mcap,
+}
+
+/// Instrument of the heights of a log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HeightSource {
+    /// That of satellite navigation where there is one, else that of air pressure, with a warning.
+    #[default]
+    Auto,
+    /// Satellite navigation, or a filter that uses it.
+    Gnss,
+    /// Air pressure in the standard atmosphere.
+    Pressure,
 }
 
 /// Time units of a flight log.

@@ -15,7 +15,9 @@
 //! BOM and CRLF are fine. An empty field is a missing value, and so are NA, NaN, null, none and `-`. Only
 //! columns that are used must be numbers.
 //!
-//! GPX files are read too (`gpx`). Other formats are refused with the tool that converts them
+//! Other files are recognised by their content, else by their ending (`kinds`): PX4 logs (`ulog`), ArduPilot
+//! logs (`dataflash`), ROS poses (`mcap_file`), flight records of gliders (`igc`), GPX (`gpx`) and KML (`kml`).
+//! Their positions and attitudes may be in streams of their own (`streams`). Further formats are refused with the tool that converts them
 //! (`foreign_formats`). Ambiguities are refused, or resolved with a note in the log: units that no header
 //! names (`time_unit`, `angle_unit`), clocks that roll over (`clock_rollover`), tables merged from several
 //! streams (`sparse_rows`). docs/inputs/LOGS.md lists all names and units; it is generated from the tables in
@@ -26,7 +28,7 @@
 //! poses of a sensor with other axes, `camera.mount` corrects them. The JPL quaternion of rotation "global to
 //! body" has the same numbers as the Hamilton "body to global", so files of `open_vins` need no conversion.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_core::{
     flight_log::{
@@ -38,187 +40,43 @@ use camsim_core::{
 use glam::{DQuat, DVec3};
 
 mod angle_unit;
+mod attitude_columns;
 mod clock_rollover;
 mod column_meaning;
 mod column_names;
 mod column_selection;
 mod columns;
+mod dataflash;
 mod detect;
+mod error;
 mod foreign_formats;
 mod gpx;
 mod header;
 mod height_column;
+mod igc;
+mod kinds;
+mod kml;
 mod layout;
+mod mcap_file;
 mod quaternions;
 mod reference;
 mod rows;
+mod scalars;
 mod sparse_rows;
+mod streams;
 mod text_table;
 mod time_fields;
 mod time_unit;
+mod ulog;
 mod units;
+mod unknown_unit;
+mod unused_keys;
 
-use columns::{AttitudeColumns, Frame};
+use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
 
+pub use error::FlightLogError;
 pub use reference::reference;
-
-/// Why a flight log cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum FlightLogError {
-    /// The file cannot be read.
-    #[error("{}: {source}; check flight.log", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// Not UTF-8 text.
-    #[error("{}: not UTF-8 text (bad byte at offset {offset}); flight logs are text, save it as \
-        UTF-8", path.display())]
-    NotText {
-        /// The file.
-        path: PathBuf,
-        /// Offset of the first byte that is not UTF-8.
-        offset: usize,
-    },
-    /// No data rows.
-    #[error("{}: the log has no data rows", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A field is not a number.
-    #[error("{}: line {line}, column {column}{name}: `{text}` is not a number{hint}", path.display())]
-    NotANumber {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// Name of the column in brackets, or nothing.
-        name: String,
-        /// Text of the field.
-        text: String,
-        /// Advice by the look of the text, or nothing.
-        hint: &'static str,
-    },
-    /// A row is too long.
-    #[error(
-        "{}: line {line} has {found} columns, but only {known} are known: a separator within a field shifts \
-            the ones behind it (put the field in quotes)", path.display()
-    )]
-    SurplusColumns {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Number of columns of the row.
-        found: usize,
-        /// Number of columns of the header, or of the other rows.
-        known: usize,
-    },
-    /// A known format that is no flight log.
-    #[error("{}: the file is {what}, no flight log that can be read: {advice}", path.display())]
-    OtherFormat {
-        /// The file.
-        path: PathBuf,
-        /// Name of the format.
-        what: &'static str,
-        /// How to convert it.
-        advice: &'static str,
-    },
-    /// The values of the file as a whole are ambiguous or implausible.
-    #[error("{}: {problem}", path.display())]
-    Values {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong and what to do.
-        problem: String,
-    },
-    /// A row is too short.
-    #[error("{}: line {line} has {found} columns, {format} needs {needed}; complete the line or set \
-        flight.format", path.display())]
-    MissingColumns {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Number of columns of the row.
-        found: usize,
-        /// Number of columns that the format needs.
-        needed: usize,
-        /// Format, as `flight.format` names it.
-        format: &'static str,
-    },
-    /// A latitude, longitude or height out of range.
-    #[error("{}: line {line}, column {column}{name}: {value} is no {what}; {advice}", path.display())]
-    OutOfRange {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// Name of the column in brackets, or nothing.
-        name: String,
-        /// `latitude`, `longitude` or `height in metres`.
-        what: &'static str,
-        /// The value, in degrees or metres.
-        value: f64,
-        /// What the value may be, and what to do.
-        advice: &'static str,
-    },
-    /// Several formats fit.
-    #[error("{}: its columns fit {candidates}; set flight.format to the right one (or name the columns in a \
-        header line)", path.display())]
-    Ambiguous {
-        /// The file.
-        path: PathBuf,
-        /// Formats that fit.
-        candidates: &'static str,
-    },
-    /// No format fits.
-    #[error(
-        "{}: {columns} columns without a header fit no known layout; set flight.format (csv-lla, csv-xya, \
-            csv-ned, tum, euroc) or name the columns in a header line", path.display()
-    )]
-    UnknownLayout {
-        /// The file.
-        path: PathBuf,
-        /// Number of columns of the table.
-        columns: usize,
-    },
-    /// A header that lacks columns, or is ambiguous.
-    #[error("{}: line {line}: {problem}", path.display())]
-    Header {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is missing and what to do.
-        problem: String,
-    },
-    /// KITTI poses.
-    #[error(
-        "{}: rows are 3x4 pose matrices without times (KITTI); convert them to TUM lines `t x y z qx qy qz \
-            qw` first (evo_traj kitti --save_as_tum)", path.display()
-    )]
-    PoseMatrices {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The rows can be read but make no log.
-    #[error("{}: {source}", path.display())]
-    Log {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LogError,
-    },
-}
 
 /// The rows of a file before cleaning, with notes about them.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,6 +156,9 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
 pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
     let bytes =
         std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
+    if let Some(format) = kinds::detect(path, &bytes, spec) {
+        return kinds::read(format, path, &bytes, spec);
+    }
     if let Some((what, advice)) = foreign_formats::detect(&bytes) {
         return Err(FlightLogError::OtherFormat { path: path.to_owned(), what, advice });
     }
@@ -308,14 +169,18 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         return gpx::read(path, content.trim_start(), spec);
     }
     let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    if spec.format == LogFormat::Gpx {
-        return Err(problem("flight.format is \"gpx\" but the file is no XML; remove the key".to_owned()));
+    if matches!(spec.format, LogFormat::Gpx | LogFormat::Kml) {
+        return Err(problem(format!(
+            "flight.format is \"{}\" but the file is no XML; remove the key",
+            columns::format_name(spec.format)
+        )));
     }
     let table = text_table::Table::new(content);
     if table.rows.is_empty() {
         return Err(FlightLogError::Empty { path: path.to_owned() });
     }
     let mut notes = Vec::new();
+    notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     let mut rows = rows::read(path, &table, &layout)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
@@ -338,14 +203,17 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         );
     }
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
-    sparse_rows::interpolate_positions(&mut rows.rows, layout.attitude != AttitudeColumns::None, &mut notes);
+    let (is_geodetic, reads_attitude) =
+        (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
+    sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
     if table.has_decimal_commas {
         notes.push(Note {
             is_warning: false,
             text: "commas are read as the beginning of decimals".to_owned(),
         });
     }
-    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, &layout)).collect(), notes })
+    let kind = layout.attitude.kind();
+    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
 }
 
 /// Rotation by half a turn about x, which negates y and z.
@@ -357,24 +225,22 @@ fn ned_from_enu() -> DQuat {
 }
 
 /// A row in the frames of camsim: geodetic or north-east-down positions, forward-right-down bodies.
-fn raw_row(row: &rows::ParsedRow, layout: &TableLayout) -> RawRow {
+fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
     let [a, b, c] = row.position;
-    let position = match layout.frame {
+    let position = match frame {
         Frame::Geodetic => RawPosition::Geodetic(Geodetic::from_deg(a, b, c)),
         Frame::NorthEastUp => RawPosition::Ned(DVec3::new(a, b, -c)),
         Frame::NorthEastDown => RawPosition::Ned(DVec3::new(a, b, c)),
         Frame::EastNorthUp => RawPosition::Ned(DVec3::new(b, a, -c)),
     };
-    let attitude = match layout.attitude {
+    let attitude = match kind {
         // A partial attitude is kept, with NaN: the cleaning treats it as faulty.
         _ if !row.has_attitude() => RawAttitude::None,
-        AttitudeColumns::None => RawAttitude::None,
-        AttitudeColumns::Euler(_) => {
-            RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]])
-        }
-        AttitudeColumns::Quaternion(_) => {
+        AttitudeKind::None => RawAttitude::None,
+        AttitudeKind::Euler => RawAttitude::EulerDeg([row.attitude[0], row.attitude[1], row.attitude[2]]),
+        AttitudeKind::Quaternion => {
             let world_from_body = DQuat::from_array(row.attitude);
-            RawAttitude::Quaternion(match layout.frame {
+            RawAttitude::Quaternion(match frame {
                 Frame::EastNorthUp => ned_from_enu() * world_from_body * FLU_FROM_FRD,
                 _ => world_from_body,
             })

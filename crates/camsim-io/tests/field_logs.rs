@@ -6,9 +6,10 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    flight_log::{FlightLog, HeightConversion},
+    flight_log::{FlightLog, HeightConversion, Note},
     scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin, TimeUnit,
+        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
+        TimeUnit,
     },
 };
 use camsim_io::flight_log::read_flight_log;
@@ -24,6 +25,8 @@ fn spec() -> FlightSpec {
         attitude: AttitudeSource::Log,
         origin: Origin::First,
         height: HeightReference::Ellipsoid,
+        height_from: HeightSource::Auto,
+        topic: None,
         window_s: None,
         speed: 1.0,
     }
@@ -391,6 +394,7 @@ fn published_flights_are_read_or_refused_as_expected() {
     };
     // File, settings, and number of rows or a substring of the message.
     let ned = || format(LogFormat::CsvNed);
+    let msl = || FlightSpec { height: HeightReference::Msl, ..spec() };
     let cases: [(&str, FlightSpec, Result<usize, &str>); 21] = [
         ("flights/demo_brighton_lawnmower_x0.05.csv", spec(), Ok(5886)),
         ("flights/demo_sertig_lawnmower_x5.5.csv", spec(), Ok(10_618)),
@@ -404,8 +408,12 @@ fn published_flights_are_read_or_refused_as_expected() {
         ("flights/rpng_neighborhood_01_gps.txt", track(), Ok(1931)),
         ("flights/tumrgbd_fr2_desk_groundtruth.txt", spec(), Ok(20_947)),
         ("flights/tumvi_corridor1_okvis.txt", spec(), Ok(5986)),
-        ("flights/px4/sample_appended_multiple.ulg", spec(), Err("ulog2csv")),
-        ("flights/px4/sample_log_small.ulg", spec(), Err("ulog2csv")),
+        (
+            "flights/px4/sample_appended_multiple.ulg",
+            msl(),
+            Err("no position is valid in vehicle_local_position"),
+        ),
+        ("flights/px4/sample_log_small.ulg", msl(), Ok(1279)),
         ("camsim/path_lawnmower.csv", spec(), Ok(51_596)),
         ("camsim/path-pure-pattern-rotation.csv", spec(), Err("csv-ned")),
         ("camsim/path-pure-pattern-rotation.csv", ned(), Ok(5)),
@@ -425,6 +433,7 @@ fn published_flights_are_read_or_refused_as_expected() {
         let name = |text: String| text.replace(&format!("{}/", data.display()), "").replace('|', "\\|");
         let key = match (spec.format, spec.attitude) {
             (LogFormat::CsvNed, _) => "`format = \"csv-ned\"`",
+            _ if spec.height == HeightReference::Msl => "`height = \"msl\"`",
             (_, AttitudeSource::Track) => "`attitude = \"track\"`",
             _ => "",
         };
@@ -450,7 +459,9 @@ fn published_flights_are_read_or_refused_as_expected() {
         };
         match (&result, expected) {
             (Ok(log), Ok(rows)) if log.rows.len() == *rows => {
-                if let Some(warning) = log.notes.iter().find(|note| note.is_warning) {
+                // On the bench, the estimator of this log had no position but that of its receiver.
+                let known = |note: &&Note| note.text == "`vehicle_local_position` has no valid position";
+                if let Some(warning) = log.notes.iter().find(|note| note.is_warning && !known(note)) {
                     faults.push(format!("{file}: an unexpected warning: {}", warning.text));
                 }
             }

@@ -196,6 +196,8 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
             attitude: Default::default(),
             origin: Default::default(),
             height: Default::default(),
+            height_from: Default::default(),
+            topic: None,
             window_s: None,
             speed: 1.0,
         },

@@ -73,6 +73,8 @@ pub const PARAMS: &[Param] = &[
         "origin of the local north-east-down frame: the first row, or latitude, longitude, height",
     ),
     param("flight.height", "", ANY, 1.0, "vertical datum of the log's heights"),
+    param("flight.height_from", "", ANY, 1.0, "instrument of the heights, where a log has several"),
+    param("flight.topic", "", ANY, 1.0, "stream of a log that has several: position, attitude"),
     param("flight.window_s", "s", [0.0, 1e6], 0.05, "part of the log to fly, from its first good row"),
     param("flight.speed", "x", [0.01, 100.0], 0.01, "speed-up of the log: 2 flies twice as fast"),
     param(

@@ -132,7 +132,10 @@ impl RigFolder<'_> {
         write_rig(self.folder, self.rig).or_failed()?;
         let sequences: Vec<_> = self.loaded.iter().map(|loaded| &*loaded.sequence).collect();
         tables::write_platform(self.folder, &sequences)?;
-        self.loaded.first().map_or(Ok(()), |loaded| write_sensors(self.folder, &loaded.sensors)).or_failed()?;
+        self.loaded
+            .first()
+            .map_or(Ok(()), |loaded| write_sensors(self.folder, &loaded.sensors))
+            .or_failed()?;
         self.write_run(jobs, inputs, adapter, false)
     }
 

@@ -309,3 +309,100 @@ fn rows_without_attitude_are_interpolated_without_a_repair() {
     let truth = body_from_euler_deg([0.0, 1.0, 178.0 + 0.02 * 11.0]);
     assert!(attitude::angle_between_rad(log.rows[11].ned_from_body, truth) < 1e-6);
 }
+
+/// A level circle of 100 m at an angular rate, with rows at 20 Hz for 20 s, flown by its track.
+fn track_circle(rate_rad_s: f64) -> FlightLog {
+    let rows: Vec<_> = (0..=400)
+        .map(|i| {
+            let t_s = f64::from(i) * 0.05;
+            let (sin, cos) = (rate_rad_s * t_s).sin_cos();
+            let place = [100.0 * sin, 100.0 * (1.0 - cos), -100.0];
+            RawRow { attitude: RawAttitude::None, ..ned_row(1 + i as usize, t_s, place, [0.0; 3]) }
+        })
+        .collect();
+    FlightLog::from_raw(&rows, &by_track()).unwrap()
+}
+
+fn by_track() -> LogOptions {
+    LogOptions { attitude: AttitudeSource::Track, ..LogOptions::default() }
+}
+
+/// Roll, pitch and yaw in degrees.
+fn angles_deg(row: &LogRow) -> [f64; 3] {
+    let (yaw, pitch, roll) = row.ned_from_body.to_euler(glam::EulerRot::ZYX);
+    [roll, pitch, yaw].map(f64::to_degrees)
+}
+
+#[test]
+fn bank_of_a_circle_is_that_of_the_stated_filter() {
+    // Moments of the tricube window over [-1, 1], by the midpoint rule.
+    let moment = |power: i32| {
+        (0..20_000)
+            .map(|i| (f64::from(i) + 0.5) / 10_000.0 - 1.0)
+            .map(|tau| (1.0 - tau.abs().powi(3)).powi(3) * tau.powi(power))
+            .sum::<f64>()
+            / 10_000.0
+    };
+    let [m0, m2, m4, m6] = [0, 2, 4, 6].map(moment);
+    let flattening = (m6 * m0 - m2 * m4) / (m4 * m0 - m2 * m2) / 12.0;
+    assert!((flattening - 0.043).abs() < 5e-4, "{flattening}");
+    for rate in [0.05, 0.1, 0.2, 0.3] {
+        let log = track_circle(rate);
+        for row in &log.rows[40..360] {
+            let [roll, pitch, yaw] = angles_deg(row);
+            let coordinated = 100.0 * rate * rate / 9.806_65;
+            let expected = (coordinated * (1.0 - flattening * rate * rate)).atan().to_degrees();
+            let heading = (rate * row.t_s).to_degrees();
+            let turned = (yaw - heading + 180.0).rem_euclid(360.0) - 180.0;
+            assert!((roll - expected).abs() < 0.01, "{rate}: bank {roll}, not {expected}");
+            assert!(turned.abs() < 1e-3 && pitch.abs() < 1e-6, "{rate}: heading {yaw}, not {heading}");
+        }
+    }
+}
+
+/// North at 5 m/s for 10 s, a stop of 20 s, then east, with noise of a receiver all the time.
+fn stop_and_go(sigma_m: f64) -> FlightLog {
+    let mut state = 1_u64;
+    let mut noise = || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sigma_m * (sum - 6.0)
+    };
+    let rows: Vec<_> = (0..400)
+        .map(|i| {
+            let t_s = f64::from(i) * 0.1;
+            let north = 5.0 * t_s.min(10.0) + noise();
+            let east = 5.0 * (t_s - 30.0).max(0.0) + noise();
+            let row = ned_row(1 + i as usize, t_s, [north, east, -100.0], [0.0; 3]);
+            RawRow { attitude: RawAttitude::None, ..row }
+        })
+        .collect();
+    FlightLog::from_raw(&rows, &by_track()).unwrap()
+}
+
+#[test]
+fn heading_is_kept_at_a_standstill() {
+    for (sigma_m, still_deg, flying_deg) in [(0.0, 1e-6, 1e-6), (0.3, 20.0, 25.0)] {
+        for row in &stop_and_go(sigma_m).rows {
+            let [roll, pitch, yaw] = angles_deg(row);
+            if (12.0..27.5).contains(&row.t_s) {
+                let level = roll.abs() < 1e-6 && pitch.abs() < 1e-6;
+                assert!(yaw.abs() <= still_deg && level, "{} s: {yaw} {roll} {pitch}", row.t_s);
+            }
+            if row.t_s > 32.0 {
+                assert!((yaw - 90.0).abs() <= flying_deg, "{} s: {yaw}", row.t_s);
+            }
+        }
+    }
+    // 90 degrees within 2 s by a smooth step: 1.5 times the mean rate at its middle.
+    let quiet = stop_and_go(0.0);
+    let rates = quiet.rows.windows(2).map(|pair| {
+        attitude::angle_between_rad(pair[0].ned_from_body, pair[1].ned_from_body).to_degrees()
+            / (pair[1].t_s - pair[0].t_s)
+    });
+    let fastest = rates.fold(0.0, f64::max);
+    assert!((60.0..68.0).contains(&fastest), "{fastest}");
+}

@@ -12,6 +12,7 @@ use super::{
     header::HeaderColumns,
     height_column::{height_column, is_height},
     text_table::{Separator, Table},
+    unknown_unit::unknown_units,
 };
 
 fn is_time(meaning: ColumnMeaning) -> bool {
@@ -36,8 +37,9 @@ pub(super) fn missing_columns_message(header: &HeaderColumns) -> String {
     let names: Vec<&str> = header.0.iter().map(|column| column.name.as_str()).collect();
     format!(
         "the columns `{}` name no time and position; name t and lat, lon, alt, or t and north, east, down \
-            (or alt), or t and x, y, z",
-        names.join(", ")
+            (or alt), or t and x, y, z{}",
+        names.join(", "),
+        unknown_units(header).into_iter().map(|(_, text)| format!("; {text}")).collect::<String>()
     )
 }
 
@@ -102,74 +104,15 @@ pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Res
     // ROS stamps are split into seconds and nanoseconds.
     let nanoseconds = match (&parts[..], times.is_empty()) {
         ([], _) | (_, true) => None,
-        ([part], false) if header.stem(column).starts_with("sec") => Some(*part),
+        ([part], false)
+            if header.stem(column).starts_with("sec") || header.stem(column).contains("stamp_sec") =>
+        {
+            Some(*part)
+        }
         _ => return Err(header.ambiguity_message(&[&times[..], &parts[..]].concat())),
     };
     let date = header.unique(ColumnMeaning::Date)?;
     Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
-}
-
-/// The columns of the attitude; [`AttitudeColumns::None`] where the header names no complete one.
-///
-/// # Errors
-/// Several columns hold the same quantity, or a unit makes no sense.
-// Long because every incomplete attitude gets its own note.
-pub(super) fn attitude_columns(
-    header: &HeaderColumns,
-    notes: &mut Vec<Note>,
-) -> Result<AttitudeColumns, String> {
-    use ColumnMeaning::{MagneticYaw, Pitch, Qw, Qx, Qy, Qz, Roll, Yaw};
-    let has = |meaning: ColumnMeaning| !header.columns_where(|other| other == meaning).is_empty();
-    let yaws = header.columns_where(|meaning| matches!(meaning, Yaw | MagneticYaw));
-    let has_angles = has(Roll) && has(Pitch) && !yaws.is_empty();
-    if let Some(columns) = header.unique_each([Qx, Qy, Qz, Qw])? {
-        if has_angles {
-            push_warning(notes, "of the attitude's quaternion and angles the quaternion counts".to_owned());
-        }
-        return Ok(AttitudeColumns::Quaternion(columns));
-    }
-    if !has_angles {
-        let incomplete: Vec<usize> = header
-            .columns_where(|meaning| matches!(meaning, Roll | Pitch | Yaw | MagneticYaw | Qx | Qy | Qz | Qw));
-        if !incomplete.is_empty() {
-            push_information(
-                notes,
-                format!(
-                    "an attitude needs roll, pitch and yaw, or qx, qy, qz and qw: {} alone is none",
-                    header.describe(&incomplete)
-                ),
-            );
-        }
-        let numbered = columns_by_name(header, |name| {
-            ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name)
-        });
-        if !numbered.is_empty() {
-            push_warning(
-                notes,
-                format!(
-                    "{} are no attitude, as their order is not known: rename them to qw, qx, qy, qz (PX4 \
-                        numbers them in this order)",
-                    header.describe(&numbered)
-                ),
-            );
-        }
-        return Ok(AttitudeColumns::None);
-    }
-    let &[yaw] = &yaws[..] else { return Err(header.ambiguity_message(&yaws)) };
-    header.check_usable(yaw)?;
-    if has(MagneticYaw) {
-        push_warning(
-            notes,
-            format!(
-                "`{}` is from magnetic north, but taken as from true north: add the declination",
-                header.name(yaw)
-            ),
-        );
-    }
-    let [roll, pitch] = header.unique_each([Roll, Pitch])?.unwrap_or_default();
-    Ok(AttitudeColumns::Euler(
-        [roll, pitch, yaw].map(|column| FieldSource::whole(column, header.factor(column))),
-    ))
 }
 
 /// The axes of the positions and their three columns.
@@ -216,7 +159,7 @@ pub(super) fn position_columns(
                 header.describe(&parts)
             ));
         }
-        let height = height_column(header, Some(spec.height), notes)?;
+        let height = height_column(header, Some(spec.height), spec.height_from, notes)?;
         let horizontal = match (header.unique_each([Latitude, Longitude])?, header.unique(LatitudeLongitude)?)
         {
             (Some(pair), None) => pair.map(source),
@@ -244,10 +187,10 @@ pub(super) fn position_columns(
         };
         let (frame, vertical) = match header.unique(Down)? {
             Some(_) if has_height && format == LogFormat::CsvXya => {
-                (Frame::NorthEastUp, height_column(header, None, notes)?)
+                (Frame::NorthEastUp, height_column(header, None, spec.height_from, notes)?)
             }
             Some(down) => (Frame::NorthEastDown, down),
-            None => (Frame::NorthEastUp, height_column(header, None, notes)?),
+            None => (Frame::NorthEastUp, height_column(header, None, spec.height_from, notes)?),
         };
         let fits = match format {
             LogFormat::Auto => true,
@@ -282,7 +225,7 @@ pub(super) fn position_columns(
         }
         let vertical = match z {
             Some(z) => z,
-            None => height_column(header, None, notes)?,
+            None => height_column(header, None, spec.height_from, notes)?,
         };
         return Ok((frame, [x, y, vertical].map(source)));
     }
@@ -297,7 +240,7 @@ pub(super) fn position_columns(
 }
 
 /// Columns whose name, in lower case, fulfils a condition.
-fn columns_by_name(header: &HeaderColumns, condition: impl Fn(&str) -> bool) -> Vec<usize> {
+pub(super) fn columns_by_name(header: &HeaderColumns, condition: impl Fn(&str) -> bool) -> Vec<usize> {
     (0..header.0.len())
         .filter(|&column| condition(&header.name(column).trim_matches(['"', ' ']).to_lowercase()))
         .collect()
@@ -343,7 +286,8 @@ pub(super) fn note_unused_columns(
     let describes_another = |name: &str| {
         let stem =
             ["_unit", "_units", "_datum", "_frame"].iter().find_map(|suffix| name.strip_suffix(suffix));
-        stem.is_some_and(|stem| column_names::find(stem).is_some())
+        matches!(name, "unit" | "units" | "datum")
+            || stem.is_some_and(|stem| column_names::find(stem).is_some())
     };
     let descriptions = columns_by_name(header, describes_another);
     if !descriptions.is_empty() {
@@ -355,6 +299,11 @@ pub(super) fn note_unused_columns(
                 header.describe(&descriptions)
             ),
         );
+    }
+    for (meaning, text) in unknown_units(header) {
+        if header.columns_where(|other| other == meaning).is_empty() {
+            push_warning(notes, text);
+        }
     }
     let declination = columns_by_name(header, |name| {
         name.starts_with("declination") || name.starts_with("magnetic_declination")

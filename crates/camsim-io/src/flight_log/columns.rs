@@ -43,6 +43,28 @@ pub(super) enum AttitudeColumns {
     Quaternion([usize; 4]),
 }
 
+impl AttitudeColumns {
+    /// What the columns hold.
+    pub(super) fn kind(self) -> AttitudeKind {
+        match self {
+            Self::None => AttitudeKind::None,
+            Self::Euler(_) => AttitudeKind::Euler,
+            Self::Quaternion(_) => AttitudeKind::Quaternion,
+        }
+    }
+}
+
+/// What the attitudes of a log are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum AttitudeKind {
+    /// There are none.
+    None,
+    /// Roll, pitch, yaw in degrees.
+    Euler,
+    /// Quaternions x, y, z, w.
+    Quaternion,
+}
+
 /// The columns of the time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TimeColumns {
@@ -68,5 +90,10 @@ pub(super) fn format_name(format: LogFormat) -> &'static str {
         LogFormat::Tum => "tum",
         LogFormat::Euroc => "euroc",
         LogFormat::Gpx => "gpx",
+        LogFormat::Kml => "kml",
+        LogFormat::Igc => "igc",
+        LogFormat::Ulog => "ulog",
+        LogFormat::Dataflash => "dataflash",
+        LogFormat::Mcap => "mcap",
     }
 }

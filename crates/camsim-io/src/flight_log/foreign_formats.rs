@@ -13,16 +13,9 @@ pub(super) struct ForeignFormat {
 /// Formats recognised by their signature. docs/inputs/LOGS.md lists them.
 pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
     ForeignFormat {
-        name: "a PX4 log (ULog)",
-        signatures: &[b"ULog\x01\x12\x35"],
-        advice: "convert it (pip install pyulog; ulog2csv FILE.ulg) and give vehicle_global_position's \
-            table, with lat, lon and alt",
-    },
-    ForeignFormat {
-        name: "an ArduPilot log (DataFlash)",
-        signatures: &[b"\xa3\x95", b"FMT,", b"FMT ,"],
-        advice: "convert it (pip install pymavlink; mavlogdump.py --types GPS --format csv FILE) or export a \
-            table of POS and ATT",
+        name: "an ArduPilot log as text",
+        signatures: &[b"FMT,", b"FMT ,"],
+        advice: "give the binary log (.bin), or export a table of POS and ATT",
     },
     ForeignFormat {
         name: "a MAVLink telemetry log",
@@ -30,14 +23,15 @@ pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
         advice: "convert it with mavlogdump.py --format csv",
     },
     ForeignFormat {
-        name: "a ROS bag",
+        name: "a ROS 1 bag",
         signatures: &[b"#ROSBAG"],
-        advice: "export the poses (evo_traj bag FILE TOPIC --save_as_tum)",
+        advice: "convert it to MCAP (mcap convert FILE.bag flight.mcap)",
     },
     ForeignFormat {
-        name: "a ROS 2 bag",
-        signatures: &[b"SQLite format 3", b"\x89MCAP"],
-        advice: "export the poses (evo_traj bag2 FOLDER TOPIC --save_as_tum)",
+        name: "a database (SQLite), as ROS 2 bags of the kind .db3 are",
+        signatures: &[b"SQLite format 3"],
+        advice: "convert it to MCAP (ros2 bag convert, with `storage_id: mcap` in its output options, or mcap \
+            convert FILE.db3 flight.mcap)",
     },
     ForeignFormat {
         name: "compressed",
@@ -60,11 +54,6 @@ pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
         advice: "convert it to GPX (gpsbabel -i nmea -f FILE -o gpx -F flight.gpx)",
     },
     ForeignFormat {
-        name: "an IGC flight record",
-        signatures: &[b"AXXX", b"AXCT", b"ALXN", b"ALXV", b"AFLA", b"AGCS", b"HFDTE"],
-        advice: "convert it to GPX (gpsbabel -i igc -f FILE -o gpx -F flight.gpx)",
-    },
-    ForeignFormat {
         name: "JSON",
         signatures: &[b"{", b"[{", b"[\n"],
         advice: "write its rows as CSV with a header line",
@@ -77,11 +66,9 @@ pub(super) const SUBTITLES: (&str, &str) = (
     "write a CSV with a header `t_s,lat_deg,lon_deg,alt_msl_m` (exiftool -ee -csv of the video, or its \
         flight record), and set flight.attitude = \"track\"",
 );
-/// Name and advice of KML, recognised by its XML root element.
-pub(super) const KML: (&str, &str) =
-    ("KML", "convert it to GPX (gpsbabel -i kml -f FILE -o gpx -F flight.gpx), if its points have times");
 /// Name and advice of XML files with any other root element.
-pub(super) const OTHER_XML: (&str, &str) = ("XML other than GPX", "write a CSV with a header line, or GPX");
+pub(super) const OTHER_XML: (&str, &str) =
+    ("XML other than GPX and KML", "write a CSV with a header line, or GPX");
 
 /// Name and advice of the format of a file that cannot be a flight log; `None` if it may be one.
 pub(super) fn detect(bytes: &[u8]) -> Option<(&'static str, &'static str)> {

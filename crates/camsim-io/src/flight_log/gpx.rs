@@ -1,4 +1,4 @@
-//! Track points of GPX files.
+//! XML: track points of GPX files; KML goes on to `kml`.
 //!
 //! | tag | |
 //! |---|---|
@@ -15,7 +15,12 @@ use camsim_core::{
 };
 use roxmltree::{Document, Node};
 
-use super::{FlightLogError, RawLog, columns::format_name, foreign_formats, time_fields};
+use super::{
+    FlightLogError, RawLog,
+    columns::format_name,
+    foreign_formats, kml, time_fields,
+    unused_keys::{unused_height_note, unused_topic_note},
+};
 
 /// Reads the track points of a GPX file.
 ///
@@ -31,7 +36,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
     match document.root_element().tag_name().name() {
         "gpx" => {}
-        "kml" => return Err(foreign(foreign_formats::KML)),
+        "kml" => return kml::read(path, &document, spec),
         _ => return Err(foreign(foreign_formats::OTHER_XML)),
     }
     if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
@@ -101,6 +106,7 @@ fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, Fli
 /// Notes on keys and tags that are not used.
 fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
     let mut notes = Vec::new();
+    notes.extend(unused_topic_note(spec).into_iter().chain(unused_height_note(spec)));
     if spec.height == HeightReference::Ellipsoid {
         let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
             flight.height = \"msl\" unless you know better";

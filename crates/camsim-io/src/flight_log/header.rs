@@ -143,7 +143,7 @@ impl HeaderColumns {
 }
 
 /// The physical dimension of a column; `None` where it has no unit.
-fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
+pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
     use ColumnMeaning::*;
     match meaning {
         Time | NanosecondsPart => Some(Dimension::Time),
@@ -162,6 +162,10 @@ fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
 // Long because the rules for qualifiers share the meaning, unit and problem found so far.
 fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
+    if let Some(meaning) = px4_quaternion(name) {
+        let (stem, unit, is_bare_unit) = ("q".to_owned(), None, false);
+        return Some(ParsedName { meaning, stem, unit, is_bare_unit, problem: None });
+    }
     let (bare, mut qualifier_texts) = split_brackets(name);
     let (bare, after_comma) = bare.split_once(',').map_or((bare.as_str(), ""), |(bare, rest)| (bare, rest));
     let unit_line = unit_line.unwrap_or("").trim_matches(['[', ']', '(', ')']);
@@ -213,7 +217,20 @@ fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
             Qualifier::Magnetic | Qualifier::Ignored => {}
         }
     }
-    Some(ParsedName { meaning, stem, unit, is_bare_unit: known.unit.is_some(), problem })
+    // `header.stamp.sec` says whose seconds it counts, unlike `sec`.
+    let is_bare_unit = known.unit.is_some() && !stem.contains("stamp");
+    Some(ParsedName { meaning, stem, unit, is_bare_unit, problem })
+}
+
+/// The part of a quaternion that PX4's exports number: `q[0]`, `vehicle_attitude.q[3]`.
+fn px4_quaternion(name: &str) -> Option<ColumnMeaning> {
+    let (before, number) = name.strip_suffix(']')?.rsplit_once("q[")?;
+    if !(before.is_empty() || before.ends_with(['.', '/', ':']) || before.ends_with("attitude_")) {
+        return None;
+    }
+    use ColumnMeaning::{Qw, Qx, Qy, Qz};
+    let index: usize = number.parse().ok()?;
+    [Qw, Qx, Qy, Qz].get(index).copied()
 }
 
 /// Splits a name into the text outside of brackets and the texts inside.
@@ -232,7 +249,7 @@ fn split_brackets(name: &str) -> (String, Vec<String>) {
 }
 
 /// The normal form of a name: lower case, words joined by single underscores. `TimeUS` is two words.
-fn normal_form(name: &str) -> String {
+pub(super) fn normal_form(name: &str) -> String {
     let mut normal = String::with_capacity(name.len() + 4);
     let mut before = ' ';
     for c in name.trim().chars() {

@@ -1,6 +1,9 @@
 //! Selection of the column that holds the height.
 
-use camsim_core::{flight_log::Note, scenario::HeightReference};
+use camsim_core::{
+    flight_log::Note,
+    scenario::{HeightReference, HeightSource},
+};
 
 use super::{
     column_meaning::ColumnMeaning,
@@ -17,8 +20,15 @@ pub(super) fn is_height(meaning: ColumnMeaning) -> bool {
     )
 }
 
+fn push_pressure_warning(header: &HeaderColumns, column: usize, notes: &mut Vec<Note>) {
+    push_warning(
+        notes,
+        format!("the height, `{}`, is by air pressure: it may be off by 100 m and more", header.name(column)),
+    );
+}
+
 /// The column of the height. `reference` is `flight.height`, or `None` for local coordinates, where it does
-/// not matter.
+/// not matter; `source` is `flight.height_from`.
 ///
 /// # Errors
 /// There is no height above a datum, or several among which none can be preferred.
@@ -26,8 +36,16 @@ pub(super) fn is_height(meaning: ColumnMeaning) -> bool {
 pub(super) fn height_column(
     header: &HeaderColumns,
     reference: Option<HeightReference>,
+    source: HeightSource,
     notes: &mut Vec<Note>,
 ) -> Result<usize, String> {
+    if source == HeightSource::Pressure {
+        let column = header.unique(ColumnMeaning::PressureHeight)?;
+        let column =
+            column.ok_or("flight.height_from is \"pressure\", but no column is a height by air pressure")?;
+        push_pressure_warning(header, column, notes);
+        return Ok(column);
+    }
     let wanted = reference.map(|height| match height {
         HeightReference::Msl => VerticalDatum::MeanSeaLevel,
         HeightReference::Ellipsoid => VerticalDatum::Ellipsoid,
@@ -47,14 +65,13 @@ pub(super) fn height_column(
             header.unique(ColumnMeaning::PressureHeight)?,
             header.columns_where(|meaning| meaning == ColumnMeaning::RelativeHeight).first().copied(),
         ) {
-            (Some(column), _) => {
-                push_warning(
-                    notes,
-                    format!(
-                        "the only height, `{}`, is by air pressure: it may be off by 100 m and more",
-                        header.name(column)
-                    ),
+            (Some(_), _) if source == HeightSource::Gnss => {
+                return Err(
+                    "flight.height_from is \"gnss\", but the only height is by air pressure".to_owned()
                 );
+            }
+            (Some(column), _) => {
+                push_pressure_warning(header, column, notes);
                 column
             }
             (None, Some(column)) => {

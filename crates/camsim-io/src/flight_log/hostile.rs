@@ -3,11 +3,16 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod columns;
 mod files;
+mod formats;
+mod records;
 mod times;
 mod units;
 
-use camsim_core::scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, LogFormat, TimeUnit};
+use camsim_core::scenario::{
+    AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, LogFormat, TimeUnit,
+};
 
 use super::{tests::spec, *};
 

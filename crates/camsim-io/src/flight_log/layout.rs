@@ -9,10 +9,10 @@ use camsim_core::{
 
 use super::{
     FlightLogError,
+    attitude_columns::attitude_columns,
     column_meaning::ColumnMeaning,
     column_selection::{
-        attitude_columns, has_time_and_position, missing_columns_message, note_unused_columns,
-        position_columns, time_columns,
+        has_time_and_position, missing_columns_message, note_unused_columns, position_columns, time_columns,
     },
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,
@@ -64,9 +64,8 @@ impl TableLayout {
             LogFormat::CsvXya => (Frame::NorthEastUp, ["north", "east", "altitude"]),
             LogFormat::CsvNed => (Frame::NorthEastDown, ["north", "east", "down"]),
             LogFormat::Tum | LogFormat::Euroc => (Frame::EastNorthUp, ["x", "y", "z"]),
-            LogFormat::CsvLla | LogFormat::Auto | LogFormat::Gpx => {
-                (Frame::Geodetic, ["latitude", "longitude", "height"])
-            }
+            // The other formats are no tables.
+            _ => (Frame::Geodetic, ["latitude", "longitude", "height"]),
         };
         let (attitude, attitude_names) = match format {
             LogFormat::Tum => (AttitudeColumns::Quaternion([4, 5, 6, 7]), &["qx", "qy", "qz", "qw"][..]),

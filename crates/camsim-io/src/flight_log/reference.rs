@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
-    foreign_formats::{FOREIGN_FORMATS, KML, OTHER_XML, SUBTITLES},
+    foreign_formats::{FOREIGN_FORMATS, OTHER_XML, SUBTITLES},
     units::{Dimension, UNITS},
 };
 
@@ -20,6 +20,33 @@ const FORMATS: &[(&str, &str, &str)] = &[
     ("tum", "t, x, y, z, qx, qy, qz, qw", "metres, x east, y north, z up; body forward-left-up"),
     ("euroc", "t, x, y, z, qw, qx, qy, qz", "as tum; whole times are nanoseconds"),
     ("gpx", "`trkpt` with lat, lon, `ele`, `time`", "no attitude: flight.attitude = \"track\""),
+    (
+        "kml",
+        "`gx:Track` with `when`, `gx:coord`, `gx:angles`; or placemarks with `TimeStamp` and `Point`",
+        "degrees, metres above mean sea level (altitudeMode absolute); angles are heading, tilt, roll",
+    ),
+    (
+        "igc",
+        "`B` records, with `LAD`, `LOD`, `TDS`",
+        "heights by flight.height_from; no attitude: flight.attitude = \"track\"",
+    ),
+    (
+        "ulog",
+        "vehicle_global_position, vehicle_local_position (with its origin), vehicle_odometry, \
+            vehicle_gps_position, the same of estimator_*; vehicle_attitude",
+        "PX4's own; quaternions w, x, y, z of a forward-right-down body to north-east-down",
+    ),
+    (
+        "dataflash",
+        "POS, AHR2, XKF1 or NKF1 (with ORGN), GPS, SIM; ATT, XKQ",
+        "ArduPilot's own, with the factors of its formats: degrees, metres above mean sea level",
+    ),
+    (
+        "mcap",
+        "PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry, TFMessage (`/tf#child_frame`), \
+            NavSatFix with Imu; ROS 2 (cdr) or ROS 1",
+        "metres, x east, y north, z up; body forward-left-up (REP 103)",
+    ),
 ];
 
 /// Keys of `[flight]` that control the reading, with what each decides.
@@ -37,7 +64,18 @@ const KEYS: &[(&str, &str)] = &[
             where yaw jumps by a turn of radians; refused where all stay within pi",
     ),
     ("angles", "whether angles wrap or count turns"),
-    ("attitude", "`track`: columns of the attitude are not read at all"),
+    ("attitude", "`track`: the attitude of the log is not read at all"),
+    (
+        "height_from",
+        "igc and tables: heights of satellite navigation (`gnss`) or of air pressure (`pressure`, standard \
+            atmosphere); `auto`: gnss where there is one, else pressure with a warning",
+    ),
+    (
+        "topic",
+        "ulog, dataflash, mcap: the stream of the positions, and behind a comma that of the attitudes \
+            (`vehicle_gps_position, vehicle_attitude`; `GPS, AHR2`; `/fix, /imu`); `#1` behind a name is an \
+            instance, a core, or a child frame",
+    ),
     (
         "height",
         "what heights are above; decides between several height columns, and warns where the column says \
@@ -166,7 +204,7 @@ pub fn reference() -> String {
     }
     text += "\n## Refused with advice\n\n| file | what to do |\n|---|---|\n";
     let by_signature = FOREIGN_FORMATS.iter().map(|format| (format.name, format.advice));
-    for (name, advice) in by_signature.chain([SUBTITLES, KML, OTHER_XML]) {
+    for (name, advice) in by_signature.chain([SUBTITLES, OTHER_XML]) {
         let _ = writeln!(text, "| {name} | {advice} |");
     }
     text

@@ -1,8 +1,10 @@
 #![allow(clippy::unwrap_used)]
 
+use std::path::PathBuf;
+
 use camsim_core::{
     flight_log::{RawAttitude, RawPosition, body_from_euler_deg},
-    scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, Origin, TimeUnit},
+    scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, Origin, TimeUnit},
 };
 use glam::{DQuat, DVec3};
 
@@ -18,6 +20,8 @@ pub(super) fn spec(format: LogFormat) -> FlightSpec {
         attitude: AttitudeSource::Log,
         origin: Origin::First,
         height: HeightReference::Ellipsoid,
+        height_from: HeightSource::Auto,
+        topic: None,
         window_s: None,
         speed: 1.0,
     }

@@ -117,13 +117,31 @@ const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("seed", Whole),
     ("flight.log", Path),
-    ("flight.format", Word(&["auto", "csv-lla", "csv-xya", "csv-ned", "tum", "euroc", "gpx"])),
+    (
+        "flight.format",
+        Word(&[
+            "auto",
+            "csv-lla",
+            "csv-xya",
+            "csv-ned",
+            "tum",
+            "euroc",
+            "gpx",
+            "kml",
+            "igc",
+            "ulog",
+            "dataflash",
+            "mcap",
+        ]),
+    ),
     ("flight.time_unit", Word(&["auto", "s", "ms", "us", "ns", "min", "h"])),
     ("flight.angle_unit", Word(&["auto", "deg", "rad"])),
     ("flight.angles", Word(&["auto", "wrapped", "continuous"])),
     ("flight.attitude", Word(&["log", "track"])),
     ("flight.origin", NumbersOr(3, "first")),
     ("flight.height", Word(HEIGHT)),
+    ("flight.height_from", Word(&["auto", "gnss", "pressure"])),
+    ("flight.topic", Text),
     ("flight.window_s", Numbers(2)),
     ("flight.speed", Number),
     ("tracker.kind", Word(&["hold", "linear", "sqrt", "spline"])),
@@ -344,7 +362,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
 ];
 
 /// Words that this version does not support.
-pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[("flight.format", "ulog")];
+pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[];
 
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[

@@ -96,6 +96,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
         "a saved scenario reads back"
     );
     (scenario.camera.name, scenario.camera.clock_offset_ms) = ("left".into(), 0.5);
+    scenario.flight.topic = Some("/odom".into());
     scenario.output.twin = vec![TwinSpec {
         name: "sharp".into(),
         exposure: Some(false),

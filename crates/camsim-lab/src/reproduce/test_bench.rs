@@ -123,6 +123,8 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
             attitude: Default::default(),
             origin: Default::default(),
             height: Default::default(),
+            height_from: Default::default(),
+            topic: None,
             window_s: None,
             speed: 1.0,
         },

@@ -23,6 +23,8 @@ pub fn scenario() -> Scenario {
         attitude: Default::default(),
         origin: Default::default(),
         height: Default::default(),
+        height_from: Default::default(),
+        topic: None,
         window_s: None,
         speed: 1.0,
     };

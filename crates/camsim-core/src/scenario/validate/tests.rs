@@ -20,6 +20,8 @@ pub(crate) fn good() -> Scenario {
             attitude: Default::default(),
             origin: Default::default(),
             height: Default::default(),
+            height_from: Default::default(),
+            topic: None,
             window_s: None,
             speed: 1.0,
         },

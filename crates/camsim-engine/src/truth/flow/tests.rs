@@ -58,6 +58,8 @@ fn sequence() -> Arc<Sequence> {
             attitude: Default::default(),
             origin: Default::default(),
             height: Default::default(),
+            height_from: Default::default(),
+            topic: None,
             window_s: None,
             speed: 1.0,
         },

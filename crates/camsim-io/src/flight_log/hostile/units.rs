@@ -338,7 +338,7 @@ fn columns_that_qualify_a_quantity_are_refused_or_noted() {
         &track(),
         &["`lat_min`", "`lat_sec`", "`lon_min`", "decimals"],
     );
-    for (name, value) in [("alt_units", "ft"), ("alt_datum", "MSL")] {
+    for (name, value) in [("alt_units", "ft"), ("alt_datum", "MSL"), ("units", "ft")] {
         assert_flies(
             name,
             &log(&format!("t,lat,lon,alt,{name}"), &format!("T,LAT,LON,H,{value}")),
@@ -354,9 +354,15 @@ fn columns_that_qualify_a_quantity_are_refused_or_noted() {
         &auto(),
         "flight.angle_unit",
     );
-    for name in ["q0,q1,q2,q3", "q[0],q[1],q[2],q[3]"] {
-        let numbered = log(&format!("t,lat,lon,alt,{name}"), "T,LAT,LON,H,1,0,0,0");
-        assert_refused(name, numbered.as_bytes(), &auto(), &["no usable attitude", "qw, qx, qy, qz"]);
+    let numbered = log("t,lat,lon,alt,q0,q1,q2,q3", "T,LAT,LON,H,1,0,0,0");
+    assert_refused("q0", numbered.as_bytes(), &auto(), &["no usable attitude", "qw, qx, qy, qz"]);
+    for prefix in ["", "vehicle_attitude.", "vehicle_attitude_"] {
+        let names: Vec<String> = (0..4).map(|i| format!("{prefix}q[{i}]")).collect();
+        let px4 = log(&format!("t,lat,lon,alt,{}", names.join(",")), "T,LAT,LON,H,0.866025404,0,0,0.5");
+        assert_flies("PX4's quaternion", &px4, &auto(), "as PX4 writes");
+        let yaw =
+            read_with(px4.as_bytes(), &auto()).unwrap().rows[0].ned_from_body.to_euler(glam::EulerRot::ZYX).0;
+        assert!((yaw.to_degrees() - 60.0).abs() < 1e-5, "{yaw}");
     }
 }
 

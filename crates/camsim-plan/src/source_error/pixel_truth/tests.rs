@@ -52,6 +52,8 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
             attitude: Default::default(),
             origin: Default::default(),
             height: Default::default(),
+            height_from: Default::default(),
+            topic: None,
             window_s: None,
             speed: 1.0,
         },

@@ -1,0 +1,258 @@
+//! Flight records of glider loggers (IGC).
+//!
+//! | record | applied |
+//! |---|---|
+//! | `B` | time of day, latitude, longitude, and the height that `flight.height_from` says |
+//! | `HFDTE` | the date; without it times count from midnight. Midnight goes on |
+//! | `I` | `LAD`, `LOD` (more decimals of minutes) and `TDS` (decimals of seconds) in `B` |
+//! | `HFALG` | what satellite heights are above: the ellipsoid (`ELL`), or the geoid (`GEO`) |
+//!
+//! Heights of satellite navigation are above the ellipsoid unless the record says otherwise; those by air
+//! pressure are of the standard atmosphere, not above any datum. A fix without height (`V`) is left out where
+//! others have one.
+
+use std::path::Path;
+
+use camsim_core::{
+    flight_log::Note,
+    scenario::{FlightSpec, HeightSource, LogFormat},
+};
+
+use super::{
+    FlightLogError, RawLog,
+    columns::{AttitudeKind, Frame},
+    streams::{self, Stream, Streams},
+    time_fields,
+    unused_keys::unused_topic_note,
+};
+
+const SECOND_NS: i128 = 1_000_000_000;
+const DAY_NS: i128 = 86_400 * SECOND_NS;
+/// Length of a `B` record without extensions.
+const FIX_CHARACTERS: usize = 35;
+
+/// One fix.
+#[derive(Clone, Copy, Debug)]
+struct Fix {
+    line: usize,
+    time_ns: i128,
+    plane: [f64; 2],
+    /// Whether the fix has three dimensions.
+    is_3d: bool,
+    pressure_m: f64,
+    gnss_m: f64,
+}
+
+/// Places of extensions within `B` records: first and last character, from 0.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extensions {
+    latitude: Option<(usize, usize)>,
+    longitude: Option<(usize, usize)>,
+    seconds: Option<(usize, usize)>,
+}
+
+/// Whether a text is a flight record: it begins with a logger's identifier, and has fixes.
+pub(super) fn is_igc(bytes: &[u8]) -> bool {
+    let is_fix = |line: &[u8]| {
+        line.len() >= FIX_CHARACTERS
+            && line[0] == b'B'
+            && line[1..7].iter().all(u8::is_ascii_digit)
+            && matches!(line[14], b'N' | b'S')
+            && matches!(line[23], b'E' | b'W')
+    };
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut lines = bytes.split(|&byte| byte == b'\n').take(500);
+    match bytes.first() {
+        Some(b'A') => lines.any(|line| is_fix(line) || line.starts_with(b"HFDTE")),
+        Some(b'H' | b'B' | b'I') => lines.any(is_fix),
+        _ => false,
+    }
+}
+
+/// Reads a flight record.
+///
+/// # Errors
+/// There are no fixes, or one is damaged.
+pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
+    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
+    streams::check_format(path, spec, LogFormat::Igc)?;
+    let bad_line =
+        |line: usize, problem: String| FlightLogError::Header { path: path.to_owned(), line, problem };
+    let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().collect();
+    let (mut fixes, mut extensions, mut day_ns, mut is_msl) =
+        (Vec::<Fix>::new(), Extensions::default(), 0, false);
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        let line_number = index + 1;
+        let line = line.trim();
+        if line.starts_with('I') {
+            extensions = Extensions::parse(line);
+        } else if line.starts_with("HFDTE") {
+            day_ns = date_ns(line)
+                .ok_or_else(|| bad_line(line_number, format!("`{line}` is no date such as HFDTE010523")))?;
+        } else if line.starts_with("HFALG") {
+            is_msl = line.contains("GEO");
+        } else if line.starts_with('B') {
+            let fix =
+                Fix::parse(line, line_number, &extensions).map_err(|text| bad_line(line_number, text))?;
+            fixes.push(fix);
+        }
+    }
+    if fixes.is_empty() {
+        return Err(problem("the IGC file has no fixes (B records): it is no record of a flight".to_owned()));
+    }
+    unroll_midnight(&mut fixes, day_ns, &mut notes);
+    let uses_gnss = chooses_gnss(&fixes, spec, &mut notes).map_err(problem)?;
+    if uses_gnss {
+        notes.extend(streams::height_note("GNSS heights of the IGC file", is_msl, spec));
+    }
+    let count = fixes.len();
+    if uses_gnss && fixes.iter().any(|fix| fix.is_3d) {
+        fixes.retain(|fix| fix.is_3d);
+    }
+    if fixes.len() < count {
+        let text =
+            format!("{} of {count} fixes have no GNSS height (V), and are left out", count - fixes.len());
+        notes.push(Note { is_warning: true, text });
+    }
+    let rows = fixes.iter().map(|fix| {
+        let mut row = streams::empty_row(fix.line, Some(fix.time_ns));
+        let height = if uses_gnss { fix.gnss_m } else { fix.pressure_m };
+        row.position = [fix.plane[0], fix.plane[1], height];
+        row
+    });
+    let position = Stream { name: "B".to_owned(), rows: rows.collect() };
+    Streams { frame: Frame::Geodetic, kind: AttitudeKind::None, position, attitude: None, notes }
+        .into_log(path, spec)
+}
+
+/// Whether heights are those of satellite navigation.
+fn chooses_gnss(fixes: &[Fix], spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<bool, String> {
+    let has_gnss = fixes.iter().any(|fix| fix.gnss_m != 0.0);
+    let has_pressure = fixes.iter().any(|fix| fix.pressure_m != 0.0);
+    match spec.height_from {
+        HeightSource::Gnss if !has_gnss => {
+            Err("all GNSS heights are 0: set flight.height_from = \"pressure\"".to_owned())
+        }
+        HeightSource::Pressure if !has_pressure => {
+            Err("all pressure heights are 0: set flight.height_from = \"gnss\"".to_owned())
+        }
+        HeightSource::Auto if has_gnss => Ok(true),
+        HeightSource::Gnss => Ok(true),
+        HeightSource::Pressure | HeightSource::Auto => {
+            let reason = if spec.height_from == HeightSource::Auto { "all GNSS heights are 0: " } else { "" };
+            notes.push(Note {
+                is_warning: true,
+                text: format!(
+                    "{reason}the heights are those of air pressure in the standard atmosphere, which may be \
+                        off by 100 m and more"
+                ),
+            });
+            Ok(false)
+        }
+    }
+}
+
+/// Adds the date, and a day wherever the clock falls by more than half of one.
+fn unroll_midnight(fixes: &mut [Fix], day_ns: i128, notes: &mut Vec<Note>) {
+    let (mut offset_ns, mut before_ns) = (day_ns, None);
+    for fix in fixes {
+        if before_ns.is_some_and(|before_ns: i128| before_ns - fix.time_ns > DAY_NS / 2) {
+            offset_ns += DAY_NS;
+            let text = format!("the clock passes midnight at line {}: the times go on from there", fix.line);
+            notes.push(Note { is_warning: false, text });
+        }
+        before_ns = Some(fix.time_ns);
+        fix.time_ns += offset_ns;
+    }
+}
+
+impl Fix {
+    fn parse(line: &str, number: usize, extensions: &Extensions) -> Result<Self, String> {
+        let bad = |what: &str| {
+            format!(
+                "`{line}` is a damaged fix ({what}): remove the line, or copy the record again from the logger"
+            )
+        };
+        if line.len() < FIX_CHARACTERS || !line.is_ascii() {
+            return Err(bad("it is cut off"));
+        }
+        let whole = |from: usize, to: usize| {
+            let text = &line[from..to];
+            text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse::<i64>().ok()).flatten()
+        };
+        let clock = |from: usize| whole(from, from + 2).map(i128::from);
+        let (Some(hours), Some(minutes), Some(seconds)) = (clock(1), clock(3), clock(5)) else {
+            return Err(bad("time"));
+        };
+        if hours > 23 || minutes > 59 || seconds > 59 {
+            return Err(bad("time"));
+        }
+        let time_ns = (hours * 3600 + minutes * 60 + seconds) * SECOND_NS
+            + (decimals(line, extensions.seconds) * 1e9).round() as i128;
+        let angle = |degrees: Option<i64>, thousandths: Option<i64>, place: Option<(usize, usize)>| {
+            let minutes = (thousandths? as f64 + decimals(line, place)) / 1000.0;
+            (minutes < 60.0).then(|| degrees.map(|degrees| degrees as f64 + minutes / 60.0)).flatten()
+        };
+        let latitude =
+            angle(whole(7, 9), whole(9, 14), extensions.latitude).ok_or_else(|| bad("latitude"))?;
+        let longitude =
+            angle(whole(15, 18), whole(18, 23), extensions.longitude).ok_or_else(|| bad("longitude"))?;
+        let (south, west) = match (&line[14..15], &line[23..24]) {
+            (ns @ ("N" | "S"), ew @ ("E" | "W")) => (ns == "S", ew == "W"),
+            _ => return Err(bad("hemisphere")),
+        };
+        if latitude > 90.0 || longitude > 180.0 {
+            return Err(bad("place"));
+        }
+        // Heights below 0 begin with a minus sign.
+        let height = |from: usize| line[from..from + 5].parse::<f64>().map_err(|_| bad("height"));
+        Ok(Self {
+            line: number,
+            time_ns,
+            plane: [if south { -latitude } else { latitude }, if west { -longitude } else { longitude }],
+            is_3d: &line[24..25] == "A",
+            pressure_m: height(25)?,
+            gnss_m: height(30)?,
+        })
+    }
+}
+
+impl Extensions {
+    /// Parses an `I` record: `I`, a count, and for each extension its first and last character and code.
+    fn parse(line: &str) -> Self {
+        let mut extensions = Self::default();
+        let parts = line.get(3..).unwrap_or("").as_bytes().chunks_exact(7);
+        for part in parts {
+            let place = |from: usize| {
+                let text = std::str::from_utf8(part.get(from..from + 2)?).ok()?;
+                text.parse::<usize>().ok()?.checked_sub(1)
+            };
+            let range = place(0).zip(place(2));
+            match &part[4..] {
+                b"LAD" => extensions.latitude = range,
+                b"LOD" => extensions.longitude = range,
+                b"TDS" => extensions.seconds = range,
+                _ => {}
+            }
+        }
+        extensions
+    }
+}
+
+/// The digits at a place as decimals: `25` is 0.25; 0 where there are none.
+fn decimals(line: &str, place: Option<(usize, usize)>) -> f64 {
+    place
+        .and_then(|(first, last)| line.get(first..last.checked_add(1)?))
+        .filter(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
+        .and_then(|digits| format!("0.{digits}").parse().ok())
+        .unwrap_or(0.0)
+}
+
+/// Nanoseconds since 1970 of `HFDTE010523` or `HFDTEDATE:010523,01`: day, month, year.
+fn date_ns(line: &str) -> Option<i128> {
+    let digits: String =
+        line.chars().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
+    let [day, month, year] = [digits.get(0..2)?, digits.get(2..4)?, digits.get(4..6)?];
+    let century = if year < "80" { "20" } else { "19" };
+    time_fields::date_ns(&format!("{century}{year}-{month}-{day}"))
+}

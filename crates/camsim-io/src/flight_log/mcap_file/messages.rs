@@ -1,0 +1,133 @@
+//! The ROS messages that hold a pose, or a part of one.
+
+use super::cdr::Decoder;
+
+/// RosKind of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum RosKind {
+    Pose,
+    PoseWithCovariance,
+    Odometry,
+    Transform,
+    Transforms,
+    NavSatFix,
+    Imu,
+}
+
+impl RosKind {
+    const ALL: [Self; 7] = [
+        Self::Pose,
+        Self::PoseWithCovariance,
+        Self::Odometry,
+        Self::Transform,
+        Self::Transforms,
+        Self::NavSatFix,
+        Self::Imu,
+    ];
+
+    /// Name as ROS 1 writes it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Pose => "geometry_msgs/PoseStamped",
+            Self::PoseWithCovariance => "geometry_msgs/PoseWithCovarianceStamped",
+            Self::Odometry => "nav_msgs/Odometry",
+            Self::Transform => "geometry_msgs/TransformStamped",
+            Self::Transforms => "tf2_msgs/TFMessage",
+            Self::NavSatFix => "sensor_msgs/NavSatFix",
+            Self::Imu => "sensor_msgs/Imu",
+        }
+    }
+
+    /// The kind of a schema's name, as `nav_msgs/msg/Odometry`.
+    pub(super) fn of_schema(name: &str) -> Option<Self> {
+        let plain = name.replace("/msg/", "/");
+        let plain = if plain == "tf/tfMessage" { "tf2_msgs/TFMessage" } else { &plain };
+        Self::ALL.into_iter().find(|kind| kind.name() == plain)
+    }
+
+    pub(super) fn has_position(self) -> bool {
+        self != Self::Imu
+    }
+}
+
+/// What a message states.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sample {
+    /// Number of the message in the file, from 1.
+    pub(super) number: usize,
+    /// Stamp of the header.
+    pub(super) stamp_ns: i128,
+    /// Time at which it was recorded.
+    pub(super) recorded_ns: i128,
+    /// x, y, z, or latitude, longitude, height.
+    pub(super) position: Option<[f64; 3]>,
+    /// x, y, z, w.
+    pub(super) rotation: Option<[f64; 4]>,
+    /// Whether a receiver had a fix; true of other messages.
+    pub(super) is_valid: bool,
+}
+
+/// The samples of a message, each with its child frame if it is one of several transforms; `None` if the
+/// message is too short.
+pub(super) fn decode(
+    kind: RosKind,
+    mut decoder: Decoder<'_>,
+    number: usize,
+    recorded_ns: i128,
+) -> Option<Vec<(Option<String>, Sample)>> {
+    let sample = |stamp_ns, position, rotation, is_valid| Sample {
+        number,
+        stamp_ns,
+        recorded_ns,
+        position,
+        rotation,
+        is_valid,
+    };
+    let d = &mut decoder;
+    match kind {
+        RosKind::Transforms => {
+            let count = d.u32()?;
+            let mut samples = Vec::new();
+            for _ in 0..count {
+                let stamp = header_ns(d)?;
+                let child = d.text()?;
+                let (position, rotation) = (d.f64s()?, d.f64s()?);
+                samples.push((Some(child), sample(stamp, Some(position), Some(rotation), true)));
+            }
+            Some(samples)
+        }
+        RosKind::Pose | RosKind::PoseWithCovariance | RosKind::Odometry | RosKind::Transform => {
+            let stamp = header_ns(d)?;
+            if matches!(kind, RosKind::Odometry | RosKind::Transform) {
+                d.text()?;
+            }
+            let (position, rotation) = (d.f64s()?, d.f64s()?);
+            Some(vec![(None, sample(stamp, Some(position), Some(rotation), true))])
+        }
+        RosKind::NavSatFix => {
+            let stamp = header_ns(d)?;
+            let status = d.u8()?.cast_signed();
+            d.u16()?;
+            let position = d.f64s()?;
+            Some(vec![(None, sample(stamp, Some(position), None, status >= 0))])
+        }
+        RosKind::Imu => {
+            let stamp = header_ns(d)?;
+            let rotation = d.f64s()?;
+            let covariance: [f64; 9] = d.f64s()?;
+            // A first element of -1 says that there is no orientation.
+            let has_rotation = covariance[0] != -1.0 && rotation != [0.0; 4];
+            Some(vec![(None, sample(stamp, None, has_rotation.then_some(rotation), true))])
+        }
+    }
+}
+
+/// Stamp of a header, whose frame is passed over.
+fn header_ns(decoder: &mut Decoder<'_>) -> Option<i128> {
+    if decoder.is_ros1 {
+        decoder.u32()?;
+    }
+    let (seconds, nanoseconds) = (decoder.u32()?, decoder.u32()?);
+    decoder.text()?;
+    Some(i128::from(seconds.cast_signed()) * 1_000_000_000 + i128::from(nanoseconds))
+}
