@@ -126,6 +126,10 @@ impl CpuRenderer {
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
         let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
         raster.draw(view, &mut ideal.drawn);
+        if let (Some(_), Some(key)) = (plan.shadows, plan.keys.first()) {
+            let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
+            cast.add_shadows(plan, key, &mut ideal.drawn);
+        }
         IdealBuffer(self.last)
     }
 

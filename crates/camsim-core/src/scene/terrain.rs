@@ -25,6 +25,7 @@ mod lattice;
 mod placed;
 mod query;
 mod select;
+mod sunlit;
 mod terrain_tiles;
 #[cfg(test)]
 mod tests;
@@ -46,6 +47,7 @@ pub use query::Frustum;
 pub use query::TerrainHit;
 pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh};
+pub use sunlit::SunlitBlocks;
 pub use terrain_tiles::TerrainTiles;
 use tree::BlockTree;
 pub use walk::TerrainTriangle;
@@ -103,6 +105,8 @@ pub struct Terrain {
     /// Colour of the terrain beyond the texture (R G B A as stored), given to the outermost texels at every
     /// level. `None` keeps those texels.
     pub beyond: Option<[u8; 4]>,
+    /// Light of the sun and of the sky at each vertex, which the texture contains; empty without shadows.
+    pub light_parts: Vec<[f32; 2]>,
     /// Grid of the vertex positions, metres (a power of two).
     pub quantum_m: f64,
     /// Bounding box of the terrain.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{Mesh, Prefilter, PrefilterTaps, Scene, Wrap},
+    scene::{Light, Mesh, Prefilter, PrefilterTaps, Scene, Wrap},
     temporal::IdealGeometry,
 };
 use glam::{DMat2, DVec2, DVec3, Vec3, Vec4};
@@ -87,6 +87,8 @@ pub(super) struct SurfaceShader<'a> {
     pub fog_per_m: f64,
     /// Meshes that are elsewhere than in the scene.
     pub posed: &'a [PosedMesh],
+    /// The light whose shadows are seen.
+    pub shadows: Option<Light>,
 }
 
 /// The plane of a triangle at a position.
@@ -130,6 +132,22 @@ impl PlanePoint {
     }
 }
 
+/// How a colour turns dark in the shadow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShadowTone {
+    /// Share of the light that is the sky's.
+    pub sky_share: f32,
+    /// The part of the colour that is no reflected light: emission and fog.
+    pub unlit: Vec3,
+}
+
+impl ShadowTone {
+    /// A colour in full light with a share of the sun.
+    pub fn shaded(&self, lit: Vec3, sun: f32) -> Vec3 {
+        self.unlit + (self.sky_share + sun * (1.0 - self.sky_share)) * (lit - self.unlit)
+    }
+}
+
 impl SurfaceShader<'_> {
     /// A mesh where it is.
     pub fn mesh(&self, number: usize) -> &Mesh {
@@ -141,24 +159,34 @@ impl SurfaceShader<'_> {
         Vec3::from_array(self.scene.sky_linear)
     }
 
-    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position. `None` where the ray of the
-    /// position does not meet the plane in front of the camera.
-    pub fn color(&self, triangle: &Triangle, position_px: DVec2) -> Option<Vec4> {
+    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position, with a share of the sun. `None`
+    /// where the ray of the position does not meet the plane in front of the camera.
+    pub fn color(&self, triangle: &Triangle, position_px: DVec2, sun: f64) -> Option<Vec4> {
         let ray = self.camera.ray(position_px);
         match triangle.surface.checked_sub(1) {
-            None => self.terrain_color(triangle, &ray, position_px),
-            Some(mesh) => self.mesh_color(mesh as usize, triangle, &ray, position_px),
+            None => self.terrain_color(triangle, &ray, position_px, sun),
+            Some(mesh) => self.mesh_color(mesh as usize, triangle, &ray, position_px, sun),
         }
     }
 
-    fn terrain_color(&self, triangle: &Triangle, ray: &SceneRay, position_px: DVec2) -> Option<Vec4> {
+    fn terrain_color(
+        &self,
+        triangle: &Triangle,
+        ray: &SceneRay,
+        position_px: DVec2,
+        sun: f64,
+    ) -> Option<Vec4> {
         let terrain = self.scene.terrain.as_ref()?;
         let corners = triangle.corners;
         let points = corners.map(|corner| terrain_position(terrain, triangle.chunk, corner));
         let uvs = corners.map(|corner| uv_of(terrain.vertices[corner as usize].uv));
         let point = PlanePoint::new(points, &self.camera, ray)?;
         let sampling = Sampling { wrap: [Wrap::Clamp; 2], nearest: false, premultiplied: false };
-        let color = self.texture_color(0, &point, uvs, sampling).truncate();
+        let mut color = self.texture_color(0, &point, uvs, sampling).truncate();
+        if sun < 1.0 {
+            let of_sky = terrain.sky_share(corners, point.weights);
+            color *= (of_sky + sun * (1.0 - of_sky)) as f32;
+        }
         Some(self.in_fog(color, &point, position_px).extend(1.0))
     }
 
@@ -168,6 +196,7 @@ impl SurfaceShader<'_> {
         triangle: &Triangle,
         ray: &SceneRay,
         position_px: DVec2,
+        sun: f64,
     ) -> Option<Vec4> {
         let mesh = self.mesh(number);
         let (material, corners) = (&mesh.material, triangle.corners);
@@ -179,8 +208,10 @@ impl SurfaceShader<'_> {
         let texture = self.texture_color(1 + number, &point, uvs, sampling);
         let [r, g, b, tint_alpha] = mesh.tint_at(corners, point.weights);
         let light = self.scene.light.as_ref();
-        let light =
-            light.map_or(1.0, |light| mesh.light_at(light, corners, point.weights, ray.direction_ned));
+        let light = light.map_or(1.0, |light| {
+            let [of_sun, of_sky] = mesh.light_parts_at(light, corners, point.weights, ray.direction_ned);
+            (sun * of_sun + of_sky).clamp(0.0, 1.0)
+        });
         let tint = (light * DVec3::new(r, g, b)).as_vec3();
         let emissive = Vec3::from_array(material.emissive);
         if !material.blends {
@@ -190,6 +221,33 @@ impl SurfaceShader<'_> {
         let color = (texture.truncate() * tint + emissive * texture.w) / texture.w.max(LEAST_ALPHA);
         let alpha = texture.w * tint_alpha.clamp(0.0, 1.0) as f32;
         Some((alpha * self.in_fog(color, &point, position_px)).extend(alpha))
+    }
+
+    /// What a triangle's light at a position is made of.
+    pub fn shadow_tone(&self, triangle: &Triangle, position_px: DVec2) -> Option<ShadowTone> {
+        let ray = self.camera.ray(position_px);
+        let (points, mesh): ([DVec3; 3], _) = match triangle.surface.checked_sub(1) {
+            None => {
+                let terrain = self.scene.terrain.as_ref()?;
+                (triangle.corners.map(|corner| terrain_position(terrain, triangle.chunk, corner)), None)
+            }
+            Some(mesh) => {
+                let mesh = self.mesh(mesh as usize);
+                (triangle.corners.map(|corner| mesh.position_ned_m(corner)), Some(mesh))
+            }
+        };
+        let point = PlanePoint::new(points, &self.camera, &ray)?;
+        let sky_share = match (mesh, &self.scene.terrain, &self.scene.light) {
+            (Some(mesh), _, Some(light)) => {
+                let direction = ray.direction_ned;
+                let [of_sun, of_sky] = mesh.light_parts_at(light, triangle.corners, point.weights, direction);
+                if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }
+            }
+            (None, Some(terrain), _) => terrain.sky_share(triangle.corners, point.weights),
+            _ => 1.0,
+        };
+        let emissive = mesh.map_or(Vec3::ZERO, |mesh| Vec3::from_array(mesh.material.emissive));
+        Some(ShadowTone { sky_share: sky_share as f32, unlit: self.in_fog(emissive, &point, position_px) })
     }
 
     /// Prefiltered texture of a surface.

@@ -13,6 +13,9 @@ use super::moving::PosedMesh;
 /// parameters, relative, and barycentric weight of the corner beside that edge.
 const SAME_EDGE: f64 = 1e-9;
 
+/// A ray parameter before everything, which ends a search.
+const NO_MORE: f64 = -1.0;
+
 /// Trees of boxes over a scene's meshes and over the triangles of their shapes.
 #[derive(Debug)]
 pub(super) struct SceneTrees {
@@ -123,6 +126,54 @@ impl SceneTrees {
         hits.opaque = mesh.or(ground);
         hits.blended.iter_mut().for_each(|hit| hit.t += t_min);
         hits.sort();
+    }
+
+    /// First opaque triangle of a model from `t_min` on, before `limit`, in a scene without blended surfaces.
+    pub fn first_model(
+        &self,
+        scene: &Scene,
+        ray: &SceneRay,
+        t_min: f64,
+        limit: f64,
+    ) -> Option<(f64, Triangle)> {
+        let origin_ned_m = ray.origin_ned_m + t_min * ray.direction_ned;
+        let ray = SceneRay { origin_ned_m, direction_ned: ray.direction_ned };
+        let mut no_layers = Vec::new();
+        let blended = RefCell::new(&mut no_layers);
+        let meet = |number: u32, limit: f64| {
+            let (mesh, shape_from_ned) =
+                (&scene.meshes[number as usize], &self.shape_from_ned[number as usize]);
+            self.meet(number, mesh, shape_from_ned, &ray, limit, &blended)
+        };
+        let hit = self.meshes.first(origin_ned_m, ray.direction_ned, limit - t_min, meet);
+        hit.map(|(t, hit)| (t + t_min, hit.triangle()))
+    }
+
+    /// Whether a ray meets a model that has depth, whichever side of it. Meshes of `posed` are where they are
+    /// there, and not in the scene.
+    pub fn is_blocked(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay) -> bool {
+        let stands = |number: u32, _| {
+            let mesh = &scene.meshes[number as usize];
+            let is_met = self.is_blocked_by(number, mesh, &self.shape_from_ned[number as usize], ray);
+            is_met.then_some((NO_MORE, ()))
+        };
+        self.meshes.first(ray.origin_ned_m, ray.direction_ned, f64::INFINITY, stands).is_some()
+            || posed
+                .iter()
+                .any(|posed| self.is_blocked_by(posed.number, &posed.mesh, &posed.shape_from_ned, ray))
+    }
+
+    fn is_blocked_by(&self, number: u32, mesh: &Mesh, shape_from_ned: &DMat3, ray: &SceneRay) -> bool {
+        let SceneRay { origin_ned_m, direction_ned } = *ray;
+        let origin = *shape_from_ned * (origin_ned_m - mesh.origin_ned_m);
+        let direction = *shape_from_ned * direction_ned;
+        let meet = |triangle: u32, limit: f64| {
+            let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+            let points = corners.map(|corner| mesh.position_ned_m(corner));
+            let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
+            has_depth(mesh, &MeshHit { t, mesh: number, corners, weights }).then_some((NO_MORE, ()))
+        };
+        self.shapes[number as usize].first(origin, direction, f64::INFINITY, meet).is_some()
     }
 
     /// First opaque hit of a mesh before `limit`. Boxes are met in the shape's own axes, triangles where they
