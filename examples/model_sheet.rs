@@ -137,6 +137,8 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         attitude: Default::default(),
         origin: Default::default(),
         height: Default::default(),
+        height_from: Default::default(),
+        topic: None,
         window_s: None,
         speed: 1.0,
     };
@@ -148,6 +150,10 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         scene: Default::default(),
         quality: Default::default(),
         output: Default::default(),
+        imu: Vec::new(),
+        gnss: Vec::new(),
+        barometer: Vec::new(),
+        magnetometer: Vec::new(),
     };
     (scenario.camera.size_px, scenario.camera.focal_px) = (SIZE_PX, [FOCAL_PX; 2]);
     let path = CameraPath::new(

@@ -132,10 +132,9 @@ impl RigFolder<'_> {
         write_rig(self.folder, self.rig).or_failed()?;
         let sequences: Vec<_> = self.loaded.iter().map(|loaded| &*loaded.sequence).collect();
         tables::write_platform(self.folder, &sequences)?;
-        self.loaded
-            .first()
-            .map_or(Ok(()), |loaded| write_sensors(self.folder, &loaded.sensors))
-            .or_failed()?;
+        if let Some(loaded) = self.loaded.first() {
+            write_sensors(self.folder, &loaded.sensors).or_failed()?;
+        }
         self.write_run(jobs, inputs, adapter, false)
     }
 

@@ -74,7 +74,7 @@ pub fn write_fixed(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failu
     let epoch_ns = sequence.platform_epoch_ns();
     let optical = camera_trajectory_csv(ticks.map(|t_s| camera_at(&sequence.path, epoch_ns, t_s)));
     write_atomic(&job.folder.join("camera_trajectory.csv"), optical.as_bytes()).or_failed()?;
-    job.sensors.map_or(Ok(()), |sensors| write_sensors(job.folder, sensors)).or_failed()?;
+    job.sensors.map(|sensors| write_sensors(job.folder, sensors)).transpose().or_failed()?;
     let vibration_hz = sequence.path.highest_vibration_hz();
     if vibration_hz > 0.5 * rate_hz {
         console.warn(format_args!(

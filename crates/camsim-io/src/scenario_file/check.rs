@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 use super::{
-    schema::{Schema, ValueKind},
+    schema::{self, Schema, ValueKind},
     similar,
     tree::{Tree, join},
 };
