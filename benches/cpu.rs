@@ -163,7 +163,7 @@ fn files(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
             bencher.iter_batched(
                 || frame.clone(),
                 |frame| {
-                    let writer = FrameWriter::new(files.clone(), 1);
+                    let mut writer = FrameWriter::new(files.clone(), 1);
                     writer.write(frame).and_then(|()| writer.finish())
                 },
                 criterion::BatchSize::LargeInput,
