@@ -24,13 +24,14 @@ use crate::{
     frame_list::Shard,
     frame_source::FrameSource,
     interrupt,
-    progress::{frames_bar, waiting},
+    progress::frames_bar,
 };
 
 mod findings;
 mod folder;
 mod outcome;
 mod pictures;
+mod planning;
 mod rig;
 mod tables;
 mod tracks;
@@ -40,6 +41,7 @@ use folder::FolderState;
 pub use folder::{Lock, refuse_others, refuse_unknown};
 pub use outcome::Outcome;
 use pictures::{JobPictures, Pictures, Series};
+use planning::plan_first;
 #[cfg(feature = "viewer")]
 pub use rig::resume_command;
 pub use rig::{RigFolder, Selected};
@@ -127,29 +129,6 @@ pub fn run(
     console.set_camera(None);
     rig.map_or(Ok(()), |rig| rig.write_end(jobs, &inputs, &adapter))?;
     Ok(outcome)
-}
-
-/// Plans the first of the pictures that a run renders; returns the time it takes. `is_planned`: the planner of
-/// `source` is theirs.
-fn plan_first(
-    job: &Job<'_>,
-    pictures: &Pictures,
-    is_planned: bool,
-    source: &dyn FrameSource,
-    console: &Console<'_>,
-) -> Result<Duration, Failure> {
-    let begin = Instant::now();
-    let first = |series: &Series| todo(job, series).first().copied();
-    if let Some((series, frame)) = pictures.series.iter().find_map(|series| Some((series, first(series)?))) {
-        let waiting = waiting("planning the first frame", console.is_quiet());
-        let planned = match is_planned {
-            true => source.planner().plan(frame),
-            false => source.planner_of(&series.sequence).and_then(|planner| planner.plan(frame)),
-        };
-        waiting.finish_and_clear();
-        planned.or_bad_input()?;
-    }
-    Ok(begin.elapsed())
 }
 
 /// Frames of this run's shard.
