@@ -156,7 +156,7 @@ fn time_reader(message: &Message<'_>) -> Result<impl Fn(&[u8]) -> Option<i128> +
         .ok_or_else(|| format!("`{}` has no time (TimeUS)", message.name))?;
     Ok(move |record: &[u8]| {
         let time = column.read(record);
-        (time.is_finite() && time < 9e15).then(|| (time * unit_ns) as i128)
+        (time.is_finite() && time < 9e15).then_some((time * unit_ns) as i128)
     })
 }
 

@@ -125,9 +125,12 @@ fn damaged_files_give_no_panic_and_no_silent_loss() {
     }
 }
 
-/// A ULog file with `vehicle_local_position` and `vehicle_attitude`; rows of time (us), x, y, z, valid, and
-/// counter of resets, with a level attitude each.
-fn ulog(rows: &[(u64, [f32; 3], u8, u8)]) -> Vec<u8> {
+/// Time (us), x, y, z, whether it is valid, and the counter of resets.
+type LocalPosition = (u64, [f32; 3], u8, u8);
+
+/// A ULog file with `vehicle_local_position` and `vehicle_attitude`, each row
+/// with a level attitude.
+fn ulog(rows: &[LocalPosition]) -> Vec<u8> {
     let mut bytes = b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec();
     let mut message = |kind: u8, body: &[u8]| {
         bytes.extend(u16::try_from(body.len()).unwrap().to_le_bytes());
@@ -157,7 +160,7 @@ fn ulog(rows: &[(u64, [f32; 3], u8, u8)]) -> Vec<u8> {
     bytes
 }
 
-fn straight(count: u64) -> Vec<(u64, [f32; 3], u8, u8)> {
+fn straight(count: u64) -> Vec<LocalPosition> {
     (0..count).map(|i| (1_000_000 + i * 100_000, [i as f32, 0.0, -50.0], 1, 0)).collect()
 }
 
@@ -167,7 +170,7 @@ fn px4_logs_tell_gaps_resets_and_disorder() {
     let clean = read_named("a.ulg", &ulog(&straight(100)), &auto()).unwrap();
     assert_eq!((clean.rows.len(), warnings(&clean).as_str(), clean.report.is_clean()), (100, "", true));
     assert!((clean.rows[99].position_ned_m - DVec3::new(99.0, 0.0, -50.0)).length() < 1e-6);
-    let told = |what: &str, change: &dyn Fn(&mut Vec<(u64, [f32; 3], u8, u8)>), word: &str| {
+    let told = |what: &str, change: &dyn Fn(&mut Vec<LocalPosition>), word: &str| {
         let mut rows = straight(100);
         change(&mut rows);
         match read_named("a.ulg", &ulog(&rows), &auto()) {

@@ -249,7 +249,7 @@ pub(super) fn time_field(topic: &Topic<'_>) -> Result<UlogField, String> {
 /// Nanoseconds of a time in microseconds.
 pub(super) fn time_ns(microseconds: f64) -> Option<i128> {
     (microseconds.is_finite() && microseconds > 0.0 && microseconds < 9e15)
-        .then(|| (microseconds * 1e3) as i128)
+        .then_some((microseconds * 1e3) as i128)
 }
 
 /// Name of a topic with its instance.
