@@ -31,6 +31,7 @@ mod planes;
 mod ray;
 mod render;
 mod shading;
+mod shadow;
 mod terrain_pyramid;
 mod timing;
 mod truth;
@@ -107,6 +108,8 @@ pub struct Hit {
     pub texture_uv: [f64; 2],
     /// Factor on the texture's colour at the point.
     pub tint: [f64; 3],
+    /// Share of the light in it that is left in the shadow.
+    pub sky_share: f64,
     /// Unit normal of the triangle, NED, on the side that the ray comes from; 0 for a triangle without area.
     pub normal_ned: DVec3,
     /// 0 = terrain, 1 + i = mesh i of the scene.
@@ -233,8 +236,8 @@ impl Oracle {
             .and_then(|(terrain, terrain_pyramid)| terrain_pyramid.first(terrain, ray, f64::INFINITY))
     }
 
-    /// Linear light of one hit, with fog by slant range. In a scene without blended surfaces this is all the
-    /// light of the ray; [`Oracle::radiance`] includes blended layers.
+    /// Linear light of one hit, with fog by slant range. In a scene without blended surfaces and shadows this
+    /// is all the light of the ray; [`Oracle::radiance`] includes both.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
         self.shading.color(hit, uv.extend(1.0).length())
@@ -253,7 +256,7 @@ impl Oracle {
         let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
         let direction = pose.ned_from_camera * way;
         if !self.blends {
-            let hit = self.cast_at(t_s, pose.position_ned_m, direction);
+            let hit = self.cast_at(t_s, pose.position_ned_m, direction).map(|hit| self.in_light(t_s, hit));
             return self.shading.color(hit.as_ref(), range_per_depth);
         }
         let Some(ray) = Ray::new(pose.position_ned_m, direction) else {
@@ -269,9 +272,11 @@ impl Oracle {
         let (mut sum, mut left) = (DVec3::ZERO, 1.0);
         for layer in &layers {
             let alpha = layer.alpha.clamp(0.0, 1.0);
-            sum += left * alpha * self.shading.color(Some(&layer.hit), range_per_depth);
+            let hit = self.in_light(t_s, layer.hit);
+            sum += left * alpha * self.shading.color(Some(&hit), range_per_depth);
             left *= 1.0 - alpha;
         }
+        let solid = solid.map(|hit| self.in_light(t_s, hit));
         sum + left * self.shading.color(solid.as_ref(), range_per_depth)
     }
 

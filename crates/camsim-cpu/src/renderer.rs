@@ -118,7 +118,7 @@ impl CpuRenderer {
         ideal.size_px = plan.ideal.size_px;
         ideal.cast.clear();
         let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
-        if self.general_only || !(self.rasterises && is_plain) {
+        if self.general_only || !(self.rasterises && is_plain) || plan.shadows.is_some() {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
             return IdealBuffer(self.last);

@@ -13,7 +13,7 @@ use crate::ir::{
     motion::Motion,
     predicted::Predicted,
     skip::Skip,
-    stages::{BlurStage, EdgeStage, PrefilterTaps, RayStage, TemporalStage},
+    stages::{BlurStage, EdgeStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
 };
 use passes::passes;
 use prediction::write_prediction;
@@ -58,6 +58,8 @@ pub struct PlanSummary<'a> {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
+    /// Shadows of the sun.
+    pub shadows: Option<ShadowStage>,
     /// What reads the surfaces' pictures for the ideal frame.
     pub surface_reads: PrefilterTaps,
     /// Samples of each pixel of the ideal frame.
@@ -105,6 +107,7 @@ impl FramePlan {
             temporal: self.temporal,
             blur: self.blur,
             edges: self.edges,
+            shadows: self.shadows,
             surface_reads: self.surface_reads,
             samples_a_pixel: self.samples_a_pixel,
             taps: self.taps,

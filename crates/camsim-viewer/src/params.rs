@@ -321,7 +321,7 @@ pub const PARAMS: &[Param] = &[
         "azimuth of the sun, east of north; without a light the scene is unshaded",
     ),
     param("scene.light.sun_elevation_deg", "deg", [0.0, 90.0], 0.2, "elevation of the sun above the horizon"),
-    param("scene.light.sun", "x", [0.0, 1.0], 0.005, "direct light on surfaces facing the sun; no shadows"),
+    param("scene.light.sun", "x", [0.0, 1.0], 0.005, "direct light on surfaces facing the sun"),
     param(
         "scene.light.sky",
         "x",
@@ -329,6 +329,7 @@ pub const PARAMS: &[Param] = &[
         0.005,
         "diffuse light on upward surfaces, half of it on walls; sun + sky is at most 1",
     ),
+    param("scene.light.shadows", "", ANY, 1.0, "whether terrain and models keep the sun from what is behind"),
     param("quality.preset", "", ANY, 1.0, "paper: the methods as published, for comparison"),
     param(
         "quality.max_error_px",

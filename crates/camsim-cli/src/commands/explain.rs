@@ -396,10 +396,11 @@ fn print_source(
 /// Prints the light, with its errors that are not predicted.
 fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
-    let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
+    let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky, shadows } = light;
     let from = format!(
         "light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky \
-         {sky}"
+         {sky}, {}",
+        if *shadows { "with shadows" } else { "without shadows" }
     );
     let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
         (Some(summary), Some(terrain)) => {

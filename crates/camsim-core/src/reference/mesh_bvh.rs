@@ -211,27 +211,60 @@ impl MeshBvh {
         if cover.one_sided && (b - a).cross(c - a).dot(ray.direction) >= 0.0 {
             return None;
         }
-        let vertices = [0, 1, 2]
-            .map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
-        let [red, green, blue, alpha]: [f64; 4] = [0, 1, 2, 3]
-            .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].tint[k])).sum());
-        let uv = vertices.map(|vertex| vertex.uv);
-        let hit = hit_at(ray, t, weights, uv, triangle.corners, triangle.surface);
+        let (uv, [red, green, blue, alpha]) = values_at(cover, triangle, weights);
+        let hit = hit_at(ray, t, uv, triangle.corners, triangle.surface);
         let alpha = cover.holes.as_ref().map_or(1.0, |(coat, _)| coat.alpha_at(hit.texture_uv) * alpha);
-        let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray));
-        Some((Hit { tint: [red, green, blue].map(|part| part * lit), ..hit }, alpha))
+        let [of_sun, of_sky] =
+            self.light.map_or([0.0, 1.0], |light| lit(&light, cover, triangle, weights, ray));
+        let lit = of_sun + of_sky;
+        let sky_share = if of_sun > 0.0 { of_sky / lit } else { 1.0 };
+        Some((Hit { tint: [red, green, blue].map(|part| part * lit), sky_share, ..hit }, alpha))
     }
+
+    /// Whether a ray meets a surface that has depth, of either side.
+    pub(super) fn blocks(&self, ray: &Ray) -> bool {
+        let mut is_met = false;
+        self.walk(ray, f64::INFINITY, |triangle, limit| {
+            let (t, weights) = intersect_triangle(triangle.corners.map(|corner| ray.shear(corner)), limit)?;
+            let cover = self.cover(triangle);
+            let stops = |(coat, cutoff): &(SurfaceTexture, f64)| {
+                let (uv, tint) = values_at(cover, triangle, weights);
+                coat.alpha_at(uv) * tint[3] >= *cutoff
+            };
+            is_met |= t > 0.0 && cover.holes.as_ref().is_none_or(stops);
+            // Nothing is nearer than this.
+            is_met.then_some(f64::NEG_INFINITY)
+        });
+        is_met
+    }
+}
+
+/// Texture coordinates and tint at a point of a triangle.
+fn values_at(cover: &MeshSurface, triangle: &MeshTriangle, weights: [f64; 3]) -> ([f64; 2], [f64; 4]) {
+    let vertices =
+        [0, 1, 2].map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
+    let tint = [0, 1, 2, 3]
+        .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].tint[k])).sum());
+    let uv = [0, 1]
+        .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].uv[k])).sum());
+    (uv, tint)
 }
 
 fn has_alpha(mesh: &Mesh) -> bool {
     mesh.material.blends || mesh.material.cutoff.is_some()
 }
 
-/// Factor of the light reflected at a point of a triangle towards the ray's origin (Lambert): the sun by the
-/// cosine of its angle, the sky by the share of it that the surface faces.
-fn lit(light: &Light, cover: &MeshSurface, triangle: &MeshTriangle, weights: [f64; 3], ray: &Ray) -> f64 {
+/// Factors of the light of sun and sky reflected at a point of a triangle towards the ray's origin (Lambert):
+/// the sun by the cosine of its angle, the sky by the share of it that the surface faces.
+fn lit(
+    light: &Light,
+    cover: &MeshSurface,
+    triangle: &MeshTriangle,
+    weights: [f64; 3],
+    ray: &Ray,
+) -> [f64; 2] {
     if cover.normals.is_empty() {
-        return 1.0;
+        return [0.0, 1.0];
     }
     let [a, b, c] = triangle.corners;
     let from_behind = (b - a).cross(c - a).dot(ray.direction) >= 0.0;
@@ -241,7 +274,7 @@ fn lit(light: &Light, cover: &MeshSurface, triangle: &MeshTriangle, weights: [f6
     let normal = ray.ned_from_ray.map_or(normal, |turn| turn * normal);
     let of_sun = light.to_sun_ned.dot(normal).max(0.0);
     let of_sky = 0.5 + 0.5 * -normal.z;
-    light.sun * of_sun + light.sky * of_sky
+    [light.sun * of_sun, light.sky * of_sky]
 }
 
 /// World normals of a shape's vertices: the cross product of two transformed tangents. (The other renderers
@@ -265,20 +298,18 @@ fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
 pub(super) fn hit_at(
     ray: &Ray,
     t: f64,
-    weights: [f64; 3],
-    uv: [[f32; 2]; 3],
+    texture_uv: [f64; 2],
     [a, b, c]: [DVec3; 3],
     surface: u32,
 ) -> Hit {
     let normal = (b - a).cross(c - b).normalize_or_zero();
     let normal_ned = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-    let texture_uv =
-        [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
     Hit {
         point_ned_m: ray.origin + t * ray.direction,
         depth_m: t,
         texture_uv,
         tint: [1.0; 3],
+        sky_share: 1.0,
         normal_ned,
         surface,
     }

@@ -37,14 +37,19 @@ impl MovingMeshes {
     pub(super) fn first(&self, ray: &Ray, t_s: f64, limit: f64, solid: bool) -> Option<Hit> {
         let back = self.ray_at_start(ray, t_s)?;
         let hit = if solid { self.bvh.first_solid(&back, limit) } else { self.bvh.first(&back, limit) };
-        hit.map(|hit| now(hit, ray))
+        hit.map(|hit| now(hit, ray, &back))
+    }
+
+    /// Whether a ray meets a surface that has depth at path time `t_s`.
+    pub(super) fn blocks(&self, ray: &Ray, t_s: f64) -> bool {
+        self.ray_at_start(ray, t_s).is_some_and(|back| self.bvh.blocks(&back))
     }
 
     /// All intersections with blended surfaces at path time `t_s`, before `limit`.
     pub(super) fn layers(&self, ray: &Ray, t_s: f64, limit: f64) -> Vec<BlendLayer> {
         let Some(back) = self.ray_at_start(ray, t_s) else { return Vec::new() };
         let mut layers = self.bvh.layers(&back, limit);
-        layers.iter_mut().for_each(|layer| layer.hit = now(layer.hit, ray));
+        layers.iter_mut().for_each(|layer| layer.hit = now(layer.hit, ray, &back));
         layers
     }
 
@@ -58,7 +63,8 @@ impl MovingMeshes {
     }
 }
 
-/// A hit with its point where it is now.
-fn now(hit: Hit, ray: &Ray) -> Hit {
-    Hit { point_ned_m: ray.origin + hit.depth_m * ray.direction, ..hit }
+/// A hit of the ray `back` with its point and its normal as they are now.
+fn now(hit: Hit, ray: &Ray, back: &Ray) -> Hit {
+    let normal_ned = back.ned_from_ray.map_or(hit.normal_ned, |turn| turn * hit.normal_ned);
+    Hit { point_ned_m: ray.origin + hit.depth_m * ray.direction, normal_ned, ..hit }
 }

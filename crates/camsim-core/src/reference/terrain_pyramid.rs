@@ -91,6 +91,27 @@ impl TerrainPyramid {
         best
     }
 
+    /// Whether a ray meets the surface.
+    pub(super) fn blocks(&self, terrain: &Terrain, ray: &Ray) -> bool {
+        let mut stack = vec![(self.levels.len() as u32 - 1, [0_u32; 2])];
+        while let Some((level, at)) = stack.pop() {
+            if self.enter(level, at, ray, f64::INFINITY).is_none() {
+                continue;
+            }
+            let Some(below) = level.checked_sub(1) else {
+                if first_in_block(terrain, at, ray, f64::INFINITY).is_some() {
+                    return true;
+                }
+                continue;
+            };
+            let size = self.levels[below as usize].size;
+            let children = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| [2 * at[0] + x, 2 * at[1] + y]);
+            let there = children.into_iter().filter(|child| child[0] < size[0] && child[1] < size[1]);
+            stack.extend(there.map(|child| (below, child)));
+        }
+        false
+    }
+
     fn enter(&self, level: u32, [x, y]: [u32; 2], ray: &Ray, limit: f64) -> Option<f64> {
         let level = &self.levels[level as usize];
         let bounds = &level.boxes[(y * level.size[0] + x) as usize];
@@ -143,10 +164,19 @@ fn first_in_block(terrain: &Terrain, block: [u32; 2], ray: &Ray, mut limit: f64)
     }
     let (t, weights, corners) = best?;
     let span = &terrain.chunks[chunk as usize];
-    let uv = corners.map(|[i, j]| {
+    let vertices = corners.map(|[i, j]| {
         let [i, j] = [i0 + i as u32, j0 + j as u32];
-        terrain.vertices[(span.first_vertex + j * (span.cells[0] + 1) + i) as usize].uv
+        (span.first_vertex + j * (span.cells[0] + 1) + i) as usize
     });
+    let between = |value: &dyn Fn(usize) -> f32| {
+        (0..3).map(|corner| weights[corner] * f64::from(value(vertices[corner]))).sum::<f64>()
+    };
+    let uv = [0, 1].map(|k: usize| between(&|vertex| terrain.vertices[vertex].uv[k]));
     let corners = corners.map(|[i, j]| terrain.position_ned_m(chunk, i0 + i as u32, j0 + j as u32));
-    Some(hit_at(ray, t, weights, uv, corners, TERRAIN))
+    let hit = hit_at(ray, t, uv, corners, TERRAIN);
+    if terrain.light_parts.is_empty() {
+        return Some(hit);
+    }
+    let [of_sun, of_sky] = [0, 1].map(|k: usize| between(&|vertex| terrain.light_parts[vertex][k]));
+    Some(Hit { sky_share: if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }, ..hit })
 }

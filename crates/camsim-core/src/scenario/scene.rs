@@ -33,7 +33,7 @@ pub struct SceneSpec {
     pub light: Option<LightSpec>,
 }
 
-/// `scene.light`: factor on the colours of terrain and models, without shadows.
+/// `scene.light`: factor on the colours of terrain and models.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightSpec {
@@ -45,11 +45,14 @@ pub struct LightSpec {
     pub sun: f64,
     /// Factor of the sky on a surface that faces upwards; half of it on walls.
     pub sky: f64,
+    /// Whether terrain and models keep the sun from what is behind them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub shadows: bool,
 }
 
 impl Default for LightSpec {
     fn default() -> Self {
-        Self { sun_azimuth_deg: 180.0, sun_elevation_deg: 45.0, sun: 0.8, sky: 0.2 }
+        Self { sun_azimuth_deg: 180.0, sun_elevation_deg: 45.0, sun: 0.8, sky: 0.2, shadows: false }
     }
 }
 

@@ -1,13 +1,17 @@
 //! Sun and sky light with the Lambert model: the factor on the colour of a surface.
 //!
 //! `I(n) = sun max(0, n.s) + sky (1 + n.up) / 2`, with s towards the sun. A surface facing the sun gets `sun`
-//! of its albedo, a surface facing upwards all of `sky`. There are no shadows and no gloss, so the factor
-//! depends on the surface point and its side only; a point has the same brightness from everywhere and at all
-//! times.
+//! of its albedo, a surface facing upwards all of `sky`. There is no gloss, so the factor depends on the
+//! surface point and its side only; a point has the same brightness from everywhere and, unless the shadow of
+//! something that moves passes over it, at all times.
+//!
+//! With shadows the first term is dropped where anything lies between the point and the sun, and where the
+//! triangle faces away from the sun, whatever its vertices' normals.
 //!
 //! Meshes interpolate the normals of their vertices and evaluate I for the result *without normalising it*: I
 //! then differs by at most `sun + sky / 2` times the difference of the normals, which bounds the error of the
-//! levels of detail. On the terrain, light is baked into the texture.
+//! levels of detail. On the terrain, light is baked into the texture; in its shadows the texture is multiplied by
+//! the share of the light that is the sky's ([`Terrain::sky_share`](super::Terrain::sky_share)).
 
 use glam::{DMat3, DVec3};
 
@@ -24,6 +28,8 @@ pub struct Light {
     pub sun: f64,
     /// Factor added by the sky to a surface that faces upwards; 0..=1, together with the sun at most 1.
     pub sky: f64,
+    /// Whether surfaces keep the sun from what is behind them.
+    pub shadows: bool,
 }
 
 impl Light {
@@ -33,15 +39,30 @@ impl Light {
         let (sin, cos) = azimuth_rad.sin_cos();
         let to_sun_ned =
             DVec3::new(elevation_rad.cos() * cos, elevation_rad.cos() * sin, -elevation_rad.sin());
-        Self { to_sun_ned, sun, sky }
+        Self { to_sun_ned, sun, sky, shadows: false }
+    }
+
+    /// The same light with shadows, or without.
+    #[must_use]
+    pub fn with_shadows(self, shadows: bool) -> Self {
+        Self { shadows, ..self }
     }
 
     /// Factor on the colour of a surface with this outward normal, 0..=1. An interpolated normal is shorter
     /// than a unit vector.
     #[must_use]
     pub fn factor(&self, normal_ned: DVec3) -> f64 {
-        (self.sun * normal_ned.dot(self.to_sun_ned).max(0.0) + self.sky * 0.5 * (1.0 - normal_ned.z))
-            .clamp(0.0, 1.0)
+        let [of_sun, of_sky] = self.parts(normal_ned);
+        (of_sun + of_sky).clamp(0.0, 1.0)
+    }
+
+    /// The parts of the factor that are the sun's and the sky's.
+    #[must_use]
+    pub fn parts(&self, normal_ned: DVec3) -> [f64; 2] {
+        [
+            self.sun * normal_ned.dot(self.to_sun_ned).max(0.0),
+            self.sky * 0.5 * (1.0 - normal_ned.z),
+        ]
     }
 }
 

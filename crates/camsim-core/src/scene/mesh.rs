@@ -294,13 +294,25 @@ impl Mesh {
 
     /// Interpolated light factor in a triangle on the side seen along a direction; 1 without normals.
     pub fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
+        let [of_sun, of_sky] = self.light_parts_at(light, corners, weights, direction_ned);
+        (of_sun + of_sky).clamp(0.0, 1.0)
+    }
+
+    /// The parts of [`Mesh::light_at`] that are the sun's and the sky's; 0 and 1 without normals.
+    pub fn light_parts_at(
+        &self,
+        light: &Light,
+        corners: [u32; 3],
+        weights: [f64; 3],
+        direction_ned: DVec3,
+    ) -> [f64; 2] {
         if !self.shape.has_normals() {
-            return 1.0;
+            return [0.0, 1.0];
         }
         let outward: DVec3 = (0..3).map(|k| weights[k] * self.normal_ned(corners[k])).sum();
         let [a, b, c] = corners.map(|v| self.position_ned_m(v));
         let is_front = (b - a).cross(c - a).dot(direction_ned) < 0.0;
-        light.factor(if is_front { outward } else { -outward })
+        light.parts(if is_front { outward } else { -outward })
     }
 
     /// World normal of a vertex.

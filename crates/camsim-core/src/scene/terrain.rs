@@ -103,6 +103,8 @@ pub struct Terrain {
     /// Colour of the terrain beyond the texture (R G B A as stored), given to the outermost texels at every
     /// level. `None` keeps those texels.
     pub beyond: Option<[u8; 4]>,
+    /// Light of the sun and of the sky at each vertex, which the texture contains; empty without shadows.
+    pub light_parts: Vec<[f32; 2]>,
     /// Grid of the vertex positions, metres (a power of two).
     pub quantum_m: f64,
     /// Bounding box of the terrain.

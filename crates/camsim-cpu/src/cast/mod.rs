@@ -22,6 +22,7 @@ use crate::general::{FineSamples, IdealImage};
 mod mips;
 mod moving;
 mod shade;
+mod shadow;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -29,6 +30,7 @@ mod trace;
 use mips::MipChain;
 pub use moving::{Instant, MovingCaster, RayScratch};
 use shade::{KeyCamera, SurfaceShader};
+use shadow::{SeenLight, SurfaceSuns, share_of_sun};
 use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -82,9 +84,10 @@ impl CastScene {
     pub fn draw(&self, plan: &FramePlan, key: &KeyFrame) -> IdealImage {
         let frame = FrameCaster::new(self, plan, key, 1);
         let size_px = plan.ideal.size_px;
+        let border_rays = plan.shadows.map_or(0, |shadows| shadows.border_rays);
         let (mut color_rgba, inverse_depth) = match plan.samples_a_pixel {
-            0 | 1 => frame.centres(size_px),
-            _ => frame.sample_means(size_px),
+            0 | 1 => frame.centres(size_px, border_rays),
+            _ => frame.sample_means(size_px, border_rays),
         };
         if plan.preset == Preset::Paper {
             color_rgba.par_iter_mut().for_each(|value| *value = stored(*value));
@@ -114,7 +117,10 @@ impl CastScene {
                 let depth = |pixel: usize| (!read[pixel]).then_some([inverse_depth[pixel]; SAMPLES]);
                 (frame.sample_depths(size_px, depth), Vec::new())
             }
-            _ => frame.samples(size_px.map(|side| side * scale)),
+            _ => {
+                let border_rays = plan.shadows.map_or(0, |shadows| shadows.border_rays);
+                frame.samples(size_px.map(|side| side * scale), border_rays)
+            }
         };
         FineSamples::new(size_px, inverse_depth, (scale, thin), depths, colors)
     }
@@ -143,6 +149,8 @@ struct TriangleShare {
     triangle: Triangle,
     /// A bit for each sample.
     samples: u8,
+    /// Sum of their shares of the sun.
+    sun: f64,
     /// Linear R G B times alpha, and alpha; once it is needed.
     color: Option<glam::Vec4>,
 }
@@ -160,63 +168,38 @@ impl<'a> FrameCaster<'a> {
             reads: plan.surface_reads,
             fog_per_m: visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
             posed: &[],
+            shadows: scene.light.filter(|_| plan.shadows.is_some()),
         };
         Self { trees: &cast.trees, shader }
     }
 
     /// Linear R G B A and inverse depth at the centres of all pixels.
-    fn centres(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
-        let (width, height) = (width as usize, height as usize);
-        let mut color = vec![[0.0; 4]; width * height];
-        let mut depth = vec![0.0; width * height];
-        color.par_chunks_mut(width).zip(depth.par_chunks_mut(width)).enumerate().for_each_init(
-            PixelScratch::default,
-            |scratch, (y, (color, depth))| {
-                for (x, (color, depth)) in color.iter_mut().zip(depth).enumerate() {
-                    let linear;
-                    (linear, *depth) = self.middle(DVec2::new(x as f64, y as f64), &mut scratch.hits[0]);
-                    *color = linear.extend(1.0).to_array();
-                }
-            },
-        );
+    fn centres(&self, size_px: [u32; 2], border_rays: u32) -> (Vec<f32>, Vec<f32>) {
+        let pixels = self.pixels(size_px, border_rays, |middle_px, scratch, suns| {
+            let (color, depth, seen) = self.middle(middle_px, &mut scratch.hits[0], suns);
+            ((color.extend(1.0).to_array(), depth), seen)
+        });
+        let (color, depth): (Vec<[f32; 4]>, Vec<f32>) = pixels.into_par_iter().unzip();
         (color.into_flattened(), depth)
     }
 
     /// Linear R G B A of all pixels as means over their samples, and inverse depth at their centres.
-    fn sample_means(&self, size_px: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
-        let [width, height] = size_px.map(|side| side as usize);
-        let mut color = vec![[0.0; 4]; width * height];
-        let mut samples = vec![[0.0; SAMPLES]; width * height];
-        color.par_chunks_mut(width).zip(samples.par_chunks_mut(width)).enumerate().for_each_init(
-            PixelScratch::default,
-            |scratch, (y, (color, depths))| {
-                for (x, (color, depths)) in color.iter_mut().zip(depths).enumerate() {
-                    let colors;
-                    (colors, *depths) = self.pixel_samples(DVec2::new(x as f64, y as f64), scratch);
-                    let [a, b, c, d] = colors;
-                    *color = (0.25 * ((a + d) + (b + c))).extend(1.0).to_array();
-                }
-            },
-        );
+    fn sample_means(&self, size_px: [u32; 2], border_rays: u32) -> (Vec<f32>, Vec<f32>) {
+        let pixels = self.pixels(size_px, border_rays, |middle_px, scratch, suns| {
+            let ([a, b, c, d], depths, seen) = self.pixel_samples(middle_px, scratch, suns);
+            (((0.25 * ((a + d) + (b + c))).extend(1.0).to_array(), depths), seen)
+        });
+        let (color, samples): (Vec<[f32; 4]>, Vec<[f32; SAMPLES]>) = pixels.into_par_iter().unzip();
         (color.into_flattened(), centre_depths(size_px, &samples))
     }
 
     /// Inverse depths and colours of the samples of all pixels.
-    fn samples(&self, [width, height]: [u32; 2]) -> (Vec<[f32; SAMPLES]>, Vec<SampleColors>) {
-        let (width, height) = (width as usize, height as usize);
-        let mut depths = vec![[0.0; SAMPLES]; width * height];
-        let mut colors = vec![[[f16::ZERO; 3]; SAMPLES]; width * height];
-        depths.par_chunks_mut(width).zip(colors.par_chunks_mut(width)).enumerate().for_each_init(
-            PixelScratch::default,
-            |scratch, (y, (depths, colors))| {
-                for (x, (depths, halves)) in depths.iter_mut().zip(colors).enumerate() {
-                    let colors;
-                    (colors, *depths) = self.pixel_samples(DVec2::new(x as f64, y as f64), scratch);
-                    *halves = colors.map(|color| color.to_array().map(f16::from_f32));
-                }
-            },
-        );
-        (depths, colors)
+    fn samples(&self, size_px: [u32; 2], border_rays: u32) -> (Vec<[f32; SAMPLES]>, Vec<SampleColors>) {
+        let pixels = self.pixels(size_px, border_rays, |middle_px, scratch, suns| {
+            let (colors, depths, seen) = self.pixel_samples(middle_px, scratch, suns);
+            ((depths, colors.map(|color| color.to_array().map(f16::from_f32))), seen)
+        });
+        pixels.into_par_iter().unzip()
     }
 
     /// Inverse depths of the samples of all pixels whose depths are not known.
@@ -258,41 +241,63 @@ impl<'a> FrameCaster<'a> {
         }
     }
 
-    /// Linear R G B and inverse depth (1/m) of the ray of a position.
-    fn middle(&self, position_px: DVec2, hits: &mut Hits) -> (Vec3, f32) {
+    /// Linear R G B and inverse depth (1/m) of the ray of a position, and what light it sees. The share of the
+    /// sun is that of the ray, or from `suns`.
+    fn middle(
+        &self,
+        position_px: DVec2,
+        hits: &mut Hits,
+        suns: Option<&SurfaceSuns>,
+    ) -> (Vec3, f32, SeenLight) {
         self.trace(position_px, hits);
-        let (mut sum, mut left) = (Vec3::ZERO, 1.0);
+        let ray = self.shader.camera.ray(position_px);
+        let (mut sum, mut left, mut seen) = (Vec3::ZERO, 1.0, SeenLight::default());
+        let mut color = |triangle: &Triangle, t: f64| {
+            let sun = self.sun(triangle, t, &ray);
+            seen.add(triangle.surface, sun);
+            self.shader.color(triangle, position_px, share_of_sun(triangle.surface, sun, suns))
+        };
         for hit in &hits.blended {
-            let Some(color) = self.shader.color(&hit.triangle(), position_px) else { continue };
+            let Some(color) = color(&hit.triangle(), hit.t) else { continue };
             sum += left * color.truncate();
             left *= 1.0 - color.w;
             if left < HIDDEN {
-                return (sum, self.inverse_depth(hits));
+                return (sum, self.inverse_depth(hits), seen);
             }
         }
-        let opaque = self.opaque_triangle(hits, &self.shader.camera.ray(position_px));
-        let color = opaque.and_then(|triangle| self.shader.color(&triangle, position_px));
+        let opaque = self.opaque_triangle(hits, &ray).zip(hits.opaque);
+        let color = opaque.and_then(|(triangle, hit)| color(&triangle, hit.t()));
         let behind = color.map_or(self.shader.sky(), |color| color.truncate());
-        (sum + left * behind, self.inverse_depth(hits))
+        (sum + left * behind, self.inverse_depth(hits), seen)
     }
 
-    /// Linear R G B and inverse depths (1/m) of a pixel's samples. Each triangle is shaded once: at the mean
-    /// place of the samples that show it where its texture ends with it, else at the pixel's middle.
+    /// Linear R G B and inverse depths (1/m) of a pixel's samples, and what light they see. Each triangle is
+    /// shaded once: at the mean place of the samples that show it where its texture ends with it, else at the
+    /// pixel's middle; with the mean of their shares of the sun, or that from `suns`.
     fn pixel_samples(
         &self,
         middle_px: DVec2,
         scratch: &mut PixelScratch,
-    ) -> ([Vec3; SAMPLES], [f32; SAMPLES]) {
+        suns: Option<&SurfaceSuns>,
+    ) -> ([Vec3; SAMPLES], [f32; SAMPLES], SeenLight) {
         let PixelScratch { hits, shares } = scratch;
         shares.clear();
-        let mut opaque = [None; SAMPLES];
+        let (mut opaque, mut seen) = ([None; SAMPLES], SeenLight::default());
         for (k, (hits, place)) in hits.iter_mut().zip(SAMPLE_POSITIONS).enumerate() {
             self.trace(middle_px + place, hits);
-            opaque[k] = self.opaque_triangle(hits, &self.shader.camera.ray(middle_px + place));
-            for triangle in hits.blended.iter().map(|hit| hit.triangle()).chain(opaque[k]) {
+            let ray = self.shader.camera.ray(middle_px + place);
+            opaque[k] = self.opaque_triangle(hits, &ray);
+            let first = opaque[k].zip(hits.opaque).map(|(triangle, hit)| (triangle, hit.t()));
+            for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(first) {
+                let sun = self.sun(&triangle, t, &ray);
+                seen.add(triangle.surface, sun);
+                let sun = share_of_sun(triangle.surface, sun, suns);
                 match shares.iter_mut().find(|share| share.triangle == triangle) {
-                    Some(share) => share.samples |= 1 << k,
-                    None => shares.push(TriangleShare { triangle, samples: 1 << k, color: None }),
+                    Some(share) => {
+                        share.samples |= 1 << k;
+                        share.sun += sun;
+                    }
+                    None => shares.push(TriangleShare { triangle, samples: 1 << k, sun, color: None }),
                 }
             }
         }
@@ -316,7 +321,7 @@ impl<'a> FrameCaster<'a> {
             let color = opaque[k].and_then(&mut color);
             sum + left * color.map_or(self.shader.sky(), |color| color.truncate())
         });
-        (colors, [0, 1, 2, 3].map(|k: usize| self.inverse_depth(&hits[k])))
+        (colors, [0, 1, 2, 3].map(|k: usize| self.inverse_depth(&hits[k])), seen)
     }
 
     fn share_color(&self, share: &TriangleShare, middle_px: DVec2) -> Option<glam::Vec4> {
@@ -327,9 +332,10 @@ impl<'a> FrameCaster<'a> {
         let ends = mesh.is_some_and(|mesh| mesh.material.blends || mesh.material.cutoff.is_none());
         let shading_px = middle_px + if ends { mean } else { DVec2::ZERO };
         // Seen at grazing incidence the plane may end before the pixel's middle.
-        let color = self.shader.color(&share.triangle, shading_px);
+        let sun = share.sun / f64::from(share.samples.count_ones());
+        let color = self.shader.color(&share.triangle, shading_px, sun);
         color.or_else(|| {
-            places.clone().find_map(|place| self.shader.color(&share.triangle, middle_px + place))
+            places.clone().find_map(|place| self.shader.color(&share.triangle, middle_px + place, sun))
         })
     }
 }

@@ -78,7 +78,8 @@ impl MovingCaster {
             reads,
             fog_per_m: scene.fog_visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
             posed: &instant.posed,
+            shadows: scene.light.filter(|light| light.shadows),
         };
-        FrameCaster { trees: &self.cast.trees, shader }.middle(uv / step_uv, &mut scratch.0).0
+        FrameCaster { trees: &self.cast.trees, shader }.middle(uv / step_uv, &mut scratch.0, None).0
     }
 }

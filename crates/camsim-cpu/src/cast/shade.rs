@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{Mesh, Prefilter, PrefilterTaps, Scene, Wrap},
+    scene::{Light, Mesh, Prefilter, PrefilterTaps, Scene, Wrap},
     temporal::IdealGeometry,
 };
 use glam::{DMat2, DVec2, DVec3, Vec3, Vec4};
@@ -87,6 +87,8 @@ pub(super) struct SurfaceShader<'a> {
     pub fog_per_m: f64,
     /// Meshes that are elsewhere than in the scene.
     pub posed: &'a [PosedMesh],
+    /// The light whose shadows are seen.
+    pub shadows: Option<Light>,
 }
 
 /// The plane of a triangle at a position.
@@ -141,24 +143,34 @@ impl SurfaceShader<'_> {
         Vec3::from_array(self.scene.sky_linear)
     }
 
-    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position. `None` where the ray of the
-    /// position does not meet the plane in front of the camera.
-    pub fn color(&self, triangle: &Triangle, position_px: DVec2) -> Option<Vec4> {
+    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position, with a share of the sun. `None`
+    /// where the ray of the position does not meet the plane in front of the camera.
+    pub fn color(&self, triangle: &Triangle, position_px: DVec2, sun: f64) -> Option<Vec4> {
         let ray = self.camera.ray(position_px);
         match triangle.surface.checked_sub(1) {
-            None => self.terrain_color(triangle, &ray, position_px),
-            Some(mesh) => self.mesh_color(mesh as usize, triangle, &ray, position_px),
+            None => self.terrain_color(triangle, &ray, position_px, sun),
+            Some(mesh) => self.mesh_color(mesh as usize, triangle, &ray, position_px, sun),
         }
     }
 
-    fn terrain_color(&self, triangle: &Triangle, ray: &SceneRay, position_px: DVec2) -> Option<Vec4> {
+    fn terrain_color(
+        &self,
+        triangle: &Triangle,
+        ray: &SceneRay,
+        position_px: DVec2,
+        sun: f64,
+    ) -> Option<Vec4> {
         let terrain = self.scene.terrain.as_ref()?;
         let corners = triangle.corners;
         let points = corners.map(|corner| terrain_position(terrain, triangle.chunk, corner));
         let uvs = corners.map(|corner| uv_of(terrain.vertices[corner as usize].uv));
         let point = PlanePoint::new(points, &self.camera, ray)?;
         let sampling = Sampling { wrap: [Wrap::Clamp; 2], nearest: false, premultiplied: false };
-        let color = self.texture_color(0, &point, uvs, sampling).truncate();
+        let mut color = self.texture_color(0, &point, uvs, sampling).truncate();
+        if sun < 1.0 {
+            let of_sky = terrain.sky_share(corners, point.weights);
+            color *= (of_sky + sun * (1.0 - of_sky)) as f32;
+        }
         Some(self.in_fog(color, &point, position_px).extend(1.0))
     }
 
@@ -168,6 +180,7 @@ impl SurfaceShader<'_> {
         triangle: &Triangle,
         ray: &SceneRay,
         position_px: DVec2,
+        sun: f64,
     ) -> Option<Vec4> {
         let mesh = self.mesh(number);
         let (material, corners) = (&mesh.material, triangle.corners);
@@ -179,8 +192,10 @@ impl SurfaceShader<'_> {
         let texture = self.texture_color(1 + number, &point, uvs, sampling);
         let [r, g, b, tint_alpha] = mesh.tint_at(corners, point.weights);
         let light = self.scene.light.as_ref();
-        let light =
-            light.map_or(1.0, |light| mesh.light_at(light, corners, point.weights, ray.direction_ned));
+        let light = light.map_or(1.0, |light| {
+            let [of_sun, of_sky] = mesh.light_parts_at(light, corners, point.weights, ray.direction_ned);
+            (sun * of_sun + of_sky).clamp(0.0, 1.0)
+        });
         let tint = (light * DVec3::new(r, g, b)).as_vec3();
         let emissive = Vec3::from_array(material.emissive);
         if !material.blends {

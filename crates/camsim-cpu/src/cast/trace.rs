@@ -13,6 +13,9 @@ use super::moving::PosedMesh;
 /// parameters, relative, and barycentric weight of the corner beside that edge.
 const SAME_EDGE: f64 = 1e-9;
 
+/// A ray parameter before everything, which ends a search.
+const NO_MORE: f64 = -1.0;
+
 /// Trees of boxes over a scene's meshes and over the triangles of their shapes.
 #[derive(Debug)]
 pub(super) struct SceneTrees {
@@ -123,6 +126,37 @@ impl SceneTrees {
         hits.opaque = mesh.or(ground);
         hits.blended.iter_mut().for_each(|hit| hit.t += t_min);
         hits.sort();
+    }
+
+    /// Whether a ray meets anything that has depth, whichever side of it. Meshes of `posed` are where they are
+    /// there, and not in the scene.
+    pub fn is_blocked(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay) -> bool {
+        let SceneRay { origin_ned_m, direction_ned } = *ray;
+        if scene.terrain.as_ref().is_some_and(|terrain| terrain.blocks(origin_ned_m, direction_ned)) {
+            return true;
+        }
+        let stands = |number: u32, _| {
+            let mesh = &scene.meshes[number as usize];
+            let is_met = self.is_blocked_by(number, mesh, &self.shape_from_ned[number as usize], ray);
+            is_met.then_some((NO_MORE, ()))
+        };
+        self.meshes.first(origin_ned_m, direction_ned, f64::INFINITY, stands).is_some()
+            || posed.iter().any(|posed| {
+                self.is_blocked_by(posed.number, &posed.mesh, &posed.shape_from_ned, ray)
+            })
+    }
+
+    fn is_blocked_by(&self, number: u32, mesh: &Mesh, shape_from_ned: &DMat3, ray: &SceneRay) -> bool {
+        let SceneRay { origin_ned_m, direction_ned } = *ray;
+        let origin = *shape_from_ned * (origin_ned_m - mesh.origin_ned_m);
+        let direction = *shape_from_ned * direction_ned;
+        let meet = |triangle: u32, limit: f64| {
+            let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+            let points = corners.map(|corner| mesh.position_ned_m(corner));
+            let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
+            has_depth(mesh, &MeshHit { t, mesh: number, corners, weights }).then_some((NO_MORE, ()))
+        };
+        self.shapes[number as usize].first(origin, direction, f64::INFINITY, meet).is_some()
     }
 
     /// First opaque hit of a mesh before `limit`. Boxes are met in the shape's own axes, triangles where they

@@ -32,8 +32,9 @@ pub(super) fn load_scene(
     log: &FlightLog,
 ) -> Result<(Scene, Option<TerrainSummary>, Vec<String>), LoadError> {
     let spec = &scenario.scene;
-    let light = spec.light.map(|LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky }| {
+    let light = spec.light.map(|LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky, shadows }| {
         Light::new(sun_azimuth_deg.to_radians(), sun_elevation_deg.to_radians(), sun, sky)
+            .with_shadows(shadows)
     });
     let mut scene = Scene {
         light,

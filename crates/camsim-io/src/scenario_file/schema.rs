@@ -221,6 +221,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.light.sun_elevation_deg", Number),
     ("scene.light.sun", Number),
     ("scene.light.sky", Number),
+    ("scene.light.shadows", Flag),
     ("quality.preset", Word(&["default", "paper"])),
     ("quality.max_error_px", Number),
     ("quality.max_error_dn", Number),

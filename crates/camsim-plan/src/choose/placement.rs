@@ -6,6 +6,9 @@
 //! | software adapter | cpu, vectorised, where it can draw the scene; else gpu | cpu, vectorised, where it can make the plan; else gpu |
 //! | no adapter, or `--backend cpu` | cpu | cpu |
 //!
+//! Shadows of the sun are made by the cpu: a frame of a scene with shadows has all its passes there, whatever
+//! the machine has.
+//!
 //! A software adapter runs on the same processor as the cpu renderer, which takes half of its time for the
 //! plans that it vectorises (docs/DECISIONS.md, "Cpu renderer").
 
@@ -32,6 +35,9 @@ const MOST_COPIED: f64 = 12.0;
 /// scene](cpu_rasterises).
 pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: bool) -> Placement {
     let (cpu, gpu) = (Placement::all(Renderer::Cpu), Placement::all(Renderer::Gpu));
+    if plan.shadows.is_some() {
+        return cpu;
+    }
     let gpu_then_cpu = Placement { ideal: Renderer::Gpu, reverse: Renderer::Cpu };
     match (capabilities.backend, capabilities.adapter) {
         (Backend::Cpu, _) | (_, None) => cpu,

@@ -7,7 +7,7 @@ use camsim_core::{
 
 use crate::ir::{
     frame_plan::FramePlan,
-    stages::{BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, TemporalStage},
+    stages::{BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
 };
 
 /// Names of the passes, in order.
@@ -17,6 +17,12 @@ pub(crate) fn passes(plan: &FramePlan) -> Vec<String> {
         passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
     }
     passes.push(ideal_pass(plan));
+    passes.extend(plan.shadows.map(|ShadowStage { border_rays }| {
+        format!(
+            "shadows: a ray to the sun from each sample of the ideal frame, {border_rays} a pixel at their borders; by \
+             the cpu, as are all passes of this frame"
+        )
+    }));
     passes.extend(edge_passes(plan));
     let truth = if plan.truth { ", depth and coordinates" } else { "" };
     let (ray, temporal) = (ray(plan.ray), temporal(plan.temporal));

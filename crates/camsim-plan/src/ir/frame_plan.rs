@@ -22,7 +22,7 @@ use super::{
     predicted::Predicted,
     seen_plane::SeenPlane,
     skip::Skip,
-    stages::{BlurStage, EdgeStage, PrefilterTaps, RayStage, TemporalStage},
+    stages::{BlurStage, EdgeStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
 };
 
 /// A row's camera that moves towards the nearest surface gives it at most this many times its inverse depth:
@@ -74,6 +74,8 @@ pub struct FramePlan {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
+    /// Shadows of the sun; `None` in a scene without.
+    pub shadows: Option<ShadowStage>,
     /// What reads the surfaces' pictures for the ideal frame.
     pub surface_reads: PrefilterTaps,
     /// Samples of each pixel of the ideal frame: 1, or [`camsim_core::temporal::SAMPLES`] where borders are

@@ -71,6 +71,14 @@ impl BlurStage {
     }
 }
 
+/// How the ideal frame gets the sun's shadows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct ShadowStage {
+    /// Rays towards the sun over the area of an ideal pixel beside whose middle light turns into shadow.
+    /// Elsewhere a pixel takes one, or one for each of its samples.
+    pub border_rays: u32,
+}
+
 /// How pixels at silhouettes are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]

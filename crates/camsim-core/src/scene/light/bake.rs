@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Light;
-use crate::scene::{CHUNK_CELLS, Encoding, Terrain, Texture, Wrap, linear_from_srgb};
+use crate::scene::{CHUNK_CELLS, Encoding, Terrain, TerrainChunk, Texture, Wrap, linear_from_srgb};
 
 /// Texture rows per task.
 const BAND_ROWS: usize = 64;
@@ -30,6 +30,9 @@ impl Terrain {
         let times = ground.times(self.texture.size_px);
         let mut texture = if times > 1 { finer(&self.texture, times) } else { Texture::clone(&self.texture) };
         ground.paint(&mut texture);
+        if light.shadows {
+            self.light_parts = light_parts(self, light);
+        }
         // Ground beyond the texture is lit as level ground.
         if let Some(beyond) = &mut self.beyond {
             let bytes = ByteScaling::new(texture.encoding);
@@ -39,6 +42,21 @@ impl Terrain {
         self.texture = Arc::new(texture);
         times
     }
+}
+
+/// Light of the sun and of the sky at each vertex of a terrain; 0 in voids.
+fn light_parts(terrain: &Terrain, light: &Light) -> Vec<[f32; 2]> {
+    let columns = terrain.chunk_grid[0] as usize;
+    let of_chunk = |(number, chunk): (usize, &TerrainChunk)| {
+        let first = [number % columns, number / columns].map(|at| at * CHUNK_CELLS as usize);
+        let [across, down] = chunk.cells.map(|cells| cells as usize + 1);
+        let of_vertex = |k: usize| {
+            let normal = normal(terrain, [first[0] + k % across, first[1] + k / across]);
+            normal.map_or([0.0; 2], |normal| light.parts(normal).map(|part| part as f32))
+        };
+        (0..across * down).map(of_vertex).collect::<Vec<_>>()
+    };
+    terrain.chunks.par_iter().enumerate().map(of_chunk).collect::<Vec<_>>().concat()
 }
 
 /// Light at each height, and in a ring around the DEM that extrapolates its border: the texels of the texture

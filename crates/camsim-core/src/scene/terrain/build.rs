@@ -173,6 +173,7 @@ impl Terrain {
             void_cells: 0,
             texture,
             beyond: None,
+            light_parts: Vec::new(),
             quantum_m,
             bounds: Aabb::EMPTY,
             tree: BlockTree::new([1, 1], &[Aabb::EMPTY]),

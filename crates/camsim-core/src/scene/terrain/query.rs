@@ -39,6 +39,32 @@ impl Terrain {
         best
     }
 
+    /// Whether `origin + t direction`, t >= 0, meets the full surface, from either side.
+    pub fn blocks(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> bool {
+        /// Before all boxes, which ends the walk.
+        const NO_MORE: f64 = -1.0;
+        let mut is_met = false;
+        let beside = direction_ned.normalize().any_orthonormal_pair();
+        self.tree.walk(origin_ned_m, direction_ned, f64::INFINITY, &mut |block, limit| {
+            let hit = self.intersect_block(block, origin_ned_m, direction_ned, beside, limit);
+            is_met |= hit.is_some();
+            if is_met { NO_MORE } else { limit }
+        });
+        is_met
+    }
+
+    /// Share of the light at a point of a triangle that is left in the shadow, by the triangle's vertices and
+    /// their weights; 1 in a scene without shadows.
+    #[must_use]
+    pub fn sky_share(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
+        let part = |k: usize| -> f64 {
+            let of_corner = |c: usize| self.light_parts.get(corners[c] as usize).map_or(0.0, |of| of[k].into());
+            (0..3).map(|c| weights[c] * of_corner(c)).sum()
+        };
+        let (of_sun, of_sky) = (part(0), part(1));
+        if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }
+    }
+
     /// Down coordinate of the topmost point of the full surface at a horizontal position; `None` off the
     /// terrain.
     pub fn down_at(&self, north_m: f64, east_m: f64) -> Option<f64> {

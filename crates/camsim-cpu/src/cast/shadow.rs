@@ -1,0 +1,181 @@
+//! Shadows of the sun: rays from what the camera's rays meet.
+//!
+//! A first pass takes a ray to the sun from every ray of the camera. Where light and shadow meet within three
+//! by three pixels, a second one finds the share of each surface in a pixel that the sun shines on, by rays
+//! spread evenly over the pixel.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::{
+    FrameCaster, PixelScratch,
+    trace::{Hits, SceneRay, Triangle, terrain_position},
+};
+
+/// How far above its surface a ray to the sun begins, metres: more than rounding, less than anything shows.
+const LIFT_M: f64 = 1e-6;
+/// Turn of a Fibonacci lattice: the golden ratio's fraction.
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
+
+/// What a point has of the sun.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Sun {
+    /// It makes no difference there.
+    NoMatter,
+    /// The triangle faces away from it.
+    Behind,
+    Hidden,
+    Shining,
+}
+
+/// Whether light and shadow were seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SeenLight {
+    light: bool,
+    shadow: bool,
+}
+
+impl SeenLight {
+    pub fn add(&mut self, surface: u32, sun: Sun) {
+        self.light |= sun == Sun::Shining;
+        self.shadow |= is_in_shadow(surface, sun);
+    }
+
+    fn or(self, other: Self) -> Self {
+        Self { light: self.light | other.light, shadow: self.shadow | other.shadow }
+    }
+}
+
+/// Whether a point counts as shaded. A model's triangle that faces away has no sunlight to lose; on the ground
+/// it has, as the light there is that of smooth slopes.
+fn is_in_shadow(surface: u32, sun: Sun) -> bool {
+    sun == Sun::Hidden || (sun == Sun::Behind && surface == 0)
+}
+
+/// For each surface in a pixel the number of its rays, and of those that have the sun.
+#[derive(Debug, Default)]
+pub(super) struct SurfaceSuns(Vec<(u32, u32, u32)>);
+
+impl SurfaceSuns {
+    fn add(&mut self, surface: u32, sun: Sun) {
+        let shines = u32::from(sun == Sun::Shining);
+        if shines == 0 && !is_in_shadow(surface, sun) {
+            return;
+        }
+        match self.0.iter_mut().find(|of| of.0 == surface) {
+            Some(of) => (of.1, of.2) = (of.1 + 1, of.2 + shines),
+            None => self.0.push((surface, 1, shines)),
+        }
+    }
+
+    fn share(&self, surface: u32) -> Option<f64> {
+        let of = self.0.iter().find(|of| of.0 == surface)?;
+        Some(f64::from(of.2) / f64::from(of.1))
+    }
+}
+
+/// Share of the sun that a surface has where a ray meets it, or over the pixel if that is known.
+pub(super) fn share_of_sun(surface: u32, sun: Sun, suns: Option<&SurfaceSuns>) -> f64 {
+    let own = if matches!(sun, Sun::Shining | Sun::NoMatter) { 1.0 } else { 0.0 };
+    if own == 0.0 && !is_in_shadow(surface, sun) {
+        return own;
+    }
+    suns.and_then(|suns| suns.share(surface)).unwrap_or(own)
+}
+
+impl FrameCaster<'_> {
+    /// What a triangle has of the sun where a ray meets it.
+    pub(super) fn sun(&self, triangle: &Triangle, t: f64, ray: &SceneRay) -> Sun {
+        let Some(light) = self.shader.shadows else { return Sun::NoMatter };
+        let scene = self.shader.scene;
+        let points: [DVec3; 3] = match (triangle.surface.checked_sub(1), &scene.terrain) {
+            (Some(mesh), _) => {
+                let mesh = self.shader.mesh(mesh as usize);
+                if !mesh.shape.has_normals() {
+                    return Sun::NoMatter;
+                }
+                triangle.corners.map(|corner| mesh.position_ned_m(corner))
+            }
+            (None, Some(terrain)) => {
+                let has_sun = |&corner: &u32| {
+                    terrain.light_parts.get(corner as usize).is_some_and(|[of_sun, _]| *of_sun > 0.0)
+                };
+                if !triangle.corners.iter().any(has_sun) {
+                    return Sun::NoMatter;
+                }
+                triangle.corners.map(|corner| terrain_position(terrain, triangle.chunk, corner))
+            }
+            (None, None) => return Sun::NoMatter,
+        };
+        let [a, b, c] = points;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = if normal.dot(ray.direction_ned) > 0.0 { -normal } else { normal };
+        if normal.dot(light.to_sun_ned) <= 0.0 {
+            return Sun::Behind;
+        }
+        let origin_ned_m = ray.origin_ned_m + t * ray.direction_ned + LIFT_M * normal;
+        let to_sun = SceneRay { origin_ned_m, direction_ned: light.to_sun_ned };
+        match self.trees.is_blocked(scene, self.shader.posed, &to_sun) {
+            true => Sun::Hidden,
+            false => Sun::Shining,
+        }
+    }
+
+    /// Values of all pixels by their middles. Those at borders of shadows are made again, with the shares of
+    /// the sun over the pixel.
+    pub(super) fn pixels<T: Send + Clone>(
+        &self,
+        size_px: [u32; 2],
+        border_rays: u32,
+        pixel: impl Fn(DVec2, &mut PixelScratch, Option<&SurfaceSuns>) -> (T, SeenLight) + Sync,
+    ) -> Vec<T> {
+        let [width, height] = size_px.map(|side| side as usize);
+        let middle_px = |i: usize| DVec2::new((i % width) as f64, (i / width) as f64);
+        let all = (0..width * height).into_par_iter().with_min_len(width);
+        let first = all.map_init(PixelScratch::default, |scratch, i| pixel(middle_px(i), scratch, None));
+        let (mut values, seen): (Vec<T>, Vec<SeenLight>) = first.unzip();
+        if self.shader.shadows.is_none() {
+            return values;
+        }
+        let borders: Vec<usize> =
+            (0..width * height).into_par_iter().filter(|&i| is_at_border(&seen, size_px, i)).collect();
+        let refined = borders.par_iter().with_min_len(16).map_init(PixelScratch::default, |scratch, &i| {
+            let suns = self.suns(middle_px(i), border_rays, &mut scratch.hits[0]);
+            pixel(middle_px(i), scratch, Some(&suns)).0
+        });
+        let refined: Vec<T> = refined.collect();
+        borders.into_iter().zip(refined).for_each(|(i, value)| values[i] = value);
+        values
+    }
+
+    /// Shares of the sun over a pixel.
+    fn suns(&self, middle_px: DVec2, rays: u32, hits: &mut Hits) -> SurfaceSuns {
+        let mut suns = SurfaceSuns::default();
+        for k in 0..rays {
+            let place =
+                DVec2::new((f64::from(k) + 0.5) / f64::from(rays), (f64::from(k) * GOLDEN).fract()) - 0.5;
+            let position_px = middle_px + place;
+            self.trace(position_px, hits);
+            let ray = self.shader.camera.ray(position_px);
+            let opaque = self.opaque_triangle(hits, &ray).zip(hits.opaque);
+            let opaque = opaque.map(|(triangle, hit)| (triangle, hit.t()));
+            for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(opaque) {
+                suns.add(triangle.surface, self.sun(&triangle, t, &ray));
+            }
+        }
+        suns
+    }
+}
+
+/// Whether both light and shadow are seen in a pixel or its neighbours.
+fn is_at_border(seen: &[SeenLight], [width, height]: [u32; 2], i: usize) -> bool {
+    let (width, height) = (width as usize, height as usize);
+    let (x, y) = (i % width, i / width);
+    let mut all = SeenLight::default();
+    for y in y.saturating_sub(1)..(y + 2).min(height) {
+        for x in x.saturating_sub(1)..(x + 2).min(width) {
+            all = all.or(seen[y * width + x]);
+        }
+    }
+    all.light && all.shadow
+}
