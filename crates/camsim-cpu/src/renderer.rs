@@ -118,7 +118,7 @@ impl CpuRenderer {
         ideal.size_px = plan.ideal.size_px;
         ideal.cast.clear();
         let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
-        if self.general_only || !(self.rasterises && is_plain) || plan.shadows.is_some() {
+        if self.general_only || !(self.rasterises && is_plain) {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
             return IdealBuffer(self.last);
@@ -126,6 +126,10 @@ impl CpuRenderer {
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
         let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
         raster.draw(view, &mut ideal.drawn);
+        if let (Some(_), Some(key)) = (plan.shadows, plan.keys.first()) {
+            let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
+            cast.add_shadows(plan, key, &mut ideal.drawn);
+        }
         IdealBuffer(self.last)
     }
 

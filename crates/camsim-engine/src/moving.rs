@@ -3,18 +3,16 @@
 //! The renderers draw what stands still. Within the outline that a moving thing sweeps in the exposure of a
 //! row, each pixel is then replaced by the mean of rays over its area and exposure, each cast at its own
 //! instant with everything where it is then: parallax, rolling shutter, blur and what comes into view behind
-//! need no approximation there. Elsewhere nothing changes.
+//! need no approximation there. With shadows of the sun, so is each pixel where the thing's shadow may fall.
+//! Elsewhere nothing changes.
 
 mod outline;
+mod sweep;
 
 use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
-    noise::tail_table,
-    photometric::photometric,
-    scene::{RigidMotion, Scene},
-    sequence::Sequence,
-    shutter::RowAxis,
+    noise::tail_table, photometric::photometric, scene::Scene, sequence::Sequence, shutter::RowAxis,
 };
 use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
@@ -35,19 +33,6 @@ pub(crate) struct MovingScene {
     caster: Arc<OnceLock<MovingCaster>>,
     vignette: Vec<f32>,
     noise_table: Vec<f32>,
-}
-
-/// The motions of a scene, each with all that it carries.
-fn motions(scene: &Scene) -> Vec<(Arc<RigidMotion>, camsim_core::scene::Aabb)> {
-    let mut motions: Vec<(Arc<RigidMotion>, camsim_core::scene::Aabb)> = Vec::new();
-    for mesh in &scene.meshes {
-        let Some(motion) = &mesh.motion else { continue };
-        match motions.iter_mut().find(|(known, _)| Arc::ptr_eq(known, motion)) {
-            Some((_, bounds)) => *bounds = bounds.union(&mesh.bounds()),
-            None => motions.push((motion.clone(), mesh.bounds())),
-        }
-    }
-    motions
 }
 
 impl MovingScene {
@@ -84,8 +69,8 @@ impl MovingScene {
 
     /// Replaces the colours of the pixels in which something may move: linear R G B A, row-major.
     pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
-        let motions = motions(&self.sequence.scene);
-        let outline = Outline::new(&self.sequence.path, plan, &motions);
+        let swept = sweep::all_that_moves(&self.sequence.scene, plan.window_s);
+        let outline = Outline::new(&self.sequence.path, plan, &swept);
         let lines: Vec<usize> = (0..outline.spans.len()).filter(|&i| !outline.spans[i].is_empty()).collect();
         if lines.is_empty() {
             return;

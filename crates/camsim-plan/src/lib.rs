@@ -60,7 +60,9 @@ pub use ir::{
     row_tables::{RowPoses, RowTimes, row_poses, row_records, row_times, table_shape},
     seen_plane::SeenPlane,
     skip::Skip,
-    stages::{BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
+    stages::{
+        BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage,
+    },
 };
 pub use planner::Planner;
 pub use source_error::pixel_truth::{FrameRays, PixelHit, PixelTruth};

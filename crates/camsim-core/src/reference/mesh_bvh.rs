@@ -245,8 +245,8 @@ fn values_at(cover: &MeshSurface, triangle: &MeshTriangle, weights: [f64; 3]) ->
         [0, 1, 2].map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
     let tint = [0, 1, 2, 3]
         .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].tint[k])).sum());
-    let uv = [0, 1]
-        .map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].uv[k])).sum());
+    let uv =
+        [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(vertices[corner].uv[k])).sum());
     (uv, tint)
 }
 
@@ -295,13 +295,7 @@ fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
 }
 
 /// The hit of a ray on a triangle with these corners.
-pub(super) fn hit_at(
-    ray: &Ray,
-    t: f64,
-    texture_uv: [f64; 2],
-    [a, b, c]: [DVec3; 3],
-    surface: u32,
-) -> Hit {
+pub(super) fn hit_at(ray: &Ray, t: f64, texture_uv: [f64; 2], [a, b, c]: [DVec3; 3], surface: u32) -> Hit {
     let normal = (b - a).cross(c - b).normalize_or_zero();
     let normal_ned = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
     Hit {

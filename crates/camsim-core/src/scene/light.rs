@@ -59,10 +59,7 @@ impl Light {
     /// The parts of the factor that are the sun's and the sky's.
     #[must_use]
     pub fn parts(&self, normal_ned: DVec3) -> [f64; 2] {
-        [
-            self.sun * normal_ned.dot(self.to_sun_ned).max(0.0),
-            self.sky * 0.5 * (1.0 - normal_ned.z),
-        ]
+        [self.sun * normal_ned.dot(self.to_sun_ned).max(0.0), self.sky * 0.5 * (1.0 - normal_ned.z)]
     }
 }
 

@@ -23,6 +23,7 @@ mod mips;
 mod moving;
 mod shade;
 mod shadow;
+mod shadow_pass;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -132,6 +132,22 @@ impl PlanePoint {
     }
 }
 
+/// How a colour turns dark in the shadow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShadowTone {
+    /// Share of the light that is the sky's.
+    pub sky_share: f32,
+    /// The part of the colour that is no reflected light: emission and fog.
+    pub unlit: Vec3,
+}
+
+impl ShadowTone {
+    /// A colour in full light with a share of the sun.
+    pub fn shaded(&self, lit: Vec3, sun: f32) -> Vec3 {
+        self.unlit + (self.sky_share + sun * (1.0 - self.sky_share)) * (lit - self.unlit)
+    }
+}
+
 impl SurfaceShader<'_> {
     /// A mesh where it is.
     pub fn mesh(&self, number: usize) -> &Mesh {
@@ -205,6 +221,33 @@ impl SurfaceShader<'_> {
         let color = (texture.truncate() * tint + emissive * texture.w) / texture.w.max(LEAST_ALPHA);
         let alpha = texture.w * tint_alpha.clamp(0.0, 1.0) as f32;
         Some((alpha * self.in_fog(color, &point, position_px)).extend(alpha))
+    }
+
+    /// What a triangle's light at a position is made of.
+    pub fn shadow_tone(&self, triangle: &Triangle, position_px: DVec2) -> Option<ShadowTone> {
+        let ray = self.camera.ray(position_px);
+        let (points, mesh): ([DVec3; 3], _) = match triangle.surface.checked_sub(1) {
+            None => {
+                let terrain = self.scene.terrain.as_ref()?;
+                (triangle.corners.map(|corner| terrain_position(terrain, triangle.chunk, corner)), None)
+            }
+            Some(mesh) => {
+                let mesh = self.mesh(mesh as usize);
+                (triangle.corners.map(|corner| mesh.position_ned_m(corner)), Some(mesh))
+            }
+        };
+        let point = PlanePoint::new(points, &self.camera, &ray)?;
+        let sky_share = match (mesh, &self.scene.terrain, &self.scene.light) {
+            (Some(mesh), _, Some(light)) => {
+                let direction = ray.direction_ned;
+                let [of_sun, of_sky] = mesh.light_parts_at(light, triangle.corners, point.weights, direction);
+                if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }
+            }
+            (None, Some(terrain), _) => terrain.sky_share(triangle.corners, point.weights),
+            _ => 1.0,
+        };
+        let emissive = mesh.map_or(Vec3::ZERO, |mesh| Vec3::from_array(mesh.material.emissive));
+        Some(ShadowTone { sky_share: sky_share as f32, unlit: self.in_fog(emissive, &point, position_px) })
     }
 
     /// Prefiltered texture of a surface.

@@ -32,7 +32,7 @@ pub(super) enum Sun {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SeenLight {
     light: bool,
-    shadow: bool,
+    pub shadow: bool,
 }
 
 impl SeenLight {
@@ -41,7 +41,12 @@ impl SeenLight {
         self.shadow |= is_in_shadow(surface, sun);
     }
 
-    fn or(self, other: Self) -> Self {
+    /// Whether both were.
+    pub fn is_border(self) -> bool {
+        self.light && self.shadow
+    }
+
+    pub fn or(self, other: Self) -> Self {
         Self { light: self.light | other.light, shadow: self.shadow | other.shadow }
     }
 }
@@ -68,7 +73,7 @@ impl SurfaceSuns {
         }
     }
 
-    fn share(&self, surface: u32) -> Option<f64> {
+    pub fn share(&self, surface: u32) -> Option<f64> {
         let of = self.0.iter().find(|of| of.0 == surface)?;
         Some(f64::from(of.2) / f64::from(of.1))
     }
@@ -149,7 +154,7 @@ impl FrameCaster<'_> {
     }
 
     /// Shares of the sun over a pixel.
-    fn suns(&self, middle_px: DVec2, rays: u32, hits: &mut Hits) -> SurfaceSuns {
+    pub(super) fn suns(&self, middle_px: DVec2, rays: u32, hits: &mut Hits) -> SurfaceSuns {
         let mut suns = SurfaceSuns::default();
         for k in 0..rays {
             let place =
@@ -177,5 +182,5 @@ fn is_at_border(seen: &[SeenLight], [width, height]: [u32; 2], i: usize) -> bool
             all = all.or(seen[y * width + x]);
         }
     }
-    all.light && all.shadow
+    all.is_border()
 }

@@ -128,6 +128,27 @@ impl SceneTrees {
         hits.sort();
     }
 
+    /// First opaque triangle of a model from `t_min` on, before `limit`, in a scene without blended surfaces.
+    pub fn first_model(
+        &self,
+        scene: &Scene,
+        ray: &SceneRay,
+        t_min: f64,
+        limit: f64,
+    ) -> Option<(f64, Triangle)> {
+        let origin_ned_m = ray.origin_ned_m + t_min * ray.direction_ned;
+        let ray = SceneRay { origin_ned_m, direction_ned: ray.direction_ned };
+        let mut no_layers = Vec::new();
+        let blended = RefCell::new(&mut no_layers);
+        let meet = |number: u32, limit: f64| {
+            let (mesh, shape_from_ned) =
+                (&scene.meshes[number as usize], &self.shape_from_ned[number as usize]);
+            self.meet(number, mesh, shape_from_ned, &ray, limit, &blended)
+        };
+        let hit = self.meshes.first(origin_ned_m, ray.direction_ned, limit - t_min, meet);
+        hit.map(|(t, hit)| (t + t_min, hit.triangle()))
+    }
+
     /// Whether a ray meets anything that has depth, whichever side of it. Meshes of `posed` are where they are
     /// there, and not in the scene.
     pub fn is_blocked(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay) -> bool {
@@ -141,9 +162,9 @@ impl SceneTrees {
             is_met.then_some((NO_MORE, ()))
         };
         self.meshes.first(origin_ned_m, direction_ned, f64::INFINITY, stands).is_some()
-            || posed.iter().any(|posed| {
-                self.is_blocked_by(posed.number, &posed.mesh, &posed.shape_from_ned, ray)
-            })
+            || posed
+                .iter()
+                .any(|posed| self.is_blocked_by(posed.number, &posed.mesh, &posed.shape_from_ned, ray))
     }
 
     fn is_blocked_by(&self, number: u32, mesh: &Mesh, shape_from_ned: &DMat3, ray: &SceneRay) -> bool {

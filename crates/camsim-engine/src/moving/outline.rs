@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     mount::CameraPath,
+    pose::CameraPose,
     row_time::WorldPoint,
     scene::{Aabb, RigidMotion, terrain::Frustum},
     shutter::RowAxis,
@@ -47,12 +48,10 @@ pub(super) fn pixel(plan: &FramePlan, line: usize, along: u32) -> [u32; 2] {
 }
 
 impl Outline {
-    pub fn new(path: &CameraPath, plan: &FramePlan, motions: &[(Arc<RigidMotion>, Aabb)]) -> Self {
-        let motions: Vec<_> =
-            motions.iter().filter(|(motion, bounds)| may_be_seen(path, plan, motion, bounds)).collect();
+    pub fn new(path: &CameraPath, plan: &FramePlan, swept: &[Swept]) -> Self {
+        let swept: Vec<Swept> = swept.iter().filter_map(|swept| swept.in_view(path, plan)).collect();
         let spans = (0..line_count(plan)).into_par_iter().map(|line| {
-            let boxes =
-                motions.iter().filter_map(|(motion, bounds)| project(path, plan, line, motion, bounds));
+            let boxes = swept.iter().flat_map(|swept| swept.project(path, plan, line));
             let mut spans: Vec<[u32; 2]> =
                 boxes.filter_map(|projected| span(plan, line, &projected)).collect();
             spans.sort_unstable();
@@ -62,41 +61,68 @@ impl Outline {
     }
 }
 
-/// Whether any row may see what moves: all rays of the frame have directions within its ideal frame's field of
-/// view, and begin no farther from that frame's camera than the path leads.
-fn may_be_seen(path: &CameraPath, plan: &FramePlan, motion: &RigidMotion, bounds: &Aabb) -> bool {
-    let [begin_s, end_s] = plan.window_s;
-    let swept = motion.bounds(bounds, begin_s, end_s);
-    let instants_s = (0..=INSTANTS).map(|i| begin_s + (end_s - begin_s) * f64::from(i) / f64::from(INSTANTS));
-    let positions_ned_m: Vec<DVec3> = instants_s.map(|t_s| path.pose(t_s).position_ned_m).collect();
-    let key_poses = if plan.keys.is_empty() { vec![plan.key_pose] } else { plan.key_poses() };
-    key_poses.iter().any(|key_pose| {
-        let distance_m = |position_ned_m: &DVec3| position_ned_m.distance(key_pose.position_ned_m);
-        let reach_m = TRAVEL * positions_ned_m.iter().map(distance_m).fold(0.0, f64::max);
-        let swept = Aabb { min: swept.min - reach_m, max: swept.max + reach_m };
-        Frustum::new(key_pose, plan.tangents()).may_see(&swept)
-    })
+/// Where something that moves may change the picture: where it is itself, and where its shadow may fall.
+pub(super) struct Swept {
+    pub motion: Arc<RigidMotion>,
+    /// What it carries, at path time 0.
+    pub bounds: Aabb,
+    /// Parts of the way from it along the sun's rays, metres: the first is itself, the others are those on
+    /// which a shadow may meet something.
+    pub ways_ned_m: Vec<[DVec3; 2]>,
 }
 
-/// Where a box may be seen during the exposure of a row; `None` if it is behind the camera. The box is the one
-/// that holds all of the motion within the exposure, however fast it turns.
-fn project(
-    path: &CameraPath,
-    plan: &FramePlan,
-    line: usize,
-    motion: &RigidMotion,
-    bounds: &Aabb,
-) -> Option<Projected> {
-    let [x, y] = pixel(plan, line, 0);
-    let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-    let half_s = 0.5 * plan.shutter.exposure_s();
-    let Aabb { min, max } = motion.bounds(bounds, mid_s - half_s, mid_s + half_s);
+impl Swept {
+    /// The parts of it that any row may see; `None` if there are none. All rays of the frame have directions
+    /// within its ideal frame's field of view, and begin no farther from that frame's camera than the path
+    /// leads.
+    fn in_view(&self, path: &CameraPath, plan: &FramePlan) -> Option<Self> {
+        let [begin_s, end_s] = plan.window_s;
+        let swept = self.motion.bounds(&self.bounds, begin_s, end_s);
+        let instants_s =
+            (0..=INSTANTS).map(|i| begin_s + (end_s - begin_s) * f64::from(i) / f64::from(INSTANTS));
+        let positions_ned_m: Vec<DVec3> = instants_s.map(|t_s| path.pose(t_s).position_ned_m).collect();
+        let key_poses = if plan.keys.is_empty() { vec![plan.key_pose] } else { plan.key_poses() };
+        let may_be_seen = |way: &[DVec3; 2]| {
+            let swept = along(&swept, way);
+            key_poses.iter().any(|key_pose| {
+                let distance_m = |position_ned_m: &DVec3| position_ned_m.distance(key_pose.position_ned_m);
+                let reach_m = TRAVEL * positions_ned_m.iter().map(distance_m).fold(0.0, f64::max);
+                let swept = Aabb { min: swept.min - reach_m, max: swept.max + reach_m };
+                Frustum::new(key_pose, plan.tangents()).may_see(&swept)
+            })
+        };
+        let ways_ned_m: Vec<[DVec3; 2]> = self.ways_ned_m.iter().copied().filter(may_be_seen).collect();
+        let seen = Self { motion: self.motion.clone(), bounds: self.bounds, ways_ned_m };
+        (!seen.ways_ned_m.is_empty()).then_some(seen)
+    }
+
+    /// Where its parts may be seen during the exposure of a row, those that are not behind the camera. Each is
+    /// in the box that holds all of the motion within the exposure, however fast it turns.
+    fn project(&self, path: &CameraPath, plan: &FramePlan, line: usize) -> Vec<Projected> {
+        let [x, y] = pixel(plan, line, 0);
+        let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+        let half_s = 0.5 * plan.shutter.exposure_s();
+        let swept = self.motion.bounds(&self.bounds, mid_s - half_s, mid_s + half_s);
+        let poses = PHASES.map(|phase| {
+            let t_s = mid_s + phase * plan.shutter.exposure_s();
+            (t_s, path.pose(t_s))
+        });
+        self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way))).collect()
+    }
+}
+
+/// A box that is shifted by a way, from its one end to the other.
+fn along(bounds: &Aabb, way: &[DVec3; 2]) -> Aabb {
+    let [from, to] = way;
+    Aabb { min: bounds.min + from.min(*to), max: bounds.max + from.max(*to) }
+}
+
+/// Where a box may be seen from poses at path times; `None` if it is behind the camera.
+fn project(plan: &FramePlan, poses: &[(f64, CameraPose)], Aabb { min, max }: &Aabb) -> Option<Projected> {
     let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY };
     let (mut low_px, mut high_px) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (mut shown, mut in_front, mut all) = (0, 0, 0);
-    for phase in PHASES {
-        let t_s = mid_s + phase * plan.shutter.exposure_s();
-        let pose = path.pose(t_s);
+    for (t_s, pose) in poses {
         for k in 0..8 {
             let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
             let corner_ned_m =
@@ -104,7 +130,7 @@ fn project(
             all += 1;
             let depth_m = (pose.ned_from_camera.conjugate() * (corner_ned_m - pose.position_ned_m)).z;
             in_front += u32::from(depth_m > 0.0);
-            if let Some((px, _)) = plan.camera.show(&pose, t_s, WorldPoint::At(corner_ned_m)) {
+            if let Some((px, _)) = plan.camera.show(pose, *t_s, WorldPoint::At(corner_ned_m)) {
                 shown += 1;
                 (low_px, high_px) = (low_px.min(px), high_px.max(px));
             }

@@ -7,7 +7,9 @@ use camsim_core::{
 
 use crate::ir::{
     frame_plan::FramePlan,
-    stages::{BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
+    stages::{
+        BlurStage, EdgeStage, NodeDepths, PathStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage,
+    },
 };
 
 /// Names of the passes, in order.

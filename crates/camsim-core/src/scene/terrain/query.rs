@@ -58,7 +58,8 @@ impl Terrain {
     #[must_use]
     pub fn sky_share(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
         let part = |k: usize| -> f64 {
-            let of_corner = |c: usize| self.light_parts.get(corners[c] as usize).map_or(0.0, |of| of[k].into());
+            let of_corner =
+                |c: usize| self.light_parts.get(corners[c] as usize).map_or(0.0, |of| of[k].into());
             (0..3).map(|c| weights[c] * of_corner(c)).sum()
         };
         let (of_sun, of_sky) = (part(0), part(1));
@@ -72,6 +73,22 @@ impl Terrain {
         let hit =
             self.intersect(DVec3::new(north_m, east_m, top), DVec3::Z, self.bounds.max.z - top + 1.0)?;
         Some(top + hit.t)
+    }
+
+    /// False only if no box around 4x4 cells meets a box.
+    #[must_use]
+    pub fn may_meet(&self, bounds: &super::Aabb) -> bool {
+        let mut stack = vec![self.tree.root()];
+        while let Some(node) = stack.pop() {
+            if !self.tree.bounds(node).meets(bounds) {
+                continue;
+            }
+            if node.level == 0 {
+                return true;
+            }
+            stack.extend(self.tree.children(node));
+        }
+        false
     }
 
     /// Lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such a

@@ -67,6 +67,15 @@ impl TerrainHit {
 }
 
 impl Terrain {
+    /// Chunk and vertices of a triangle.
+    #[must_use]
+    pub fn vertices_of(&self, triangle: TerrainTriangle) -> (u32, [u32; 3]) {
+        let (number, cell) = self.chunk_of_cell(triangle.cell);
+        let chunk = &self.chunks[number as usize];
+        let vertex = |[i, j]: [u32; 2]| chunk.first_vertex + j * (chunk.cells[0] + 1) + i;
+        (number, cell_triangles(cell)[triangle.half as usize].map(vertex))
+    }
+
     /// Unit normal of a triangle, NED, upwards.
     #[must_use]
     pub fn normal_ned(&self, triangle: TerrainTriangle) -> DVec3 {

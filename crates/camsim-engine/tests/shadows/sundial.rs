@@ -1,0 +1,178 @@
+//! A sundial: a pole on level ground, whose shadow trigonometry knows.
+
+use std::sync::Arc;
+
+use camsim_core::{
+    reference::{Hit, Oracle},
+    scenario::Channel,
+    scene::Scene,
+    sequence::Sequence,
+};
+use camsim_engine::{Backend, Engine};
+use glam::{DVec2, DVec3};
+
+use crate::{
+    SKY, SUN, block,
+    common::{engine, render, sequence, steady},
+    level_ground, light, looking_down, reference,
+};
+
+const SIZE_PX: [u32; 2] = [160, 120];
+/// The pole: half its width and its height, metres.
+const HALF_M: f64 = 0.25;
+const HEIGHT_M: f64 = 8.0;
+
+/// A pole in the middle of level ground. The camera is 60 m above it, where the shadow is in view.
+fn sundial() -> Arc<Sequence> {
+    let scene = Scene {
+        terrain: Some(level_ground(&light())),
+        meshes: vec![block(DVec3::ZERO, [HALF_M; 2], HEIGHT_M, 100)],
+        sky_linear: [0.1; 3],
+        light: Some(light()),
+        ..Scene::default()
+    };
+    sequence(looking_down(SIZE_PX, 300.0), steady(60.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene)
+}
+
+/// Outline of the pole's shadow on the ground, north and east, metres: what its floor and its shifted top span.
+fn shadow_outline() -> Vec<DVec2> {
+    let azimuth = 220_f64.to_radians() - std::f64::consts::PI;
+    let shift = HEIGHT_M / 35_f64.to_radians().tan() * DVec2::from_angle(azimuth);
+    let corner = |n: f64, e: f64| HALF_M * DVec2::new(n, e);
+    // Towards the north-east: three corners of the floor, and three of the top. Turns from north to east.
+    vec![
+        corner(1.0, -1.0),
+        corner(1.0, -1.0) + shift,
+        corner(1.0, 1.0) + shift,
+        corner(-1.0, 1.0) + shift,
+        corner(-1.0, 1.0),
+        corner(-1.0, -1.0),
+    ]
+}
+
+/// Signed distance to the border of a convex outline, positive within.
+fn within_m(outline: &[DVec2], point: DVec2) -> f64 {
+    (0..outline.len()).fold(f64::INFINITY, |least, k| {
+        let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+        least.min((b - a).normalize().perp_dot(point - a))
+    })
+}
+
+/// Area of a convex outline within a rectangle.
+fn area_within(outline: &[DVec2], low: DVec2, high: DVec2) -> f64 {
+    let sides = [(DVec2::X, low.x), (-DVec2::X, -high.x), (DVec2::Y, low.y), (-DVec2::Y, -high.y)];
+    let mut left = outline.to_vec();
+    for (inward, at) in sides {
+        let inside = |p: DVec2| inward.dot(p) - at;
+        let mut cut = Vec::new();
+        for k in 0..left.len() {
+            let (a, b) = (left[k], left[(k + 1) % left.len()]);
+            if inside(a) >= 0.0 {
+                cut.push(a);
+            }
+            if (inside(a) >= 0.0) != (inside(b) >= 0.0) {
+                cut.push(a.lerp(b, inside(a) / (inside(a) - inside(b))));
+            }
+        }
+        left = cut;
+    }
+    0.5 * (0..left.len()).map(|k| left[k].perp_dot(left[(k + 1) % left.len()])).sum::<f64>()
+}
+
+#[test]
+fn reference_has_the_sundials_shadow_where_trigonometry_says() {
+    let oracle = Oracle::new(sundial()).expect("an oracle");
+    let outline = shadow_outline();
+    let ground = |point: DVec2| -> Hit {
+        let origin = point.extend(-1e-3);
+        let hit = oracle.cast(origin, DVec3::Z).expect("ground");
+        assert_eq!(hit.surface, 0);
+        hit
+    };
+    let (mut shaded, mut lit) = (0, 0);
+    // The tip's middle and corners, and points 1 mm on both sides of all borders.
+    for k in 0..outline.len() {
+        let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+        let inward = (b - a).normalize().perp();
+        for share in [0.01, 0.3, 0.5, 0.77, 0.99] {
+            for off_m in [-1e-3, 1e-3] {
+                let point = a.lerp(b, share) + off_m * inward;
+                // The floor of the pole is not ground that is seen.
+                if point.abs().max_element() < HALF_M + 2e-3 {
+                    continue;
+                }
+                let expected = within_m(&outline, point) > 0.0;
+                assert_eq!(oracle.is_in_shadow(0.0, &ground(point)), expected, "{point}");
+                (shaded, lit) = (shaded + u32::from(expected), lit + u32::from(!expected));
+            }
+        }
+    }
+    assert!(shaded > 15 && lit > 15, "{shaded} {lit}");
+    // The tip is as far from the top's corner as trigonometry says.
+    let tip_m = HEIGHT_M / 35_f64.to_radians().tan();
+    let along = DVec2::from_angle(40_f64.to_radians());
+    let corner = DVec2::splat(HALF_M);
+    let found = [-1e-6, 1e-6].map(|off_m| {
+        let inside = corner + (tip_m + off_m) * along - 1e-9;
+        oracle.is_in_shadow(0.0, &ground(inside))
+    });
+    assert_eq!(found, [true, false]);
+}
+
+/// Light of ground pixels, by area in closed form; `None` where the pole may be seen.
+fn expected_pixel(outline: &[DVec2], x: u32, y: u32) -> Option<f64> {
+    let m_a_px = 60.0 / 300.0;
+    let north = |y: f64| (59.5 - y) * m_a_px;
+    let east = |x: f64| (x - 79.5) * m_a_px;
+    let (x, y) = (f64::from(x), f64::from(y));
+    let (low, high) = (DVec2::new(north(y + 0.5), east(x - 0.5)), DVec2::new(north(y - 0.5), east(x + 0.5)));
+    // Seen from above, the top covers a sixth more than the floor.
+    if low.max(-high).max_element() < 0.5 {
+        return None;
+    }
+    let share = area_within(outline, low, high) / (m_a_px * m_a_px);
+    let of_sun = SUN * 35_f64.to_radians().sin();
+    Some(0.8 * (of_sun * (1.0 - share) + SKY))
+}
+
+fn expect_sundial(who: &str, picture: &[f32], most: [f64; 2]) {
+    let outline = shadow_outline();
+    let (mut area, mut expected_area) = (0.0, 0.0);
+    let (mut squares, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
+    let full = 0.8 * (SUN * 35_f64.to_radians().sin() + SKY);
+    for i in 0..SIZE_PX[0] * SIZE_PX[1] {
+        let Some(expected) = expected_pixel(&outline, i % SIZE_PX[0], i / SIZE_PX[0]) else { continue };
+        let found = f64::from(picture[4 * i as usize]);
+        worst = worst.max((found - expected).abs());
+        (area, expected_area) = (area + full - found, expected_area + full - expected);
+        if expected < full - 1e-9 {
+            (squares, count) = (squares + (found - expected).powi(2), count + 1.0);
+        }
+    }
+    let rms = (squares / count as f64).sqrt();
+    eprintln!(
+        "{who}: worst {worst:.4}, rms {rms:.4} in {count} pixels, area {area:.3} of {expected_area:.3}"
+    );
+    assert!(count > 100.0 && worst < most[0] && rms < most[1], "{who}: {worst} {rms}");
+    assert!((area / expected_area - 1.0).abs() < 0.02, "{who}: {area} {expected_area}");
+}
+
+#[test]
+fn reference_pictures_the_sundial() {
+    expect_sundial("reference", &reference(&sundial()), [0.02, 0.005]);
+}
+
+#[test]
+fn cpu_pictures_the_sundial() {
+    let picture = render(&Engine::cpu(), &sundial(), &[Channel::Color], 0).frame.color_rgba;
+    expect_sundial("cpu", &picture, [0.06, 0.015]);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn gpu_pictures_the_sundial() {
+    let mut engine = engine();
+    engine.set_backend(Backend::Gpu);
+    let picture = render(&engine, &sundial(), &[Channel::Color], 0).frame.color_rgba;
+    expect_sundial("gpu", &picture, [0.06, 0.015]);
+}
