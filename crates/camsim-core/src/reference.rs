@@ -3,8 +3,8 @@
 //!
 //! It shares with them the scenario, the trajectory (with the mount), the motions of what moves and the forward
 //! model of the lens, and nothing else. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
-//! `terrain_pyramid`, `mesh_bvh`, `moving`), colour (`shading`) and integration (`render`) are implementations
-//! of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
+//! `terrain_pyramid`, `mesh_bvh`, `moving`), shadows (`shadow`), colour (`shading`) and integration (`render`)
+//! are implementations of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
 //! The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these measurements and by the
 //! predictions of the planner.
 
@@ -272,8 +272,7 @@ impl Oracle {
         let (mut sum, mut left) = (DVec3::ZERO, 1.0);
         for layer in &layers {
             let alpha = layer.alpha.clamp(0.0, 1.0);
-            let hit = self.in_light(t_s, layer.hit);
-            sum += left * alpha * self.shading.color(Some(&hit), range_per_depth);
+            sum += left * alpha * self.shading.color(Some(&self.in_light(t_s, layer.hit)), range_per_depth);
             left *= 1.0 - alpha;
         }
         let solid = solid.map(|hit| self.in_light(t_s, hit));

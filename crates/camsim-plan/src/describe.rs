@@ -138,7 +138,12 @@ impl FramePlan {
                 100.0 * silhouette_share
             )
         });
-        [ignored, paper].into_iter().flatten().collect()
+        let shadows = self.shadows.map(|_| {
+            "borders of shadows, which no probe looks for: where light turns into shadow, reading between the \
+             pixels of the ideal frame misses some of its contrast"
+                .to_owned()
+        });
+        [ignored, shadows, paper].into_iter().flatten().collect()
     }
 }
 

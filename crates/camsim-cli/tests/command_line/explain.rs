@@ -77,3 +77,27 @@ fn predicted_error_is_listed_by_cause() {
         "{floor}"
     );
 }
+
+#[test]
+fn shadows_are_a_pass_or_are_skipped_with_a_reason() {
+    let scenario = assets().join("demo.toml");
+    let explain = |settings: &[&str]| {
+        let sets = settings.iter().flat_map(|set| ["--set", *set]);
+        let (code, out, err) =
+            camsim([&["explain", text(&scenario)][..], &sets.collect::<Vec<_>>()].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    assert!(explain(&[]).contains("  shadows: scene.light is not set\n"));
+    let off = explain(&["scene.light.sun=0.7"]);
+    assert!(
+        off.contains("  shadows: scene.light.shadows is off\n") && off.contains("without shadows"),
+        "{off}"
+    );
+    let on = explain(&["scene.light.shadows=true"]);
+    assert!(on.contains("  shadows: a ray to the sun from each") && on.contains("with shadows"), "{on}");
+    assert!(
+        on.contains("not in it: borders of shadows") && !on.contains("scene.light.shadows is off"),
+        "{on}"
+    );
+}

@@ -25,6 +25,7 @@ mod lattice;
 mod placed;
 mod query;
 mod select;
+mod sunlit;
 mod terrain_tiles;
 #[cfg(test)]
 mod tests;
@@ -46,6 +47,7 @@ pub use query::Frustum;
 pub use query::TerrainHit;
 pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh};
+pub use sunlit::SunlitBlocks;
 pub use terrain_tiles::TerrainTiles;
 use tree::BlockTree;
 pub use walk::TerrainTriangle;

@@ -1,10 +1,11 @@
 //! Textures with their mip levels, and filtered reads of them. Twin of `shaders/ideal/surface.wgsl`,
 //! `shaders/ideal/prefilter` and `shaders/ideal/texture`.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
-use camsim_core::scene::{Prefilter, TexelForm, Texture, Wrap};
+use camsim_core::scene::{Encoding, Prefilter, Scene, TexelForm, Texture, Wrap};
 use glam::{DVec2, Vec4};
+use rayon::prelude::*;
 
 /// A texture and its mip levels, as linear light when read.
 #[derive(Debug)]
@@ -31,6 +32,26 @@ pub(super) struct Sampling {
     pub nearest: bool,
     /// Whether reads are averaged weighted by alpha, as blended surfaces need it.
     pub premultiplied: bool,
+}
+
+/// The textures of the terrain and of all meshes; surfaces of one texture have it in common.
+pub(super) fn of_scene(scene: &Scene) -> Vec<Arc<MipChain>> {
+    let none = || (Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear)), None);
+    let ground = scene.terrain.as_ref().map(|terrain| (terrain.texture.clone(), terrain.beyond));
+    let textures: Vec<_> = std::iter::once(ground.unwrap_or_else(none))
+        .chain(scene.meshes.iter().map(|mesh| (mesh.material.texture.clone(), None)))
+        .collect();
+    let (mut numbers, mut distinct) = (HashMap::new(), Vec::new());
+    let number = |(texture, border): &(Arc<Texture>, Option<[u8; 4]>)| {
+        *numbers.entry((Arc::as_ptr(texture), *border)).or_insert_with(|| {
+            distinct.push((texture.clone(), *border));
+            distinct.len() - 1
+        })
+    };
+    let numbers: Vec<usize> = textures.iter().map(number).collect();
+    let mips = |(texture, border): &_| Arc::new(MipChain::new(texture, *border));
+    let distinct: Vec<Arc<MipChain>> = distinct.par_iter().map(mips).collect();
+    numbers.into_iter().map(|number| distinct[number].clone()).collect()
 }
 
 impl MipChain {

@@ -5,11 +5,11 @@
 //! are those of the triangles' planes, with textures prefiltered over the pixel ([`shade`], [`mips`]).
 //! Terrain and models have full detail.
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
     scenario::Preset,
-    scene::{Encoding, Scene, Texture, srgb_from_linear},
+    scene::{Scene, SunlitBlocks, srgb_from_linear},
     temporal::{SAMPLE_POSITIONS, edge_mask, resolve_depth},
 };
 use camsim_plan::{EdgeStage, FramePlan, KeyFrame, NEAR_M};
@@ -48,36 +48,25 @@ const SAMPLES: usize = SAMPLE_POSITIONS.len();
 pub struct CastScene {
     scene: Arc<Scene>,
     trees: SceneTrees,
-    /// Of the terrain, then by mesh; surfaces of one texture have it in common.
-    textures: Vec<Arc<MipChain>>,
+    /// Of the terrain, then by mesh; surfaces of one texture have it in common. Made when first needed.
+    textures: OnceLock<Vec<Arc<MipChain>>>,
+    /// Where the terrain leaves the sun; `None` without terrain or shadows.
+    sunlit: Option<SunlitBlocks>,
 }
 
 impl CastScene {
-    /// Builds trees over all triangles, and the mip levels of all textures.
+    /// Builds trees over all triangles.
     #[must_use]
     pub fn new(scene: &Arc<Scene>) -> Self {
-        let none = || (Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear)), None);
-        let ground = scene.terrain.as_ref().map(|terrain| (terrain.texture.clone(), terrain.beyond));
-        let textures: Vec<_> = std::iter::once(ground.unwrap_or_else(none))
-            .chain(scene.meshes.iter().map(|mesh| (mesh.material.texture.clone(), None)))
-            .collect();
-        let (mut numbers, mut distinct) = (HashMap::new(), Vec::new());
-        let number = |(texture, border): &(Arc<Texture>, Option<[u8; 4]>)| {
-            *numbers.entry((Arc::as_ptr(texture), *border)).or_insert_with(|| {
-                distinct.push((texture.clone(), *border));
-                distinct.len() - 1
-            })
-        };
-        let numbers: Vec<usize> = textures.iter().map(number).collect();
-        let (trees, distinct) = rayon::join(
-            || SceneTrees::new(scene),
-            || -> Vec<Arc<MipChain>> {
-                let mips = |(texture, border): &_| Arc::new(MipChain::new(texture, *border));
-                distinct.par_iter().map(mips).collect()
-            },
-        );
-        let textures = numbers.into_iter().map(|number| distinct[number].clone()).collect();
-        Self { scene: scene.clone(), trees, textures }
+        let light = scene.light.filter(|light| light.shadows);
+        let sunlit = scene.terrain.as_ref().zip(light);
+        let sunlit = sunlit.map(|(terrain, light)| SunlitBlocks::new(terrain, light.to_sun_ned));
+        Self { scene: scene.clone(), trees: SceneTrees::new(scene), textures: OnceLock::new(), sunlit }
+    }
+
+    /// The mip levels of all textures. The first call makes them, on all threads: not from one of their tasks.
+    fn textures(&self) -> &[Arc<MipChain>] {
+        self.textures.get_or_init(|| mips::of_scene(&self.scene))
     }
 
     /// The ideal frame of a plan's key frame.
@@ -134,6 +123,7 @@ type SampleColors = [[f16; 3]; SAMPLES];
 #[derive(Debug)]
 struct FrameCaster<'a> {
     trees: &'a SceneTrees,
+    sunlit: Option<&'a SunlitBlocks>,
     shader: SurfaceShader<'a>,
 }
 
@@ -159,19 +149,26 @@ struct TriangleShare {
 impl<'a> FrameCaster<'a> {
     /// With `scale` pixels along a side of an ideal pixel.
     fn new(cast: &'a CastScene, plan: &FramePlan, key: &KeyFrame, scale: u32) -> Self {
+        let mut caster = Self::without_textures(cast, plan, key, scale);
+        caster.shader.textures = cast.textures();
+        caster
+    }
+
+    /// One that casts rays and makes no colours.
+    fn without_textures(cast: &'a CastScene, plan: &FramePlan, key: &KeyFrame, scale: u32) -> Self {
         let scene = &*cast.scene;
         // The paper's fog comes after the gather.
         let visibility_m = scene.fog_visibility_m.filter(|_| plan.linear_fog.is_none());
         let shader = SurfaceShader {
             scene,
-            textures: &cast.textures,
+            textures: &[],
             camera: KeyCamera::new(&plan.ideal, &key.pose, scale),
             reads: plan.surface_reads,
             fog_per_m: visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
             posed: &[],
             shadows: scene.light.filter(|_| plan.shadows.is_some()),
         };
-        Self { trees: &cast.trees, shader }
+        Self { trees: &cast.trees, sunlit: cast.sunlit.as_ref(), shader }
     }
 
     /// Linear R G B A and inverse depth at the centres of all pixels.

@@ -44,8 +44,10 @@ impl MovingCaster {
     /// Builds trees over all triangles, and the mip levels of all textures.
     #[must_use]
     pub fn new(scene: &Arc<Scene>) -> Self {
+        let cast = CastScene::new(scene);
+        cast.textures();
         let moving = (0..).zip(&scene.meshes).filter(|(_, mesh)| mesh.motion.is_some());
-        Self { moving: moving.map(|(number, _)| number).collect(), cast: CastScene::new(scene) }
+        Self { moving: moving.map(|(number, _)| number).collect(), cast }
     }
 
     /// The scene at path time `t_s`, seen by a camera.
@@ -73,13 +75,14 @@ impl MovingCaster {
         let scene = &*self.cast.scene;
         let shader = SurfaceShader {
             scene,
-            textures: &self.cast.textures,
+            textures: self.cast.textures(),
             camera: KeyCamera::with_steps(&instant.pose, step_uv),
             reads,
             fog_per_m: scene.fog_visibility_m.map_or(0.0, |visibility_m| FOG_AT_VISIBILITY / visibility_m),
             posed: &instant.posed,
             shadows: scene.light.filter(|light| light.shadows),
         };
-        FrameCaster { trees: &self.cast.trees, shader }.middle(uv / step_uv, &mut scratch.0, None).0
+        let caster = FrameCaster { trees: &self.cast.trees, sunlit: self.cast.sunlit.as_ref(), shader };
+        caster.middle(uv / step_uv, &mut scratch.0, None).0
     }
 }

@@ -4,6 +4,7 @@
 //! by three pixels, a second one finds the share of each surface in a pixel that the sun shines on, by rays
 //! spread evenly over the pixel.
 
+use camsim_core::scene::Terrain;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -88,29 +89,27 @@ pub(super) fn share_of_sun(surface: u32, sun: Sun, suns: Option<&SurfaceSuns>) -
     suns.and_then(|suns| suns.share(surface)).unwrap_or(own)
 }
 
+/// Whether the sun has a part in the light on a triangle of the terrain.
+fn has_sun(terrain: &Terrain, triangle: &Triangle) -> bool {
+    let has_sun =
+        |&corner: &u32| terrain.light_parts.get(corner as usize).is_some_and(|[of_sun, _]| *of_sun > 0.0);
+    triangle.corners.iter().any(has_sun)
+}
+
 impl FrameCaster<'_> {
     /// What a triangle has of the sun where a ray meets it.
     pub(super) fn sun(&self, triangle: &Triangle, t: f64, ray: &SceneRay) -> Sun {
         let Some(light) = self.shader.shadows else { return Sun::NoMatter };
         let scene = self.shader.scene;
-        let points: [DVec3; 3] = match (triangle.surface.checked_sub(1), &scene.terrain) {
-            (Some(mesh), _) => {
-                let mesh = self.shader.mesh(mesh as usize);
-                if !mesh.shape.has_normals() {
-                    return Sun::NoMatter;
-                }
+        let mesh = triangle.surface.checked_sub(1).map(|mesh| self.shader.mesh(mesh as usize));
+        let points: [DVec3; 3] = match (mesh, &scene.terrain) {
+            (Some(mesh), _) if mesh.shape.has_normals() => {
                 triangle.corners.map(|corner| mesh.position_ned_m(corner))
             }
-            (None, Some(terrain)) => {
-                let has_sun = |&corner: &u32| {
-                    terrain.light_parts.get(corner as usize).is_some_and(|[of_sun, _]| *of_sun > 0.0)
-                };
-                if !triangle.corners.iter().any(has_sun) {
-                    return Sun::NoMatter;
-                }
+            (None, Some(terrain)) if has_sun(terrain, triangle) => {
                 triangle.corners.map(|corner| terrain_position(terrain, triangle.chunk, corner))
             }
-            (None, None) => return Sun::NoMatter,
+            _ => return Sun::NoMatter,
         };
         let [a, b, c] = points;
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -120,10 +119,24 @@ impl FrameCaster<'_> {
         }
         let origin_ned_m = ray.origin_ned_m + t * ray.direction_ned + LIFT_M * normal;
         let to_sun = SceneRay { origin_ned_m, direction_ned: light.to_sun_ned };
-        match self.trees.is_blocked(scene, self.shader.posed, &to_sun) {
+        let is_blocked = scene.terrain.as_ref().is_some_and(|terrain| {
+            let is_open = mesh.is_none() && normal.z < 0.0 && self.is_sunlit(terrain, triangle);
+            !is_open && terrain.blocks(origin_ned_m, light.to_sun_ned)
+        });
+        match is_blocked || self.trees.is_blocked(scene, self.shader.posed, &to_sun) {
             true => Sun::Hidden,
             false => Sun::Shining,
         }
+    }
+
+    /// Whether the terrain is known to leave the sun on all of the block around one of its triangles.
+    fn is_sunlit(&self, terrain: &Terrain, triangle: &Triangle) -> bool {
+        let chunk = &terrain.chunks[triangle.chunk as usize];
+        // The first corner is the north-western one of both triangles of a cell.
+        let first = triangle.corners[0] - chunk.first_vertex;
+        let across = chunk.cells[0] + 1;
+        let cell = [first % across, first / across];
+        self.sunlit.is_some_and(|sunlit| sunlit.is_lit(terrain, triangle.chunk, cell))
     }
 
     /// Values of all pixels by their middles. Those at borders of shadows are made again, with the shares of

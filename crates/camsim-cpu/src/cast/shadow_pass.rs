@@ -38,7 +38,7 @@ impl CastScene {
     /// Puts shadows into a rasterised ideal frame of a key frame.
     pub(crate) fn add_shadows(&self, plan: &FramePlan, key: &KeyFrame, frame: &mut RasterFrame) {
         let Some(shadows) = plan.shadows else { return };
-        let caster = FrameCaster::new(self, plan, key, 1);
+        let mut caster = FrameCaster::without_textures(self, plan, key, 1);
         let [width, height] = plan.ideal.size_px.map(|side| side as usize);
         let RasterFrame { color, depth, stride } = frame;
         let mut middles = vec![Middle::default(); width * height];
@@ -54,8 +54,13 @@ impl CastScene {
                 }
             },
         );
-        let pass = Pass { caster, middles, size_px: [width, height], border_rays: shadows.border_rays };
         let has_samples = plan.samples_a_pixel > 1;
+        let shows_several =
+            !self.scene.meshes.is_empty() || middles.iter().any(|middle| middle.triangle.is_none());
+        if has_samples && shows_several {
+            caster.shader.textures = self.textures();
+        }
+        let pass = Pass { caster, middles, size_px: [width, height], border_rays: shadows.border_rays };
         color.par_chunks_mut(CHANNELS * *stride).take(height).enumerate().for_each_init(
             PixelScratch::default,
             |scratch, (y, row)| {

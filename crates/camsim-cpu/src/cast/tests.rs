@@ -6,7 +6,7 @@
 use camsim_core::{
     pose::CameraPose,
     reference::Oracle,
-    scene::{Material, Mesh, PrefilterTaps, Wrap},
+    scene::{Encoding, Material, Mesh, PrefilterTaps, Texture, Wrap},
     sequence::Sequence,
     temporal::{
         IdealGeometry,
@@ -196,7 +196,7 @@ fn samples_have_the_depths_and_colors_of_the_reference() {
     for scale in [1, 2] {
         let frame = FrameCaster::new(&cast, &plan, &key, scale);
         let fine_px = SIZE_PX.map(|side| side * scale);
-        let (depths, colors) = frame.samples(fine_px);
+        let (depths, colors) = frame.samples(fine_px, 0);
         let (mut apart, mut sum) = (0, 0.0);
         for (i, (depths, colors)) in depths.iter().zip(&colors).enumerate() {
             let corner = DVec2::new((i as u32 % fine_px[0]).into(), (i as u32 / fine_px[0]).into());
@@ -221,7 +221,7 @@ fn samples_have_the_depths_and_colors_of_the_reference() {
     // A pixel's colour is the mean of its samples'.
     plan.samples_a_pixel = 4;
     let image = cast.draw(&plan, &key);
-    let (_, colors) = FrameCaster::new(&cast, &plan, &key, 1).samples(SIZE_PX);
+    let (_, colors) = FrameCaster::new(&cast, &plan, &key, 1).samples(SIZE_PX, 0);
     for (i, _) in pixels() {
         let mean = colors[i].map(|color| DVec3::from_array(color.map(|half| half.to_f64())));
         let mean = mean.iter().sum::<DVec3>() / 4.0;
@@ -282,7 +282,7 @@ fn samples_of_an_edge_are_on_its_sides() {
     for scale in [1, 3] {
         let frame = FrameCaster::new(&cast, &plan, &key, scale);
         let fine_px = SIZE_PX.map(|side| side * scale);
-        let (depths, colors) = frame.samples(fine_px);
+        let (depths, colors) = frame.samples(fine_px, 0);
         if scale == 1 {
             assert_eq!(depths, frame.sample_depths(fine_px, |_| None));
         }

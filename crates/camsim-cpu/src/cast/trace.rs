@@ -149,19 +149,15 @@ impl SceneTrees {
         hit.map(|(t, hit)| (t + t_min, hit.triangle()))
     }
 
-    /// Whether a ray meets anything that has depth, whichever side of it. Meshes of `posed` are where they are
+    /// Whether a ray meets a model that has depth, whichever side of it. Meshes of `posed` are where they are
     /// there, and not in the scene.
     pub fn is_blocked(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay) -> bool {
-        let SceneRay { origin_ned_m, direction_ned } = *ray;
-        if scene.terrain.as_ref().is_some_and(|terrain| terrain.blocks(origin_ned_m, direction_ned)) {
-            return true;
-        }
         let stands = |number: u32, _| {
             let mesh = &scene.meshes[number as usize];
             let is_met = self.is_blocked_by(number, mesh, &self.shape_from_ned[number as usize], ray);
             is_met.then_some((NO_MORE, ()))
         };
-        self.meshes.first(origin_ned_m, direction_ned, f64::INFINITY, stands).is_some()
+        self.meshes.first(ray.origin_ned_m, ray.direction_ned, f64::INFINITY, stands).is_some()
             || posed
                 .iter()
                 .any(|posed| self.is_blocked_by(posed.number, &posed.mesh, &posed.shape_from_ned, ray))

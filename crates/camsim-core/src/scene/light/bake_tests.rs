@@ -132,3 +132,39 @@ fn voids_are_lit_like_their_surroundings() {
     // Some 50 heights of 16 texels each, and their neighbours.
     assert!((300..2500).contains(&other), "{other}");
 }
+
+#[test]
+fn parts_of_sun_and_sky_add_up_to_the_baked_light() {
+    let (cols, rows) = (150, 90);
+    let heights: Vec<f64> = (0..cols * rows)
+        .map(|k| 30.0 * (f64::from(k % cols) * 0.3).sin() * (f64::from(k / cols) * 0.2).cos())
+        .collect();
+    let white = Texture {
+        size_px: [cols, rows],
+        rgba8: vec![255; 4 * (cols * rows) as usize],
+        encoding: Encoding::Linear,
+    };
+    let baked = |light: &Light| {
+        let mut terrain =
+            Terrain::from_heights(cols, rows, 5.0, &heights, Some(Arc::new(white.clone()))).unwrap();
+        terrain.bake_light(light);
+        terrain
+    };
+    assert!(baked(&sun()).light_parts.is_empty());
+    let light = sun().with_shadows(true);
+    let terrain = baked(&light);
+    assert_eq!(terrain.texture.rgba8, baked(&sun()).texture.rgba8);
+    assert_eq!(terrain.light_parts.len(), terrain.vertices.len());
+    let mut dark = 0;
+    for (vertex, [of_sun, of_sky]) in terrain.vertices.iter().zip(&terrain.light_parts) {
+        let [x, y] = [(vertex.uv[0] * cols as f32) as usize, (vertex.uv[1] * rows as f32) as usize];
+        let byte = terrain.texture.rgba8[4 * (y * cols as usize + x)];
+        let off = (of_sun + of_sky) * 255.0 - f32::from(byte);
+        assert!(off.abs() < 0.51, "{off} at {x}, {y}");
+        assert!(*of_sun >= 0.0 && *of_sky > 0.0);
+        dark += u32::from(*of_sun == 0.0);
+    }
+    assert!(dark > 100, "{dark}");
+    // Ground that is all sky's stays as it is in the shadow.
+    assert_eq!(Terrain::sky_share(&baked(&sun()), [0, 1, 2], [0.2, 0.3, 0.5]), 1.0);
+}
