@@ -82,18 +82,24 @@ impl PictureChoice {
     }
 }
 
+/// Scale of the ideal frame of a scene with shadows, of the least: no prediction knows their borders, and at
+/// scale 1 a border of contrast 0.3 keeps 37 dB only (`camsim-engine/tests/shadows`).
+const SHADOW_SCALE: f64 = 1.4;
+
 /// The cheapest picture within `quality.max_error_dn`, or the best there is.
 pub(crate) fn choose(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> PictureChoice {
     if context.is_paper() {
         return PictureChoice::of_paper();
     }
     let quality = context.quality();
+    let light = context.inputs.sequence.scene.light;
     let most_error_dn = ErrorBudget::new(quality).sampling_dn(&context.inputs.sequence.scene);
     let task = SamplingTask {
         quality,
         max_error_dn: most_error_dn * context.request.share_of_dn,
         most_error_dn,
         least_scale: context.reach.least_scale(),
+        wished_scale: if light.is_some_and(|light| light.shadows) { SHADOW_SCALE } else { 1.0 },
         most_scale: scale_of(context, scene, context.inputs.max_ideal_px, context.inputs.max_side_px),
         ideal_share: ideal_share(context, scene),
         may_have_samples: false,

@@ -56,6 +56,8 @@ pub(crate) struct SamplingTask<'a> {
     pub most_error_dn: f64,
     /// Least scale of the ideal frame.
     pub least_scale: f64,
+    /// Least scale that is wished for, of the least: finer where shadows have borders.
+    pub wished_scale: f64,
     /// Scale of the ideal frame that is too fine already.
     pub most_scale: f64,
     /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
@@ -165,10 +167,12 @@ impl SamplingSearch<'_> {
         let Self { prices, task, .. } = self;
         let scales =
             SCALES.iter().filter(|&&scale| scale > 1.05 * task.least_scale && scale < task.most_scale);
-        let scales: Vec<f64> = task.quality.ideal_scale.value().map_or_else(
+        let mut scales: Vec<f64> = task.quality.ideal_scale.value().map_or_else(
             || std::iter::once(task.least_scale).chain(scales.copied()).collect(),
             |scale| vec![scale],
         );
+        let is_coarse = |scale: &f64| *scale < task.wished_scale * task.least_scale;
+        scales.drain(..scales.partition_point(is_coarse).min(scales.len() - 1));
         let fewest = |plan: SamplingPlan| {
             task.sampled(&plan, task.samples_per_px(plan.scale).first().copied().unwrap_or(0.0)).1
         };
