@@ -63,7 +63,7 @@ fn is_in_shadow(surface: u32, sun: Sun) -> bool {
 pub(super) struct SurfaceSuns(Vec<(u32, u32, u32)>);
 
 impl SurfaceSuns {
-    fn add(&mut self, surface: u32, sun: Sun) {
+    pub fn add(&mut self, surface: u32, sun: Sun) {
         let shines = u32::from(sun == Sun::Shining);
         if shines == 0 && !is_in_shadow(surface, sun) {
             return;
@@ -169,10 +169,7 @@ impl FrameCaster<'_> {
     /// Shares of the sun over a pixel.
     pub(super) fn suns(&self, middle_px: DVec2, rays: u32, hits: &mut Hits) -> SurfaceSuns {
         let mut suns = SurfaceSuns::default();
-        for k in 0..rays {
-            let place =
-                DVec2::new((f64::from(k) + 0.5) / f64::from(rays), (f64::from(k) * GOLDEN).fract()) - 0.5;
-            let position_px = middle_px + place;
+        for position_px in lattice(middle_px, rays) {
             self.trace(position_px, hits);
             let ray = self.shader.camera.ray(position_px);
             let opaque = self.opaque_triangle(hits, &ray).zip(hits.opaque);
@@ -183,6 +180,14 @@ impl FrameCaster<'_> {
         }
         suns
     }
+}
+
+/// Positions spread evenly over a pixel: a Fibonacci lattice.
+pub(super) fn lattice(middle_px: DVec2, count: u32) -> impl Iterator<Item = DVec2> {
+    let place = move |k: u32| {
+        DVec2::new((f64::from(k) + 0.5) / f64::from(count), (f64::from(k) * GOLDEN).fract()) - 0.5
+    };
+    (0..count).map(move |k| middle_px + place(k))
 }
 
 /// Whether both light and shadow are seen in a pixel or its neighbours.

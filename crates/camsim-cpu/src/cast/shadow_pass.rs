@@ -15,14 +15,14 @@ use rayon::prelude::*;
 use super::{
     CastScene, FrameCaster, PixelScratch,
     shade::ShadowTone,
-    shadow::{SeenLight, share_of_sun},
+    shadow::{SeenLight, SurfaceSuns, lattice, share_of_sun},
     trace::{Hits, Triangle},
 };
 use crate::ideal::RasterFrame;
 
-/// Relative difference of inverse depths up to which the terrain that is drawn is the terrain that a walk
-/// finds. Farther apart a ray is cast.
-const SAME_DEPTH: f64 = 2e-3;
+/// Relative difference of depths up to which the terrain that a walk finds is the one that is drawn, with fewer
+/// triangles, or the one beside it. Farther apart something nearer may hide it, and a ray is cast.
+const SAME_DEPTH: f64 = 0.02;
 const CHANNELS: usize = 4;
 
 /// What a pixel's middle sees.
@@ -32,6 +32,9 @@ struct Middle {
     seen: SeenLight,
     /// Share of the sun.
     sun: f32,
+    /// Inverse depth, 1/m, and the terrain's triangle there or beside it.
+    inverse_depth: f64,
+    ground: Option<TerrainTriangle>,
 }
 
 impl CastScene {
@@ -107,12 +110,14 @@ impl Pass<'_> {
             return None;
         }
         let middle_px = DVec2::new(x as f64, y as f64);
-        let suns =
-            seen.is_border().then(|| self.caster.suns(middle_px, self.border_rays, &mut scratch.hits[0]));
         if has_samples && !is_one_surface {
-            let ([a, b, c, d], ..) = self.caster.pixel_samples(middle_px, scratch, suns.as_ref());
+            let ([a, b, c, d], ..) = self.caster.pixel_samples(middle_px, scratch, None);
             return Some(0.25 * ((a + d) + (b + c)));
         }
+        let suns = seen.is_border().then(|| match is_one_surface {
+            true => self.suns_beside(middle, middle_px, &mut scratch.hits[0]),
+            false => self.caster.suns(middle_px, self.border_rays, &mut scratch.hits[0]),
+        });
         let triangle = middle.triangle?;
         let of_pixel = suns.as_ref().and_then(|suns| suns.share(triangle.surface));
         let sun = of_pixel.map_or(middle.sun, |share| share as f32);
@@ -121,6 +126,22 @@ impl Pass<'_> {
         }
         let tone: ShadowTone = self.caster.shader.shadow_tone(&triangle, middle_px)?;
         Some(tone.shaded(lit, sun))
+    }
+}
+
+impl Pass<'_> {
+    /// Shares of the sun over a pixel that shows one surface.
+    fn suns_beside(&self, middle: &Middle, middle_px: DVec2, hits: &mut Hits) -> SurfaceSuns {
+        let mut suns = SurfaceSuns::default();
+        for position_px in lattice(middle_px, self.border_rays) {
+            let mut ground = middle.ground;
+            let first = self.caster.first_surface(position_px, middle.inverse_depth, &mut ground, hits);
+            if let Some((triangle, t)) = first {
+                let ray = self.caster.shader.camera.ray(position_px);
+                suns.add(triangle.surface, self.caster.sun(&triangle, t, &ray));
+            }
+        }
+        suns
     }
 }
 
@@ -135,12 +156,13 @@ impl FrameCaster<'_> {
         hits: &mut Hits,
     ) -> Middle {
         let Some((triangle, t)) = self.first_surface(position_px, inverse_depth, before, hits) else {
-            return Middle { sun: 1.0, ..Middle::default() };
+            return Middle { sun: 1.0, ground: *before, ..Middle::default() };
         };
         let sun = self.sun(&triangle, t, &self.shader.camera.ray(position_px));
         let mut seen = SeenLight::default();
         seen.add(triangle.surface, sun);
-        Middle { triangle: Some(triangle), seen, sun: share_of_sun(triangle.surface, sun, None) as f32 }
+        let share = share_of_sun(triangle.surface, sun, None) as f32;
+        Middle { triangle: Some(triangle), seen, sun: share, inverse_depth: t.recip(), ground: *before }
     }
 
     fn first_surface(

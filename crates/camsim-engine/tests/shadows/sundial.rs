@@ -158,7 +158,7 @@ fn expect_sundial(who: &str, picture: &[f32], least_db: f64) {
             (squares, count) = (squares + error * error, count + 1.0);
         }
     }
-    let psnr_db = -10.0 * (squares / f64::from(count)).log10();
+    let psnr_db = -10.0 * (squares / count).log10();
     let of_area = area / expected_area;
     eprintln!(
         "{who}: {psnr_db:.1} dB in {count} pixels, worst {worst:.4}, area {of_area:.4} of the expected"
