@@ -105,7 +105,7 @@ pub(super) const PROPERTIES: &[SupportRow] = &[
     ("metallicFactor, metallicRoughnessTexture", Reported, "colour is albedo"),
     ("roughnessFactor", Irrelevant, "gloss alone: colour is albedo"),
     ("normalTexture", Reported, "the scene's light uses the surface's own normals"),
-    ("occlusionTexture", Reported, "there are no shadows"),
+    ("occlusionTexture", Reported, "the sky is hidden from nothing"),
     ("COLOR_1, COLOR_2, ...", Reported, "glTF defines no meaning"),
     ("TANGENT", Irrelevant, "for normalTexture"),
     ("cameras", Irrelevant, "the camera is the scenario's"),
