@@ -44,6 +44,8 @@ pub(super) fn read_depth(path: &Path) -> Result<FloatPlane, DatasetError> {
 pub(super) struct DepthScale {
     /// Steps per metre.
     pub(super) per_metre: f64,
+    /// Whether readers expect that number.
+    pub(super) is_usual: bool,
     beyond: AtomicU64,
 }
 
@@ -62,12 +64,12 @@ impl DepthScale {
                 SCALES.iter().find(fits).copied().unwrap_or(1.0)
             }
         };
-        Ok(Self::fixed(per_metre))
+        Ok(Self { is_usual: per_metre == usual, ..Self::fixed(per_metre) })
     }
 
     /// A scale that readers have built in.
     pub(super) fn fixed(per_metre: f64) -> Self {
-        Self { per_metre, beyond: AtomicU64::new(0) }
+        Self { per_metre, is_usual: true, beyond: AtomicU64::new(0) }
     }
 
     /// A 16 bit grey PNG. Depths that do not fit become 0.

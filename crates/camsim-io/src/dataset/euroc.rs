@@ -218,6 +218,11 @@ pub(super) fn timing(camera: &RunCamera) -> String {
     } else {
         format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
     };
+    let offset_ms = camera.spec.clock_offset_ms;
+    let centre = match offset_ms == 0.0 {
+        true => centre,
+        false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
+    };
     if readout_ms == 0.0 {
         format!("{centre}; global shutter")
     } else {

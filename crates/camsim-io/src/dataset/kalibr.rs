@@ -101,12 +101,12 @@ pub(super) fn chain_yaml(
         let (model, coefficients) = distortion(job.name(), camera, &lens)?;
         let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
         let camera_from_body = camera.body_from_camera().inverse();
-        let _ = write!(text, "cam{i}:\n");
+        let _ = writeln!(text, "cam{i}:");
         if let Some(imu) = imu {
             let camera_from_imu = camera_from_body.of(&imu.body_from_imu);
             let pose = if key == "T_imu_cam" { camera_from_imu.inverse() } else { camera_from_imu };
             let rows = matrix_rows(&pose.matrix(), "  ");
-            let _ = write!(text, "  {key}:\n{rows}  timeshift_cam_imu: {}\n", real(imu.shift_s(camera)));
+            let _ = writeln!(text, "  {key}:\n{rows}  timeshift_cam_imu: {}", real(imu.shift_s(camera)));
         }
         if let Some(body_from_before) = before {
             let _ = write!(
@@ -126,7 +126,7 @@ pub(super) fn chain_yaml(
             list(&[fx, fy, cx, cy])
         );
         if let Some(delay_s) = line_delay_s(camera) {
-            let _ = write!(text, "  line_delay: {}\n", real(delay_s));
+            let _ = writeln!(text, "  line_delay: {}", real(delay_s));
         }
         before = Some(camera.body_from_camera());
     }

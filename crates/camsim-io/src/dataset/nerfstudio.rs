@@ -132,7 +132,7 @@ fn write_transforms(
 
 fn notes(job: &ExportJob<'_>, scale: Option<&DepthScale>) -> Vec<String> {
     let mut notes: Vec<String> = scale.and_then(DepthScale::note).into_iter().collect();
-    if let Some(scale) = scale.filter(|scale| scale.per_metre != USUAL_STEPS) {
+    if let Some(scale) = scale.filter(|scale| !scale.is_usual) {
         let factor = 1.0 / scale.per_metre;
         notes.push(format!(
             "depth has {} steps per metre, not millimetres: `ns-train ... nerfstudio-data \

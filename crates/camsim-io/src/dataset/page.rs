@@ -23,6 +23,9 @@ impl Page {
         for (i, camera) in run.cameras.iter().enumerate().filter(|(_, camera)| !camera.name.is_empty()) {
             let _ = write!(text, "\n- cam{i}: camera `{}`", camera.name);
         }
+        if run.cameras.len() > 1 {
+            text.push('\n');
+        }
         text += "\n## Conventions\n\n| what | here |\n|---|---|\n";
         Self { text }
     }

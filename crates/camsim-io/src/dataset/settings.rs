@@ -56,7 +56,7 @@ fn orb_slam(
         }
         if i == 0 {
             let kind = if lens.equidistant().is_some() { "KannalaBrandt8" } else { "PinHole" };
-            let _ = write!(text, "Camera.type: \"{kind}\"\n");
+            let _ = writeln!(text, "Camera.type: \"{kind}\"");
         }
         text += &orb_camera(i + 1, &lens);
     }
@@ -105,7 +105,7 @@ fn orb_camera(number: usize, lens: &Intrinsics) -> String {
     let mut text = "\n".to_owned();
     let matrix = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
     for (name, value) in matrix.into_iter().chain(coefficients) {
-        let _ = write!(text, "Camera{number}.{name}: {}\n", real(value));
+        let _ = writeln!(text, "Camera{number}.{name}: {}", real(value));
     }
     text
 }
@@ -149,7 +149,7 @@ fn write_vins(job: &ExportJob<'_>, imu: &ImuSensor, body_from_b: &Rigid) -> Resu
     );
     for (i, camera) in cameras.iter().enumerate() {
         let b_from_camera = body_from_b.inverse().of(&camera.body_from_camera());
-        let _ = write!(text, "image{i}_topic: \"/cam{i}/image_raw\"\ncam{i}_calib: \"cam{i}.yaml\"\n");
+        let _ = writeln!(text, "image{i}_topic: \"/cam{i}/image_raw\"\ncam{i}_calib: \"cam{i}.yaml\"");
         text += &opencv_matrix(&format!("body_T_cam{i}"), &b_from_camera.matrix());
         job.target.text(&name(&format!("cam{i}.yaml")), &camodocal(i, camera)?)?;
     }

@@ -29,7 +29,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
         write_camera(job, &job.prefix(i), camera, &scale)?;
     }
     let mut notes: Vec<String> = scale.note().into_iter().collect();
-    if scale.per_metre != USUAL_STEPS {
+    if !scale.is_usual {
         notes.push(format!(
             "depth has {} steps per metre, not the usual {USUAL_STEPS}: tell the reader (ORB-SLAM3: \
              RGBD.DepthMapFactor)",
