@@ -1,6 +1,7 @@
 #!/bin/sh
 # Installs what is missing, then checks formatting and lints and runs every test; needs only a clone of the repository and Rust.
 #   CAMSIM_DATA=DIR    also runs the tests on real flights, terrains and calibrations, which are not in the repository
+#   CAMSIM_SKIP_JUDGES=1  leaves out scripts/judges.sh, which downloads Python packages
 #   CAMSIM_SKIP_GPU=1  ignores the tests that need a graphics adapter; without it they fail on a machine that has none
 set -eu
 cd "$(dirname "$0")/.."
@@ -37,4 +38,10 @@ say "tests"
 # Examples in the documentation first, so that the run closes on the suite itself.
 cargo test --workspace --doc
 cargo test --workspace --lib --bins --tests
+say "exports, judged by readers of other programs"
+if [ "${CAMSIM_SKIP_JUDGES:-}" = 1 ]; then
+    say "CAMSIM_SKIP_JUDGES=1: JUDGES SKIPPED, no other program has read the exports"
+else
+    sh scripts/judges.sh
+fi
 say "all passed"

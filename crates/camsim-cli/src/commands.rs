@@ -10,6 +10,7 @@ pub mod compare;
 pub mod completions;
 pub mod demo;
 pub mod explain;
+pub mod export;
 pub mod info;
 pub mod lens;
 pub mod merge;

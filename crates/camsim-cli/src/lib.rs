@@ -35,6 +35,7 @@ Examples:
   camsim render flight.toml -o frames             renders every frame of a scenario
   camsim render flight.toml --frames 0..10 --set camera.shutter.readout_ms=0
   camsim explain flight.toml --frame 7            shows the plan of a frame, and what it skips
+  camsim export flight.toml --as euroc -o euroc   writes frames as another program reads them
   camsim verify flight.toml                       compares measured with predicted errors
   camsim camera import calib.yaml -o CAMERA.toml  converts calibrations of other programs
   camsim apply CAMERA.toml FRAME.toml -o out.png  applies the camera to an ideal RGB-D image of any origin
@@ -70,6 +71,7 @@ enum Command {
     Render(commands::render::RenderArgs),
     Explain(commands::explain::ExplainArgs),
     Verify(commands::verify::VerifyArgs),
+    Export(commands::export::ExportArgs),
     Track(commands::track::TrackArgs),
     Lens(commands::lens::LensArgs),
     Camera(commands::camera::CameraArgs),
@@ -118,6 +120,7 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Render(args) => commands::render::run(&args, console),
         Command::Explain(args) => commands::explain::run(&args, console),
         Command::Verify(args) => commands::verify::run(&args, console),
+        Command::Export(args) => commands::export::run(&args, console),
         Command::Track(args) => commands::track::run(&args, console),
         Command::Lens(args) => commands::lens::run(&args, console),
         Command::Camera(args) => commands::camera::run(&args, console),

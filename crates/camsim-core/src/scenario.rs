@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 mod auto;
 mod camera;
 mod channel;
+mod dataset;
 mod motion;
 mod rig;
 mod scene;
@@ -26,6 +27,7 @@ pub use camera::{
     ShutterSpec, VibrationSpec, ZoomSpec,
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
+pub use dataset::DatasetFormat;
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use rig::Rig;
 pub use scene::{
@@ -448,6 +450,9 @@ pub struct OutputSpec {
     /// Twins of every frame, each in a folder of its own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub twin: Vec<TwinSpec>,
+    /// Layouts of other programs that are written at the end of a run, each in a folder of its own in `datasets`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub datasets: Vec<DatasetFormat>,
 }
 
 impl Default for OutputSpec {
@@ -465,6 +470,7 @@ impl Default for OutputSpec {
             palette: false,
             tracks: None,
             twin: Vec::new(),
+            datasets: Vec::new(),
         }
     }
 }

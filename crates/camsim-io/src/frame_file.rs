@@ -63,7 +63,7 @@ use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
 pub(crate) mod columns;
 mod depth;
-mod exr_planes;
+pub(crate) mod exr_planes;
 mod floats;
 mod flow;
 mod images;

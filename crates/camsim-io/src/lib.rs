@@ -24,6 +24,7 @@
 //! | [`pictures`] | textures and grey images |
 //! | [`load`] | everything that a scenario names |
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
+//! | [`dataset`] | output folders in the layouts of other programs |
 //! | [`write`](mod@write) | frames and tables |
 //! | [`manifest`] | `run.json`; resuming of runs |
 //! | [`merge`](mod@merge) | joining of shards |
@@ -38,6 +39,7 @@ pub mod board_file;
 pub mod builtin;
 pub mod camera_file;
 pub mod compare;
+pub mod dataset;
 pub mod flight_log;
 pub mod frame_file;
 pub mod gltf_file;

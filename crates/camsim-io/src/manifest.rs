@@ -207,6 +207,8 @@ pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Resu
     [&mut old, &mut new].into_iter().filter_map(|tree| tree.get_mut("output")?.as_object_mut()).for_each(
         |output| {
             output.remove("twin");
+            // Datasets are made of the frames.
+            output.remove("datasets");
         },
     );
     let new_inputs = portable_inputs(inputs, folder);

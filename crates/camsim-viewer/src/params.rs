@@ -411,6 +411,7 @@ pub const PARAMS: &[Param] = &[
         "frames from one to the other of flow and flow_back",
     ),
     param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow_global leads to"),
+    param("output.datasets", "", ANY, 1.0, "layouts of other programs, made of the frames"),
     param("output.palette", "", ANY, 1.0, "pictures of object and class in colour"),
     param(
         "output.tracks.points",

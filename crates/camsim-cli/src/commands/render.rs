@@ -6,11 +6,14 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Rig, Scenario, Solver, validate};
+use camsim_core::scenario::{
+    Auto, Channel, DatasetFormat, ImageFormat, Preset, Rig, Scenario, Solver, validate,
+};
 use camsim_engine::Finished;
 use camsim_io::{merge::write_checksums, scenario_file::print_default, write::Y4mStream};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use super::export::{export_datasets, with_needs};
 use crate::{
     backend,
     console::Console,
@@ -36,7 +39,7 @@ use cameras::{chosen_cameras, frames_of_cameras, piped_camera};
 /// folder, DIR/NAME, and DIR has run.json, rig.toml and trajectory.csv. Paths in these files are relative to them, so
 /// a folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
 /// command that resumes the run.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 #[command(after_help = "\
 Examples:
   camsim render flight.toml
@@ -100,8 +103,9 @@ pub struct RenderArgs {
     print_default: bool,
 }
 
+/// `--backend`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum RenderBackend {
+pub enum RenderBackend {
     /// This machine's processor alone; needs no Vulkan driver
     Cpu,
     /// The graphics adapter alone, a software adapter where there is no card
@@ -119,6 +123,13 @@ impl RenderBackend {
             Self::Gpu => Some(backend::EngineBackend::Gpu),
             Self::Reference => None,
         }
+    }
+}
+
+impl RenderArgs {
+    /// What `camsim export` renders: what is missing in its folder.
+    pub fn for_export(frames: Option<FrameList>, changes: Changes, backend: Option<RenderBackend>) -> Self {
+        Self { frames, changes, backend, resume: true, ..Self::default() }
     }
 }
 
@@ -145,14 +156,31 @@ fn channel_parser() -> impl TypedValueParser<Value = Channel> {
     })
 }
 
-/// Renders a scenario.
+/// Renders a scenario, and writes its datasets.
 pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(path) = args.scenario.clone() else {
         return Ok(console.print(&print_default())?);
     };
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
-    let rig = inputs::read_changed_rig(&path, &args.changes, console)?
-        .try_map(|scenario| with_backend(with_outputs(scenario, args)?, args.backend))?;
+    let datasets = render(args, &path, &folder, None, console)?;
+    if args.shard.is_some() && !datasets.is_empty() {
+        console.note("a shard writes no datasets: when all are there, `camsim export DIR --as ...` does");
+        return Ok(());
+    }
+    export_datasets(&folder, &datasets, args.pipe, console)
+}
+
+/// Renders the scenario at `path` with all that its datasets need, which are returned, or that `export` needs.
+pub fn render(
+    args: &RenderArgs,
+    path: &Path,
+    folder: &Path,
+    export: Option<DatasetFormat>,
+    console: &mut Console<'_>,
+) -> Result<Vec<DatasetFormat>, Failure> {
+    let rig = inputs::read_changed_rig(path, &args.changes, console)?.try_map(|scenario| {
+        with_needs(with_backend(with_outputs(scenario, args)?, args.backend)?, export, console)
+    })?;
     let cameras = chosen_cameras(&rig, &args.camera)?;
     refuse_parts_of_videos(&rig, args.shard)?;
     let piped = piped_camera(args.pipe, &rig, &cameras)?;
@@ -162,12 +190,15 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     let selected = Selected {
         rig: &rig,
         loaded: &loaded,
-        folder: &folder,
+        folder,
         frames: frames_of_cameras(args.frames.as_ref(), &cameras, &loaded, console)?,
         cameras,
         shard: args.shard,
         resume: args.resume,
-        resume_command: console.command_with("--resume"),
+        resume_command: match export {
+            Some(_) => console.command(),
+            None => console.command_with("--resume"),
+        },
     };
     let sequence = selected.first();
     let renderer = args.backend.and_then(RenderBackend::renderer);
@@ -205,7 +236,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         }
     })?;
     if args.checksums {
-        write_checksums(&folder).or_failed()?;
+        write_checksums(folder).or_failed()?;
     }
     if !console.is_quiet() {
         let (seconds, size_mb) = (outcome.time.as_secs_f64(), outcome.bytes as f64 * 1e-6);
@@ -221,7 +252,7 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         times.add_start("plan of the first frame", outcome.first_plan);
         console.print(&times.text())?;
     }
-    Ok(())
+    Ok(rig.first().output.datasets.clone())
 }
 
 /// A shard has a part of the frames, and its video would have the name of all others.

@@ -181,6 +181,7 @@ impl Scenario {
             camera.name += &format!("/{}/{k}", twin.name);
         }
         scenario.output.twin.clear();
+        scenario.output.datasets.clear();
         if let Some(channels) = &twin.channels {
             scenario.output.channels.clone_from(channels);
         }

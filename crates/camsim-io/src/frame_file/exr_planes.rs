@@ -11,15 +11,15 @@ use exr::prelude::read_all_flat_layers_from_file;
 use super::{FrameFileError, images::failure};
 
 /// One channel of one part of a file.
-pub(super) struct ExrPlane {
+pub(crate) struct ExrPlane {
     /// Full name.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Width, height.
-    pub(super) size_px: [u32; 2],
+    pub(crate) size_px: [u32; 2],
     /// Position of the first pixel of the data window in the pixels of the file.
-    pub(super) origin_px: [i32; 2],
+    pub(crate) origin_px: [i32; 2],
     /// Samples, row by row.
-    pub(super) values: Vec<f32>,
+    pub(crate) values: Vec<f32>,
 }
 
 impl ExrPlane {
@@ -33,11 +33,11 @@ impl ExrPlane {
 const NO_DEPTH: [&str; 2] = ["Mist", "Denoising Depth"];
 
 /// All planes of a file.
-pub(super) struct ExrPlanes {
+pub(crate) struct ExrPlanes {
     /// Planes in the order of the file.
-    pub(super) planes: Vec<ExrPlane>,
+    pub(crate) planes: Vec<ExrPlane>,
     /// Centre of the display window in the pixels of the file: the optical axis, also of a cropped picture.
-    pub(super) display_centre_px: [f64; 2],
+    pub(crate) display_centre_px: [f64; 2],
     /// Width of a pixel divided by its height.
     pixel_aspect: f64,
     /// Whether the chromaticities differ from those of sRGB.
@@ -46,7 +46,7 @@ pub(super) struct ExrPlanes {
 }
 
 /// Reads all parts of a file.
-pub(super) fn read_exr(path: &Path) -> Result<ExrPlanes, FrameFileError> {
+pub(crate) fn read_exr(path: &Path) -> Result<ExrPlanes, FrameFileError> {
     let image = read_all_flat_layers_from_file(path).map_err(|error| {
         let fix = match &error {
             exr::error::Error::NotSupported(_) => "write it with ZIP compression, and not deep",
@@ -94,7 +94,7 @@ const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 
 
 impl ExrPlanes {
     /// Notes on attributes of the header that are not applied.
-    pub(super) fn notes(&self, [fx, fy]: [f64; 2]) -> Vec<String> {
+    pub(crate) fn notes(&self, [fx, fy]: [f64; 2]) -> Vec<String> {
         let mut notes = Vec::new();
         // In wide pixels the horizontal focal length is shorter.
         let implied_aspect = fy / fx;
@@ -118,7 +118,7 @@ impl ExrPlanes {
     }
 
     /// The two planes of a flow (right, down), if the file has no others.
-    pub(super) fn pair(&self) -> Result<[&ExrPlane; 2], String> {
+    pub(crate) fn pair(&self) -> Result<[&ExrPlane; 2], String> {
         match &self.planes[..] {
             // Channels are sorted by name: X before Y and U before V, but G before R.
             [a, b] if a.name.ends_with('G') && b.name.ends_with('R') => Ok([complete(b)?, complete(a)?]),
@@ -136,7 +136,7 @@ impl ExrPlanes {
     }
 
     /// The plane of this full name, or the only one whose name ends with it.
-    pub(super) fn plane(&self, wanted: &str) -> Result<&ExrPlane, String> {
+    pub(crate) fn plane(&self, wanted: &str) -> Result<&ExrPlane, String> {
         if let Some(plane) = self.planes.iter().find(|plane| plane.name == wanted) {
             return complete(plane);
         }
@@ -151,7 +151,7 @@ impl ExrPlanes {
     }
 
     /// Planes of red, green and blue: the given channels (one for grey), else the only ones of the file.
-    pub(super) fn colors(
+    pub(crate) fn colors(
         &self,
         channels: Option<&[String]>,
         layer: Option<&str>,
@@ -225,7 +225,7 @@ impl ExrPlanes {
     }
 
     /// The plane of depth: the given channel, else the only one that can be depth.
-    pub(super) fn depth(&self, channel: Option<&str>, layer: Option<&str>) -> Result<&ExrPlane, String> {
+    pub(crate) fn depth(&self, channel: Option<&str>, layer: Option<&str>) -> Result<&ExrPlane, String> {
         match (channel, layer) {
             (Some(channel), Some(layer)) => return self.plane(&format!("{layer}.{channel}")),
             (Some(channel), None) => return self.plane(channel),

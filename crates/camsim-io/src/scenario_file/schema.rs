@@ -89,6 +89,20 @@ use ValueKind::*;
 /// Class of an object.
 const CLASS: ValueKind = Within(1, u16::MAX as u32);
 const AUTO: &[&str] = &["auto"];
+/// Layouts of other programs.
+const DATASETS: &[&str] = &[
+    "euroc",
+    "tum",
+    "kitti",
+    "colmap",
+    "nerfstudio",
+    "kalibr",
+    "mcap",
+    "carla-rs",
+    "gopro",
+    "webdataset",
+    "flo",
+];
 /// Channels of frames and of their twins.
 const CHANNELS: &[&str] = &[
     "color",
@@ -267,6 +281,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("output.format", Words(&["exr", "png", "mp4", "mkv", "y4m"])),
     ("output.stamps", Word(&["log", "zero"])),
     ("output.epoch_ns", Whole),
+    ("output.datasets", Words(DATASETS)),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
     ("output.video.codec", Word(&["h264", "h265", "ffv1"])),

@@ -78,6 +78,19 @@ pub(super) fn remove_temporaries(paths: impl Iterator<Item = PathBuf>) {
     }
 }
 
+/// Removes the temporary files that killed runs left in `folder` and below. No other process may write there.
+pub(crate) fn remove_all_temporaries(folder: &Path) {
+    // As above, what cannot be read or removed does no harm.
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_folder {
+            remove_all_temporaries(&entry.path());
+        } else if entry.file_name().to_str().and_then(final_name).is_some() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// The final name of a temporary file; `None` for other files.
 fn final_name(temporary: &str) -> Option<&str> {
     let (name, unique) = temporary.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;

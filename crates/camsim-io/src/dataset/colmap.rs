@@ -1,0 +1,104 @@
+//! COLMAP: `images/`, and the model with exact tracks, binary in `sparse/0` and as text in `sparse_text/0`.
+//!
+//! Each image is a frame and each camera a rig of its own: with a rolling shutter, a delay or vibration no pose
+//! between two cameras is the same in all frames.
+
+use camsim_core::scenario::LensModel;
+
+use super::{
+    DatasetError, ExportJob,
+    euroc::timing,
+    page::{OPTICAL, PIXEL_CENTRE_HALF, Page, WORLD},
+    run_folder::{Intrinsics, RunFrame},
+};
+
+mod model;
+mod model_binary;
+mod model_text;
+mod observations;
+
+use model::Model;
+
+/// Writes the export; returns notes.
+pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        camera.require(job.name(), &["color_png"])?;
+        let prefix = job.prefix(i);
+        job.each_frame(camera, |frame| {
+            let name = format!("images/{}", picture(&prefix, frame));
+            job.target.link(&camera.file(frame, "color_png"), &name)
+        })?;
+    }
+    let model = Model::new(job)?;
+    model_binary::write(job, &model, "sparse/0")?;
+    model_text::write(job, &model, "sparse_text/0")?;
+    let notes = notes(job, &model);
+    job.target.text("README.md", &page(job, &notes))?;
+    Ok(notes)
+}
+
+/// Name of a picture below `images`.
+fn picture(prefix: &str, frame: &RunFrame) -> String {
+    format!("{prefix}frame_{:06}.png", frame.number)
+}
+
+/// The smallest camera model that holds the lens: name, number, parameters.
+fn camera_model(lens: &Intrinsics) -> (&'static str, i32, Vec<f64>) {
+    let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px.map(|px| px + 0.5));
+    let [k1, k2, p1, p2, rest @ ..] = lens.coefficients;
+    if lens.model == LensModel::KannalaBrandt {
+        return ("OPENCV_FISHEYE", 5, vec![fx, fy, cx, cy, k1, k2, p1, p2]);
+    }
+    let is_radial = fx == fy && [p1, p2] == [0.0; 2];
+    match (rest == [0.0; 4], is_radial) {
+        (false, _) => ("FULL_OPENCV", 6, [&[fx, fy, cx, cy], &lens.coefficients[..]].concat()),
+        (true, true) if [k1, k2] == [0.0; 2] => ("SIMPLE_PINHOLE", 0, vec![fx, cx, cy]),
+        (true, true) if k2 == 0.0 => ("SIMPLE_RADIAL", 2, vec![fx, cx, cy, k1]),
+        (true, true) => ("RADIAL", 3, vec![fx, cx, cy, k1, k2]),
+        (true, false) if [k1, k2, p1, p2] == [0.0; 4] => ("PINHOLE", 1, vec![fx, fy, cx, cy]),
+        (true, false) => ("OPENCV", 4, vec![fx, fy, cx, cy, k1, k2, p1, p2]),
+    }
+}
+
+fn notes(job: &ExportJob<'_>, model: &Model) -> Vec<String> {
+    let mut notes = Vec::new();
+    if model.points() == 0 {
+        notes.push(
+            "the model has no points: add [output.tracks] with points = \"terrain\", \"board\", \"vertices\" or a table, \
+             and render again"
+                .to_owned(),
+        );
+    }
+    if job.run.cameras.iter().any(|camera| !camera.is_global()) {
+        notes.push(
+            "the camera has a rolling shutter, and COLMAP one pose for each picture, that of the image's centre: points \
+             away from it are where their row saw them, and reproject with an error"
+                .to_owned(),
+        );
+    }
+    notes
+}
+
+fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
+    let mut page = Page::new("COLMAP model", job.run);
+    page.line("world", WORLD)
+        .line("camera", OPTICAL)
+        .line("poses", "camera from world: x_cam = R x + t, at the mid-exposure of the image's centre")
+        .line("quaternions", "w x y z, w not negative")
+        .line("pixels", PIXEL_CENTRE_HALF)
+        .line("lens", "the smallest of COLMAP's models that holds camsim's coefficients as they are")
+        .line(
+            "points",
+            "those of `tracks.csv` that are visible and seen once in a picture; exact, not estimated. Colour is that of \
+             the picture that sees them first",
+        )
+        .line("rigs, frames", "each camera is a rig, each picture a frame; COLMAP before 3.12 does without these files")
+        .line("`sparse/0`, `sparse_text/0`", "the same model, binary and as text");
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        page.line(&format!("shutter of camera {}", i + 1), &timing(camera));
+    }
+    notes.iter().for_each(|note| {
+        page.note(note);
+    });
+    page.text().to_owned()
+}

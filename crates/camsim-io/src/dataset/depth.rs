@@ -1,0 +1,139 @@
+//! Depth pictures of other programs: 16 bit PNG with a fixed number of steps per metre; 0 = none.
+
+use std::{
+    io::Cursor,
+    path::Path,
+    sync::atomic::{AtomicU32, AtomicU64, Ordering},
+};
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use rayon::prelude::*;
+
+use super::{DatasetError, ExportJob, run_folder::RunCamera};
+use crate::frame_file::exr_planes::read_exr;
+
+/// Scales that are tried, from fine to coarse.
+const SCALES: [f64; 12] = [5000.0, 1000.0, 500.0, 256.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0, 2.0, 1.0];
+/// Largest step of a 16 bit PNG.
+const LARGEST: f64 = 65535.0;
+
+/// One plane of an EXR file.
+pub(super) struct FloatPlane {
+    pub(super) size_px: [u32; 2],
+    pub(super) values: Vec<f32>,
+}
+
+/// Reads planes of a channel by their names.
+pub(super) fn read_planes(path: &Path, names: &[&str]) -> Result<Vec<FloatPlane>, DatasetError> {
+    let fail = |message: String| DatasetError::Input { path: path.into(), message };
+    let file = read_exr(path).map_err(|error| fail(error.to_string()))?;
+    let plane = |name: &&str| {
+        let plane = file.plane(name).map_err(&fail)?;
+        Ok(FloatPlane { size_px: plane.size_px, values: plane.values.clone() })
+    };
+    names.iter().map(plane).collect()
+}
+
+/// Depth of a frame, row by row.
+pub(super) fn read_depth(path: &Path) -> Result<FloatPlane, DatasetError> {
+    let mut planes = read_planes(path, &["Z"])?;
+    planes.pop().ok_or_else(|| DatasetError::Input { path: path.into(), message: "has no Z".to_owned() })
+}
+
+/// How depth is scaled to integers.
+pub(super) struct DepthScale {
+    /// Steps per metre.
+    pub(super) per_metre: f64,
+    /// Whether readers expect that number.
+    pub(super) is_usual: bool,
+    beyond: AtomicU64,
+}
+
+impl DepthScale {
+    /// The scale that the user gave, or the finest one, `usual` at most, by which every depth fits.
+    pub(super) fn choose(
+        job: &ExportJob<'_>,
+        cameras: &[&RunCamera],
+        usual: f64,
+    ) -> Result<Self, DatasetError> {
+        let per_metre = match job.options.depth_per_metre {
+            Some(given) => given,
+            None => {
+                let largest_m = largest_depth_m(job, cameras)?;
+                let fits = |scale: &&f64| **scale <= usual && largest_m * **scale <= LARGEST;
+                SCALES.iter().find(fits).copied().unwrap_or(1.0)
+            }
+        };
+        Ok(Self { is_usual: per_metre == usual, ..Self::fixed(per_metre) })
+    }
+
+    /// A scale that readers have built in.
+    pub(super) fn fixed(per_metre: f64) -> Self {
+        Self { per_metre, is_usual: true, beyond: AtomicU64::new(0) }
+    }
+
+    /// A 16 bit grey PNG. Depths that do not fit become 0.
+    pub(super) fn png(&self, source: &Path) -> Result<Vec<u8>, DatasetError> {
+        let FloatPlane { size_px, values } = read_depth(source)?;
+        let steps = values.iter().map(|z| (f64::from(*z) * self.per_metre).round());
+        let mut beyond = 0;
+        let steps: Vec<u16> = steps
+            .map(|step| {
+                if step <= LARGEST {
+                    step as u16
+                } else {
+                    beyond += 1;
+                    0
+                }
+            })
+            .collect();
+        self.beyond.fetch_add(beyond, Ordering::Relaxed);
+        png16(source, size_px, &steps, ExtendedColorType::L16)
+    }
+
+    /// What to tell about depths that did not fit.
+    pub(super) fn note(&self) -> Option<String> {
+        let beyond = self.beyond.load(Ordering::Relaxed);
+        let most_m = LARGEST / self.per_metre;
+        (beyond > 0).then(|| {
+            format!(
+                "{beyond} pixels are deeper than {most_m:.1} m, which 16 bits at {} steps per metre do not hold: \
+                 their depth is 0, none",
+                self.per_metre
+            )
+        })
+    }
+}
+
+/// Encodes 16 bit samples.
+pub(super) fn png16(
+    source: &Path,
+    [width, height]: [u32; 2],
+    samples: &[u16],
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>, DatasetError> {
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_ne_bytes()).collect();
+    let mut out = Cursor::new(Vec::new());
+    PngEncoder::new(&mut out)
+        .write_image(&bytes, width, height, kind)
+        .map_err(|error| DatasetError::Input { path: source.into(), message: error.to_string() })?;
+    Ok(out.into_inner())
+}
+
+/// The largest depth of all frames.
+fn largest_depth_m(job: &ExportJob<'_>, cameras: &[&RunCamera]) -> Result<f64, DatasetError> {
+    let largest = AtomicU32::new(0);
+    for camera in cameras {
+        camera.frames.par_iter().try_for_each(|frame| {
+            if (job.target.watch.is_stopped)() {
+                return Err(DatasetError::Stopped);
+            }
+            let plane = read_depth(&camera.file(frame, "depth"))?;
+            let here = plane.values.iter().copied().filter(|z| z.is_finite()).fold(0.0, f32::max);
+            // Bits of floats that are not negative ascend with them.
+            largest.fetch_max(here.to_bits(), Ordering::Relaxed);
+            Ok(())
+        })?;
+    }
+    Ok(f64::from(f32::from_bits(largest.into_inner())))
+}

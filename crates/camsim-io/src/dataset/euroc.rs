@@ -1,0 +1,245 @@
+//! EuRoC/ASL: `mav0/cam0/{data.csv, sensor.yaml, exposure.csv, data/NS.png}`, `imu0`, ground truth.
+
+use std::io::Write;
+
+use glam::DVec3;
+
+use super::{
+    DatasetError, ExportJob,
+    axes::{Rigid, enu, enu_from_ned},
+    imu::{ImuSensor, body_from_b, imus},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    run_folder::{Intrinsics, RunCamera},
+    settings,
+    text::{list, matrix_list, real, wxyz},
+};
+
+/// Writes the export; returns notes.
+pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
+    let imus = imus(job.run)?;
+    let body_from_b = body_from_b(imus.first());
+    let mut notes = Vec::new();
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        camera.require(job.name(), &["color_png"])?;
+        check_stamps(job.name(), camera)?;
+        write_camera(job, i, camera, &body_from_b)?;
+    }
+    for (i, imu) in imus.iter().enumerate() {
+        write_imu(job, i, imu, &body_from_b)?;
+    }
+    write_truth(job, &body_from_b, imus.first())?;
+    notes.extend(settings::write(job, &imus, &body_from_b)?);
+    job.target.text("README.md", &page(job, imus.first(), &notes))?;
+    Ok(notes)
+}
+
+/// Refuses stamps that cannot be names of files.
+pub(super) fn check_stamps(format: &str, camera: &RunCamera) -> Result<(), DatasetError> {
+    match camera.frames.iter().find(|frame| frame.stamp_ns < 0) {
+        Some(frame) => Err(DatasetError::Refused(format!(
+            "frame {} has the stamp {} ns, and {format} has no stamps before 0: set output.stamps = \"zero\" with an \
+             output.epoch_ns such as 1000000000",
+            frame.number, frame.stamp_ns
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn write_camera(
+    job: &ExportJob<'_>,
+    i: usize,
+    camera: &RunCamera,
+    body_from_b: &Rigid,
+) -> Result<(), DatasetError> {
+    let intrinsics = camera.intrinsics()?;
+    let b_from_camera = body_from_b.inverse().of(&camera.body_from_camera());
+    let name = |file: &str| format!("mav0/cam{i}/{file}");
+    job.each_frame(camera, |frame| {
+        job.target.link(&camera.file(frame, "color_png"), &name(&format!("data/{}.png", frame.stamp_ns)))
+    })?;
+    job.target.text(&name("sensor.yaml"), &sensor_yaml(camera, &intrinsics, &b_from_camera))?;
+    let exposure_ns = (camera.shutter.exposure_s() * 1e9).round();
+    job.target.stream(&name("data.csv"), &mut |out| {
+        writeln!(out, "#timestamp [ns],filename")?;
+        camera
+            .frames
+            .iter()
+            .try_for_each(|frame| Ok(writeln!(out, "{},{}.png", frame.stamp_ns, frame.stamp_ns)?))
+    })?;
+    job.target.stream(&name("exposure.csv"), &mut |out| {
+        writeln!(out, "#timestamp [ns],exposure time[ns]")?;
+        camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{},{exposure_ns}", frame.stamp_ns)?))
+    })?;
+    job.target.stream(&format!("settings/times_cam{i}.txt"), &mut |out| {
+        camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{}", frame.stamp_ns)?))
+    })
+}
+
+fn sensor_yaml(camera: &RunCamera, intrinsics: &Intrinsics, b_from_camera: &Rigid) -> String {
+    let [width, height] = intrinsics.size_px;
+    let ([fx, fy], [cx, cy]) = (intrinsics.focal_px, intrinsics.principal_px);
+    let (model, coefficients) = distortion(intrinsics);
+    format!(
+        "# (0, 0) is the centre of the first pixel.\nsensor_type: camera\ncomment: camsim {name}\n\n\
+         # x_B = T_BS x_S, S the optical axes.\nT_BS:\n  cols: 4\n  rows: 4\n  data: {data}\n\n\
+         rate_hz: {rate}\nresolution: [{width}, {height}]\ncamera_model: pinhole\n\
+         intrinsics: {intrinsics} #fu, fv, cu, cv\ndistortion_model: {model}\n\
+         distortion_coefficients: {coefficients}\n",
+        name = camera.name,
+        data = matrix_list(&b_from_camera.matrix()),
+        rate = real(camera.spec.fps),
+        intrinsics = list(&[fx, fy, cx, cy]),
+        coefficients = list(&coefficients),
+    )
+}
+
+/// Name and coefficients of the lens in ASL's files; that of eight coefficients is OKVIS's.
+pub(super) fn distortion(intrinsics: &Intrinsics) -> (&'static str, Vec<f64>) {
+    match (intrinsics.equidistant(), intrinsics.radial_tangential()) {
+        (Some(k), _) => ("equidistant", k.to_vec()),
+        (None, Some(k)) => ("radial-tangential", k.to_vec()),
+        (None, None) => ("radialtangential8", intrinsics.coefficients.to_vec()),
+    }
+}
+
+/// Measurements of an inertial sensor, and its noise.
+fn write_imu(
+    job: &ExportJob<'_>,
+    i: usize,
+    imu: &ImuSensor,
+    body_from_b: &Rigid,
+) -> Result<(), DatasetError> {
+    let mut rows = imu.rows()?;
+    job.target.stream(&format!("mav0/imu{i}/data.csv"), &mut |out| {
+        writeln!(
+            out,
+            "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y \
+             [m s^-2],a_RS_S_z [m s^-2]"
+        )?;
+        while let Some(row) = rows.next_row()? {
+            let [w, a] = [row.gyro_rad_s, row.acc_m_s2];
+            writeln!(out, "{},{},{},{},{},{},{}", row.t_ns, w.x, w.y, w.z, a.x, a.y, a.z)?;
+        }
+        Ok(())
+    })?;
+    let b_from_imu = body_from_b.inverse().of(&imu.body_from_imu);
+    let yaml = format!(
+        "sensor_type: imu\ncomment: camsim\nT_BS:\n  cols: 4\n  rows: 4\n  data: {}\n\nrate_hz: {}\n\
+         gyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\n\
+         accelerometer_random_walk: {}\n",
+        matrix_list(&b_from_imu.matrix()),
+        real(imu.rate_hz),
+        real(imu.gyro_noise),
+        real(imu.gyro_walk),
+        real(imu.acc_noise),
+        real(imu.acc_walk)
+    );
+    job.target.text(&format!("mav0/imu{i}/sensor.yaml"), &yaml)
+}
+
+/// The motion of B: position, attitude, velocity and biases.
+fn write_truth(
+    job: &ExportJob<'_>,
+    body_from_b: &Rigid,
+    imu: Option<&ImuSensor>,
+) -> Result<(), DatasetError> {
+    let mut biases = imu.map(ImuSensor::biases).transpose()?;
+    let mut rows = job.run.platform()?;
+    job.target.stream("mav0/state_groundtruth_estimate0/data.csv", &mut |out| {
+        writeln!(
+            out,
+            "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], \
+             v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], \
+             b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]"
+        )?;
+        while let Some(state) = rows.next_state()? {
+            let lever_m = body_from_b.translation_m;
+            let position = enu(state.position_ned_m + state.ned_from_body * lever_m);
+            let attitude = wxyz(enu_from_ned() * state.ned_from_body * body_from_b.rotation);
+            let swing = state.ned_from_body * state.rate_body_rad_s.cross(lever_m);
+            let velocity = enu(state.velocity_ned_m_s + swing);
+            let [gyro, acc] = match &mut biases {
+                Some(biases) => biases.at(state.t_ns)?,
+                None => [DVec3::ZERO; 2],
+            };
+            write!(out, "{}", state.t_ns)?;
+            let vectors = [velocity, gyro, acc];
+            let values = position.to_array().into_iter().chain(attitude);
+            for value in values.chain(vectors.iter().flat_map(DVec3::to_array)) {
+                write!(out, ",{value}")?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    })?;
+    let yaml = format!(
+        "sensor_type: visual-inertial\ncomment: camsim, exact\nT_BS:\n  cols: 4\n  rows: 4\n  data: {}\n",
+        matrix_list(&Rigid::IDENTITY.matrix())
+    );
+    job.target.text("mav0/state_groundtruth_estimate0/sensor.yaml", &yaml)
+}
+
+fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, notes: &[String]) -> String {
+    let mut page = Page::new("EuRoC/ASL folder", job.run);
+    let body = match imu {
+        Some(_) => {
+            "the axes of imu0: `T_BS` of imu0 is the identity, and the ground truth is that of the IMU"
+        }
+        None => {
+            "the platform, x forward, y left, z up (camsim's own is forward, right, down); there is no IMU, and the \
+             biases are 0"
+        }
+    };
+    page.line("world R", WORLD)
+        .line("body B", body)
+        .line("camera S", OPTICAL)
+        .line("`T_BS`", "takes coordinates of the sensor to those of B; without the mount's vibration")
+        .line("quaternions", "w x y z, world from B, w not negative")
+        .line("pixels", PIXEL_CENTRE_0)
+        .line("stamps", "nanoseconds on the run's clock, as the camera gives them: its delay is in them");
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        page.line(&format!("time of cam{i}"), &timing(camera));
+    }
+    page.note(
+        "`settings` holds `times_camN.txt` (ORB-SLAM3's list of stamps) and settings of other programs.",
+    );
+    notes.iter().for_each(|note| {
+        page.note(note);
+    });
+    page.text().to_owned()
+}
+
+/// When rows are exposed, in words.
+pub(super) fn timing(camera: &RunCamera) -> String {
+    let shutter = &camera.shutter;
+    let [delay_ms, readout_ms] = [shutter.delay_s(), shutter.readout_s()].map(|s| 1e3 * s);
+    let centre = if delay_ms == 0.0 {
+        "the image's centre is exposed at the stamp (middle of the exposure)".to_owned()
+    } else {
+        format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
+    };
+    let offset_ms = camera.spec.clock_offset_ms;
+    let centre = match offset_ms == 0.0 {
+        true => centre,
+        false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
+    };
+    if readout_ms == 0.0 {
+        format!("{centre}; global shutter")
+    } else {
+        format!(
+            "{centre}; row (or column) y of N = {} is exposed ((y + 0.5)/N - 0.5) {readout_ms} ms later, read {}",
+            shutter.lines(),
+            direction(camera)
+        )
+    }
+}
+
+fn direction(camera: &RunCamera) -> &'static str {
+    use camsim_core::scenario::Readout;
+    match camera.spec.shutter.readout {
+        Readout::TopToBottom => "from top to bottom",
+        Readout::BottomToTop => "from bottom to top (y from there)",
+        Readout::LeftToRight => "from left to right",
+        Readout::RightToLeft => "from right to left (y from there)",
+    }
+}

@@ -1,0 +1,196 @@
+//! Kalibr: folders of its bag creator, `camchain.yaml`, `imu.yaml`, `target.yaml`.
+
+use std::{fmt::Write as _, io::Write};
+
+use camsim_core::scenario::{BoardKind, Readout};
+
+use super::{
+    DatasetError, ExportJob,
+    euroc::{check_stamps, timing},
+    imu::{ImuSensor, imus},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page},
+    run_folder::{Intrinsics, RunCamera},
+    text::{list, matrix_rows, real},
+};
+
+/// Writes the export; returns notes.
+pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
+    let imus = imus(job.run)?;
+    let chain = chain_yaml(job, imus.first(), "T_cam_imu")?;
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        camera.require(job.name(), &["color_png"])?;
+        check_stamps(job.name(), camera)?;
+        job.each_frame(camera, |frame| {
+            // Its reader takes the last nine digits as nanoseconds, and sorts names.
+            let name = format!("cam{i}/{:019}.png", frame.stamp_ns);
+            job.target.link(&camera.file(frame, "color_png"), &name)
+        })?;
+    }
+    for (i, imu) in imus.iter().enumerate() {
+        write_imu(job, i, imu)?;
+    }
+    job.target.text("camchain.yaml", &chain)?;
+    if let Some(target) = target_yaml(job)? {
+        job.target.text("target.yaml", &target)?;
+    }
+    let notes = imus.first().and_then(|imu| imu.begins_late(job.run)).into_iter().collect::<Vec<_>>();
+    job.target.text("README.md", &page(job, &imus, &notes))?;
+    Ok(notes)
+}
+
+/// Measurements and noise of an inertial sensor.
+fn write_imu(job: &ExportJob<'_>, i: usize, imu: &ImuSensor) -> Result<(), DatasetError> {
+    let mut rows = imu.rows()?;
+    job.target.stream(&format!("imu{i}.csv"), &mut |out| {
+        writeln!(out, "timestamp,omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z")?;
+        while let Some(row) = rows.next_row()? {
+            let [w, a] = [row.gyro_rad_s, row.acc_m_s2];
+            writeln!(out, "{:019},{},{},{},{},{},{}", row.t_ns, w.x, w.y, w.z, a.x, a.y, a.z)?;
+        }
+        Ok(())
+    })?;
+    job.target.text(&format!("imu{i}.yaml"), &imu_yaml(i, imu))
+}
+
+/// Noise, as `kalibr_calibrate_imu_camera --imu` reads it.
+pub(super) fn imu_yaml(i: usize, imu: &ImuSensor) -> String {
+    format!(
+        "rostopic: /imu{i}\nupdate_rate: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n\
+         gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n",
+        real(imu.rate_hz),
+        real(imu.acc_noise),
+        real(imu.acc_walk),
+        real(imu.gyro_noise),
+        real(imu.gyro_walk)
+    )
+}
+
+/// Distortion model and its four coefficients.
+///
+/// # Errors
+/// The lens has more coefficients than Kalibr's models.
+fn distortion(
+    format: &str,
+    camera: &RunCamera,
+    lens: &Intrinsics,
+) -> Result<(&'static str, [f64; 4]), DatasetError> {
+    match (lens.equidistant(), lens.radial_tangential()) {
+        (Some(k), _) => Ok(("equidistant", k)),
+        (None, Some(k)) => Ok(("radtan", k)),
+        (None, None) => Err(DatasetError::Refused(format!(
+            "{}: {format} knows lenses with k1 k2 p1 p2 or equidistant k1 to k4, and this one has k3 to k6: set them \
+             to 0, or export the folder of a twin with lens = false",
+            camera.folder.display()
+        ))),
+    }
+}
+
+/// The chain of cameras; from the first inertial sensor, if there is one, by `T_cam_imu` or, as OpenVINS names it,
+/// the inverse `T_imu_cam`.
+pub(super) fn chain_yaml(
+    job: &ExportJob<'_>,
+    imu: Option<&ImuSensor>,
+    key: &str,
+) -> Result<String, DatasetError> {
+    let mut text = "# (0, 0) is the centre of the first pixel. T_a_b takes coordinates in b to those in a.\n\
+                    # t_imu = t_cam + timeshift_cam_imu, for the image's centre; line_delay (s) counts rows from there.\n"
+        .to_owned();
+    let mut before = None;
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        let lens = camera.intrinsics()?;
+        let (model, coefficients) = distortion(job.name(), camera, &lens)?;
+        let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
+        let camera_from_body = camera.body_from_camera().inverse();
+        let _ = writeln!(text, "cam{i}:");
+        if let Some(imu) = imu {
+            let camera_from_imu = camera_from_body.of(&imu.body_from_imu);
+            let pose = if key == "T_imu_cam" { camera_from_imu.inverse() } else { camera_from_imu };
+            let rows = matrix_rows(&pose.matrix(), "  ");
+            let _ = writeln!(text, "  {key}:\n{rows}  timeshift_cam_imu: {}", real(imu.shift_s(camera)));
+        }
+        if let Some(body_from_before) = before {
+            let _ = write!(
+                text,
+                "  T_cn_cnm1:\n{}",
+                matrix_rows(&camera_from_body.of(&body_from_before).matrix(), "  ")
+            );
+        }
+        let others: Vec<String> =
+            (0..job.run.cameras.len()).filter(|k| *k != i).map(|k| k.to_string()).collect();
+        let _ = write!(
+            text,
+            "  cam_overlaps: [{}]\n  camera_model: pinhole\n  distortion_coeffs: {}\n  distortion_model: {model}\n  \
+             intrinsics: {}\n  resolution: [{w}, {h}]\n  rostopic: /cam{i}/image_raw\n",
+            others.join(", "),
+            list(&coefficients),
+            list(&[fx, fy, cx, cy])
+        );
+        if let Some(delay_s) = line_delay_s(camera) {
+            let _ = writeln!(text, "  line_delay: {}", real(delay_s));
+        }
+        before = Some(camera.body_from_camera());
+    }
+    Ok(text)
+}
+
+/// Time from a row to the next one, of cameras that read rows.
+fn line_delay_s(camera: &RunCamera) -> Option<f64> {
+    let line_s = camera.shutter.readout_s() / f64::from(camera.shutter.lines());
+    match camera.spec.shutter.readout {
+        _ if line_s == 0.0 => None,
+        Readout::TopToBottom => Some(line_s),
+        Readout::BottomToTop => Some(-line_s),
+        Readout::LeftToRight | Readout::RightToLeft => None,
+    }
+}
+
+/// Kalibr's target file for the board of the scene, if it knows boards of this kind.
+fn target_yaml(job: &ExportJob<'_>) -> Result<Option<String>, DatasetError> {
+    let Some(board) = &job.run.manifest().scenario.scene.board else { return Ok(None) };
+    // A board of the user's own target file has none of these.
+    let (Some(columns), Some(rows), Some(size_m)) = (board.columns, board.rows, board.size_m) else {
+        return Ok(None);
+    };
+    let row_size_m = real(board.row_size_m.unwrap_or(size_m));
+    let size_m = real(size_m);
+    Ok(match board.kind {
+        Some(BoardKind::Aprilgrid) => Some(format!(
+            "target_type: 'aprilgrid'\ntagCols: {columns}\ntagRows: {rows}\ntagSize: {size_m}\ntagSpacing: {}\n",
+            real(board.spacing.unwrap_or(0.3))
+        )),
+        Some(BoardKind::Chessboard) => Some(format!(
+            "target_type: 'checkerboard'\ntargetCols: {columns}\ntargetRows: {rows}\nrowSpacingMeters: \
+             {row_size_m}\ncolSpacingMeters: {size_m}\n"
+        )),
+        Some(kind @ (BoardKind::Circles | BoardKind::AsymmetricCircles)) => Some(format!(
+            "target_type: 'circlegrid'\ntargetCols: {columns}\ntargetRows: {rows}\nspacingMeters: {size_m}\n\
+             asymmetricGrid: {}\n",
+            kind == BoardKind::AsymmetricCircles
+        )),
+        Some(BoardKind::Charuco) | None => None,
+    })
+}
+
+fn page(job: &ExportJob<'_>, imus: &[ImuSensor], notes: &[String]) -> String {
+    let mut page = Page::new("Kalibr, for its bag creator", job.run);
+    page.line("names", "`camN/NS.png`, the stamp in nanoseconds with 19 digits")
+        .line("camera", OPTICAL)
+        .line("pixels", PIXEL_CENTRE_0)
+        .line(
+            "`camchain.yaml`",
+            "the true chain: `T_cam_imu`, `T_cn_cnm1` without the mount's vibration; `timeshift_cam_imu` takes \
+             stamps of the camera to the IMU's time of the image's centre (minus the camera's delay); `line_delay` in seconds",
+        )
+        .line("`imuN.yaml`", "continuous-time noise densities and bias random walks");
+    if imus.is_empty() {
+        page.line("IMU", "none in this run, so there is no `T_cam_imu`");
+    }
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        page.line(&format!("shutter of cam{i}"), &timing(camera));
+    }
+    page.note("`kalibr_bagcreater --folder . --output-bag run.bag` makes a bag of it.");
+    notes.iter().for_each(|note| {
+        page.note(note);
+    });
+    page.text().to_owned()
+}

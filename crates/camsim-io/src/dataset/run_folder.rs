@@ -1,0 +1,384 @@
+//! What an output folder of `camsim render` holds: cameras, frames with poses and files, twins, the platform.
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    mount::body_from_camera,
+    pose::CameraPose,
+    scenario::{CameraSpec, FieldOr, FlowInstant, LensModel, LensSpec, TwinSpec},
+    shutter::Shutter,
+};
+use glam::{DQuat, DVec3};
+use serde_json::Value;
+
+use super::{DatasetError, axes::Rigid, csv_rows::CsvRows};
+use crate::{
+    manifest::RunManifest,
+    write::{RIG_TOML, rig_names},
+};
+
+/// An output folder.
+#[derive(Clone, Debug)]
+pub struct RunFolder {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Whether the run is finished.
+    pub is_finished: bool,
+    /// Its cameras, in the scenario's order; at least one.
+    pub cameras: Vec<RunCamera>,
+}
+
+/// The pictures of a camera, or of a twin.
+#[derive(Clone, Debug)]
+pub struct RunCamera {
+    /// Name within the rig; empty for the only camera of a run.
+    pub name: String,
+    /// Folder of its channels.
+    pub folder: PathBuf,
+    /// Its `run.json`.
+    pub manifest: RunManifest,
+    /// The camera.
+    pub spec: CameraSpec,
+    /// Its timing.
+    pub shutter: Shutter,
+    /// Its frames by number, and by instant in a burst.
+    pub frames: Vec<RunFrame>,
+    /// Names of the columns of files.
+    columns: Vec<String>,
+}
+
+/// A row of `frames.csv`.
+#[derive(Clone, Debug)]
+pub struct RunFrame {
+    /// Frame number.
+    pub number: u64,
+    /// Number within the frame's burst.
+    pub instant: Option<u32>,
+    /// Stamp, nanoseconds.
+    pub stamp_ns: i64,
+    /// Pose at the stamp.
+    pub pose: CameraPose,
+    /// Paths by the columns of files, relative to the folder; empty where there is none.
+    files: Vec<String>,
+}
+
+/// Motion of the platform at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct PlatformState {
+    /// Time on the clock of stamps, nanoseconds.
+    pub t_ns: i64,
+    /// Position, north, east, down, metres.
+    pub position_ned_m: DVec3,
+    /// Velocity, m/s.
+    pub velocity_ned_m_s: DVec3,
+    /// Attitude.
+    pub ned_from_body: DQuat,
+    /// Angular rate in body axes, rad/s.
+    pub rate_body_rad_s: DVec3,
+}
+
+/// A camera as others describe it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Focal lengths fx, fy.
+    pub focal_px: [f64; 2],
+    /// Principal point; (0, 0) is the centre of the first pixel.
+    pub principal_px: [f64; 2],
+    /// Lens model.
+    pub model: LensModel,
+    /// Its coefficients in camsim's order, with zeros behind them.
+    pub coefficients: [f64; 8],
+}
+
+impl RunFolder {
+    /// Reads the tables of an output folder.
+    ///
+    /// # Errors
+    /// A file is missing or malformed, or no frame has been written.
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        let run = read_run(path)?;
+        let cameras: Vec<RunCamera> = if run.get("cameras").is_none() {
+            vec![RunCamera::open(path, String::new())?]
+        } else {
+            let names = rig_names(path);
+            // Those that --camera has left out have no folder.
+            let rendered = names.iter().filter(|name| path.join(name).join("frames.csv").is_file());
+            rendered.map(|name| RunCamera::open(&path.join(name), name.clone())).collect::<Result<_, _>>()?
+        };
+        if cameras.is_empty() {
+            let message = "names no camera that has been rendered: render the folder again".to_owned();
+            return Err(DatasetError::Input { path: path.join(RIG_TOML), message });
+        }
+        if let Some(empty) = cameras.iter().find(|camera| camera.frames.is_empty()) {
+            let message = "has no frames with files: render them, with output.format not empty".to_owned();
+            return Err(DatasetError::Input { path: empty.folder.join("frames.csv"), message });
+        }
+        let is_finished = run.get("finished").and_then(Value::as_bool).unwrap_or(false);
+        Ok(Self { path: path.into(), is_finished, cameras })
+    }
+
+    /// The `run.json` of the first camera; all have the same but for their camera.
+    #[must_use]
+    pub fn manifest(&self) -> &RunManifest {
+        &self.cameras[0].manifest
+    }
+
+    /// The motion of the platform, row by row.
+    pub(super) fn platform(&self) -> Result<PlatformRows, DatasetError> {
+        PlatformRows::open(&self.path.join("trajectory.csv"))
+    }
+
+    /// Number of frames of all cameras.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.cameras.iter().map(|camera| camera.frames.len() as u64).sum()
+    }
+}
+
+/// Reads `run.json`.
+fn read_run(folder: &Path) -> Result<Value, DatasetError> {
+    let path = folder.join("run.json");
+    let fail = |message: String| DatasetError::Input { path: path.clone(), message };
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        fail(format!("cannot be read: {error}; name a folder that camsim render has made"))
+    })?;
+    serde_json::from_str(&text).map_err(|error| fail(format!("is no run.json of camsim: {error}")))
+}
+
+impl RunCamera {
+    fn open(folder: &Path, name: String) -> Result<Self, DatasetError> {
+        let fail = |message: String| DatasetError::Input { path: folder.join("run.json"), message };
+        let run = read_run(folder)?;
+        let manifest: RunManifest = serde_json::from_value(run)
+            .map_err(|error| fail(format!("is not of this version of camsim: {error}")))?;
+        let spec = manifest.scenario.camera.clone();
+        let shutter =
+            Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|e| fail(e.to_string()))?;
+        let (columns, frames) = read_frames(&folder.join("frames.csv"))?;
+        Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns })
+    }
+
+    /// Twins beside its frames.
+    #[must_use]
+    pub fn twins(&self) -> &[TwinSpec] {
+        &self.manifest.scenario.output.twin
+    }
+
+    /// The pictures of a twin of this camera.
+    ///
+    /// # Errors
+    /// As [`RunFolder::open`].
+    pub fn twin(&self, twin: &TwinSpec) -> Result<Self, DatasetError> {
+        Self::open(&self.folder.join(&twin.name), self.name.clone())
+    }
+
+    /// Columns and paths of a frame's own files; not the video, which has all frames.
+    pub fn files<'a>(&'a self, frame: &'a RunFrame) -> impl Iterator<Item = (String, PathBuf)> + 'a {
+        let files = self.columns.iter().zip(&frame.files).filter(|(_, file)| file.contains('/'));
+        files.map(|(column, file)| (column.clone(), self.folder.join(file)))
+    }
+
+    /// Whether every frame has a file in this column.
+    #[must_use]
+    pub fn has(&self, column: &str) -> bool {
+        self.place(column).is_some_and(|place| self.frames.iter().all(|frame| !frame.files[place].is_empty()))
+    }
+
+    fn place(&self, column: &str) -> Option<usize> {
+        self.columns.iter().position(|known| known == column)
+    }
+
+    /// Path of a frame's file; empty if there is none.
+    #[must_use]
+    pub fn file(&self, frame: &RunFrame, column: &str) -> PathBuf {
+        let name = self.place(column).map_or("", |place| frame.files[place].as_str());
+        if name.is_empty() { PathBuf::new() } else { self.folder.join(name) }
+    }
+
+    /// Checks that every frame has a file in each of these columns.
+    ///
+    /// # Errors
+    /// [`DatasetError::Missing`] with the key that writes it.
+    pub fn require(&self, format: &str, columns: &[&str]) -> Result<(), DatasetError> {
+        let Some(missing) = columns.iter().find(|column| !self.has(column)) else { return Ok(()) };
+        let key = match *missing {
+            "color_png" => "\"png\" to output.format, and \"color\" to output.channels".to_owned(),
+            "color_exr" => "\"exr\" to output.format, and \"color\" to output.channels".to_owned(),
+            channel => format!("\"{channel}\" to output.channels"),
+        };
+        let frame = self.frames.iter().find(|frame| self.file(frame, missing).as_os_str().is_empty());
+        let which = frame.map_or_else(String::new, |frame| format!(" (frame {} is the first)", frame.number));
+        Err(DatasetError::Missing(format!(
+            "{format} needs {missing} of every frame, which {} lacks{which}: add {key} and render again, or export \
+             the scenario itself, which renders what is needed",
+            self.folder.display()
+        )))
+    }
+
+    /// Time of the mid-exposure of the image's centre on the platform's clock, nanoseconds.
+    #[must_use]
+    pub fn centre_ns(&self, frame: &RunFrame) -> i64 {
+        frame.stamp_ns.saturating_add((self.stamp_to_centre_s() * 1e9).round() as i64)
+    }
+
+    /// What is added to a stamp to get the mid-exposure of the image's centre on the platform's clock, seconds.
+    #[must_use]
+    pub fn stamp_to_centre_s(&self) -> f64 {
+        let dt_s = self.shutter.dt_instant_s(FlowInstant::Centre) - self.spec.clock_offset_ns() as f64 * 1e-9;
+        // Without the sign of a zero.
+        dt_s + 0.0
+    }
+
+    /// Whether the centre is exposed at the stamp.
+    #[must_use]
+    pub fn is_prompt(&self) -> bool {
+        self.shutter.delay_s() == 0.0 && self.shutter.interlace_s() == 0.0
+    }
+
+    /// Pose at the mid-exposure of the image's centre: that at the stamp, or that between the two middle rows.
+    ///
+    /// # Errors
+    /// The camera has a delay, and the frames no `rows`.
+    pub fn centre_pose(&self, format: &str, frame: &RunFrame) -> Result<CameraPose, DatasetError> {
+        if self.is_prompt() {
+            return Ok(frame.pose);
+        }
+        self.require(format, &["rows"])?;
+        let mut rows =
+            CsvRows::open(&self.file(frame, "rows"), &["row", "n", "e", "d", "qw", "qx", "qy", "qz"])?;
+        let last = self.shutter.lines() - 1;
+        let (first, second) = (last / 2, last.div_ceil(2));
+        let mut middle: Vec<(DVec3, DQuat)> = Vec::with_capacity(2);
+        while rows.advance()? {
+            let row: u32 = rows.whole(0)?;
+            if row == first || row == second {
+                middle.push((rows.vector(1)?, rows.wxyz(4)?));
+            }
+        }
+        let (Some(a), Some(b)) = (middle.first(), middle.last()) else {
+            let message = "has no row of the image's middle; render it again".to_owned();
+            return Err(DatasetError::Input { path: self.file(frame, "rows"), message });
+        };
+        Ok(CameraPose { position_ned_m: a.0.midpoint(b.0), ned_from_camera: a.1.slerp(b.1, 0.5) })
+    }
+
+    /// Camera matrix and lens.
+    ///
+    /// # Errors
+    /// The camera zooms: no layout has a place for that.
+    pub fn intrinsics(&self) -> Result<Intrinsics, DatasetError> {
+        let CameraSpec { size_px, focal_px, principal_point_px, zoom, lens, .. } = &self.spec;
+        if !zoom.is_empty() {
+            return Err(DatasetError::Refused(format!(
+                "{}: the camera zooms (camera.zoom), and this layout has one calibration for all pictures: export \
+                 a run with a fixed lens",
+                self.folder.display()
+            )));
+        }
+        let centre = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
+        let LensSpec { model, coefficients: given } = lens;
+        let mut coefficients = [0.0; 8];
+        coefficients.iter_mut().zip(given).for_each(|(place, value)| *place = *value);
+        let principal_px = principal_point_px.unwrap_or(centre);
+        Ok(Intrinsics { size_px: *size_px, focal_px: *focal_px, principal_px, model: *model, coefficients })
+    }
+
+    /// The camera's pose in the body (forward, right, down), without vibration.
+    #[must_use]
+    pub fn body_from_camera(&self) -> Rigid {
+        let mount = &self.spec.mount;
+        Rigid {
+            rotation: body_from_camera(mount.angles_deg),
+            translation_m: DVec3::from_array(mount.offset_m),
+        }
+    }
+
+    /// Whether the camera shakes against the body.
+    #[must_use]
+    pub fn vibrates(&self) -> bool {
+        !self.spec.mount.vibration.is_empty()
+    }
+
+    /// Whether all pixels have one instant.
+    #[must_use]
+    pub fn is_global(&self) -> bool {
+        self.spec.shutter.readout_ms == 0.0 && self.spec.shutter.interlace_ms == FieldOr::Ms(0.0)
+    }
+}
+
+impl Intrinsics {
+    /// Whether the lens changes nothing.
+    #[must_use]
+    pub fn is_pinhole(&self) -> bool {
+        match self.model {
+            LensModel::Pinhole => true,
+            LensModel::BrownConrady => self.coefficients == [0.0; 8],
+            LensModel::KannalaBrandt => false,
+        }
+    }
+
+    /// k1 k2 p1 p2, where these are all.
+    #[must_use]
+    pub fn radial_tangential(&self) -> Option<[f64; 4]> {
+        let [k1, k2, p1, p2, rest @ ..] = self.coefficients;
+        (self.model != LensModel::KannalaBrandt && rest == [0.0; 4]).then_some([k1, k2, p1, p2])
+    }
+
+    /// k1 k2 k3 k4 of a Kannala-Brandt lens.
+    #[must_use]
+    pub fn equidistant(&self) -> Option<[f64; 4]> {
+        let [k1, k2, k3, k4, ..] = self.coefficients;
+        (self.model == LensModel::KannalaBrandt).then_some([k1, k2, k3, k4])
+    }
+}
+
+/// Columns of `frames.csv` before those of files.
+const FRAME_COLUMNS: [&str; 9] = ["frame", "stamp_ns", "n", "e", "d", "qw", "qx", "qy", "qz"];
+
+/// Names of the columns of files, and the frames.
+fn read_frames(path: &Path) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
+    let mut rows = CsvRows::open(path, &FRAME_COLUMNS)?;
+    let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
+    let instant = header.iter().position(|name| name == "instant");
+    let last = instant.or_else(|| header.iter().position(|name| name == "ideal_qz")).unwrap_or(0);
+    let columns = header.get(last + 1..).unwrap_or_default().to_vec();
+    let mut frames = Vec::new();
+    while rows.advance()? {
+        frames.push(RunFrame {
+            number: rows.whole(0)?,
+            instant: instant.and_then(|place| rows.cell(place).parse().ok()),
+            stamp_ns: rows.whole(1)?,
+            pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(5)? },
+            files: (0..columns.len()).map(|k| rows.cell(last + 1 + k).to_owned()).collect(),
+        });
+    }
+    Ok((columns, frames))
+}
+
+/// Rows of `trajectory.csv`.
+pub(super) struct PlatformRows(CsvRows);
+
+impl PlatformRows {
+    fn open(path: &Path) -> Result<Self, DatasetError> {
+        let columns =
+            ["t_s", "n_m", "e_m", "d_m", "vn", "ve", "vd", "qw", "qx", "qy", "qz", "wx", "wy", "wz"];
+        Ok(Self(CsvRows::open(path, &columns)?))
+    }
+
+    /// The next row; `None` at the end.
+    pub(super) fn next_state(&mut self) -> Result<Option<PlatformState>, DatasetError> {
+        let rows = &mut self.0;
+        if !rows.advance()? {
+            return Ok(None);
+        }
+        Ok(Some(PlatformState {
+            t_ns: rows.seconds_ns(0)?,
+            position_ned_m: rows.vector(1)?,
+            velocity_ned_m_s: rows.vector(4)?,
+            ned_from_body: rows.wxyz(7)?,
+            rate_body_rad_s: rows.vector(11)?,
+        }))
+    }
+}

@@ -1,0 +1,184 @@
+//! MCAP, with sensors beside the camera.
+
+use std::{collections::BTreeMap, fs};
+
+use camsim_core::scenario::DatasetFormat;
+use serde::Deserialize;
+
+use super::{Sample, exported, sample, text};
+
+/// The head of every message that has one.
+#[derive(Deserialize)]
+struct Stamp {
+    sec: i32,
+    nanosec: u32,
+    frame: String,
+}
+
+#[derive(Deserialize)]
+struct Info {
+    head: Stamp,
+    height: u32,
+    width: u32,
+    model: String,
+    d: Vec<f64>,
+    k: [f64; 9],
+    _r: [f64; 9],
+    p: [f64; 12],
+}
+
+#[derive(Deserialize)]
+struct Transforms(Vec<(Stamp, String, [f64; 3], [f64; 4])>);
+
+#[derive(Deserialize)]
+struct Inertial {
+    head: Stamp,
+    _orientation: [f64; 4],
+    orientation_covariance: [f64; 9],
+    gyro: [f64; 3],
+    gyro_covariance: [f64; 9],
+    acc: [f64; 3],
+}
+
+#[derive(Deserialize)]
+struct Fix {
+    head: Stamp,
+    status: i8,
+    _service: u16,
+    latitude: f64,
+    longitude: f64,
+    altitude: f64,
+}
+
+fn decoded<T: for<'de> Deserialize<'de>>(data: &[u8]) -> T {
+    assert_eq!(data[..4], [0, 1, 0, 0], "little-endian CDR");
+    cdr_encoding::from_bytes::<T, byteorder::LittleEndian>(&data[4..]).unwrap().0
+}
+
+/// Writes sensors as `camsim render` does.
+fn write_sensors(sample: &Sample) {
+    let folder = sample.run().join("sensors");
+    fs::create_dir_all(&folder).unwrap();
+    let imu = "kind = \"imu\"\nname = \"imu0\"\ntable = \"imu0.csv\"\nrate_hz = 200.0\nrows = 2\n\
+               T_body_sensor = [[1.0, 0.0, 0.0, 0.5], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.25], [0.0, 0.0, 0.0, 1.0]]\n\
+               [noise]\ngyroscope_noise_density = 0.01\ngyroscope_random_walk = 0.001\n\
+               accelerometer_noise_density = 0.02\naccelerometer_random_walk = 0.002\n\
+               [scenario]\nclock_offset_ms = 2.0\n";
+    fs::write(folder.join("imu0.toml"), imu).unwrap();
+    let columns = "t_ns,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,t_true_ns,\
+                   gyro_bias_x_rad_s,gyro_bias_y_rad_s,gyro_bias_z_rad_s,accel_bias_x_m_s2,accel_bias_y_m_s2,\
+                   accel_bias_z_m_s2";
+    let rows = "990000000,1,2,3,4,5,6,0,0.1,0.2,0.3,0.4,0.5,0.6\n1500000000,7,8,9,10,11,12,0,0.2,0.3,0.4,0.5,0.6,0.7\n";
+    fs::write(folder.join("imu0.csv"), format!("{columns}\n{rows}")).unwrap();
+    let gnss = "kind = \"gnss\"\nname = \"gnss0\"\ntable = \"gnss0.csv\"\nrate_hz = 1.0\n\
+                T_body_sensor = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]\n";
+    fs::write(folder.join("gnss0.toml"), gnss).unwrap();
+    let fixes = "t_ns,fix,lat_deg,lon_deg,height_m\n1000000001,1,46.5,7.25,900.5\n1050000000,0,,,\n";
+    fs::write(folder.join("gnss0.csv"), fixes).unwrap();
+}
+
+type Messages = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
+
+fn messages(sample: &Sample) -> (Messages, Vec<u64>) {
+    let bytes = fs::read(sample.out().join("camsim.mcap")).unwrap();
+    let (mut by_topic, mut times) = (Messages::new(), Vec::new());
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!((schema.encoding.as_str(), message.channel.message_encoding.as_str()), ("ros2msg", "cdr"));
+        assert!(message.channel.metadata.contains_key("offered_qos_profiles"));
+        times.push(message.log_time);
+        by_topic
+            .entry(message.channel.topic.clone())
+            .or_default()
+            .push((message.log_time, message.data.to_vec()));
+    }
+    (by_topic, times)
+}
+
+#[test]
+fn messages_are_those_of_ros_by_ascending_time() {
+    let lens = "[camera]\nsize_px = [6, 4]\nfocal_px = [5.0, 5.5]\n[camera.lens]\nmodel = \"brown-conrady\"\n\
+                coefficients = [-0.25, 0.06, 0.001, -0.002, 0.01]\n";
+    let sample = Sample::with(lens, "");
+    sample.write(&["color_png", "depth"]);
+    write_sensors(&sample);
+    exported(&sample, DatasetFormat::Mcap).unwrap();
+    let (messages, times) = messages(&sample);
+    assert!(times.is_sorted(), "{times:?}");
+    let counts: Vec<(&str, usize)> = messages.iter().map(|(topic, of)| (topic.as_str(), of.len())).collect();
+    assert_eq!(
+        counts,
+        [
+            ("/cam0/camera_info", 4),
+            ("/cam0/depth/image_raw", 4),
+            ("/cam0/image_raw/compressed", 4),
+            ("/gnss0/fix", 2),
+            ("/ground_truth/pose", 2),
+            ("/imu0", 2),
+            ("/tf", 2),
+            ("/tf_static", 1)
+        ]
+    );
+    let info: Info = decoded(&messages["/cam0/camera_info"][1].1);
+    assert_eq!((info.head.sec, info.head.nanosec, info.head.frame.as_str()), (1, 100_000_000, "cam0"));
+    assert_eq!((info.width, info.height, info.model.as_str()), (6, 4, "plumb_bob"));
+    assert_eq!((info.k[2], info.k[4], info.p[6]), (2.5, 5.5, 1.5));
+    assert_eq!(info.d, [-0.25, 0.06, 0.001, -0.002, 0.01]);
+    // Header of 4 + 4 + (4 + 5), format (4 + 4), length: each aligned to 4.
+    let picture = &messages["/cam0/image_raw/compressed"][0].1;
+    let png = fs::read(sample.run().join("color/frame_000004.png")).unwrap();
+    assert!(picture.ends_with(&png));
+    let z = &messages["/cam0/depth/image_raw"][0].1;
+    let last = f32::from_le_bytes(z[z.len() - 4..].try_into().unwrap());
+    assert_eq!(last, sample::depth_m(4, 23));
+    let imu: Inertial = decoded(&messages["/imu0"][0].1);
+    assert_eq!((imu.head.nanosec, imu.gyro, imu.acc), (990_000_000, [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
+    assert_eq!(imu.orientation_covariance[0], -1.0);
+    // White noise of a density at 200 Hz.
+    assert!((imu.gyro_covariance[8] - 1e-4 * 200.0).abs() < 1e-15);
+    let fixes: Vec<Fix> = messages["/gnss0/fix"].iter().map(|(_, data)| decoded(data)).collect();
+    assert_eq!((fixes[0].latitude, fixes[0].longitude, fixes[0].altitude), (46.5, 7.25, 900.5));
+    assert_eq!((fixes[0].status, fixes[1].status, fixes[1].head.frame.as_str()), (0, -1, "gnss0"));
+    assert!(fixes[1].latitude.is_nan());
+    // Of the body at north 1, east 2, down -3 with its nose to the north.
+    let Transforms(moved) = decoded(&messages["/tf"][0].1);
+    let (head, child, position, q) = &moved[0];
+    assert_eq!((head.frame.as_str(), child.as_str(), *position), ("map", "base_link", [2.0, 1.0, 3.0]));
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(q.iter().zip([0.0, 0.0, half, half]).all(|(a, b)| (a - b).abs() < 1e-12), "{q:?}");
+    let Transforms(fixed) = decoded(&messages["/tf_static"][0].1);
+    let of: BTreeMap<&str, &[f64; 3]> =
+        fixed.iter().map(|(_, child, place, _)| (child.as_str(), place)).collect();
+    assert_eq!(of["imu0"], &[0.5, 0.0, -0.25]);
+    assert_eq!(of["cam0"], &[0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn euroc_has_the_imu_as_its_body() {
+    let sample = Sample::with("[camera.shutter]\ndelay_ms = 5.0\n", "");
+    sample.write(&["color_png"]);
+    write_sensors(&sample);
+    let report = exported(&sample, DatasetFormat::Euroc).unwrap();
+    assert_eq!(report.notes, [""; 0]);
+    let file = |name: &str| text(&sample.out().join(name));
+    assert_eq!(file("mav0/imu0/data.csv").lines().nth(1), Some("990000000,1,2,3,4,5,6"));
+    let truth = file("mav0/state_groundtruth_estimate0/data.csv");
+    let cells: Vec<f64> =
+        truth.lines().nth(1).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    // Half a metre before the body and a quarter below; it turns by 1 rad/s to the right about it.
+    let wanted = [2.0, 1.5, 2.75];
+    assert!(cells[1..4].iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{cells:?}");
+    let wanted = [5.5, 4.0, -6.0];
+    assert!(cells[8..11].iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{cells:?}");
+    // 9.000001 of 510 ms after the first row.
+    let share = 9.000_001 / 510.0;
+    assert!(
+        (cells[11] - (0.1 + 0.1 * share)).abs() < 1e-12 && (cells[16] - (0.6 + 0.1 * share)).abs() < 1e-12
+    );
+    // The IMU's clock is 2 ms ahead, the picture 5 ms old.
+    let chain = file("settings/openvins/kalibr_imucam_chain.yaml");
+    assert!(chain.contains("timeshift_cam_imu: -0.003\n") && chain.contains("  T_imu_cam:\n"), "{chain}");
+    assert!(file("settings/vins/vins.yaml").contains("\ntd: -0.003\n"));
+    assert!(file("settings/orb_slam3.yaml").contains("IMU.NoiseGyro: 0.01\n"));
+}

@@ -1,0 +1,211 @@
+//! A small output folder, as `camsim render` writes it.
+
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
+
+use camsim_core::{
+    frame::{Plane, PlaneValues, RenderedFrame, RowRecord},
+    pose::{BodyState, CameraPose},
+    scenario::{Channel, ImageFormat, Scenario},
+};
+use glam::{DQuat, DVec3};
+use tempfile::TempDir;
+
+use crate::{
+    manifest::{PATHS, RunManifest},
+    scenario_file::parse_scenario,
+    write::{
+        FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, TRACKS_COLUMNS, TrajectoryRecord,
+        frames_path, trajectory_csv, write_atomic,
+    },
+};
+
+/// Width and height of its pictures.
+pub(super) const SIZE: [u32; 2] = [6, 4];
+/// Numbers of its frames, with a gap.
+pub(super) const FRAMES: [u64; 4] = [4, 5, 6, 9];
+
+/// The folder of a run, and one for an export.
+pub(super) struct Sample {
+    base: TempDir,
+    scenario: Scenario,
+}
+
+/// Motion of the camera, by frames since the fourth.
+pub(super) fn pose(frames: f64) -> CameraPose {
+    // Looks north, level, and turns to the right.
+    let north = DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
+    CameraPose {
+        position_ned_m: DVec3::new(10.0 + frames, 20.0, -30.0),
+        ned_from_camera: DQuat::from_rotation_z(0.1 * frames) * north,
+    }
+}
+
+/// Nanoseconds of a frame, a tenth of a second each; the fourth is at 1 s.
+pub(super) fn stamp_ns(frame: u64) -> i64 {
+    1_000_000_000 + 100_000_000 * (frame as i64 - 4)
+}
+
+impl Sample {
+    /// A sample whose scenario has more keys at its begin.
+    pub(super) fn new(keys: &str) -> Self {
+        Self::with("", keys)
+    }
+
+    /// A sample whose scenario has more tables at its end, and keys at its begin.
+    pub(super) fn with(tables: &str, keys: &str) -> Self {
+        let camera = if tables.contains("[camera]") {
+            ""
+        } else {
+            "[camera]\nsize_px = [6, 4]\nfocal_px = [5.0, 5.5]\nfps = 10.0\n"
+        };
+        let text = format!(
+            "{keys}[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n{camera}{tables}"
+        );
+        let scenario = parse_scenario(&text, Path::new("s.toml"), &[]).unwrap();
+        Self { base: tempfile::tempdir().unwrap(), scenario }
+    }
+
+    pub(super) fn run(&self) -> PathBuf {
+        self.base.path().join("run")
+    }
+
+    pub(super) fn out(&self) -> PathBuf {
+        self.base.path().join("out")
+    }
+
+    /// Writes the run with files in these columns, and its twins likewise.
+    pub(super) fn write(&self, columns: &[&str]) {
+        write_run(&self.run(), &self.scenario, columns);
+        let body = |t_ns: i64| TrajectoryRecord {
+            t_ns,
+            state: BodyState {
+                position_ned_m: DVec3::new(1.0, 2.0, -3.0),
+                velocity_ned_m_s: DVec3::new(4.0, 5.0, 6.0),
+                acceleration_ned_m_s2: DVec3::ZERO,
+                ned_from_body: DQuat::IDENTITY,
+                rate_body_rad_s: DVec3::Z,
+                angular_acceleration_body_rad_s2: DVec3::ZERO,
+            },
+        };
+        let rows = trajectory_csv([999_000_001, 1_250_000_000].map(body));
+        write_atomic(&self.run().join("trajectory.csv"), rows.as_bytes()).unwrap();
+        for twin in &self.scenario.output.twin {
+            write_run(&self.run().join(&twin.name), &self.scenario.twin(twin, None).unwrap(), columns);
+        }
+    }
+
+    /// Writes a run of two cameras, `left` and `right`, half a metre apart.
+    pub(super) fn write_rig(&self, columns: &[&str]) {
+        self.write(columns);
+        std::fs::remove_file(frames_path(&self.run())).unwrap();
+        let mut scenario = self.scenario.clone();
+        for (name, offset_m) in [("left", -0.25), ("right", 0.25)] {
+            scenario.camera.name = name.to_owned();
+            scenario.camera.mount.offset_m = [0.0, offset_m, 0.0];
+            write_run(&self.run().join(name), &scenario, columns);
+        }
+        let rig = "[[cameras]]\nname = \"left\"\n[[cameras]]\nname = \"right\"\n";
+        std::fs::write(self.run().join("rig.toml"), rig).unwrap();
+        let run = serde_json::json!({
+            "cameras": { "left": "left/run.json", "right": "right/run.json" },
+            "finished": true,
+        });
+        std::fs::write(self.run().join("run.json"), run.to_string()).unwrap();
+    }
+
+    /// Writes tracks: rows of frame, point, x, y, visible, solutions.
+    pub(super) fn write_tracks(&self, points: &[[f64; 3]], rows: &[(u64, u64, [f64; 2], u8, u8)]) {
+        let mut text = "point,name,source,n_m,e_m,d_m\n".to_owned();
+        for (i, [n, e, d]) in points.iter().enumerate() {
+            let _ = writeln!(text, "{i},p{i},table.csv,{n},{e},{d}");
+        }
+        write_atomic(&self.run().join("points.csv"), text.as_bytes()).unwrap();
+        let mut text = format!("{TRACKS_COLUMNS}\n");
+        for (frame, point, [x, y], visible, solutions) in rows {
+            let _ = writeln!(text, "{frame},{point},{x},{y},{},7.5,{visible},{solutions}", stamp_ns(*frame));
+        }
+        write_atomic(&self.run().join("tracks.csv"), text.as_bytes()).unwrap();
+    }
+}
+
+fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
+    let mut scenario = scenario.clone();
+    scenario.output.format = vec![ImageFormat::Png];
+    scenario.output.channels = Channel::ALL
+        .into_iter()
+        .filter(|channel| columns.iter().any(|c| c.starts_with(channel.name())))
+        .collect();
+    let manifest = RunManifest {
+        version: "0.1.0".into(),
+        adapter: "none".into(),
+        seed: scenario.seed,
+        paths: PATHS.to_owned(),
+        twin: None,
+        scenario: scenario.clone(),
+        inputs: [("a.csv".to_owned(), "3 bytes".to_owned())].into(),
+        frames: [0, 10],
+        shard: None,
+        written: 4,
+        skipped: 0,
+        finished: true,
+        tracked_points: None,
+        warnings: vec![],
+    };
+    manifest.write(folder).unwrap();
+    let files = FrameFiles::new(folder, &scenario.output, scenario.camera.photometric.output);
+    let mut table = FrameTable::default();
+    for number in FRAMES {
+        let pose = pose((number - 4) as f64);
+        let source =
+            SourceFrame { size_px: SIZE, focal_px: [5.0; 2], principal_px: [2.5, 1.5], t_ns: 0, pose };
+        let (stamp_ns, files) = (stamp_ns(number), files.names(number));
+        table.insert(&FrameRecord { frame: number, instant: None, stamp_ns, pose, source, files });
+    }
+    let mut writer = FrameWriter::new(files, 1);
+    FRAMES.iter().for_each(|number| writer.write(frame(*number)).unwrap());
+    writer.finish().unwrap();
+    table.write(&frames_path(folder)).unwrap();
+}
+
+/// Depth of a pixel, metres.
+pub(super) fn depth_m(number: u64, pixel: usize) -> f32 {
+    if pixel == 0 { 0.0 } else { number as f32 + pixel as f32 * 0.25 }
+}
+
+/// Flow and its state.
+pub(super) fn flow(pixel: usize) -> [f32; 3] {
+    let state = pixel % 5;
+    [if pixel == 6 { 600.0 } else { pixel as f32 * 0.5 }, -(pixel as f32), state as f32]
+}
+
+fn frame(number: u64) -> RenderedFrame {
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let flows: Vec<f32> = (0..pixels).flat_map(flow).collect();
+    let row = |row: u32| {
+        // A row is a thousandth of a second, about the stamp less 5 ms.
+        let t_ns = stamp_ns(number) - 5_000_000 + (2 * i64::from(row) - 3) * 500_000;
+        let pose = pose((t_ns - stamp_ns(4)) as f64 / 1e8);
+        RowRecord {
+            row,
+            t_mid_ns: t_ns,
+            position_ned_m: pose.position_ned_m,
+            ned_from_camera: pose.ned_from_camera,
+            velocity_ned_m_s: DVec3::X,
+        }
+    };
+    RenderedFrame {
+        index: number,
+        stamp_ns: stamp_ns(number),
+        size_px: SIZE,
+        color_rgba: (0..pixels * 4).map(|i| ((i as u64 * 7 + number) % 97) as f32 / 96.0).collect(),
+        depth_m: Some((0..pixels).map(|pixel| depth_m(number, pixel)).collect()),
+        coords: None,
+        rows: (0..SIZE[1]).map(row).collect(),
+        planes: [Channel::Flow, Channel::FlowGlobal]
+            .map(|channel| Plane { channel, values: PlaneValues::Float(flows.clone()) })
+            .to_vec(),
+    }
+}

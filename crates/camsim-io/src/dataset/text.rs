@@ -1,0 +1,61 @@
+//! Numbers and matrices as the parsers of other programs want them.
+
+use glam::DQuat;
+
+/// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals.
+pub(super) fn real(value: f64) -> String {
+    let text = format!("{value}");
+    if text.contains('.') || !value.is_finite() { text } else { text + ".0" }
+}
+
+/// `[a, b, c]`.
+pub(super) fn list(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| real(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// Rows of a matrix, one list.
+pub(super) fn matrix_list(rows: &[[f64; 4]; 4]) -> String {
+    list(rows.as_flattened())
+}
+
+/// Rows of a matrix in YAML, as a list of lists.
+pub(super) fn matrix_rows(rows: &[[f64; 4]; 4], indent: &str) -> String {
+    rows.iter().map(|row| format!("{indent}- {}\n", list(row))).collect()
+}
+
+/// A matrix in OpenCV's YAML.
+pub(super) fn opencv_matrix(name: &str, rows: &[[f64; 4]; 4]) -> String {
+    let data = matrix_list(rows);
+    format!("{name}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: {data}\n")
+}
+
+/// Scalar first, not negative: q and -q are the same rotation.
+pub(super) fn wxyz(q: DQuat) -> [f64; 4] {
+    let q = if q.w < 0.0 { -q } else { q };
+    [q.w, q.x, q.y, q.z]
+}
+
+/// Scalar last, not negative.
+pub(super) fn xyzw(q: DQuat) -> [f64; 4] {
+    let [w, x, y, z] = wxyz(q);
+    [x, y, z, w]
+}
+
+/// Decimal seconds with all nine decimals.
+pub(super) fn seconds(t_ns: i64) -> String {
+    let (whole, rest) = (t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000);
+    format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_reals_to_every_parser() {
+        assert_eq!(list(&[435.0, -0.25, 1e-7, 0.0]), "[435.0, -0.25, 0.0000001, 0.0]");
+        assert_eq!(wxyz(DQuat::from_xyzw(0.1, 0.2, 0.3, -0.9)), [0.9, -0.1, -0.2, -0.3]);
+        assert_eq!(xyzw(DQuat::from_xyzw(0.1, 0.2, 0.3, 0.9)), [0.1, 0.2, 0.3, 0.9]);
+        assert_eq!([seconds(-1), seconds(1_000_000_123)], ["-0.000000001", "1.000000123"]);
+    }
+}

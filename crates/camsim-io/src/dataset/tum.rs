@@ -1,0 +1,143 @@
+//! TUM RGB-D: `rgb/`, `depth/`, their lists, `groundtruth.txt`, `associations.txt`, `calibration.txt`.
+
+use std::io::Write;
+
+use camsim_core::pose::CameraPose;
+
+use super::{
+    DatasetError, ExportJob,
+    axes::enu_from_camera,
+    depth::DepthScale,
+    euroc::{check_stamps, timing},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    run_folder::{Intrinsics, RunCamera, RunFrame},
+    text::{seconds, xyzw},
+};
+
+/// Steps per metre of the published dataset.
+const USUAL_STEPS: f64 = 5000.0;
+
+/// Writes the export; returns notes.
+pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
+    let cameras: Vec<&RunCamera> = job.run.cameras.iter().collect();
+    for camera in &cameras {
+        camera.require(job.name(), &["color_png", "depth"])?;
+        check_stamps(job.name(), camera)?;
+    }
+    let scale = DepthScale::choose(job, &cameras, USUAL_STEPS)?;
+    for (i, camera) in cameras.iter().enumerate() {
+        write_camera(job, &job.prefix(i), camera, &scale)?;
+    }
+    let mut notes: Vec<String> = scale.note().into_iter().collect();
+    if !scale.is_usual {
+        notes.push(format!(
+            "depth has {} steps per metre, not the usual {USUAL_STEPS}: tell the reader (ORB-SLAM3: \
+             RGBD.DepthMapFactor)",
+            scale.per_metre
+        ));
+    }
+    job.target.text("README.md", &page(job, &scale, &notes))?;
+    Ok(notes)
+}
+
+/// Name of a frame's pictures: the time at which the image's centre is exposed.
+fn stamp(camera: &RunCamera, frame: &RunFrame) -> String {
+    seconds(camera.centre_ns(frame))
+}
+
+fn write_camera(
+    job: &ExportJob<'_>,
+    prefix: &str,
+    camera: &RunCamera,
+    scale: &DepthScale,
+) -> Result<(), DatasetError> {
+    let intrinsics = camera.intrinsics()?;
+    let file = |name: &str| format!("{prefix}{name}");
+    job.each_frame(camera, |frame| {
+        let stamp = stamp(camera, frame);
+        job.target.link(&camera.file(frame, "color_png"), &file(&format!("rgb/{stamp}.png")))?;
+        job.target.make(&file(&format!("depth/{stamp}.png")), || scale.png(&camera.file(frame, "depth")))
+    })?;
+    for (list, what) in [("rgb", "color images"), ("depth", "depth maps")] {
+        job.target.stream(&file(&format!("{list}.txt")), &mut |out| {
+            writeln!(out, "# {what}\n# camsim\n# timestamp filename")?;
+            camera.frames.iter().try_for_each(|frame| {
+                let stamp = stamp(camera, frame);
+                Ok(writeln!(out, "{stamp} {list}/{stamp}.png")?)
+            })
+        })?;
+    }
+    job.target.stream(&file("associations.txt"), &mut |out| {
+        camera.frames.iter().try_for_each(|frame| {
+            let stamp = stamp(camera, frame);
+            Ok(writeln!(out, "{stamp} rgb/{stamp}.png {stamp} depth/{stamp}.png")?)
+        })
+    })?;
+    job.target.stream(&file("groundtruth.txt"), &mut |out| {
+        writeln!(out, "# ground truth trajectory\n# camsim\n# timestamp tx ty tz qx qy qz qw")?;
+        camera.frames.iter().try_for_each(|frame| {
+            let pose = camera.centre_pose(job.name(), frame)?;
+            Ok(writeln!(out, "{} {}", stamp(camera, frame), pose_text(&pose))?)
+        })
+    })?;
+    job.target.text(&file("calibration.txt"), &calibration(&intrinsics))
+}
+
+/// `tx ty tz qx qy qz qw` of the optical axes in ENU.
+pub(super) fn pose_text(pose: &CameraPose) -> String {
+    let pose = enu_from_camera(pose);
+    let values = pose.translation_m.to_array().into_iter().chain(xyzw(pose.rotation));
+    values.map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
+}
+
+fn calibration(intrinsics: &Intrinsics) -> String {
+    let ([fx, fy], [cx, cy]) = (intrinsics.focal_px, intrinsics.principal_px);
+    let [k1, k2, p1, p2, k3, ..] = intrinsics.coefficients;
+    let header = "# (0, 0) is the centre of the first pixel\n";
+    match intrinsics.equidistant() {
+        Some([k1, k2, k3, k4]) => {
+            format!(
+                "{header}# equidistant: fx fy cx cy k1 k2 k3 k4\n{fx} {fy} {cx} {cy} {k1} {k2} {k3} {k4}\n"
+            )
+        }
+        None if intrinsics.coefficients[5..] == [0.0; 3] => {
+            format!(
+                "{header}# fx fy cx cy d0 d1 d2 d3 d4 (k1 k2 p1 p2 k3)\n{fx} {fy} {cx} {cy} {k1} {k2} {p1} {p2} {k3}\n"
+            )
+        }
+        None => {
+            let all = intrinsics.coefficients.map(|k| k.to_string()).join(" ");
+            format!("{header}# fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6\n{fx} {fy} {cx} {cy} {all}\n")
+        }
+    }
+}
+
+fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {
+    let mut page = Page::new("TUM RGB-D folder", job.run);
+    page.line("world", WORLD)
+        .line("pose", &format!("`tx ty tz qx qy qz qw`, world from the camera's optical axes ({OPTICAL})"))
+        .line("quaternions", "x y z **w**, w not negative; camsim's own are w x y z")
+        .line("pixels", PIXEL_CENTRE_0)
+        .line(
+            "depth",
+            &format!(
+                "planar z in {} steps per metre, 16 bit; 0 = none (sky); of the same pixels as colour, at the time of \
+                 each row",
+                scale.per_metre
+            ),
+        )
+        .line(
+            "stamps",
+            "seconds on the run's clock at which the image's centre is exposed (middle of the exposure); the camera's \
+             delay is taken away, as the layout has no place for one",
+        );
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        let i = if camera.name.is_empty() { String::new() } else { format!(" of cam{i}") };
+        page.line(&format!("shutter{i}"), &timing(camera));
+    }
+    page.note("There is one pose for each picture. Pictures keep the lens; `calibration.txt` has it.");
+    notes.iter().for_each(|note| {
+        page.note(note);
+    });
+    page.text().to_owned()
+}

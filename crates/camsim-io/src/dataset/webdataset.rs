@@ -1,0 +1,195 @@
+//! WebDataset: tar shards of samples, an index of shards (`index.json`) and one of samples (`samples.csv`).
+
+use std::{
+    fs::File,
+    io::{BufWriter, Write},
+    path::PathBuf,
+};
+
+use super::{
+    DatasetError, ExportJob,
+    axes::enu_from_camera,
+    euroc::timing,
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    run_folder::{RunCamera, RunFrame},
+    text::wxyz,
+};
+use crate::write::WriteError;
+
+/// Samples of a shard.
+const SHARD: usize = 500;
+
+/// Frames of a camera, with its twins.
+struct Series<'a> {
+    prefix: String,
+    camera: &'a RunCamera,
+    twins: Vec<(String, RunCamera)>,
+}
+
+/// Writes the export; returns notes.
+pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
+    let mut series = Vec::new();
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        let single = camera.twins().iter().filter(|twin| twin.instants.is_none());
+        let twins = single
+            .map(|twin| Ok((twin.name.clone(), camera.twin(twin)?)))
+            .collect::<Result<_, DatasetError>>()?;
+        let prefix = if job.run.cameras.len() == 1 { String::new() } else { format!("cam{i}_") };
+        series.push(Series { prefix, camera, twins });
+    }
+    let samples: Vec<(&Series<'_>, &RunFrame)> = series
+        .iter()
+        .flat_map(|series| series.camera.frames.iter().map(move |frame| (series, frame)))
+        .collect();
+    let shards: Vec<&[(&Series<'_>, &RunFrame)]> = samples.chunks(SHARD).collect();
+    for (k, shard) in shards.iter().enumerate() {
+        // Shards that were written for the same tables are whole.
+        if !(job.keeps && job.target.path(&shard_name(k)).is_file()) {
+            write_shard(job, k, shard)?;
+        }
+    }
+    write_index(job, &shards)?;
+    write_samples(job, &shards)?;
+    job.target.text("README.md", &page(job))?;
+    Ok(Vec::new())
+}
+
+fn shard_name(k: usize) -> String {
+    format!("shard-{k:06}.tar")
+}
+
+fn key(series: &Series<'_>, frame: &RunFrame) -> String {
+    format!("{}frame_{:06}", series.prefix, frame.number)
+}
+
+fn write_shard(
+    job: &ExportJob<'_>,
+    k: usize,
+    shard: &[(&Series<'_>, &RunFrame)],
+) -> Result<(), DatasetError> {
+    job.target.stream(&shard_name(k), &mut |out| {
+        let mut tar = tar::Builder::new(out);
+        for (series, frame) in shard {
+            let key = key(series, frame);
+            for (column, path) in series.camera.files(frame) {
+                append(&mut tar, &format!("{key}.{}", file_ending("", &column, &path)), &path)?;
+            }
+            for (name, twin) in &series.twins {
+                let partner = twin.frames.binary_search_by_key(&frame.number, |partner| partner.number);
+                let Ok(place) = partner else { continue };
+                for (column, path) in twin.files(&twin.frames[place]) {
+                    append(&mut tar, &format!("{key}.{}", file_ending(name, &column, &path)), &path)?;
+                }
+            }
+            let text = describe(job, series, frame)?;
+            put(&mut tar, &format!("{key}.json"), text.len() as u64, &mut text.as_bytes())?;
+            job.target.advance()?;
+        }
+        tar.finish()?;
+        Ok(())
+    })
+}
+
+/// `sharp.color.png`: twin, channel and format.
+fn file_ending(twin: &str, column: &str, path: &std::path::Path) -> String {
+    let channel = column.strip_suffix("_png").or_else(|| column.strip_suffix("_exr")).unwrap_or(column);
+    let ending = path.extension().map_or_else(String::new, |ending| ending.to_string_lossy().into_owned());
+    let twin = if twin.is_empty() { String::new() } else { format!("{twin}.") };
+    format!("{twin}{channel}.{ending}")
+}
+
+type Tar<'w> = tar::Builder<&'w mut BufWriter<File>>;
+
+fn append(tar: &mut Tar<'_>, name: &str, path: &PathBuf) -> Result<(), DatasetError> {
+    let missing = |source| DatasetError::Write(WriteError::Copy { path: path.clone(), source });
+    let mut file = File::open(path).map_err(missing)?;
+    let size = file.metadata().map_err(missing)?.len();
+    put(tar, name, size, &mut file)
+}
+
+/// A file of the archive; the same bytes each time.
+fn put(
+    tar: &mut Tar<'_>,
+    name: &str,
+    size: u64,
+    content: &mut dyn std::io::Read,
+) -> Result<(), DatasetError> {
+    let mut header = tar::Header::new_ustar();
+    header.set_size(size);
+    header.set_mode(0o644);
+    header.set_mtime(0);
+    header.set_entry_type(tar::EntryType::Regular);
+    Ok(tar.append_data(&mut header, name, content)?)
+}
+
+/// Numbers of a sample.
+fn describe(job: &ExportJob<'_>, series: &Series<'_>, frame: &RunFrame) -> Result<String, DatasetError> {
+    let camera = series.camera;
+    let pose = enu_from_camera(&camera.centre_pose(job.name(), frame)?);
+    let spec = &camera.spec;
+    let value = serde_json::json!({
+        "frame": frame.number,
+        "camera": camera.name,
+        "stamp_ns": frame.stamp_ns,
+        "centre_ns": camera.centre_ns(frame),
+        "position_enu_m": pose.translation_m.to_array(),
+        "enu_from_camera_wxyz": wxyz(pose.rotation),
+        "size_px": spec.size_px,
+        "focal_px": spec.focal_px,
+        "principal_point_px": camera.intrinsics().map(|lens| lens.principal_px).ok(),
+        "lens": spec.lens,
+        "readout_ms": spec.shutter.readout_ms,
+        "exposure_ms": spec.shutter.exposure_ms,
+    });
+    Ok(value.to_string() + "\n")
+}
+
+/// The index of shards that `wids` reads.
+fn write_index(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
+    let mut list = Vec::new();
+    for (k, shard) in shards.iter().enumerate() {
+        let path = job.target.path(&shard_name(k));
+        let size = path.metadata().map_err(|source| WriteError::Io { path: path.clone(), source })?.len();
+        list.push(serde_json::json!({ "url": shard_name(k), "nsamples": shard.len(), "filesize": size }));
+    }
+    let index = serde_json::json!({
+        "__kind__": "wids-shard-index-v1",
+        "wids_version": 1,
+        "name": "camsim",
+        "shardlist": list,
+    });
+    job.target.text("index.json", &(format!("{index:#}") + "\n"))
+}
+
+fn write_samples(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
+    job.target.stream("samples.csv", &mut |out| {
+        writeln!(out, "key,shard,frame,camera,stamp_ns,centre_ns")?;
+        for (k, shard) in shards.iter().enumerate() {
+            for (series, frame) in *shard {
+                let (camera, centre_ns) = (&series.camera.name, series.camera.centre_ns(frame));
+                let (key, shard, number) = (key(series, frame), shard_name(k), frame.number);
+                writeln!(out, "{key},{shard},{number},{camera},{},{centre_ns}", frame.stamp_ns)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn page(job: &ExportJob<'_>) -> String {
+    let mut page = Page::new("WebDataset: tar shards", job.run);
+    page.line(
+        "samples",
+        "`frame_NNNNNN.CHANNEL.ENDING`, files of camsim as they are; of a twin `.TWIN.CHANNEL.ENDING`",
+    )
+    .line("`.json`", "stamp, pose, camera of the sample")
+    .line("world", WORLD)
+    .line("camera", OPTICAL)
+    .line("pose", "world from camera at the mid-exposure of the image's centre; quaternions w x y z")
+    .line("pixels", PIXEL_CENTRE_0)
+    .line("`index.json`", "shards, as `wids` reads them")
+    .line("`samples.csv`", "shard and time of each sample");
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        page.line(&format!("shutter of cam{i}"), &timing(camera));
+    }
+    page.text().to_owned()
+}

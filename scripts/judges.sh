@@ -1,0 +1,49 @@
+#!/bin/sh
+# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV. Renders a small scene, and makes a Python
+# environment with these packages (a download of about 300 MB, once).
+#   CAMSIM=target/release/camsim   the program; without it, it is built
+#   JUDGES_VENV=DIR                the environment; default target/judges-venv
+#   JUDGES_DIR=DIR                 scenes and exports; default target/judges, made anew
+set -eu
+cd "$(dirname "$0")/.."
+say() { printf '%s\n' "camsim: $*" >&2; }
+
+python=$(command -v python3 || true)
+if [ -z "$python" ]; then
+    say "JUDGES SKIPPED: no python3 here, so no other program has read the exports (apt-get install python3-venv)"
+    exit 0
+fi
+venv=${JUDGES_VENV:-target/judges-venv}
+if ! [ -x "$venv/bin/python" ]; then
+    say "making $venv"
+    "$python" -m venv "$venv" || { say "JUDGES SKIPPED: python3 has no venv (apt-get install python3-venv)"; rm -rf "$venv"; exit 0; }
+fi
+if ! "$venv/bin/python" -c "import cv2, evo, mcap, numpy, OpenEXR, pycolmap, rosbags" 2>/dev/null; then
+    say "installing the readers into $venv"
+    "$venv/bin/pip" install --quiet --requirement scripts/judges/requirements.txt ||
+        { say "JUDGES SKIPPED: the packages of scripts/judges/requirements.txt could not be installed"; exit 0; }
+fi
+dir=${JUDGES_DIR:-target/judges}
+rm -rf "$dir"
+"$venv/bin/python" scripts/judges/scene.py "$dir"
+camsim() {
+    if [ -n "${CAMSIM:-}" ]; then "$CAMSIM" "$@"; else cargo run --quiet -- "$@"; fi
+}
+judge() {
+    say "judge: $*"
+    script=$1
+    shift
+    "$venv/bin/python" "scripts/judges/$script.py" "$@"
+}
+render() {
+    say "rendering $1"
+    camsim -q render "$dir/$1.toml" -o "$dir/$1/run" --backend cpu --set "output.datasets=$2"
+}
+render gs '["tum", "euroc", "kitti", "colmap", "mcap", "flo"]'
+render rs '["tum", "euroc", "kitti"]'
+render fisheye '["colmap", "mcap"]'
+judge trajectories "$dir/gs/run" "$dir/rs/run"
+judge colmap "$dir/gs/run" "$dir/fisheye/run"
+judge bag "$dir/gs/run" "$dir/fisheye/run"
+judge pictures "$dir/gs/run"
+say "judges: all agree"

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Writes the scenes that the judges look at into a folder: python3 scene.py DIR
+
+A camera flies before a chessboard: gs.toml with a global shutter and OpenCV's lens, fisheye.toml with OpenCV's fisheye lens, rs.toml with a
+rolling shutter, exposure, delay and a lens of eight coefficients.
+"""
+
+import math
+import pathlib
+import sys
+
+SCENE = """\
+[flight]
+log = "log.csv"
+window_s = [1.0, {end_s}]
+[tracker]
+kind = "linear"
+[camera]
+size_px = [320, 240]
+focal_px = [264.0, 265.5]
+principal_point_px = [161.3, 118.2]
+fps = 10.0
+[camera.mount]
+angles_deg = [1.0, -2.0, -5.0]
+offset_m = [0.1, -0.05, 0.02]
+[camera.lens]
+model = "{model}"
+coefficients = {coefficients}
+[camera.shutter]
+{shutter}
+[scene.board]
+kind = "chessboard"
+columns = 8
+rows = 5
+size_m = 0.26
+angles_deg = [0.0, 90.0, 0.0]
+[output]
+format = ["png"]
+channels = {channels}
+stamps = "zero"
+epoch_ns = 1700000000000000000
+[output.tracks]
+points = "board"
+"""
+
+ALL = '["color", "depth", "flow"]'
+KINDS = {
+    "gs": dict(model="brown-conrady", coefficients=[-0.25, 0.06, 0.001, -0.0015], shutter="", end_s=1.6, channels=ALL),
+    "fisheye": dict(model="kannala-brandt", coefficients=[-0.02, 0.005, -0.001, 0.0002], shutter="", end_s=1.4, channels='["color"]'),
+    "rs": dict(
+        model="brown-conrady",
+        coefficients=[-0.25, 0.06, 0.001, -0.0015, 0.01, 0.02, 0.01, 0.003],
+        shutter="readout_ms = 30.0\nexposure_ms = 8.0\ndelay_ms = 5.0",
+        end_s=1.4,
+        channels=ALL,
+    ),
+}
+
+
+def main(folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = ["t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg"]
+    for i in range(40):
+        t = 0.1 * i
+        place = (-3.0 + 0.25 * t, 0.5 * math.sin(0.8 * t) - 0.1, 0.25 * math.cos(1.1 * t))
+        turn = (4 * math.sin(t), 3 * math.cos(0.9 * t), 6 * math.sin(0.7 * t))
+        rows.append(",".join(str(value) for value in (t, *place, *turn)))
+    (folder / "log.csv").write_text("\n".join(rows) + "\n")
+    for name, keys in KINDS.items():
+        (folder / f"{name}.toml").write_text(SCENE.format(**keys))
+
+
+if __name__ == "__main__":
+    main(pathlib.Path(sys.argv[1]))
