@@ -146,7 +146,7 @@ fn every_format_gives_the_circle() {
             }
         };
         let found = errors(&log, 20.0 - seconds);
-        println!("{name}: {} rows, {:.1} s, {found:.4?}", log.rows.len(), log.duration_s());
+        eprintln!("{name}: {} rows, {:.1} s, {found:.4?}", log.rows.len(), log.duration_s());
         if log.rows.len() != rows || (log.duration_s() - seconds).abs() > 1e-6 {
             faults.push(format!("{name}: {} rows, {} s", log.rows.len(), log.duration_s()));
         }

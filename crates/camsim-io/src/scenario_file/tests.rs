@@ -127,7 +127,9 @@ fn every_key_of_the_structs_is_in_the_schema() {
     });
     scenario.output.palette = true;
     scenario.output.video.bits = 10;
-    scenario.output.video.bits = 10;
+    if let Some(light) = &mut scenario.scene.light {
+        light.shadows = true;
+    }
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
     let terrain = scenario.scene.terrain.as_mut().unwrap();
