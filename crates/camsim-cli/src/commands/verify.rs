@@ -54,9 +54,9 @@ const MEASURED: [Channel; 2] = [Channel::Color, Channel::Coords];
 /// if no surface within quality.max_error_px of the pixel's centre has it. A single fault gives exit code 1.
 /// The channels range, normal, normal_world, object and class are compared in the same way if output.channels
 /// has them: a range may be off by 0.1 %, a normal by 0.1 degrees, and a number not at all. So are flow,
-/// flow_back, flow_global, motion and blur_path in at most 20000 pixels of a frame: a displacement may be off by
-/// 0.01 px, a velocity by 0.1 % and 0.05 px/s, a state not at all. Coverage is compared in about 4000 pixels, and
-/// may differ by 0.15, or more where an object is in a pixel that no pixel beside shows.
+/// flow_back, flow_global, motion and blur_path in at most 20000 pixels of a frame: a displacement may be off
+/// by 0.01 px, a velocity by 0.1 % and 0.05 px/s, a state not at all. Coverage is compared in about 4000
+/// pixels, and may differ by 0.15, or more where an object is in a pixel that no pixel beside shows.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

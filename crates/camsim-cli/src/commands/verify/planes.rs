@@ -142,7 +142,8 @@ pub fn describe(planes: &Planes) -> Vec<String> {
     let mut lines: Vec<String> = planes.flows.iter().flat_map(describe_flow).collect();
     lines.extend(planes.coverage.as_ref().map(|CoverageTruth { kept, pixels, rms, max, faults }| {
         format!(
-            "coverage against 256 rays in {pixels} pixels: {rms:.4} RMS, {} at most, {faults} not explained: {}",
+            "coverage against 256 rays in {pixels} pixels: {rms:.4} RMS, {} at most, {faults} not explained: \
+             {}",
             figure(*max),
             verdict(*kept)
         )
