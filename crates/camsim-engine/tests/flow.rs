@@ -241,10 +241,10 @@ fn a_frame_is_the_other_one_warped_by_flow() {
         if nearest < width || nearest + width >= flow.len() / 3 {
             continue;
         }
-        for k in 0..3 {
+        for (k, value) in warped.iter().enumerate().take(3) {
             squares[2] += bend(nearest, k).powi(2);
             let here = f64::from(first.color_rgba[4 * i + k]);
-            squares[0] += (warped[k] - here).powi(2);
+            squares[0] += (value - here).powi(2);
             squares[1] += (f64::from(other.color_rgba[4 * i + k]) - here).powi(2);
         }
         count += 3.0;

@@ -125,7 +125,7 @@ impl Oracle {
 
 impl Goal<'_> {
     /// From the camera, in NED, at path time `t_s`.
-    fn from_camera(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
+    fn way_from(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
         match self {
             Self::Sky(direction) => *direction,
             Self::Place(point, None) => *point - pose.position_ned_m,
@@ -140,7 +140,7 @@ impl Goal<'_> {
 impl FrameLens<'_> {
     /// Pixel at which a camera shows a goal.
     fn show(&self, pose: &CameraPose, t_s: f64, goal: Goal<'_>) -> Option<DVec2> {
-        let ray = pose.ned_from_camera.inverse() * goal.from_camera(pose, t_s);
+        let ray = pose.ned_from_camera.inverse() * goal.way_from(pose, t_s);
         match self {
             _ if ray.z.is_nan() || ray.z <= 0.0 => None,
             Self::Fixed(lens) => lens.image(ray.truncate() / ray.z),
@@ -161,7 +161,7 @@ impl FlowPicture<'_> {
                 .outside(goal, from_px)
                 .map_or((DVec2::ZERO, FlowState::None), |px| (px - from_px, FlowState::Outside));
         };
-        let way = goal.from_camera(&place.pose, place.t_s);
+        let way = goal.way_from(&place.pose, place.t_s);
         let hit = self.oracle.cast_at(place.t_s, place.pose.position_ned_m, way);
         // The parameter is 1 at the place; the sky is infinitely far away.
         let is_hidden = hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6);

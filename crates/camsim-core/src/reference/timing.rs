@@ -64,7 +64,8 @@ impl FrameTiming {
             Readout::TopToBottom | Readout::LeftToRight => along_px,
             Readout::BottomToTop | Readout::RightToLeft => count - 1.0 - along_px,
         };
-        let lag_s = if (row % 2 == 0) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
+        let lag_s =
+            if row.is_multiple_of(2) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
         self.readout_s * (2.0 * nth + 1.0 - count) / (2.0 * count) - self.delay_s - lag_s
     }
 
