@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use anyhow::anyhow;
 use camsim_core::{
-    reference::{Oracle, RenderOptions, is_rendered},
-    scenario::{Auto, Scenario},
+    reference::{Oracle, RenderOptions},
+    scenario::Auto,
     scene::LodSelection,
     sequence::Sequence,
 };
@@ -107,7 +106,6 @@ pub struct ReferenceSource {
 impl ReferenceSource {
     /// Builds the ray-casting structures.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, Failure> {
-        refuse_unrendered(&sequence.scenario)?;
         let planned = planned(sequence);
         let planner = Planner::new(planned, &sequence.scenario.output.channels, MAX_IDEAL_SIDE_PX)
             .or_bad_input()?
@@ -124,26 +122,6 @@ impl ReferenceSource {
         };
         Ok(Self { oracle: Oracle::new(sequence.clone()).or_bad_input()?, planner, options })
     }
-}
-
-/// Refuses channels, of frames or of twins, that the reference renderer does not have.
-fn refuse_unrendered(scenario: &Scenario) -> Result<(), Failure> {
-    let output = &scenario.output;
-    let of_twins = output
-        .twin
-        .iter()
-        .enumerate()
-        .filter_map(|(i, twin)| Some((format!("output.twin.{i}.channels"), twin.channels.as_ref()?)));
-    for (key, channels) in std::iter::once(("output.channels".to_owned(), &output.channels)).chain(of_twins) {
-        if let Some(channel) = channels.iter().find(|channel| !is_rendered(**channel)) {
-            return Err(Failure::bad_input(anyhow!(
-                "{key}: the reference renderer has no {}: leave it out, or render with another --backend and \
-                 quality.solver",
-                channel.name()
-            )));
-        }
-    }
-    Ok(())
 }
 
 /// The sequence as the engine would plan it.

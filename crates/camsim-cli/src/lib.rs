@@ -13,6 +13,7 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 mod backend;
+mod channel_sheet;
 mod commands;
 pub mod console;
 pub mod failure;

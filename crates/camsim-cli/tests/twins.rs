@@ -295,10 +295,4 @@ channels = ["color"]
     let (code, _, err) = render(&other, &path("out"), &[]);
     assert!(code == 0 && !path("out/global/objects.csv").exists(), "{err}");
     assert!(table("out") == whole["tracks.csv"]);
-    // The reference renderer has no flow, in a twin neither.
-    let flow = scenario(base.path(), &MORE.replace("\"object\"", "\"flow\""));
-    let args =
-        ["render", &flow, "-o", path("exact").to_str().unwrap(), "--backend", "reference"].map(str::to_owned);
-    let (code, _, err) = camsim(&args.each_ref().map(String::as_str));
-    assert!(code == 2 && err.contains("output.twin.0.channels: the reference renderer has no flow"), "{err}");
 }

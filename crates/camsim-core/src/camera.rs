@@ -154,6 +154,7 @@ impl CameraModel {
 
     /// Projection of the ideal ray `(u, v, 1)`, pixels. The formula is evaluated beyond the fold as well,
     /// where [`Lens::contains`] is false.
+    #[inline]
     pub fn project(&self, ideal: DVec2) -> DVec2 {
         self.pixel_from_distorted(self.lens.distort(ideal))
     }
@@ -164,6 +165,7 @@ impl CameraModel {
     }
 
     /// `f x + c`.
+    #[inline]
     pub(crate) fn pixel_from_distorted(&self, distorted: DVec2) -> DVec2 {
         distorted * self.focal_px + self.principal_point_px
     }

@@ -150,6 +150,7 @@ impl Lens {
 
     /// Forward: ideal to distorted. The formula is evaluated beyond the fold as well; [`Lens::contains`]
     /// tells whether the point is visible.
+    #[inline]
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         match self {
             Self::Pinhole(lens) => lens.distort(ideal),
@@ -210,9 +211,17 @@ impl Lens {
         self.fold_curve().map_or(f64::INFINITY, |fold| fold.radius(phi_rad))
     }
 
+    /// Ideal radius within which all points lie on the principal branch; infinite for a pinhole.
+    #[inline]
+    pub fn contained_radius(&self) -> f64 {
+        self.fold_curve().map_or(f64::INFINITY, FoldCurve::smallest)
+    }
+
     /// Whether an ideal point lies on the principal branch, so that `undistort(distort(ideal))` is `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
-        ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
+        // Most points are within every radius, and need no angle.
+        let is_near = ideal.length_squared() < self.contained_radius().powi(2);
+        is_near || ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
     }
 }
 

@@ -22,6 +22,8 @@ use crate::{
 };
 
 mod disocclusion;
+mod flow;
+mod flow_errors;
 mod lens_inverse;
 mod measure;
 mod mesh_bvh;
@@ -37,6 +39,9 @@ mod timing;
 mod truth;
 
 pub use disocclusion::{Disocclusion, disocclusion};
+pub use flow_errors::{
+    CoverageErrors, FLOW_TOLERANCE_PX, FlowErrors, FlowStats, coverage_errors, flow_errors, is_flow,
+};
 use lens_inverse::LensInverse;
 pub use measure::{
     CoordErrors, CoordTruth, ErrorStats, ErrorVerdict, ImageErrors, MAX_VOID_SHARE, coord_errors,
@@ -45,7 +50,6 @@ pub use measure::{
 use mesh_bvh::MeshBvh;
 use moving::{MovingMeshes, moving_meshes};
 pub use plane_errors::{NORMAL_TOLERANCE_RAD, PlaneErrors, is_compared, plane_errors};
-pub use planes::is_rendered;
 use ray::Ray;
 pub use render::{Convergence, IdealView, RenderOptions};
 use shading::Shading;
@@ -188,13 +192,7 @@ impl Oracle {
     #[must_use]
     pub fn view(&self, frame: u64) -> FrameView<'_> {
         let stamp_s = self.timing.stamp_s(frame);
-        let lens = match &self.fixed {
-            Some(lens) => FrameLens::Fixed(lens),
-            None => self
-                .zoomed_lens(zoom_at(&self.sequence.zoom_track, stamp_s))
-                .map_or(FrameLens::Invalid, FrameLens::Zoomed),
-        };
-        FrameView { oracle: self, stamp_s, lens }
+        FrameView { oracle: self, stamp_s, lens: self.lens_of(stamp_s) }
     }
 
     /// Samples the position `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase

@@ -11,6 +11,8 @@
 //! between the centres of rows and beyond the first and last one. With a sideways readout the same holds for
 //! `x`, and each field of an interlaced frame has an equation of its own.
 
+mod projector;
+
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -22,6 +24,8 @@ use crate::{
     scene::RigidMotion,
     shutter::{RowAxis, Shutter},
 };
+
+pub use projector::{ImageGain, RowProjector, Shown};
 
 /// Intervals of the readout in which a solution is looked for, one in each at most: for any camera, and for each
 /// period of its fastest vibration, and turn of a point that spins, within the readout.
@@ -178,6 +182,11 @@ impl FrameCamera {
     #[must_use]
     pub fn camera(&self) -> &CameraModel {
         &self.camera
+    }
+
+    /// The camera at mid-exposure of each row.
+    pub fn poses(&self) -> impl Iterator<Item = &CameraPose> {
+        self.fields.iter().flat_map(|field| &field.poses)
     }
 
     /// Where the frame shows a point. Of several positions the one nearest to `near_px` is returned. `None`

@@ -33,7 +33,7 @@ pub use prefilter::{Prefilter, PrefilterTaps};
 pub use terrain::{
     Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, SunlitBlocks, Terrain, TerrainChunk,
     TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainTiles, TerrainTriangle,
-    TerrainVertex,
+    TerrainVertex, TerrainWalk, WalkHit,
 };
 pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
 pub use texture_tiles::{TILE_SIDE, TileGrid, TileSource, is_whole, tile_bytes};

@@ -88,6 +88,7 @@ impl Shutter {
     }
 
     /// Whether the rows of the readout are image rows or columns.
+    #[inline]
     pub fn row_axis(&self) -> RowAxis {
         match self.direction {
             Readout::TopToBottom | Readout::BottomToTop => RowAxis::Rows,

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::{row_time::WorldPoint, scene::Scene};
+
 /// A point that is tracked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackPoint {
@@ -9,8 +11,19 @@ pub struct TrackPoint {
     pub source: String,
     /// Its name there, such as the number of a board's corner.
     pub name: String,
-    /// North, east, down, metres.
+    /// North, east, down, metres; of what moves, at path time 0.
     pub position_ned_m: DVec3,
+    /// Mesh of the scene that it moves with.
+    pub moves_with: Option<usize>,
+}
+
+impl TrackPoint {
+    /// The point at all times.
+    #[must_use]
+    pub fn world_point<'a>(&self, scene: &'a Scene) -> WorldPoint<'a> {
+        let mesh = self.moves_with.and_then(|mesh| scene.meshes.get(mesh));
+        WorldPoint::on(mesh.and_then(|mesh| mesh.motion.as_deref()), self.position_ned_m, 0.0)
+    }
 }
 
 /// At most `count` of `items`, evenly spaced in their order; the seed decides with which it begins.

@@ -16,7 +16,7 @@ use camsim_gpu::{
     session::{FRAMES_IN_FLIGHT, IdealCopy},
 };
 use camsim_plan::{
-    EdgeStage, FramePlan, PlanError, Planner, PrefilterTaps, Renderer,
+    EdgeStage, FramePlan, PixelHit, PlanError, Planner, PrefilterTaps, Renderer,
     uniforms::{FrameUniforms, Truth, frame_uniforms},
 };
 
@@ -43,6 +43,8 @@ pub struct Session<'a> {
     moving: Option<MovingScene>,
     /// Knows everything in the scene, where something moves.
     scene_planner: Option<Arc<Planner>>,
+    /// What each pixel of a frame sees; its memory is kept from frame to frame.
+    hits: Vec<Option<PixelHit>>,
 }
 
 /// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
@@ -119,6 +121,7 @@ impl<'a> Session<'a> {
             channels: channels.into(),
             moving,
             scene_planner,
+            hits: Vec::new(),
         })
     }
 
@@ -350,12 +353,12 @@ impl<'a> Session<'a> {
 
     /// The frame with its truth, from exact rays where depth look-ups are unreliable.
     fn with_truth(
-        &self,
+        &mut self,
         plan: &FramePlan,
         mut color_rgba: Vec<f32>,
         mut truth: Option<Vec<Truth>>,
     ) -> Result<RenderedFrame, PlanError> {
-        let sequence = self.planner.sequence();
+        let sequence = self.planner.sequence().clone();
         if let Some(moving) = &self.moving {
             moving.paint(&mut color_rgba, plan);
         }
@@ -378,11 +381,12 @@ impl<'a> Session<'a> {
 
     /// Corrects the truth of a renderer by rays, and computes the other truth channels.
     fn complete_truth(
-        &self,
+        &mut self,
         plan: &FramePlan,
         color_rgba: &[f32],
         truth: &mut Vec<Truth>,
     ) -> Result<Vec<Plane>, PlanError> {
+        let mut hits = std::mem::take(&mut self.hits);
         let planner = self.scene_planner();
         let rays = planner.frame_rays(plan, f64::from(self.coords_phase));
         // What moves is not in the picture that depth is looked up in.
@@ -396,8 +400,11 @@ impl<'a> Session<'a> {
         }
         // With the paper's solvers depth and coordinates say where these look.
         let mut solved = (!plan.has_exact_truth()).then(|| truth.clone());
-        let hits = hits::of_all_pixels(solved.as_mut().unwrap_or(truth), color_rgba, plan, &rays);
-        planes(&FramePixels { planner, plan, rays: &rays, truth, color_rgba, hits: &hits }, &self.channels)
+        hits::of_all_pixels(solved.as_mut().unwrap_or(truth), color_rgba, plan, &rays, &mut hits);
+        let pixels = FramePixels { planner, plan, rays: &rays, truth, color_rgba, hits: &hits };
+        let planes = planes(&pixels, &self.channels);
+        self.hits = hits;
+        planes
     }
 
     /// Ideal frame of the last rendered frame, the first of several; `None` before the first frame. Linear

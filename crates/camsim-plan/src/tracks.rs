@@ -6,11 +6,7 @@ mod terrain_corners;
 mod vertices;
 mod views;
 
-use camsim_core::{
-    row_time::{ImagePoint, WorldPoint},
-    scenario::Channel,
-    tracks::TrackPoint,
-};
+use camsim_core::{row_time::ImagePoint, scenario::Channel, tracks::TrackPoint};
 use rayon::prelude::*;
 
 use crate::{ir::plan_error::PlanError, planner::Planner};
@@ -71,13 +67,14 @@ impl Tracks {
     pub fn sightings(&self, frame: u64) -> Result<Vec<Sighting>, PlanError> {
         let camera = self.planner.frame_camera(frame as i64)?;
         let surfaces = self.planner.surfaces();
+        let scene = &self.planner.sequence().scene;
         let of_point = |(point, at): (usize, &TrackPoint)| {
-            let at_ned_m = at.position_ned_m;
-            let found = camera.find_all(WorldPoint::At(at_ned_m)).into_iter();
-            found.map(move |seen| Sighting {
-                point,
-                seen,
-                is_visible: !is_hidden(surfaces, seen.t_s, seen.pose.position_ned_m, at_ned_m),
+            let (world_point, at_ned_m) = (at.world_point(scene), at.position_ned_m);
+            let found = camera.find_all(world_point).into_iter();
+            found.map(move |seen| {
+                let now_ned_m = world_point.position_ned_m(seen.t_s).unwrap_or(at_ned_m);
+                let is_visible = !is_hidden(surfaces, seen.t_s, seen.pose.position_ned_m, now_ned_m);
+                Sighting { point, seen, is_visible }
             })
         };
         let points = self.points.par_iter().enumerate().with_min_len(POINTS_AT_ONCE);

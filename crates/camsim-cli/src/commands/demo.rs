@@ -2,15 +2,21 @@
 
 use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
-use camsim_core::{frame::RenderedFrame, mount::CameraPath, scenario::LensSpec, sequence::Sequence};
+use camsim_core::{
+    frame::RenderedFrame,
+    mount::CameraPath,
+    scenario::{Channel, LensSpec},
+    sequence::Sequence,
+};
 use camsim_engine::Engine;
 use camsim_io::{
     builtin,
-    write::{WriteError, contact_sheet},
+    write::{WriteError, channel_pictures, contact_sheet},
 };
 
 use crate::{
     backend::BackendArgs,
+    channel_sheet::write_channel_sheet,
     console::Console,
     failure::{Failure, OrFail},
     frame_source::EngineSource,
@@ -26,10 +32,26 @@ const SHEET_COLUMNS: u32 = 4;
 /// Reduction factor of the thumbnails.
 const SHEET_SHRINK: u32 = 2;
 
+/// Channels of `channels.png`.
+const SHEET_CHANNELS: [Channel; 12] = [
+    Channel::Color,
+    Channel::Depth,
+    Channel::Range,
+    Channel::Normal,
+    Channel::NormalWorld,
+    Channel::Object,
+    Channel::Coverage,
+    Channel::Flow,
+    Channel::FlowBack,
+    Channel::FlowGlobal,
+    Channel::Motion,
+    Channel::BlurPath,
+];
+
 /// Render the built-in flight; no input is needed
 ///
-/// Writes EXR and PNG frames, a contact sheet, and one frame of the perfect and the imperfect camera side by
-/// side.
+/// Writes EXR and PNG frames, a contact sheet, one frame of the perfect and the imperfect camera side by side,
+/// and its truth channels in colour.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// Output folder
@@ -86,8 +108,14 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let pair = folder.join("perfect-and-real.png");
     let middle = frames[frames.len() / 2];
     let flawless = Arc::new(without_flaws(&loaded.sequence)?);
-    let both = [render_one(&engine, &flawless, middle)?, render_one(&engine, &loaded.sequence, middle)?];
+    let only_color = [Channel::Color];
+    let both = [&flawless, &loaded.sequence]
+        .map(|sequence| render_one(&engine, sequence, &only_color, middle))
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()?;
     contact_sheet(&pair, &both, 2, 1).or_failed()?;
+    let all = render_one(&engine, &loaded.sequence, &SHEET_CHANNELS, middle)?;
+    let channels = write_channel_sheet(folder, channel_pictures(&all))?;
 
     let (seconds, folder_name) = (outcome.time.as_secs_f64(), folder.display());
     console.line(format_args!(
@@ -102,6 +130,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         "  {}   frame {middle} without and with the camera's imperfections",
         pair.display()
     ))?;
+    console.line(format_args!("  {}   what is true of its pixels, in colour", channels.display()))?;
     console.line("next")?;
     console.line(format_args!("  camsim explain {}", scene.display()))?;
     console
@@ -126,9 +155,14 @@ fn without_flaws(sequence: &Sequence) -> Result<Sequence, Failure> {
     Ok(flawless)
 }
 
-fn render_one(engine: &Engine, sequence: &Arc<Sequence>, frame: u64) -> Result<RenderedFrame, Failure> {
+fn render_one(
+    engine: &Engine,
+    sequence: &Arc<Sequence>,
+    channels: &[Channel],
+    frame: u64,
+) -> Result<RenderedFrame, Failure> {
     let mut rendered = RenderedFrame::default();
-    let mut session = engine.session::<WriteError>(sequence.clone(), &sequence.scenario.output.channels)?;
+    let mut session = engine.session::<WriteError>(sequence.clone(), channels)?;
     session.render::<WriteError>([frame], &mut |finished| {
         rendered = finished.frame;
         Ok(())

@@ -10,12 +10,17 @@ use camsim_core::scenario::{
     Auto, Channel, DatasetFormat, ImageFormat, Preset, Rig, Scenario, Solver, validate,
 };
 use camsim_engine::Finished;
-use camsim_io::{merge::write_checksums, scenario_file::print_default, write::Y4mStream};
+use camsim_io::{
+    merge::write_checksums,
+    scenario_file::print_default,
+    write::{Y4mStream, channel_pictures},
+};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::export::{export_datasets, with_needs};
 use crate::{
     backend,
+    channel_sheet::write_channel_sheet,
     console::Console,
     failure::{FAILED, Failure, OrFail},
     frame_list::{FrameList, Shard},
@@ -89,6 +94,9 @@ pub struct RenderArgs {
     /// Print the time of each stage at the end: on the cpu, and by pass on the gpu
     #[arg(long, conflicts_with = "pipe")]
     times: bool,
+    /// Also write channels.png: the channels of the first frame as pictures in colour, four in a row
+    #[arg(long, conflicts_with = "pipe")]
+    sheet: bool,
     /// Render only the I-th of N parts, with I from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -218,9 +226,12 @@ pub fn render(
     console.detail(format_args!("adapter: {}", source.adapter()));
     let (fps, bits) = (sequence.scenario.camera.fps, sequence.scenario.output.video.bits);
     let mut pipe = args.pipe.then(|| Y4mStream::new(std::io::stdout(), fps, bits));
-    let mut broken_pipe = None;
+    let (mut broken_pipe, mut sheet) = (None, None);
     let mut on_frame = |name: Option<&str>, finished: &Finished| {
         times.add(name, &finished.times);
+        if args.sheet && sheet.is_none() {
+            sheet = Some(channel_pictures(&finished.frame));
+        }
         let pipe = pipe.as_mut().filter(|_| name == piped);
         broken_pipe = pipe.and_then(|pipe| pipe.write(&finished.frame).err());
         if broken_pipe.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -235,6 +246,9 @@ pub fn render(
             console.note(format_args!("written frames are kept; to resume: {command}"));
         }
     })?;
+    if let Some(pictures) = sheet {
+        write_channel_sheet(&folder, pictures)?;
+    }
     if args.checksums {
         write_checksums(folder).or_failed()?;
     }

@@ -27,6 +27,7 @@ pub struct FoldCurve {
     radii: Vec<f64>,
     folds: bool,
     distorted_max: f64,
+    smallest: f64,
 }
 
 impl FoldCurve {
@@ -51,7 +52,8 @@ impl FoldCurve {
             .enumerate()
             .map(|(ray, radius)| distort(DVec2::from_angle(angle(ray)) * (radius * (1.0 - 1e-9))).length())
             .fold(0.0, |max: f64, radius| if radius.is_nan() { f64::INFINITY } else { max.max(radius) });
-        Self { radii, folds, distorted_max }
+        let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
+        Self { radii, folds, distorted_max, smallest }
     }
 
     /// Radius in direction `phi` (radians from +u towards +v), linear between rays.
@@ -61,6 +63,11 @@ impl FoldCurve {
         let (here, next) = (self.radii[ray as usize % FOLD_RAYS], self.radii[(ray as usize + 1) % FOLD_RAYS]);
         let (near, far) = (here.min(next), here.max(next));
         if far > SHEET_RATIO * near { near } else { here + (next - here) * (position - ray) }
+    }
+
+    /// Smallest radius.
+    pub fn smallest(&self) -> f64 {
+        self.smallest
     }
 
     /// Radii of all rays; ray i points to `phi = i 2 pi / FOLD_RAYS`.

@@ -83,6 +83,12 @@ impl LensInverse {
         near.and_then(|start| self.polish(start, wanted)).or_else(|| self.solve_from_nothing(wanted))
     }
 
+    /// Pixel at which an ideal ray is imaged; `None` beyond the principal branch.
+    pub(super) fn image(&self, ideal: DVec2) -> Option<DVec2> {
+        let is_imaged = ideal.is_finite() && (self.plain || self.inside(ideal));
+        is_imaged.then(|| self.lens.distort(ideal) * self.focal_px + self.principal_px)
+    }
+
     fn distorted(&self, position_px: DVec2) -> DVec2 {
         (position_px - self.principal_px) / self.focal_px
     }

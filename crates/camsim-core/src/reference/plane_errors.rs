@@ -26,10 +26,12 @@ pub struct PlaneErrors {
     pub channel: Channel,
     /// Pixels that are valid in both.
     pub pixels: u64,
+    /// Those of them of which no neighbour has, by the oracle, another object or the sky.
+    pub pixels_away: u64,
     /// Pixels whose value is wrong: a range by more than [`DEPTH_TOLERANCE`] of it, a normal by more than
     /// [`NORMAL_TOLERANCE_RAD`], another number, or the sky in one of the two only.
     pub beyond: u64,
-    /// Those of them of which no neighbour has, by the oracle, another object or the sky.
+    /// Those of them that are away from borders, as in `pixels_away`.
     pub beyond_away: u64,
     /// Pixels counted in `beyond` whose value belongs to no surface within the allowed distance from the
     /// pixel's centre.
@@ -56,17 +58,7 @@ pub fn is_compared(channel: Channel) -> bool {
 /// sequence.
 #[must_use]
 pub fn plane_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Vec<PlaneErrors> {
-    let [width, height] = frame.size_px;
-    let count = width as usize * height as usize;
-    if frame.size_px != oracle.sequence.scenario.camera.size_px || frame.color_rgba.len() != 4 * count {
-        return Vec::new();
-    }
-    let view = oracle.view(number);
-    let pixel = |i: usize| [i as u32 % width, i as u32 / width];
-    let sample =
-        |i: usize| view.sample(pixel(i), DVec2::ZERO, 0.0).filter(|_| frame.color_rgba[4 * i + 3] > 0.0);
-    let samples: Vec<Option<RaySample>> = (0..count).into_par_iter().map(sample).collect();
-    let compared = Compared { view, scene: &oracle.sequence.scene, size_px: frame.size_px, samples, near_px };
+    let Some(compared) = Compared::new(oracle, number, frame, near_px) else { return Vec::new() };
     frame
         .planes
         .iter()
@@ -76,13 +68,21 @@ pub fn plane_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px
 }
 
 /// What all planes of a frame are compared with.
-struct Compared<'a> {
-    view: FrameView<'a>,
+pub(super) struct Compared<'a> {
+    pub(super) view: FrameView<'a>,
     scene: &'a Scene,
-    size_px: [u32; 2],
+    pub(super) size_px: [u32; 2],
     /// The ray of each pixel that is valid in both.
-    samples: Vec<Option<RaySample>>,
-    near_px: f64,
+    pub(super) samples: Vec<Option<RaySample>>,
+    pub(super) near_px: f64,
+}
+
+/// Places around a pixel's centre, at most `near_px` from it.
+pub(super) fn beside_offsets(near_px: f64) -> impl Iterator<Item = DVec2> {
+    (0..DIRECTIONS).flat_map(move |k| {
+        let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
+        RINGS.iter().map(move |ring| ring * near_px * direction)
+    })
 }
 
 /// Error of one pixel.
@@ -101,7 +101,26 @@ enum Value {
     Number(u32),
 }
 
-impl Compared<'_> {
+impl<'a> Compared<'a> {
+    /// `None` if the frame's size differs from that of the sequence.
+    pub(super) fn new(oracle: &'a Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Option<Self> {
+        let [width, height] = frame.size_px;
+        let count = width as usize * height as usize;
+        if frame.size_px != oracle.sequence.scenario.camera.size_px || frame.color_rgba.len() != 4 * count {
+            return None;
+        }
+        let view = oracle.view(number);
+        let pixel = |i: usize| [i as u32 % width, i as u32 / width];
+        let sample =
+            |i: usize| view.sample(pixel(i), DVec2::ZERO, 0.0).filter(|_| frame.color_rgba[4 * i + 3] > 0.0);
+        let samples: Vec<Option<RaySample>> = (0..count).into_par_iter().map(sample).collect();
+        Some(Self { view, scene: &oracle.sequence.scene, size_px: frame.size_px, samples, near_px })
+    }
+
+    pub(super) fn pixel(&self, i: usize) -> [u32; 2] {
+        [i as u32 % self.size_px[0], i as u32 / self.size_px[0]]
+    }
+
     fn errors(&self, plane: &Plane) -> Option<PlaneErrors> {
         let components = match plane.channel {
             Channel::Normal | Channel::NormalWorld => 3,
@@ -127,7 +146,7 @@ impl Compared<'_> {
             let error = self.error(plane.channel, value(i), sample);
             let is_beyond = is_beyond(plane.channel, error);
             let is_fault = is_beyond && !self.has_beside(plane.channel, i, value(i));
-            Some(PixelError { error, is_beyond, is_away: is_beyond && self.is_away(i), is_fault })
+            Some(PixelError { error, is_beyond, is_away: self.is_away(i), is_fault })
         };
         let pixels: Vec<PixelError> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
         let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.error).collect();
@@ -142,7 +161,8 @@ impl Compared<'_> {
             channel: plane.channel,
             pixels: pixels.len() as u64,
             beyond: number(&|pixel| pixel.is_beyond),
-            beyond_away: number(&|pixel| pixel.is_away),
+            pixels_away: number(&|pixel| pixel.is_away),
+            beyond_away: number(&|pixel| pixel.is_beyond && pixel.is_away),
             faults: number(&|pixel| pixel.is_fault),
             p99: at(0.99),
             max: at(1.0),
@@ -183,29 +203,33 @@ impl Compared<'_> {
 
     /// Whether a surface near a pixel's centre has a value.
     fn has_beside(&self, channel: Channel, i: usize, value: Value) -> bool {
-        let pixel = [i as u32 % self.size_px[0], i as u32 / self.size_px[0]];
-        (0..DIRECTIONS).any(|k| {
-            let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
-            RINGS.iter().any(|ring| {
-                let beside = self.view.sample(pixel, ring * self.near_px * direction, 0.0);
-                beside.is_some_and(|beside| !is_beyond(channel, self.error(channel, value, &beside)))
-            })
+        beside_offsets(self.near_px).any(|offset| {
+            let beside = self.view.sample(self.pixel(i), offset, 0.0);
+            beside.is_some_and(|beside| !is_beyond(channel, self.error(channel, value, &beside)))
         })
     }
 
     /// Whether all pixels around one show the same object.
-    fn is_away(&self, i: usize) -> bool {
-        let [width, height] = self.size_px.map(i64::from);
-        let object = |i: usize| {
-            self.samples[i]
-                .as_ref()
-                .map(|sample| sample.hit.as_ref().map_or(0, |hit| self.scene.object_of_surface(hit.surface)))
+    pub(super) fn is_away(&self, i: usize) -> bool {
+        self.around(i).all(|beside| self.object(beside) == self.object(i))
+    }
+
+    /// Object that a pixel's centre sees; `None` without a ray.
+    pub(super) fn object(&self, i: usize) -> Option<u32> {
+        let of_hit = |sample: &RaySample| {
+            sample.hit.as_ref().map_or(0, |hit| self.scene.object_of_surface(hit.surface))
         };
+        self.samples[i].as_ref().map(of_hit)
+    }
+
+    /// A pixel and those around it.
+    pub(super) fn around(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
+        let [width, height] = self.size_px.map(i64::from);
         let [x, y] = [i as i64 % width, i as i64 / width];
-        let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
+        let around = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
         around
-            .filter(|[x, y]| (0..width).contains(x) && (0..height).contains(y))
-            .all(|[x, y]| object((y * width + x) as usize) == object(i))
+            .filter(move |[x, y]| (0..width).contains(x) && (0..height).contains(y))
+            .map(move |[x, y]| (y * width + x) as usize)
     }
 }
 

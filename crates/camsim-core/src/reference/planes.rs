@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     FrameView, Hit, Oracle, RaySample, RenderOptions,
+    flow::FlowPicture,
     render::{EVEN_3D, shifts},
 };
 use crate::{
@@ -15,26 +16,12 @@ use crate::{
 /// Rays of a pixel for [`Channel::Coverage`].
 const COVERAGE_RAYS: u32 = 256;
 
-/// Whether [`Oracle::render`] delivers the plane of a channel.
-#[must_use]
-pub fn is_rendered(channel: Channel) -> bool {
-    match channel {
-        Channel::Range
-        | Channel::Normal
-        | Channel::NormalWorld
-        | Channel::Object
-        | Channel::Class
-        | Channel::Coverage => true,
-        other => other.plane().is_none(),
-    }
-}
-
 impl Oracle {
-    /// Planes of the channels that [`is_rendered`] names.
+    /// Planes of the channels that have one.
     pub(super) fn planes(&self, frame: u64, options: &RenderOptions) -> Vec<Plane> {
         let mut channels: Vec<Channel> = Vec::new();
         for &channel in &options.channels {
-            if channel.plane().is_some() && is_rendered(channel) && !channels.contains(&channel) {
+            if channel.plane().is_some() && !channels.contains(&channel) {
                 channels.push(channel);
             }
         }
@@ -72,6 +59,9 @@ impl Oracle {
             Channel::NormalWorld => floats(&|_, hit| hit.normal_ned, 3),
             Channel::Object => numbers(&|surface| scene.object_of_surface(surface)),
             Channel::Class => numbers(&|surface| scene.class_of_surface(surface)),
+            Channel::Flow | Channel::FlowBack | Channel::FlowGlobal | Channel::Motion | Channel::BlurPath => {
+                self.flow_plane(frame, channel, &view, &samples)
+            }
             _ => PlaneValues::Float(
                 samples
                     .par_iter()
@@ -81,6 +71,49 @@ impl Oracle {
             ),
         };
         channels.iter().map(|&channel| Plane { channel, values: values(channel) }).collect()
+    }
+}
+
+impl Oracle {
+    /// Flows, motion or blur path of all samples.
+    fn flow_plane(
+        &self,
+        frame: u64,
+        channel: Channel,
+        view: &FrameView<'_>,
+        samples: &[Option<RaySample>],
+    ) -> PlaneValues {
+        let width = self.sequence.scenario.camera.size_px[0];
+        let picture = self.flow_picture(frame, channel);
+        let of_pixel = |(i, sample): (usize, &Option<RaySample>)| {
+            let from_px = DVec2::new(f64::from(i as u32 % width), f64::from(i as u32 / width));
+            let pair = |px: DVec2| px.as_vec2().to_array();
+            match (channel, sample, &picture) {
+                (_, Some(seen), Some(picture)) => {
+                    let (shift, state) = picture.flow(from_px, seen);
+                    let [dx, dy] = pair(shift);
+                    vec![dx, dy, f32::from(state as u8)]
+                }
+                (Channel::Motion, Some(seen), None) => pair(view.motion(seen)).to_vec(),
+                (_, Some(seen), None) => view.blur_path(from_px, seen).map(pair).concat(),
+                (Channel::Motion, None, _) => vec![0.0; 2],
+                (Channel::BlurPath, None, _) => vec![0.0; 4],
+                (_, None, _) => vec![0.0; 3],
+            }
+        };
+        PlaneValues::Float(samples.par_iter().enumerate().flat_map_iter(of_pixel).collect())
+    }
+
+    /// The picture that a flow of a frame leads to; `None` for other channels.
+    pub(super) fn flow_picture(&self, frame: u64, channel: Channel) -> Option<FlowPicture<'_>> {
+        let output = &self.sequence.scenario.output;
+        let step = i64::from(output.flow_step);
+        match channel {
+            Channel::Flow => Some(self.flow_frame(frame as i64 + step)),
+            Channel::FlowBack => Some(self.flow_frame(frame as i64 - step)),
+            Channel::FlowGlobal => Some(self.flow_global(frame, output.flow_instant)),
+            _ => None,
+        }
     }
 }
 
@@ -94,19 +127,27 @@ impl RaySample {
 impl FrameView<'_> {
     /// Share of a pixel's area and exposure whose rays meet the same object as the sample at its centre, of
     /// the part of the area that has rays.
-    fn coverage(&self, [x, y]: [u32; 2], centre: &RaySample) -> f64 {
+    pub(super) fn coverage(&self, pixel: [u32; 2], centre: &RaySample) -> f64 {
+        self.coverage_of(pixel, centre, &[]).0
+    }
+
+    /// As [`Self::coverage`], and the share of rays that meet none of the objects in `known`.
+    pub(super) fn coverage_of(&self, [x, y]: [u32; 2], centre: &RaySample, known: &[u32]) -> (f64, f64) {
         let object =
             |hit: Option<Hit>| hit.map_or(0, |hit| self.oracle.sequence.scene.object_of_surface(hit.surface));
         let wanted = object(centre.hit);
         let shift = shifts(u64::from(y) << 32 | u64::from(x));
-        let (mut same, mut all) = (0_u32, 0_u32);
+        let (mut same, mut unknown, mut all) = (0_u32, 0_u32, 0_u32);
         for i in 0..COVERAGE_RAYS {
             let [x_share, y_share, phase] =
                 [0, 1, 2].map(|k: usize| (shift[k] + f64::from(i) * EVEN_3D[k]).fract() - 0.5);
             let Some(sample) = self.sample([x, y], DVec2::new(x_share, y_share), phase) else { continue };
             all += 1;
-            same += u32::from(object(sample.hit) == wanted);
+            let number = object(sample.hit);
+            same += u32::from(number == wanted);
+            unknown += u32::from(number != wanted && !known.contains(&number));
         }
-        f64::from(same) / f64::from(all.max(1))
+        let share = |count: u32| f64::from(count) / f64::from(all.max(1));
+        (share(same), share(unknown))
     }
 }

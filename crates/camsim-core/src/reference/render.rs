@@ -28,8 +28,8 @@ const BATCHES_A_CHECK: u32 = 4;
 /// Channels of a frame of the oracle, and the accuracy to which it is refined.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel, those of
-    /// [`super::is_rendered`] another one, and [`Channel::Coverage`] 256; the others are always present.
+    /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel, the planes
+    /// another one, [`Channel::Coverage`] 256, and each flow about as much; the others are always present.
     pub channels: Vec<Channel>,
     /// Least number of samples of each pixel; rounded up to 32.
     pub min_samples: u32,

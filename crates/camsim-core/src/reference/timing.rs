@@ -46,18 +46,26 @@ impl FrameTiming {
         self.start_s + (frame as f64 + self.phase) / self.fps
     }
 
+    /// As [`Self::stamp_s`], for a frame of any number.
+    pub(super) fn stamp_of(&self, frame: f64) -> f64 {
+        self.start_s + (frame + self.phase) / self.fps
+    }
+
     /// Mid-exposure of a pixel relative to the stamp of its frame. The rows, counted along the readout, share
     /// the readout time evenly about `-delay`; rows of the first field are earlier by the interlacing lag.
     pub(super) fn dt_s(&self, [x, y]: [u32; 2]) -> f64 {
-        let [width, height] = self.size_px;
-        let (nth, count) = match self.readout {
-            Readout::TopToBottom => (f64::from(y), height),
-            Readout::BottomToTop => (f64::from(height) - 1.0 - f64::from(y), height),
-            Readout::LeftToRight => (f64::from(x), width),
-            Readout::RightToLeft => (f64::from(width) - 1.0 - f64::from(x), width),
+        self.dt_along_s(f64::from(if self.reads_rows() { y } else { x }), y)
+    }
+
+    /// Mid-exposure of a place along the readout, pixels, in the field of an image row.
+    pub(super) fn dt_along_s(&self, along_px: f64, row: u32) -> f64 {
+        let count = f64::from(self.lines());
+        let nth = match self.readout {
+            Readout::TopToBottom | Readout::LeftToRight => along_px,
+            Readout::BottomToTop | Readout::RightToLeft => count - 1.0 - along_px,
         };
-        let count = f64::from(count);
-        let lag_s = if (y % 2 == 0) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
+        let lag_s =
+            if row.is_multiple_of(2) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
         self.readout_s * (2.0 * nth + 1.0 - count) / (2.0 * count) - self.delay_s - lag_s
     }
 

@@ -183,3 +183,56 @@ fn a_global_shutter_shows_a_point_where_its_camera_projects_it() {
         assert_eq!(found.map(|found| found.px), expected.map(|seen| seen.px));
     }
 }
+
+/// Points found by steps, of those that `find` sees inside; each must be where `find` has it.
+fn found_by_steps(frame: &FrameCamera, tolerance_px: f64) -> [usize; 2] {
+    let projector = frame.projector();
+    let (mut by_steps, mut inside) = (0, 0);
+    for (i, point) in points().enumerate() {
+        let near_px = DVec2::new(30.0, 20.0);
+        let expected = frame.find(point, near_px);
+        // From a guess that is near, and from one that is not.
+        let guess_px = expected.filter(|_| i % 2 == 0).map_or(near_px, |seen| seen.px + 0.7);
+        let found = projector.find(point, near_px, guess_px);
+        assert_eq!(found.map(|found| found.is_inside), expected.map(|seen| seen.is_inside));
+        assert_eq!(found.map(|found| found.solutions), expected.map(|seen| seen.solutions));
+        let (Some(found), Some(expected)) = (found, expected) else { continue };
+        let off_px = found.px.distance(expected.px);
+        assert!(off_px < tolerance_px, "{point:?}: {off_px:.1e} px");
+        assert!(found.position_ned_m.distance(expected.pose.position_ned_m) < 1e-5, "{point:?}");
+        assert!(found.depth_m == expected.depth_m || (found.depth_m / expected.depth_m - 1.0).abs() < 1e-6);
+        inside += usize::from(expected.is_inside);
+        by_steps += usize::from(projector.by_steps(point, guess_px).is_some());
+    }
+    [by_steps, inside]
+}
+
+#[test]
+fn steps_find_points_where_the_search_of_the_readout_finds_them() {
+    let readouts = [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft];
+    for (direction, vibration_deg) in readouts.into_iter().flat_map(|d| [(d, 0.0), (d, 0.02)]) {
+        let spec = ShutterSpec { readout_ms: 30.0, readout: direction, ..ShutterSpec::default() };
+        let frame = FrameCamera::new(path(vibration_deg), camera(), &shutter(spec), 0.5);
+        let [by_steps, inside] = found_by_steps(&frame, 2.0 * 1e-4);
+        assert!(by_steps == inside && inside > 40, "{direction:?}: {by_steps} of {inside}");
+    }
+    let global = FrameCamera::global(path(0.4), camera(), 0.5);
+    let [by_steps, inside] = found_by_steps(&global, 1e-9);
+    assert!(by_steps == inside && inside > 40, "{by_steps} of {inside}");
+}
+
+#[test]
+fn a_camera_that_shakes_or_has_fields_is_left_to_the_search() {
+    let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+    let shaken = FrameCamera::new(path(15.0), camera(), &shutter(spec.clone()), 0.5);
+    let fields = FrameCamera::new(
+        path(0.0),
+        camera(),
+        &shutter(ShutterSpec { interlace_ms: FieldOr::Ms(15.0), ..spec }),
+        0.5,
+    );
+    for frame in [shaken, fields] {
+        let [by_steps, inside] = found_by_steps(&frame, 1e-12);
+        assert!(by_steps == 0 && inside > 40, "{by_steps} of {inside}");
+    }
+}

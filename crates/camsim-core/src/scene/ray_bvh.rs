@@ -73,6 +73,9 @@ impl RayBvh {
         t_max: f64,
         meet: impl Fn(u32, f64) -> Option<(f64, T)>,
     ) -> Option<(f64, T)> {
+        if self.nodes.is_empty() {
+            return None;
+        }
         let length = direction.length();
         if !(length.is_normal() && origin.is_finite()) {
             return self.first_of_all(t_max, meet);
@@ -83,7 +86,7 @@ impl RayBvh {
         let (mut limit, mut limit_m) = (t_max, metres(t_max));
         let mut best: Option<(f64, T)> = None;
         let mut waiting = [(0.0_f32, 0_u32); MAX_WAITING];
-        let mut count = usize::from(!self.nodes.is_empty());
+        let mut count = 1;
         while count > 0 {
             count -= 1;
             let (enter_m, held) = waiting[count];

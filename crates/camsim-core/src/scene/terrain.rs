@@ -50,7 +50,7 @@ pub use select::{DrawnCell, LodSelection, TerrainMesh};
 pub use sunlit::SunlitBlocks;
 pub use terrain_tiles::TerrainTiles;
 use tree::BlockTree;
-pub use walk::TerrainTriangle;
+pub use walk::{TerrainTriangle, TerrainWalk, WalkHit};
 
 use super::Texture;
 
@@ -182,6 +182,7 @@ pub enum TerrainError {
 impl Terrain {
     /// Position of vertex (i, j) of a chunk, i from the west and j from the north: NED in metres, exact; NaN
     /// for a void.
+    #[inline]
     pub fn position_ned_m(&self, chunk: u32, i: u32, j: u32) -> DVec3 {
         let chunk = &self.chunks[chunk as usize];
         let vertex = &self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize];
@@ -190,6 +191,7 @@ impl Terrain {
 
     /// Index of the chunk that holds cell (column, row) of the full grid, and the cell's position in that
     /// chunk.
+    #[inline]
     pub fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
         let [column, row] = cell.map(|n| n / CHUNK_CELLS);
         (row * self.chunk_grid[0] + column, cell.map(|n| n % CHUNK_CELLS))
@@ -198,6 +200,7 @@ impl Terrain {
 
 /// The two triangles of cell (a, b) of a chunk, as columns and rows of its vertices: (north-west, south-east,
 /// north-east) and (north-west, south-west, south-east).
+#[inline]
 fn cell_triangles([a, b]: [u32; 2]) -> [[[u32; 2]; 3]; 2] {
     let [nw, ne, sw, se] = [[a, b], [a + 1, b], [a, b + 1], [a + 1, b + 1]];
     [[nw, se, ne], [nw, sw, se]]

@@ -6,7 +6,7 @@
 //! At borders of shadows the share of the sun is that of rays over the pixel; pixels of several samples in
 //! which different surfaces meet beside a shadow are cast anew.
 
-use camsim_core::scene::TerrainTriangle;
+use camsim_core::scene::{TerrainTriangle, WalkHit};
 use camsim_plan::{FramePlan, KeyFrame, NEAR_M};
 use glam::{DVec2, Vec3};
 use half::f16;
@@ -175,7 +175,7 @@ impl FrameCaster<'_> {
         let scene = self.shader.scene;
         let ray = self.shader.camera.ray(position_px);
         if let (Some(terrain), Some(from)) = (&scene.terrain, *before)
-            && let Some((triangle, t)) = terrain.walk(from, ray.origin_ned_m, ray.direction_ned)
+            && let Some(WalkHit { triangle, t, .. }) = terrain.walk(from, ray.origin_ned_m, ray.direction_ned)
         {
             *before = Some(triangle);
             let (chunk, corners) = terrain.vertices_of(triangle);

@@ -1,23 +1,16 @@
 //! Optical flow: where another picture shows what a pixel sees.
 
+mod parallax;
+
 use camsim_core::{
-    row_time::{FrameCamera, WorldPoint},
+    row_time::{FrameCamera, RowProjector, Shown, WorldPoint},
     scenario::FlowState,
 };
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::planes::{FramePixels, Pixel};
-
-/// The picture that a flow leads to.
-pub(super) struct FlowTarget {
-    camera: FrameCamera,
-}
-
-impl FlowTarget {
-    pub fn new(camera: FrameCamera) -> Self {
-        Self { camera }
-    }
-}
+use parallax::Doubt;
 
 /// What a pixel sees, as a point of the world that follows what it is on; the sky is infinitely far away.
 fn world_point<'a>(pixels: &'a FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint<'a> {
@@ -30,29 +23,64 @@ fn world_point<'a>(pixels: &'a FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint<
     }
 }
 
-/// Displacement to the target, pixels, and [`FlowState`] of every pixel.
-pub(super) fn flow(pixels: &FramePixels<'_>, target: &FlowTarget) -> Vec<[f32; 3]> {
-    pixels.map(&[0.0; 3], |pixel| {
-        let from_px = DVec2::from_array(pixel.position.map(f64::from));
-        let point = world_point(pixels, pixel);
-        let Some(seen) = target.camera.find(point, from_px) else { return [0.0; 3] };
-        let [dx, dy] = (seen.px - from_px).to_array();
-        let state = if !seen.is_inside {
-            FlowState::Outside
-        } else {
-            let ray_ned = match (point, point.position_ned_m(seen.t_s)) {
-                (WorldPoint::Towards(direction_ned), _) => direction_ned,
-                (_, Some(point_ned_m)) => (point_ned_m - seen.pose.position_ned_m) / seen.depth_m,
-                (_, None) => return [0.0; 3],
-            };
-            match pixels.rays.is_hidden(seen.t_s, seen.pose.position_ned_m, ray_ned, seen.depth_m) {
-                true => FlowState::Occluded,
-                false if seen.solutions > 1 => FlowState::Several,
-                false => FlowState::Visible,
-            }
+/// Displacement to the picture of another camera, pixels, and [`FlowState`] of every pixel.
+pub(super) fn flow(pixels: &FramePixels<'_>, target: &FrameCamera) -> Vec<[f32; 3]> {
+    let width = pixels.plan.camera.size_px[0] as usize;
+    let (doubt, projector) = (Doubt::of(pixels, target), target.projector());
+    let mut flow = vec![[0.0; 3]; pixels.truth.len()];
+    flow.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let mut before = DVec2::ZERO;
+        for (i, value) in (y * width..).zip(row) {
+            let Some(pixel) = pixels.pixel(i) else { continue };
+            let landing = Landing { pixels, projector: &projector, pixel, is_in_doubt: doubt.is_at(i) };
+            let Some((shift, state)) = landing.find(before) else { continue };
+            before = shift;
+            let [dx, dy] = shift.as_vec2().to_array();
+            *value = [dx, dy, f32::from(state as u8)];
+        }
+    });
+    flow
+}
+
+/// Where a picture shows what a pixel sees.
+struct Landing<'a> {
+    pixels: &'a FramePixels<'a>,
+    projector: &'a RowProjector<'a>,
+    pixel: Pixel<'a>,
+    /// Whether terrain may hide it there.
+    is_in_doubt: bool,
+}
+
+impl Landing<'_> {
+    /// Displacement, looked for near that of the pixel before; `None` where there is none.
+    fn find(&self, before: DVec2) -> Option<(DVec2, FlowState)> {
+        let from_px = DVec2::from_array(self.pixel.position.map(f64::from));
+        let point = world_point(self.pixels, self.pixel);
+        let seen = self.projector.find(point, from_px, from_px + before)?;
+        let state = match seen.is_inside {
+            false => FlowState::Outside,
+            true if self.is_hidden(point, &seen)? => FlowState::Occluded,
+            true if seen.solutions > 1 => FlowState::Several,
+            true => FlowState::Visible,
         };
-        [dx as f32, dy as f32, f32::from(state as u8)]
-    })
+        Some((seen.px - from_px, state))
+    }
+
+    fn is_hidden(&self, point: WorldPoint<'_>, seen: &Shown) -> Option<bool> {
+        let rays = self.pixels.rays;
+        if !self.is_in_doubt && !rays.has_models() {
+            return Some(false);
+        }
+        let Shown { t_s, position_ned_m, depth_m, .. } = *seen;
+        let ray_ned = match point {
+            WorldPoint::Towards(direction_ned) => direction_ned,
+            _ => (point.position_ned_m(t_s)? - position_ned_m) / depth_m,
+        };
+        Some(match self.is_in_doubt {
+            true => rays.is_hidden(t_s, position_ned_m, ray_ned, depth_m),
+            false => rays.is_behind_model(t_s, position_ned_m, ray_ned, depth_m),
+        })
+    }
 }
 
 /// Velocity of the image of the point that a pixel sees, pixels a second, at the pixel's own instant:

@@ -55,17 +55,18 @@ pub(crate) fn complete(truth: &mut [Truth], color_rgba: &[f32], plan: &FramePlan
     complete_pixels(truth, color_rgba, plan, rays, None);
 }
 
-/// The surface of every pixel, by a ray of its own; `None` where there is no ray or the ray shows the sky.
+/// The surface of every pixel, by a ray of its own, into `hits`; `None` where there is no ray or the ray shows the sky.
 /// Depths and coordinates of `truth` become those of the rays.
 pub(crate) fn of_all_pixels(
     truth: &mut [Truth],
     color_rgba: &[f32],
     plan: &FramePlan,
     rays: &FrameRays<'_>,
-) -> Vec<Option<PixelHit>> {
-    let mut hits = vec![None; truth.len()];
-    complete_pixels(truth, color_rgba, plan, rays, Some(&mut hits));
-    hits
+    hits: &mut Vec<Option<PixelHit>>,
+) {
+    hits.clear();
+    hits.resize(truth.len(), None);
+    complete_pixels(truth, color_rgba, plan, rays, Some(hits));
 }
 
 fn complete_pixels(
@@ -146,14 +147,15 @@ impl Frame<'_> {
         let rows = self.truth.par_chunks_mut(width).zip(self.source.par_chunks_mut(width)).zip(hits);
         rows.enumerate().for_each(|(y, ((truth, source), mut hits))| {
             let mut last: Option<(usize, TerrainTriangle)> = None;
+            let mut pixel_walk = rays.pixel_walk();
             for x in 0..width {
                 let i = y * width + x;
                 if !unreliable[i] || source[x].is_ray() {
                     continue;
                 }
                 let (pixel, uv) = ([x as u32, y as u32], uv(&truth[x]));
-                let walk =
-                    last.and_then(|(_, from)| rays.walk(from, pixel, uv, 2.0 * f64::from(SAME_SURFACE)));
+                let window = 2.0 * f64::from(SAME_SURFACE);
+                let walk = last.and_then(|(_, from)| pixel_walk.to(from, pixel, uv, window));
                 let walk = walk.filter(|walk| is_near(looked_up[i], walk));
                 let hit = walk.unwrap_or_else(|| rays.cast(pixel, uv));
                 set(&mut truth[x], &hit);

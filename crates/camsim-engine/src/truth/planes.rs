@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     coverage::coverage,
-    flow::{FlowTarget, blur_path, flow, motion},
+    flow::{blur_path, flow, motion},
 };
 
 /// What is known of the pixels of a frame.
@@ -36,21 +36,31 @@ pub(super) struct Pixel<'a> {
 }
 
 impl FramePixels<'_> {
+    /// Whether pixel i has a ray.
+    pub(super) fn is_valid(&self, i: usize) -> bool {
+        self.color_rgba[4 * i + 3] > 0.0
+    }
+
+    /// Position and ideal ray of pixel i.
+    pub(super) fn ray_of(&self, i: usize) -> ([u32; 2], DVec2) {
+        let width = self.plan.camera.size_px[0] as usize;
+        let [u, v] = self.truth[i].uv.map(f64::from);
+        ([(i % width) as u32, (i / width) as u32], DVec2::new(u, v))
+    }
+
+    /// Pixel i; `None` without a ray.
+    pub(super) fn pixel(&self, i: usize) -> Option<Pixel<'_>> {
+        let (position, uv) = self.ray_of(i);
+        self.is_valid(i).then(|| Pixel { position, uv, hit: self.hits[i].as_ref() })
+    }
+
     /// One value for each pixel in parallel, `empty` without a ray.
     pub(super) fn map<T: Clone + Send + Sync>(
         &self,
         empty: &T,
         value: impl Fn(Pixel<'_>) -> T + Sync,
     ) -> Vec<T> {
-        let width = self.plan.camera.size_px[0] as usize;
-        let of_pixel = |i: usize| {
-            if self.color_rgba[4 * i + 3] <= 0.0 {
-                return empty.clone();
-            }
-            let [u, v] = self.truth[i].uv.map(f64::from);
-            let position = [(i % width) as u32, (i / width) as u32];
-            value(Pixel { position, uv: DVec2::new(u, v), hit: self.hits[i].as_ref() })
-        };
+        let of_pixel = |i: usize| self.pixel(i).map_or_else(|| empty.clone(), &value);
         (0..self.truth.len()).into_par_iter().with_min_len(256).map(of_pixel).collect()
     }
 
@@ -85,7 +95,7 @@ pub(crate) fn planes(pixels: &FramePixels<'_>, channels: &[Channel]) -> Result<V
     let frame = pixels.plan.frame as i64;
     let step = i64::from(output.flow_step);
     let flow_to = |frame: i64| -> Result<PlaneValues, PlanError> {
-        Ok(pixels.floats_of(flow(pixels, &FlowTarget::new(planner.frame_camera(frame)?))))
+        Ok(pixels.floats_of(flow(pixels, &planner.frame_camera(frame)?)))
     };
     let mut planes = Vec::new();
     for &channel in channels {
@@ -104,7 +114,7 @@ pub(crate) fn planes(pixels: &FramePixels<'_>, channels: &[Channel]) -> Result<V
             Channel::FlowBack => flow_to(frame - step)?,
             Channel::FlowGlobal => {
                 let camera = planner.global_camera(frame, output.flow_instant)?;
-                pixels.floats_of(flow(pixels, &FlowTarget::new(camera)))
+                pixels.floats_of(flow(pixels, &camera))
             }
             Channel::Motion => pixels.floats(|pixel| motion(pixels, pixel)),
             Channel::BlurPath => pixels.floats(|pixel| blur_path(pixels, pixel)),

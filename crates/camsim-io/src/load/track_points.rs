@@ -71,6 +71,7 @@ fn board_points(scenario: &Scenario, log: &FlightLog, count: usize) -> Result<Ve
         source: PointSource::Board.label(),
         name: point.id.to_string(),
         position_ned_m: centre_ned_m + turn * point.position_m.extend(0.0),
+        moves_with: None,
     };
     Ok(points.into_iter().map(point).collect())
 }
@@ -124,6 +125,7 @@ fn read_points(
             source: source.to_owned(),
             name: if name.is_empty() { points.len().to_string() } else { name.to_owned() },
             position_ned_m: position_ned_m(scenario, log, at, geodetic, "a table of output.tracks.points")?,
+            moves_with: None,
         });
     }
     if points.is_empty() { Err(fail("has no row: give each point a line".into())) } else { Ok(points) }
@@ -198,6 +200,7 @@ mod tests {
             source: "p.csv".into(),
             name: name.into(),
             position_ned_m: DVec3::from_array(ned),
+            moves_with: None,
         };
         assert_eq!(points, [point("a, b", [2.0, 1.0, 3.0]), point("1", [5.0, 4.0, 6.0])]);
         // Four of the six corners; rows run from the top (north), columns to the right (east).

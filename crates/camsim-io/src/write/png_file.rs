@@ -83,6 +83,11 @@ pub fn palette_rgb8(number: u32) -> [u8; 3] {
     }
     let hue = (GOLDEN * f64::from(number)).fract();
     let (saturation, value) = [(0.9, 1.0), (0.55, 0.95), (0.9, 0.65), (0.55, 0.7)][number as usize % 4];
+    hue_rgb8(hue, saturation, value)
+}
+
+/// Colour of a hue, 0 to 1, a saturation and a brightness.
+pub(super) fn hue_rgb8(hue: f64, saturation: f64, value: f64) -> [u8; 3] {
     [0.0, 1.0, 2.0].map(|channel| {
         let missing = (2.0 - (6.0 * (hue + (3.0 - channel) / 3.0).fract() - 3.0).abs()).clamp(0.0, 1.0);
         (255.0 * value * (1.0 - saturation * missing)).round() as u8

@@ -23,16 +23,25 @@ use super::{WriteError, atomic::write_atomic_with, tables::push, write_atomic};
 pub const TRACKS_COLUMNS: &str = "frame,point,x_px,y_px,t_ns,depth_m,visible,solutions";
 /// Columns of `points.csv`; [`GEODETIC_COLUMNS`] follow where the place of the local frame is known.
 pub const POINTS_COLUMNS: &str = "point,name,source,n_m,e_m,d_m";
+/// Further column of `points.csv` where anything moves: 1 for a point on it, which is there at path time 0.
+pub const MOVES_COLUMN: &str = ",moves";
 /// Further columns of `points.csv`. Heights are above what those of the flight log are above.
 pub const GEODETIC_COLUMNS: &str = ",lat_deg,lon_deg,height_m";
 
 /// Text of `points.csv`.
 pub fn points_csv(points: &[TrackPoint], geodetic: &dyn Fn(&TrackPoint) -> Option<[f64; 3]>) -> String {
     let has_places = points.first().is_some_and(|point| geodetic(point).is_some());
-    let mut text = format!("{POINTS_COLUMNS}{}\n", if has_places { GEODETIC_COLUMNS } else { "" });
+    let has_motion = points.iter().any(|point| point.moves_with.is_some());
+    let mut text = POINTS_COLUMNS.to_owned();
+    text += if has_motion { MOVES_COLUMN } else { "" };
+    text += if has_places { GEODETIC_COLUMNS } else { "" };
+    text.push('\n');
     for (i, point) in points.iter().enumerate() {
         let _ = write!(text, "{i},{},{}", quoted(&point.name), quoted(&point.source));
         push(&mut text, &point.position_ned_m.to_array());
+        if has_motion {
+            text += if point.moves_with.is_some() { ",1" } else { ",0" };
+        }
         push(&mut text, geodetic(point).as_ref().map_or(&[], |place| place));
         text.push('\n');
     }
@@ -278,11 +287,20 @@ mod tests {
             source: "a.csv".into(),
             name: "the \"top\", left".into(),
             position_ned_m: DVec3::new(1.0, -2.5, 3.0),
+            moves_with: None,
         };
         assert_eq!(
             points_csv(std::slice::from_ref(&point), &|_| Some([46.5, 7.25, 900.0])),
             format!(
                 "{POINTS_COLUMNS}{GEODETIC_COLUMNS}\n0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,46.5,7.25,900\n"
+            )
+        );
+        let on_a_car = TrackPoint { moves_with: Some(2), name: "car/0".into(), ..point.clone() };
+        assert_eq!(
+            points_csv(&[point, on_a_car], &|_| None),
+            format!(
+                "{POINTS_COLUMNS}{MOVES_COLUMN}\n0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,0\n\
+                 1,car/0,a.csv,1,-2.5,3,1\n"
             )
         );
         assert_eq!(points_csv(&[], &|_| None), format!("{POINTS_COLUMNS}\n"));

@@ -8,7 +8,12 @@
 #[cfg(test)]
 mod tests;
 
-use camsim_core::{mount::CameraPath, pose::CameraPose, scene::TerrainTriangle, shutter::RowAxis};
+use camsim_core::{
+    mount::CameraPath,
+    pose::CameraPose,
+    scene::{TerrainTriangle, TerrainWalk},
+    shutter::RowAxis,
+};
 use glam::{DVec2, DVec3};
 
 use crate::{ir::frame_plan::FramePlan, view::surfaces::Surfaces};
@@ -105,21 +110,10 @@ impl<'a> FrameRays<'a> {
         self.truth(pixel, uv, hit)
     }
 
-    /// What the ray `uv` of a pixel meets if that is on the same unfolded patch of the terrain as a triangle
-    /// that a pixel nearby sees ([`camsim_core::scene::Terrain::walk`]), and no model is within `window` times
-    /// its depth in front of it.
+    /// A walk over the terrain from pixel to pixel.
     #[must_use]
-    pub fn walk(&self, from: TerrainTriangle, pixel: [u32; 2], uv: DVec2, window: f64) -> Option<PixelTruth> {
-        let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let terrain = self.surfaces.terrain()?;
-        let (triangle, depth_m) = terrain.walk(from, pose.position_ned_m, ray_ned)?;
-        // What moves is not in the picture that was looked up.
-        let in_front_m = if self.surfaces.moves() { depth_m } else { window * depth_m };
-        let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
-        let is_hidden = self.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
-        let normal_ned = terrain.normal_ned(triangle);
-        let hit = RayHit { depth_m, normal_ned, surface: 0, triangle: Some(triangle) };
-        (!is_hidden).then(|| self.truth(pixel, uv, Some(hit)))
+    pub fn pixel_walk(&self) -> PixelWalk<'_> {
+        PixelWalk { rays: self, walk: None }
     }
 
     /// Whether a walk from a triangle that a pixel nearby sees ends at the triangle that this pixel sees: no
@@ -132,13 +126,14 @@ impl<'a> FrameRays<'a> {
         let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let walk = |from| self.surfaces.terrain()?.walk(from, pose.position_ned_m, ray_ned);
         // A ray on an edge hits both of its triangles.
-        walk(from).is_some_and(|(triangle, depth_m)| {
-            triangle == to || walk(to).is_some_and(|(_, to_m)| (depth_m - to_m).abs() <= ON_AN_EDGE * depth_m)
+        walk(from).is_some_and(|hit| {
+            hit.triangle == to || walk(to).is_some_and(|there| (hit.t - there.t).abs() <= ON_AN_EDGE * hit.t)
         })
     }
 
     /// Camera of a pixel at mid-exposure.
     #[must_use]
+    #[inline]
     pub fn pose(&self, pixel: [u32; 2]) -> &CameraPose {
         &self.ray(&self.mid, pixel, DVec2::ZERO).0.pose
     }
@@ -162,6 +157,7 @@ impl<'a> FrameRays<'a> {
 
     /// Mid-exposure of a pixel, path time, seconds.
     #[must_use]
+    #[inline]
     pub fn mid_s(&self, pixel: [u32; 2]) -> f64 {
         self.ray(&self.mid, pixel, DVec2::ZERO).0.t_s
     }
@@ -174,14 +170,49 @@ impl<'a> FrameRays<'a> {
         hit.is_some_and(|hit| hit.depth_m < (1.0 - LAST_PART) * depth_m)
     }
 
-    fn ray<'b>(&self, rows: &'b [RowCamera], [x, y]: [u32; 2], uv: DVec2) -> (&'b RowCamera, DVec3) {
-        let row = match self.plan.shutter.row_axis() {
-            RowAxis::Rows => &rows[y as usize],
-            RowAxis::Columns => &rows[2 * x as usize + (y % 2) as usize],
-        };
+    /// Whether at path time `t_s` a model lies between a camera and what it sees along a ray at planar depth
+    /// `depth_m`, as [`Self::is_hidden`].
+    #[must_use]
+    pub fn is_behind_model(&self, t_s: f64, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
+        let limit = (1.0 - LAST_PART) * depth_m;
+        self.surfaces.model_hit_at(t_s, position_ned_m, ray_ned, limit).is_some()
+    }
+
+    /// Whether there is anything but terrain.
+    #[must_use]
+    pub fn has_models(&self) -> bool {
+        !self.surfaces.scene.meshes.is_empty()
+    }
+
+    /// Whether anything moves.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.surfaces.moves()
+    }
+
+    /// Lower bound of the planar depth of anything in view, from within `travel_m` of the frame's camera,
+    /// metres.
+    #[must_use]
+    pub fn nearest_m(&self, travel_m: f64) -> f64 {
+        self.surfaces.nearest_m(&self.plan.key_pose, self.plan.tangents(), travel_m)
+    }
+
+    /// Row of the readout that a pixel belongs to, of one of the fields for columns.
+    #[inline]
+    fn line(&self, [x, y]: [u32; 2]) -> usize {
+        match self.plan.shutter.row_axis() {
+            RowAxis::Rows => y as usize,
+            RowAxis::Columns => 2 * x as usize + (y % 2) as usize,
+        }
+    }
+
+    #[inline]
+    fn ray<'b>(&self, rows: &'b [RowCamera], pixel: [u32; 2], uv: DVec2) -> (&'b RowCamera, DVec3) {
+        let row = &rows[self.line(pixel)];
         (row, row.pose.ned_from_camera * uv.extend(1.0))
     }
 
+    #[inline]
     fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>) -> PixelTruth {
         let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
         let source_px = if self.at_phase.is_empty() {
@@ -201,12 +232,54 @@ impl<'a> FrameRays<'a> {
         PixelTruth { source_px, hit }
     }
 
+    #[inline]
     fn source_px(&self, pose: &CameraPose, ray_ned: DVec3, depth_m: Option<f64>) -> DVec2 {
         let key_pose = &self.plan.key_pose;
         // Times the inverse depth, which is 0 for the sky.
         let shift_ned_m = pose.position_ned_m - key_pose.position_ned_m;
         let point = ray_ned + depth_m.map_or(DVec3::ZERO, |depth_m| shift_ned_m / depth_m);
         self.plan.ideal.px_from_point(key_pose.ned_from_camera.conjugate() * point)
+    }
+}
+
+/// A walk over the terrain from pixel to pixel, along rows best.
+#[derive(Debug)]
+pub struct PixelWalk<'a> {
+    rays: &'a FrameRays<'a>,
+    /// By rays of a row of the readout.
+    walk: Option<(usize, TerrainWalk<'a>)>,
+}
+
+impl PixelWalk<'_> {
+    /// What the ray `uv` of a pixel meets if that is on the same unfolded patch of the terrain as a triangle
+    /// that a pixel nearby sees ([`TerrainWalk::to`]), and no model is within `window` times its depth in front
+    /// of it.
+    #[must_use]
+    #[inline]
+    pub fn to(
+        &mut self,
+        from: TerrainTriangle,
+        pixel: [u32; 2],
+        uv: DVec2,
+        window: f64,
+    ) -> Option<PixelTruth> {
+        let rays = self.rays;
+        let (RowCamera { t_s, pose }, ray_ned) = rays.ray(&rays.mid, pixel, uv);
+        let line = rays.line(pixel);
+        let known = self.walk.take().filter(|(of, walk)| *of == line && walk.triangle() == from);
+        let walk = match known {
+            Some((_, walk)) => walk,
+            None => TerrainWalk::new(rays.surfaces.terrain()?, from, pose.position_ned_m),
+        };
+        let (_, walk) = self.walk.insert((line, walk));
+        let hit = walk.to(ray_ned)?;
+        let depth_m = hit.t;
+        // What moves is not in the picture that was looked up.
+        let in_front_m = if rays.surfaces.moves() { depth_m } else { window * depth_m };
+        let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
+        let is_hidden = rays.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
+        let hit = RayHit { depth_m, normal_ned: hit.normal_ned, surface: 0, triangle: Some(hit.triangle) };
+        (!is_hidden).then(|| rays.truth(pixel, uv, Some(hit)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Corners of a regular grid on the terrain, where the frames see it.
 
 use camsim_core::{
+    row_time::WorldPoint,
     scene::{CHUNK_CELLS, Terrain},
     tracks::{TrackPoint, seeded_offset},
 };
@@ -63,6 +64,7 @@ pub(super) fn corners(planner: &Planner, views: &Views, count: usize, seed: u64)
         source: "terrain".into(),
         name: format!("{i}/{j}"),
         position_ned_m,
+        moves_with: None,
     };
     found.into_iter().map(point).collect()
 }
@@ -111,7 +113,7 @@ fn seen_corners(
     let rows = (first[1]..=part.high[1]).step_by(step as usize);
     let corners = rows.flat_map(|j| (first[0]..=part.high[0]).step_by(step as usize).map(move |i| [i, j]));
     let with_place = corners.filter_map(|corner| Some((corner, place(terrain, corner)?)));
-    views.seen(surfaces, with_place.collect(), |(_, position_ned_m)| *position_ned_m)
+    views.seen(surfaces, with_place.collect(), |(_, at_ned_m)| WorldPoint::At(*at_ned_m))
 }
 
 /// Place of a corner of the terrain's grid; `None` for one without a height.

@@ -6,6 +6,7 @@ use std::{
 };
 
 use camsim_core::{
+    row_time::WorldPoint,
     scene::{Aabb, Mesh, Scene, Shape},
     tracks::{TrackPoint, thinned},
 };
@@ -27,6 +28,7 @@ const BITS: u32 = 20;
 struct Corner {
     mesh: usize,
     vertex: u32,
+    /// Of what moves, at path time 0.
     position_ned_m: DVec3,
 }
 
@@ -44,7 +46,10 @@ pub(super) fn corners(planner: &Planner, views: &Views, count: usize, seed: u64)
     let seen = loop {
         let step = all.div_ceil(looked_at.min(most)).max(1);
         let corners = distinct(scene, first, &used, step);
-        let seen = views.seen(surfaces, corners, |corner| corner.position_ned_m);
+        let seen = views.seen(surfaces, corners, |corner| {
+            let motion = scene.meshes[corner.mesh].motion.as_deref();
+            WorldPoint::on(motion, corner.position_ned_m, 0.0)
+        });
         if seen.len() >= count || step == 1 || looked_at >= most {
             break seen;
         }
@@ -54,25 +59,22 @@ pub(super) fn corners(planner: &Planner, views: &Views, count: usize, seed: u64)
         source: "vertices".into(),
         name: format!("{}/{vertex}", mesh_name(scene, mesh, first)),
         position_ned_m,
+        moves_with: scene.meshes[mesh].motion.as_ref().map(|_| mesh),
     };
     thinned(along_curve(seen), count, seed).into_iter().map(point).collect()
 }
 
-/// Vertices that triangles use, by mesh from `first` on; meshes of one shape share the list. Points of things
-/// that move are not tracked.
+/// Vertices that triangles use, by mesh from `first` on; meshes of one shape share the list.
 fn used_vertices(scene: &Scene, first: usize) -> Vec<Arc<Vec<u32>>> {
     let mut known: HashMap<*const Shape, Arc<Vec<u32>>> = HashMap::new();
     let used = |shape: &Shape| shape.indices.iter().copied().collect::<BTreeSet<u32>>().into_iter().collect();
     let of_mesh = |mesh: &Mesh| {
-        if mesh.motion.is_some() {
-            return Arc::default();
-        }
         known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| Arc::new(used(&mesh.shape))).clone()
     };
     scene.meshes.iter().skip(first).map(of_mesh).collect()
 }
 
-/// Every `step`-th corner, without those at a place that another has.
+/// Every `step`-th corner, without those at a place that another has which moves, or stands, with it.
 fn distinct(scene: &Scene, first: usize, used: &[Arc<Vec<u32>>], step: usize) -> Vec<Corner> {
     let all = (first..).zip(used).flat_map(|(mesh, used)| used.iter().map(move |&vertex| (mesh, vertex)));
     let mut known = HashSet::new();
@@ -80,7 +82,8 @@ fn distinct(scene: &Scene, first: usize, used: &[Arc<Vec<u32>>], step: usize) ->
         let position_ned_m = scene.meshes[mesh].position_ned_m(vertex);
         // 0 and -0 are equal.
         let place = position_ned_m.to_array().map(|value| (value + 0.0).to_bits());
-        known.insert(place).then_some(Corner { mesh, vertex, position_ned_m })
+        let motion = scene.meshes[mesh].motion.as_ref().map(Arc::as_ptr);
+        known.insert((place, motion)).then_some(Corner { mesh, vertex, position_ned_m })
     };
     all.step_by(step).filter_map(corner).collect()
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{camera::CameraModel, pose::CameraPose, row_time::WorldPoint};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::hidden::is_hidden;
@@ -30,26 +30,28 @@ impl Views {
     }
 
     /// Whether any of them shows a point that nothing hides.
-    fn see(&self, surfaces: &Surfaces, point_ned_m: DVec3) -> bool {
+    fn see(&self, surfaces: &Surfaces, point: WorldPoint<'_>) -> bool {
         self.cameras.iter().any(|(camera, t_s, pose)| {
             let [width, height] = camera.size_px.map(f64::from);
             let is_inside = |px: DVec2| {
                 px.cmpge(DVec2::splat(-0.5)).all() && px.cmplt(DVec2::new(width, height) - 0.5).all()
             };
-            let shown = camera.show(pose, *t_s, WorldPoint::At(point_ned_m));
+            let shown = camera.show(pose, *t_s, point);
             shown.is_some_and(|(px, _)| is_inside(px))
-                && !is_hidden(surfaces, *t_s, pose.position_ned_m, point_ned_m)
+                && point
+                    .position_ned_m(*t_s)
+                    .is_some_and(|now_ned_m| !is_hidden(surfaces, *t_s, pose.position_ned_m, now_ned_m))
         })
     }
 
     /// Those of `items` whose point they show.
-    pub fn seen<T: Send>(
+    pub fn seen<'a, T: Send>(
         &self,
         surfaces: &Surfaces,
         items: Vec<T>,
-        point_ned_m: impl Fn(&T) -> DVec3 + Sync,
+        point: impl Fn(&T) -> WorldPoint<'a> + Sync,
     ) -> Vec<T> {
         let items = items.into_par_iter().with_min_len(POINTS_AT_ONCE);
-        items.filter(|item| self.see(surfaces, point_ned_m(item))).collect()
+        items.filter(|item| self.see(surfaces, point(item))).collect()
     }
 }

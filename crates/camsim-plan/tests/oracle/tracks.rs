@@ -7,19 +7,35 @@ use camsim_core::{
     scenario::{
         Channel, FieldOr, LensSpec, PointSource, Readout, Scenario, ShutterSpec, TracksSpec, ZoomSpec,
     },
-    scene::Scene,
+    scene::{
+        Mesh, RigidMotion, Scene,
+        motion::{Between, Curve, Joint, JointFrame, Keys, Track},
+    },
     sequence::Sequence,
     tracks::TrackPoint,
 };
 use camsim_plan::{Planner, Sighting, Tracks};
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use super::fixtures::{Steady, block, hills, scenario, sequence, tangential};
 
 const SIZE_PX: [u32; 2] = [160, 120];
 const FRAMES: u64 = 4;
 
-/// Houses on hills, with points of the terrain, of the houses, and a cloud of given ones around the ground.
+/// A drift while the whole turns about the origin.
+fn motion() -> Arc<RigidMotion> {
+    let (times_s, drift_m) = (vec![-1.0, 1.0], DVec3::new(6.0, -9.0, -2.0));
+    let turns = [-0.05, 0.05].map(DQuat::from_rotation_z).to_vec();
+    let keys = Keys {
+        position: Curve::new(times_s.clone(), vec![-drift_m, drift_m], Between::Linear).unwrap(),
+        rotation: Curve::new(times_s, turns, Between::Linear).unwrap(),
+        start_s: 0.0,
+        repeat: None,
+    };
+    Arc::new(RigidMotion::new(vec![Joint::new(JointFrame::IDENTITY, Track::Keys(keys))]))
+}
+
+/// Houses on hills, every third of which moves, with points of the terrain, of the houses, and a cloud of given ones around the ground.
 fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
     let mut scenario = scenario();
     let camera = &mut scenario.camera;
@@ -35,10 +51,12 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
     change(&mut scenario);
     let terrain = hills(120, 8.0);
     let place = |k: usize, step: f64| (k as f64 * step + 0.3).fract() - 0.5;
+    let motion = motion();
     let houses = (0..60).map(|k| {
         let (n, e) = (500.0 * place(k, 0.618_034), 500.0 * place(k, 0.414_214));
         let down = terrain.down_at(n, e).unwrap_or(0.0);
-        block(DVec3::new(n, e, down), 6.0, 4.0 + (k % 9) as f64)
+        let house = block(DVec3::new(n, e, down), 6.0, 4.0 + (k % 9) as f64);
+        Mesh { motion: (k % 3 == 0).then(|| motion.clone()), ..house }
     });
     let meshes = houses.collect();
     let cloud = (0..900).map(|k| TrackPoint {
@@ -49,6 +67,7 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
             700.0 * place(k, 0.414_214),
             80.0 * place(k, 0.732_051),
         ),
+        moves_with: None,
     });
     let given = [Vec::new(), Vec::new(), cloud.collect()];
     let scene = Scene { terrain: Some(terrain), meshes, ..Scene::default() };
@@ -65,7 +84,7 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
 
 /// Distance of a point from the oracle's ray at a sighting, and of their instants. The oracle knows the time of
 /// each row; between two rows of a field time is linear.
-fn misses(oracle: &Oracle, frame: u64, point: &TrackPoint, sighting: &Sighting) -> (f64, f64) {
+fn misses(oracle: &Oracle, frame: u64, point_ned_m: DVec3, sighting: &Sighting) -> (f64, f64) {
     let view = oracle.view(frame);
     let Sighting { seen, .. } = sighting;
     let shutter = &oracle.sequence().scenario.camera.shutter;
@@ -88,7 +107,7 @@ fn misses(oracle: &Oracle, frame: u64, point: &TrackPoint, sighting: &Sighting) 
         let later_s = offset_px[axis] * slope;
         let sample = view.sample(pixel, offset_px, later_s / (1e-3 * shutter.exposure_ms)).unwrap();
         let ray = sample.pose.ned_from_camera * sample.uv.extend(1.0);
-        let way = point.position_ned_m - sample.pose.position_ned_m;
+        let way = point_ned_m - sample.pose.position_ned_m;
         (way.cross(ray).length() / (ray.length() * way.length()), (sample.t_s - seen.t_s).abs())
     };
     inside.map(of_pixel).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
@@ -117,14 +136,18 @@ fn the_oracle_sees_each_point_where_its_track_is() {
     for (name, change) in shutters {
         let (sequence, tracks) = tracked(change);
         let oracle = Oracle::new(sequence).unwrap();
-        let (mut all, mut hidden, mut unlike) = (0, 0, 0);
+        let (mut all, mut hidden, mut unlike, mut moving) = (0, 0, 0, 0);
         for frame in 0..FRAMES {
             for sighting in tracks.sightings(frame).unwrap() {
                 let point = &tracks.points()[sighting.point];
-                let (off, off_s) = misses(&oracle, frame, point, &sighting);
+                let t_s = sighting.seen.t_s;
+                let state = point.moves_with.map(|_| motion().state(t_s));
+                let now_ned_m = state.map_or(point.position_ned_m, |state| state.point(point.position_ned_m));
+                let (off, off_s) = misses(&oracle, frame, now_ned_m, &sighting);
                 assert!(off < 1e-8 && off_s < 1e-9, "{name}: {off:.1e}, {off_s:.1e} s: {sighting:?}");
                 let camera_ned_m = sighting.seen.pose.position_ned_m;
-                let is_hidden = oracle.is_occluded(camera_ned_m, point.position_ned_m);
+                let is_hidden = oracle.is_occluded_at(t_s, camera_ned_m, now_ned_m);
+                moving += usize::from(state.is_some() && sighting.is_visible);
                 unlike += usize::from(is_hidden == sighting.is_visible);
                 hidden += usize::from(!sighting.is_visible);
                 all += 1;
@@ -132,6 +155,7 @@ fn the_oracle_sees_each_point_where_its_track_is() {
         }
         // The cloud's half below the ground is hidden, and some of what is behind houses and hills.
         assert!(all > 1000 && hidden > all / 10 && hidden < all * 9 / 10, "{name}: {hidden} of {all}");
+        assert!(moving > 50, "{name}: {moving} visible on what moves");
         // Points closer to a surface than the tolerances of both, which differ.
         assert!(unlike <= all / 500, "{name}: {unlike} of {all} are hidden for one of them");
     }

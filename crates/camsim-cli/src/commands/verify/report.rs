@@ -7,6 +7,7 @@ use camsim_core::{
 use camsim_plan::Predicted;
 use serde::Serialize;
 
+use super::planes::Planes;
 use crate::commands::explain::LevelOfDetail;
 
 #[derive(Serialize)]
@@ -27,8 +28,9 @@ pub struct Verified {
     pub measured: Measured,
     /// Errors of depths and points; `None` for solvers that compute sources without exact depths.
     pub truth: Option<Truth>,
-    /// Errors of the channels range, normal, object and class, where the scenario asks for them.
-    pub planes: Vec<PlaneTruth>,
+    /// Errors of the channels that the scenario asks for.
+    #[serde(flatten)]
+    pub planes: Planes,
     /// Level of detail of the terrain.
     pub level_of_detail: Option<LevelOfDetail>,
     /// Whether the frame's 99th percentile is within the tolerance.
@@ -78,6 +80,8 @@ pub struct PlaneTruth {
     /// Whether every value belongs to a surface near the pixel's ray.
     pub kept: bool,
     pub pixels: u64,
+    /// Number of those that are not beside a border between objects.
+    pub pixels_away: u64,
     /// Number of wrong values: of a range by 0.1 %, of a normal by 0.1 degrees.
     pub beyond: u64,
     /// Number of those that are not beside a border between objects.
@@ -100,6 +104,7 @@ impl From<PlaneErrors> for PlaneTruth {
             channel: errors.channel.name(),
             kept: errors.faults == 0,
             pixels: errors.pixels,
+            pixels_away: errors.pixels_away,
             beyond: errors.beyond,
             beyond_away: errors.beyond_away,
             faults: errors.faults,
@@ -170,8 +175,13 @@ pub fn describe_truth(truth: &Truth) -> String {
     )
 }
 
+/// Percent.
+fn share(part: u64, of: u64) -> f64 {
+    100.0 * part as f64 / of.max(1) as f64
+}
+
 pub fn describe_plane(plane: &PlaneTruth) -> String {
-    let PlaneTruth { channel, kept, pixels, beyond, beyond_away, faults, max, .. } = plane;
+    let PlaneTruth { channel, kept, pixels, pixels_away, beyond, beyond_away, faults, max, .. } = plane;
     let largest = match (*channel, max) {
         ("object" | "class", _) => String::new(),
         (_, None) => " (largest error: sky instead of surface)".to_owned(),
@@ -184,8 +194,13 @@ pub fn describe_plane(plane: &PlaneTruth) -> String {
         _ => format!("off by more than {:.1} deg", NORMAL_TOLERANCE_RAD.to_degrees()),
     };
     format!(
-        "{channel} {allowed}: {beyond} of {pixels} pixels{largest}, {beyond_away} of them away from borders of \
-         objects, {faults} on no surface near the pixel's ray: {}",
+        "{channel} {allowed}: {beyond} of {pixels} pixels{largest}; {beyond_away} of {pixels_away} away from \
+         borders of objects ({:.4} %), {} of {} within 1 px of them ({:.2} %); {faults} on no surface near the \
+         pixel's ray: {}",
+        share(*beyond_away, *pixels_away),
+        beyond - beyond_away,
+        pixels - pixels_away,
+        share(beyond - beyond_away, pixels - pixels_away),
         if *kept { "kept" } else { "FAULTS" }
     )
 }

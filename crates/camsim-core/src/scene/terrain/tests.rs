@@ -321,17 +321,17 @@ fn a_walk_to_the_next_pixel_ends_where_its_ray_hits_the_same_patch() {
             let (Some(here), Some(next)) = (first(x, y), first(to_x, to_y)) else { continue };
             let to = ray(to_x, to_y);
             match terrain.walk(here.triangle_of(&terrain), camera.position_ned_m, to) {
-                Some((triangle, t)) if (t - next.t).abs() <= 1e-9 * t => {
+                Some(WalkHit { triangle, t, .. }) if (t - next.t).abs() <= 1e-9 * t => {
                     same += 1;
                     // Where a silhouette ends, a walk may pass round it to the other sheet or to a triangle
                     // that faces away.
                     match terrain.walk(triangle, camera.position_ned_m, ray(x, y)) {
-                        Some((_, t)) => astray += usize::from((t - here.t).abs() > 1e-9 * t),
+                        Some(WalkHit { t, .. }) => astray += usize::from((t - here.t).abs() > 1e-9 * t),
                         None => given_up += 1,
                     }
                 }
                 // A root behind the first surface.
-                Some((_, t)) => {
+                Some(WalkHit { t, .. }) => {
                     hidden += 1;
                     assert!(t > next.t, "{t} {next:?}");
                     let start = camera.position_ned_m + (1.0 - 1e-6) * t * to;

@@ -46,14 +46,35 @@ const CROSSINGS: [[Crossing; 3]; 2] = [
     ],
 ];
 
-/// A triangle on the way. The signed volumes over its edges are those of [`super::intersect_triangle`]; that
-/// over a shared edge is negated, so that both sides agree where a ray passes.
-struct Step {
+/// A walk over the terrain by rays from one point. It stays at the triangle that the last ray has met, so that
+/// a ray beside it costs three products.
+#[derive(Clone, Debug)]
+pub struct TerrainWalk<'a> {
+    terrain: &'a Terrain,
+    origin_ned_m: DVec3,
     triangle: TerrainTriangle,
-    /// Relative to the ray's origin, metres.
+    /// Relative to the rays' origin, metres.
     corners_m: [DVec3; 3],
-    /// Each over the edge opposite to the corner.
-    volumes: [f64; 3],
+    /// Each the product of the ends of the edge opposite to the corner. Its product with a direction is the
+    /// signed volume of [`super::intersect_triangle`]; that of a shared edge is negated, so that both sides agree
+    /// where a ray passes.
+    edges_m2: [DVec3; 3],
+    /// Upwards, and of unit length.
+    normal: DVec3,
+    normal_ned: DVec3,
+    /// Largest coordinate of a corner.
+    reach_m: f64,
+}
+
+/// Where a walk ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WalkHit {
+    /// The triangle.
+    pub triangle: TerrainTriangle,
+    /// Ray parameter.
+    pub t: f64,
+    /// Unit normal of the triangle, NED, upwards.
+    pub normal_ned: DVec3,
 }
 
 impl TerrainHit {
@@ -76,33 +97,62 @@ impl Terrain {
         (number, cell_triangles(cell)[triangle.half as usize].map(vertex))
     }
 
-    /// Unit normal of a triangle, NED, upwards.
+    /// Walks from a triangle that a ray nearby hits to the one that `origin + t direction` hits, as
+    /// [`TerrainWalk::to`].
     #[must_use]
-    pub fn normal_ned(&self, triangle: TerrainTriangle) -> DVec3 {
-        let [a, b, c] = [0, 1, 2].map(|k| self.corner_m(triangle, k, DVec3::ZERO));
-        (b - a).cross(c - a).normalize_or_zero()
+    pub fn walk(&self, from: TerrainTriangle, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<WalkHit> {
+        TerrainWalk::new(self, from, origin_ned_m).to(direction_ned)
     }
 
-    /// Walks from a triangle that a ray nearby hits to the one that `origin + t direction` hits, across
-    /// triangles that face the origin. Returns that triangle and t; `None` if the way leads to a triangle
-    /// that faces away, to a void or off the terrain, or is long. The hit is on the same unfolded patch as
-    /// the start, which need not be the first surface along the ray.
+    /// A corner of a triangle relative to a point, metres.
+    #[inline]
+    fn corner_m(&self, triangle: TerrainTriangle, corner: usize, origin: DVec3) -> DVec3 {
+        let (chunk, cell) = self.chunk_of_cell(triangle.cell);
+        let [i, j] = cell_triangles(cell)[triangle.half as usize][corner];
+        self.position_ned_m(chunk, i, j) - origin
+    }
+}
+
+impl<'a> TerrainWalk<'a> {
+    /// A walk by rays from `origin_ned_m` that begins at a triangle.
     #[must_use]
-    pub fn walk(
-        &self,
-        from: TerrainTriangle,
-        origin_ned_m: DVec3,
-        direction_ned: DVec3,
-    ) -> Option<(TerrainTriangle, f64)> {
+    pub fn new(terrain: &'a Terrain, from: TerrainTriangle, origin_ned_m: DVec3) -> Self {
+        let corners_m = [0, 1, 2].map(|k| terrain.corner_m(from, k, origin_ned_m));
+        let mut walk = Self {
+            terrain,
+            origin_ned_m,
+            triangle: from,
+            corners_m,
+            edges_m2: [0, 1, 2].map(|k| edge_m2(&corners_m, k)),
+            normal: DVec3::ZERO,
+            normal_ned: DVec3::ZERO,
+            reach_m: 0.0,
+        };
+        walk.measure();
+        walk
+    }
+
+    /// The triangle at which the walk is.
+    #[must_use]
+    #[inline]
+    pub fn triangle(&self) -> TerrainTriangle {
+        self.triangle
+    }
+
+    /// Walks on to the triangle that `origin + t direction` hits, across triangles that face the origin. `None`
+    /// if the way leads to a triangle that faces away, to a void or off the terrain, or is long; the walk is
+    /// then anywhere on the way. The hit is on the same unfolded patch as the start, which need not be the
+    /// first surface along the ray.
+    #[must_use]
+    #[inline]
+    pub fn to(&mut self, direction_ned: DVec3) -> Option<WalkHit> {
         /// As in [`super::intersect_triangle`].
         const ROUNDING: f64 = 4e-15;
         let largest = ROUNDING * direction_ned.abs().max_element();
-        let mut step = self.first_step(from, origin_ned_m, direction_ned);
         for _ in 0..MOST_STEPS {
-            let Step { triangle, corners_m: [a, b, c], volumes } = step;
+            let volumes = self.edges_m2.map(|edge| direction_ned.dot(edge));
             let sum = volumes[0] + volumes[1] + volumes[2];
-            let reach_m = a.abs().max(b.abs()).max(c.abs()).max_element();
-            let slack = largest * reach_m * reach_m;
+            let slack = largest * self.reach_m * self.reach_m;
             // False for NaN, which is a void. Normals point up, so a triangle that faces the origin has
             // positive volumes.
             let is_facing = sum > 3.0 * slack;
@@ -111,50 +161,50 @@ impl Terrain {
             }
             let edge = (1..3).fold(0, |lowest, k| if volumes[k] < volumes[lowest] { k } else { lowest });
             if volumes[edge] >= -slack {
-                let normal = (b - a).cross(c - a);
-                let t = a.dot(normal) / direction_ned.dot(normal);
-                return (t >= 0.0).then_some((triangle, t));
+                let t = self.corners_m[0].dot(self.normal) / direction_ned.dot(self.normal);
+                let Self { triangle, normal_ned, .. } = *self;
+                return (t >= 0.0).then_some(WalkHit { triangle, t, normal_ned });
             }
-            step = self.next_step(&step, edge, origin_ned_m, direction_ned)?;
+            self.cross(edge)?;
         }
         None
     }
 
-    fn first_step(&self, triangle: TerrainTriangle, origin: DVec3, direction: DVec3) -> Step {
-        let corners_m = [0, 1, 2].map(|k| self.corner_m(triangle, k, origin));
-        Step { triangle, corners_m, volumes: [0, 1, 2].map(|k| volume(corners_m, k, direction)) }
-    }
-
-    /// The triangle across the edge opposite to a corner; `None` off the terrain.
-    fn next_step(&self, step: &Step, edge: usize, origin: DVec3, direction: DVec3) -> Option<Step> {
-        let half = step.triangle.half;
+    /// Goes to the triangle across the edge opposite to a corner; `None` off the terrain.
+    fn cross(&mut self, edge: usize) -> Option<()> {
+        let TerrainTriangle { cell, half } = self.triangle;
         let crossing = &CROSSINGS[half as usize][edge];
-        let [column, row] = [0, 1].map(|k| step.triangle.cell[k].checked_add_signed(crossing.cell[k]));
+        let [column, row] = [0, 1].map(|k| cell[k].checked_add_signed(crossing.cell[k]));
         let cell = [column?, row?];
-        if cell[0] >= self.cells[0] || cell[1] >= self.cells[1] {
+        if cell[0] >= self.terrain.cells[0] || cell[1] >= self.terrain.cells[1] {
             return None;
         }
-        let triangle = TerrainTriangle { cell, half: 1 - half };
-        let corners_m = [0, 1, 2].map(|k| match crossing.corners[k] {
-            NEW => self.corner_m(triangle, k, origin),
-            old => step.corners_m[old],
+        self.triangle = TerrainTriangle { cell, half: 1 - half };
+        let before = self.corners_m;
+        self.corners_m = [0, 1, 2].map(|k| match crossing.corners[k] {
+            NEW => self.terrain.corner_m(self.triangle, k, self.origin_ned_m),
+            old => before[old],
         });
-        let volumes = [0, 1, 2].map(|k| match crossing.corners[k] {
-            NEW => -step.volumes[edge],
-            _ => volume(corners_m, k, direction),
+        let shared_m2 = self.edges_m2[edge];
+        self.edges_m2 = [0, 1, 2].map(|k| match crossing.corners[k] {
+            NEW => -shared_m2,
+            _ => edge_m2(&self.corners_m, k),
         });
-        Some(Step { triangle, corners_m, volumes })
+        self.measure();
+        Some(())
     }
 
-    /// A corner of a triangle relative to a point, metres.
-    fn corner_m(&self, triangle: TerrainTriangle, corner: usize, origin: DVec3) -> DVec3 {
-        let (chunk, cell) = self.chunk_of_cell(triangle.cell);
-        let [i, j] = cell_triangles(cell)[triangle.half as usize][corner];
-        self.position_ned_m(chunk, i, j) - origin
+    #[inline]
+    fn measure(&mut self) {
+        let [a, b, c] = self.corners_m;
+        self.normal = (b - a).cross(c - a);
+        self.normal_ned = self.normal.normalize_or_zero();
+        self.reach_m = a.abs().max(b.abs()).max(c.abs()).max_element();
     }
 }
 
-/// Signed volume over the edge opposite to a corner.
-fn volume(corners_m: [DVec3; 3], corner: usize, direction: DVec3) -> f64 {
-    direction.dot(corners_m[(corner + 2) % 3].cross(corners_m[(corner + 1) % 3]))
+/// Product of the ends of the edge opposite to a corner.
+#[inline]
+fn edge_m2(corners_m: &[DVec3; 3], corner: usize) -> DVec3 {
+    corners_m[(corner + 2) % 3].cross(corners_m[(corner + 1) % 3])
 }

@@ -135,7 +135,7 @@ fn with_pixels(check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
 fn flow_leads_to_where_the_oracle_sees_the_same_place() {
     with_pixels(|pixels, oracle| {
         for target in [2, 0] {
-            let to = FlowTarget::new(pixels.planner.frame_camera(i64::from(target)).unwrap());
+            let to = pixels.planner.frame_camera(i64::from(target)).unwrap();
             let (mut visible, mut worst_px) = ([0; 3], 0.0_f64);
             for (i, [dx, dy, state]) in flow(pixels, &to).into_iter().enumerate() {
                 if state != f32::from(FlowState::Visible as u8) {

@@ -1,0 +1,291 @@
+//! Flow, motion and blur path of the oracle: where another picture shows what a pixel sees, by a search over
+//! the instants of that picture's rows.
+//!
+//! The equation `place = project(camera(t(place)), point(t(place)))` along the readout is looked at in steps of
+//! one pixel, from border to border, and each change of sign is closed in on by bisection.
+
+use glam::{DVec2, DVec3};
+
+use super::{FrameLens, FrameView, Oracle, RaySample, zoom_at};
+use crate::{
+    pose::CameraPose,
+    scenario::{FlowInstant, FlowState},
+    scene::RigidMotion,
+};
+
+/// Halvings of an interval of one pixel.
+const BISECTIONS: u32 = 36;
+/// Step of the derivative by differences, seconds.
+const STEP_S: f64 = 1e-4;
+
+/// What a pixel sees.
+#[derive(Clone, Copy, Debug)]
+enum Goal<'a> {
+    /// A place, and the motion of what it is on, with where it was at path time 0.
+    Place(DVec3, Option<&'a RigidMotion>),
+    /// A direction of the sky.
+    Sky(DVec3),
+}
+
+/// A picture that flow leads to.
+#[derive(Debug)]
+pub(super) struct FlowPicture<'a> {
+    oracle: &'a Oracle,
+    lens: FrameLens<'a>,
+    stamp_s: f64,
+    /// All rows at one instant.
+    global_s: Option<f64>,
+    fields: Vec<FieldScan>,
+}
+
+/// The readout of one field, in steps of one pixel from border to border.
+#[derive(Debug)]
+struct FieldScan {
+    /// An image row of the field.
+    row: u32,
+    places: Vec<(f64, f64, CameraPose)>,
+}
+
+/// Where a picture shows a goal.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    px: DVec2,
+    t_s: f64,
+    pose: CameraPose,
+}
+
+impl Oracle {
+    /// The picture of a frame of any number.
+    pub(super) fn flow_frame(&self, frame: i64) -> FlowPicture<'_> {
+        let stamp_s = self.timing.stamp_of(frame as f64);
+        let rows: &[u32] = if self.timing.field_rows() == 2 { &[0, 1] } else { &[0] };
+        let scan = |&row: &u32| {
+            let [first, last, step] = self.ends_of_field(row).map(f64::from);
+            // Half a row of the field beyond its ends, within the picture.
+            let low_px = (first - 0.5 * step).max(-0.5);
+            let high_px = (last + 0.5 * step).min(f64::from(self.timing.lines()) - 0.5);
+            let place = |k: u32| {
+                let along_px = (low_px + f64::from(k)).min(high_px);
+                let t_s = stamp_s + self.timing.dt_along_s(along_px, row);
+                (along_px, t_s, self.sequence.path.pose(t_s))
+            };
+            FieldScan { row, places: (0..=(high_px - low_px).ceil() as u32).map(place).collect() }
+        };
+        FlowPicture {
+            oracle: self,
+            lens: self.lens_of(stamp_s),
+            stamp_s,
+            global_s: None,
+            fields: rows.iter().map(scan).collect(),
+        }
+    }
+
+    /// The picture of a frame's camera with all rows at one instant.
+    pub(super) fn flow_global(&self, frame: u64, instant: FlowInstant) -> FlowPicture<'_> {
+        let stamp_s = self.timing.stamp_s(frame);
+        let ends_s = [0, self.timing.lines() - 1].map(|line| self.timing.dt_row_s(line));
+        let dt_s = match instant {
+            FlowInstant::FirstRow => ends_s[0].min(ends_s[1]),
+            FlowInstant::Centre => 0.5 * (ends_s[0] + ends_s[1]),
+            FlowInstant::LastRow => ends_s[0].max(ends_s[1]),
+        };
+        let lens = self.lens_of(stamp_s);
+        FlowPicture { oracle: self, lens, stamp_s, global_s: Some(stamp_s + dt_s), fields: Vec::new() }
+    }
+
+    pub(super) fn lens_of(&self, stamp_s: f64) -> FrameLens<'_> {
+        match &self.fixed {
+            Some(lens) => FrameLens::Fixed(lens),
+            None => self
+                .zoomed_lens(zoom_at(&self.sequence.zoom_track, stamp_s))
+                .map_or(FrameLens::Invalid, FrameLens::Zoomed),
+        }
+    }
+
+    /// First and last row of the readout that the field of an image row has, and the step between them.
+    fn ends_of_field(&self, row: u32) -> [u32; 3] {
+        let step = if self.timing.reads_rows() { self.timing.field_rows() } else { 1 };
+        let first = if step == 2 { row } else { 0 };
+        [first, first + (self.timing.lines() - 1).saturating_sub(first) / step * step, step]
+    }
+
+    fn goal<'a>(&'a self, seen: &RaySample) -> Goal<'a> {
+        let Some(hit) = seen.hit else {
+            return Goal::Sky(seen.pose.ned_from_camera * seen.uv.extend(1.0));
+        };
+        let mesh = hit.surface.checked_sub(1).and_then(|i| self.sequence.scene.meshes.get(i as usize));
+        let motion = mesh.and_then(|mesh| mesh.motion.as_deref());
+        let at_start = motion.map_or(hit.point_ned_m, |motion| {
+            let state = motion.state(seen.t_s);
+            state.rotation.conjugate() * (hit.point_ned_m - state.shift_m)
+        });
+        Goal::Place(at_start, motion)
+    }
+}
+
+impl Goal<'_> {
+    /// From the camera, in NED, at path time `t_s`.
+    fn way_from(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
+        match self {
+            Self::Sky(direction) => *direction,
+            Self::Place(point, None) => *point - pose.position_ned_m,
+            Self::Place(at_start, Some(motion)) => {
+                let state = motion.state(t_s);
+                state.rotation * *at_start + state.shift_m - pose.position_ned_m
+            }
+        }
+    }
+}
+
+impl FrameLens<'_> {
+    /// Pixel at which a camera shows a goal.
+    fn show(&self, pose: &CameraPose, t_s: f64, goal: Goal<'_>) -> Option<DVec2> {
+        let ray = pose.ned_from_camera.inverse() * goal.way_from(pose, t_s);
+        match self {
+            _ if ray.z.is_nan() || ray.z <= 0.0 => None,
+            Self::Fixed(lens) => lens.image(ray.truncate() / ray.z),
+            Self::Zoomed(lens) => lens.image(ray.truncate() / ray.z),
+            Self::Invalid => None,
+        }
+    }
+}
+
+impl FlowPicture<'_> {
+    /// Displacement of what a pixel sees, pixels, and state: the channels `flow`, `flow_back` and `flow_global`.
+    pub(super) fn flow(&self, from_px: DVec2, seen: &RaySample) -> (DVec2, FlowState) {
+        let goal = self.oracle.goal(seen);
+        let places = self.places(goal);
+        let nearest = places.iter().min_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+        let Some(place) = nearest else {
+            return self
+                .outside(goal, from_px)
+                .map_or((DVec2::ZERO, FlowState::None), |px| (px - from_px, FlowState::Outside));
+        };
+        let way = goal.way_from(&place.pose, place.t_s);
+        let hit = self.oracle.cast_at(place.t_s, place.pose.position_ned_m, way);
+        // The parameter is 1 at the place; the sky is infinitely far away.
+        let is_hidden = hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6);
+        let state = match (is_hidden, places.len()) {
+            (true, _) => FlowState::Occluded,
+            (false, 1) => FlowState::Visible,
+            (false, _) => FlowState::Several,
+        };
+        (place.px - from_px, state)
+    }
+
+    fn is_in_picture(&self, px: DVec2) -> bool {
+        let [width, height] = self.oracle.sequence.scenario.camera.size_px.map(f64::from);
+        px.x >= -0.5 && px.y >= -0.5 && px.x < width - 0.5 && px.y < height - 0.5
+    }
+
+    fn along(&self, px: DVec2) -> f64 {
+        if self.oracle.timing.reads_rows() { px.y } else { px.x }
+    }
+
+    /// All positions in the picture at which it shows a goal.
+    fn places(&self, goal: Goal<'_>) -> Vec<Place> {
+        if let Some(t_s) = self.global_s {
+            let pose = self.oracle.sequence.path.pose(t_s);
+            let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px));
+            return px.map(|px| Place { px, t_s, pose }).into_iter().collect();
+        }
+        let mut places: Vec<(f64, Place)> = Vec::new();
+        for field in &self.fields {
+            let found = self.places_of_field(field, goal).into_iter();
+            places.extend(found.map(|place| (self.to_field_px(field, place.px), place)));
+        }
+        // A position belongs to the field whose image row it is in. Only what passes between the rows of both
+        // fields is in the nearer one.
+        if places.iter().any(|(off_px, _)| *off_px <= 0.5) {
+            places.retain(|(off_px, _)| *off_px <= 0.5);
+        } else {
+            places.sort_by(|a, b| a.0.total_cmp(&b.0));
+            places.truncate(1);
+        }
+        places.into_iter().map(|(_, place)| place).collect()
+    }
+
+    /// Distance to the nearest image row of a field; 0 without fields.
+    fn to_field_px(&self, field: &FieldScan, px: DVec2) -> f64 {
+        if self.fields.len() == 1 {
+            return 0.0;
+        }
+        let off = (px.y - f64::from(field.row)).rem_euclid(2.0);
+        off.min(2.0 - off)
+    }
+
+    fn places_of_field(&self, field: &FieldScan, goal: Goal<'_>) -> Vec<Place> {
+        let miss = |along_px: f64, t_s: f64, pose: &CameraPose| {
+            Some(self.along(self.lens.show(pose, t_s, goal)?) - along_px)
+        };
+        let misses: Vec<Option<f64>> =
+            field.places.iter().map(|(along_px, t_s, pose)| miss(*along_px, *t_s, pose)).collect();
+        let mut found = Vec::new();
+        for (k, pair) in misses.windows(2).enumerate() {
+            let &[Some(before), Some(after)] = pair else { continue };
+            if (before >= 0.0) == (after >= 0.0) {
+                continue;
+            }
+            let (mut low, mut high) = (field.places[k].0, field.places[k + 1].0);
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + high);
+                let (t_s, pose) = self.camera(field, middle);
+                let is_before = miss(middle, t_s, &pose).is_some_and(|miss| (miss >= 0.0) == (before >= 0.0));
+                if is_before { low = middle } else { high = middle }
+            }
+            let (t_s, pose) = self.camera(field, 0.5 * (low + high));
+            let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px));
+            found.extend(px.map(|px| Place { px, t_s, pose }));
+        }
+        found
+    }
+
+    fn camera(&self, field: &FieldScan, along_px: f64) -> (f64, CameraPose) {
+        let t_s = self.stamp_s + self.oracle.timing.dt_along_s(along_px, field.row);
+        (t_s, self.oracle.sequence.path.pose(t_s))
+    }
+
+    /// Where the camera of the row read first or last shows a goal that no row shows: of both, and of both
+    /// fields, that which misses its row by less.
+    fn outside(&self, goal: Goal<'_>, from_px: DVec2) -> Option<DVec2> {
+        if let Some(t_s) = self.global_s {
+            return self.lens.show(&self.oracle.sequence.path.pose(t_s), t_s, goal);
+        }
+        let ends = self.fields.iter().flat_map(|field| {
+            let [first, last, step] = self.oracle.ends_of_field(field.row);
+            [first, last].into_iter().filter_map(move |line| {
+                let (t_s, pose) = self.camera(field, f64::from(line));
+                let px = self.lens.show(&pose, t_s, goal)?;
+                Some((((self.along(px) - f64::from(line)) / f64::from(step)).abs(), px))
+            })
+        });
+        let key = |(miss, px): &(f64, DVec2)| (*miss, px.distance(from_px));
+        let nearest = ends.min_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        nearest.map(|(_, px)| px)
+    }
+}
+
+impl FrameView<'_> {
+    /// Velocity of the image of what a pixel sees, pixels a second, by differences of fourth order.
+    pub(super) fn motion(&self, seen: &RaySample) -> DVec2 {
+        let at = |dt_s: f64| self.show_at(seen, seen.t_s + dt_s);
+        let pair = |dt_s: f64| Some(at(dt_s)? - at(-dt_s)?);
+        let near = pair(STEP_S).zip(pair(2.0 * STEP_S));
+        near.map_or(DVec2::ZERO, |(one, two)| (8.0 * one - two) / (12.0 * STEP_S))
+    }
+
+    /// Displacement of the image of what a pixel sees at the begin and at the end of its exposure, pixels.
+    pub(super) fn blur_path(&self, from_px: DVec2, seen: &RaySample) -> [DVec2; 2] {
+        [-0.5, 0.5].map(|phase| {
+            let t_s = seen.t_s + phase * self.oracle.timing.exposure_s();
+            self.show_at(seen, t_s).map_or(DVec2::ZERO, |px| px - from_px)
+        })
+    }
+
+    fn show_at(&self, seen: &RaySample, t_s: f64) -> Option<DVec2> {
+        self.lens.show(&self.oracle.sequence.path.pose(t_s), t_s, self.oracle.goal(seen))
+    }
+}
