@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use camsim_core::scenario::{CameraSpec, Rig, Scenario};
 
 use crate::{
-    scenario_file::{for_each_path, rig_json},
+    scenario_file::{for_each_path, rig_json, rig_table},
     write::{WriteError, write_atomic},
 };
 
@@ -106,12 +106,15 @@ pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError
 ///
 /// # Errors
 /// A path that is not Unicode; the file cannot be written.
-pub fn write_scenario(path: &Path, scenario: &Scenario) -> Result<(), WriteError> {
+pub fn write_scenario(path: &Path, rig: &Rig) -> Result<(), WriteError> {
     let encode = |message: String| WriteError::Encode { path: path.into(), message };
-    let portable = portable_scenario(scenario, path.parent().unwrap_or(Path::new("")))
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let portable = rig
+        .clone()
+        .try_map(|scenario| portable_scenario(&scenario, folder))
         .map_err(|error| encode(error.to_string()))?;
-    let text = toml::to_string(&portable).map_err(|error| encode(error.to_string()))?;
-    write_atomic(path, text.as_bytes())
+    let text = rig_table(&portable).and_then(|table| toml::to_string(&table));
+    write_atomic(path, text.map_err(|error| encode(error.to_string()))?.as_bytes())
 }
 
 /// The path of a file within `folder`, relative to it. A file elsewhere is copied to `inputs/`.

@@ -12,7 +12,7 @@ use crate::{
     console::{Console, quoted},
     failure::{Failure, OrFail},
     frame_list::{FrameList, FrameListError},
-    inputs::ScenarioArgs,
+    inputs::{self, Changes},
 };
 
 /// Write scripts that render a scenario in shards
@@ -54,8 +54,10 @@ struct SlurmArgs {
 
 #[derive(Debug, clap::Args)]
 struct ShardArgs {
+    /// Scenario (TOML)
+    scenario: PathBuf,
     #[command(flatten)]
-    scenario: ScenarioArgs,
+    changes: Changes,
     /// Number of shards
     #[arg(short = 'N', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     shards: u32,
@@ -82,14 +84,14 @@ pub fn run(args: &ClusterArgs, console: &mut Console<'_>) -> Result<(), Failure>
         Kind::Local(args) => args,
     };
     let folder = &shards.output;
-    let scenario = shards.scenario.read(console)?;
+    let rig = inputs::read_changed_rig(&shards.scenario, &shards.changes, console)?;
     if folder.join("shards").exists() {
         return Err(Failure::bad_input(anyhow!(
             "{} has shards already: choose another folder, or remove that one",
             folder.display()
         )));
     }
-    write_scenario(&folder.join("scenario.toml"), &scenario).or_failed()?;
+    write_scenario(&folder.join("scenario.toml"), &rig).or_failed()?;
     write_script(folder, "shard.sh", &shard_script(shards)?)?;
     write_script(folder, "merge.sh", &merge_script()?)?;
     let start = match &args.kind {

@@ -247,7 +247,7 @@ pub fn render(
         }
     })?;
     if let Some(pictures) = sheet {
-        write_channel_sheet(&folder, pictures)?;
+        write_channel_sheet(folder, pictures)?;
     }
     if args.checksums {
         write_checksums(folder).or_failed()?;

@@ -62,7 +62,7 @@ fn a_rig_is_written_and_read_back() {
     let read = read_rig(&run, &[("cameras.1.fps".into(), "7".into())], None).unwrap();
     assert_eq!((camera(&read, 1).fps, camera(&read, 0)), (7.0, camera(&rig, 0)));
     let vignette = camera(&read, 1).photometric.vignette.clone().unwrap();
-    assert!(vignette.starts_with(folder.path()) && vignette.ends_with("dir/v.png"), "{vignette:?}");
+    assert!(vignette.is_absolute() && vignette.ends_with("dir/v.png"), "{vignette:?}");
     let single = parse("", &[]).unwrap();
     assert!(!single.is_list() && rig_table(&single).unwrap().contains_key("camera"));
 }
