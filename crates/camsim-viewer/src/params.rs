@@ -398,6 +398,7 @@ pub const PARAMS: &[Param] = &[
         "clock of stamps: the log's, or one that starts at output.epoch_ns at the window's begin",
     ),
     param("output.epoch_ns", "ns", ANY, 1.0, "time of that clock at the window's begin"),
+    param("output.datasets", "", ANY, 1.0, "layouts of other programs, made of the frames"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR files"),
     param("output.video.codec", "", ANY, 1.0, "encoder of mp4 and mkv"),
@@ -411,7 +412,6 @@ pub const PARAMS: &[Param] = &[
         "frames from one to the other of flow and flow_back",
     ),
     param("output.flow_instant", "", ANY, 1.0, "instant of the picture that flow_global leads to"),
-    param("output.datasets", "", ANY, 1.0, "layouts of other programs, made of the frames"),
     param("output.palette", "", ANY, 1.0, "pictures of object and class in colour"),
     param(
         "output.tracks.points",

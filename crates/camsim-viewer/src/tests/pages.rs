@@ -118,7 +118,7 @@ fn an_export_shows_progress_and_can_be_cancelled() {
         }
         Ok("all written".into())
     });
-    let mut window = Window::with(Some(pattern()), Some(exporter), [1000.0, 700.0]);
+    let mut window = Window::with(Some(pattern()), Some(exporter), [1000.0, 900.0]);
     window.settle();
     window.click("Export");
     window.click("Render");
