@@ -103,13 +103,18 @@ impl Picture<'_> {
         let (width, count) = (line.len(), self.names.len());
         let samples = self.samples[y * width * count..].iter().skip(channel).step_by(count);
         line.iter_mut().zip(samples).for_each(|(to, from)| *to = *from);
+        // Whole lines at a time: byte by byte this would take as long as the compression.
         match self.pixel {
-            ExrPixel::Float => bytes.extend(line.iter().flat_map(|value| value.to_le_bytes())),
+            ExrPixel::Float => {
+                line.iter_mut().for_each(|value| *value = f32::from_bits(value.to_bits().to_le()));
+                bytes.extend_from_slice(bytemuck::cast_slice(line));
+            }
             ExrPixel::Half => {
                 line.iter_mut().for_each(|value| *value = within_half(*value));
                 let mut halves = vec![f16::ZERO; width];
                 halves.convert_from_f32_slice(line);
-                bytes.extend(halves.iter().flat_map(|value| value.to_le_bytes()));
+                halves.iter_mut().for_each(|value| *value = f16::from_bits(value.to_bits().to_le()));
+                bytes.extend_from_slice(bytemuck::cast_slice(&halves));
             }
         }
     }
