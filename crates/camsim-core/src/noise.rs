@@ -11,9 +11,9 @@ pub const SEGMENTS: usize = 16;
 /// Stream of the sensor's additive Gaussian noise.
 pub const NOISE_STREAM: u32 = 1;
 
-/// Seed of the noise of a camera or another sensor. Without a name it is `seed`; with one it is `splitmix64(seed ^ fnv1a64(name))`,
-/// the 64-bit FNV-1a hash of the name's UTF-8 bytes and the finaliser of SplitMix64, so that the cameras of
-/// one run have different noise.
+/// Seed of the noise of a camera or another sensor. Without a name it is `seed`; with one it is
+/// `splitmix64(seed ^ fnv1a64(name))`, the 64-bit FNV-1a hash of the name's UTF-8 bytes and the finaliser of
+/// SplitMix64, so that the cameras of one run have different noise.
 #[must_use]
 pub(crate) fn camera_seed(seed: u64, name: &str) -> u64 {
     if name.is_empty() {

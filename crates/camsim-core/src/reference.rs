@@ -4,9 +4,9 @@
 //! It shares with them the scenario, the trajectory (with the mount), the motions of what moves and the forward
 //! model of the lens, and nothing else. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
 //! `terrain_pyramid`, `mesh_bvh`, `moving`), shadows (`shadow`), colour (`shading`) and integration (`render`)
-//! are implementations of its own. The seeded photometric stage is shared, because a seed has no meaning other than its noise.
-//! The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these measurements and by the
-//! predictions of the planner.
+//! are implementations of its own. The seeded photometric stage is shared, because a seed has no meaning
+//! other than its noise. The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these
+//! measurements and by the predictions of the planner.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

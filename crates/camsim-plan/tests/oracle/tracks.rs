@@ -35,7 +35,8 @@ fn motion() -> Arc<RigidMotion> {
     Arc::new(RigidMotion::new(vec![Joint::new(JointFrame::IDENTITY, Track::Keys(keys))]))
 }
 
-/// Houses on hills, every third of which moves, with points of the terrain, of the houses, and a cloud of given ones around the ground.
+/// Houses on hills, every third of which moves, with points of the terrain, of the houses, and a cloud of
+/// given ones around the ground.
 fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
     let mut scenario = scenario();
     let camera = &mut scenario.camera;
