@@ -32,9 +32,11 @@ use camsim_core::scenario::DatasetFormat;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::write::WriteError;
+use crate::{
+    calibration::{CalibrationError, axes, text},
+    write::WriteError,
+};
 
-mod axes;
 mod bag;
 mod colmap;
 mod csv_rows;
@@ -52,14 +54,14 @@ mod requirements;
 mod run_folder;
 mod settings;
 mod target;
-mod text;
 mod tum;
 mod twins;
 mod webdataset;
 
 pub use axes::{Rigid, enu, enu_from_camera, enu_from_ned, flu_from_frd};
 pub use requirements::require;
-pub use run_folder::{Intrinsics, PlatformState, RunCamera, RunFolder, RunFrame};
+pub use crate::calibration::Intrinsics;
+pub use run_folder::{PlatformState, RunCamera, RunFolder, RunFrame};
 use target::Target;
 
 /// Why a folder was not exported.
@@ -79,6 +81,9 @@ pub enum DatasetError {
     /// The layout has no place for something, or the folder holds another export.
     #[error("{0}")]
     Refused(String),
+    /// A format of calibrations has no place for the camera.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -17,6 +17,7 @@
 //! |---|---|
 //! | [`scenario_file`] | scenarios and camera files (TOML), `--set` |
 //! | [`camera_file`] | calibrations of other programs |
+//! | [`calibration`] | calibrations for other programs |
 //! | [`flight_log`] | flight logs: CSV, TUM, EuRoC, GPX |
 //! | [`terrain`] | heights and ortho-images |
 //! | [`gltf_file`] | models |
@@ -37,6 +38,7 @@
 
 pub mod board_file;
 pub mod builtin;
+pub mod calibration;
 pub mod camera_file;
 pub mod compare;
 pub mod dataset;

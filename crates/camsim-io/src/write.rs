@@ -56,6 +56,7 @@ mod video;
 pub use atomic::write_atomic;
 pub(crate) use atomic::{remove_all_temporaries, temporary_path, write_atomic_with};
 pub use channel_pictures::channel_pictures;
+pub(crate) use exr_file::encode as encode_exr;
 pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, frames_path};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};

@@ -3,13 +3,11 @@
 //! Each image is a frame and each camera a rig of its own: with a rolling shutter, a delay or vibration no pose
 //! between two cameras is the same in all frames.
 
-use camsim_core::scenario::LensModel;
-
 use super::{
     DatasetError, ExportJob,
     euroc::timing,
     page::{OPTICAL, PIXEL_CENTRE_HALF, Page, WORLD},
-    run_folder::{Intrinsics, RunFrame},
+    run_folder::RunFrame,
 };
 
 mod model;
@@ -40,24 +38,6 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
 /// Name of a picture below `images`.
 fn picture(prefix: &str, frame: &RunFrame) -> String {
     format!("{prefix}frame_{:06}.png", frame.number)
-}
-
-/// The smallest camera model that holds the lens: name, number, parameters.
-fn camera_model(lens: &Intrinsics) -> (&'static str, i32, Vec<f64>) {
-    let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px.map(|px| px + 0.5));
-    let [k1, k2, p1, p2, rest @ ..] = lens.coefficients;
-    if lens.model == LensModel::KannalaBrandt {
-        return ("OPENCV_FISHEYE", 5, vec![fx, fy, cx, cy, k1, k2, p1, p2]);
-    }
-    let is_radial = fx == fy && [p1, p2] == [0.0; 2];
-    match (rest == [0.0; 4], is_radial) {
-        (false, _) => ("FULL_OPENCV", 6, [&[fx, fy, cx, cy], &lens.coefficients[..]].concat()),
-        (true, true) if [k1, k2] == [0.0; 2] => ("SIMPLE_PINHOLE", 0, vec![fx, cx, cy]),
-        (true, true) if k2 == 0.0 => ("SIMPLE_RADIAL", 2, vec![fx, cx, cy, k1]),
-        (true, true) => ("RADIAL", 3, vec![fx, cx, cy, k1, k2]),
-        (true, false) if [k1, k2, p1, p2] == [0.0; 4] => ("PINHOLE", 1, vec![fx, fy, cx, cy]),
-        (true, false) => ("OPENCV", 4, vec![fx, fy, cx, cy, k1, k2, p1, p2]),
-    }
 }
 
 fn notes(job: &ExportJob<'_>, model: &Model) -> Vec<String> {

@@ -9,10 +9,11 @@ use super::{
     axes::{Rigid, enu, enu_from_ned},
     imu::{ImuSensor, body_from_b, imus},
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
-    run_folder::{Intrinsics, RunCamera},
+    run_folder::RunCamera,
     settings,
-    text::{list, matrix_list, real, wxyz},
+    text::{matrix_list, real, wxyz},
 };
+use crate::calibration::euroc::sensor_yaml;
 
 /// Writes the export; returns notes.
 pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
@@ -51,13 +52,13 @@ fn write_camera(
     camera: &RunCamera,
     body_from_b: &Rigid,
 ) -> Result<(), DatasetError> {
-    let intrinsics = camera.intrinsics()?;
+    let calibration = camera.calibration()?;
     let b_from_camera = body_from_b.inverse().of(&camera.body_from_camera());
     let name = |file: &str| format!("mav0/cam{i}/{file}");
     job.each_frame(camera, |frame| {
         job.target.link(&camera.file(frame, "color_png"), &name(&format!("data/{}.png", frame.stamp_ns)))
     })?;
-    job.target.text(&name("sensor.yaml"), &sensor_yaml(camera, &intrinsics, &b_from_camera))?;
+    job.target.text(&name("sensor.yaml"), &sensor_yaml(&calibration, &b_from_camera)?)?;
     let exposure_ns = (camera.shutter.exposure_s() * 1e9).round();
     job.target.stream(&name("data.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],filename")?;
@@ -73,33 +74,6 @@ fn write_camera(
     job.target.stream(&format!("settings/times_cam{i}.txt"), &mut |out| {
         camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{}", frame.stamp_ns)?))
     })
-}
-
-fn sensor_yaml(camera: &RunCamera, intrinsics: &Intrinsics, b_from_camera: &Rigid) -> String {
-    let [width, height] = intrinsics.size_px;
-    let ([fx, fy], [cx, cy]) = (intrinsics.focal_px, intrinsics.principal_px);
-    let (model, coefficients) = distortion(intrinsics);
-    format!(
-        "# (0, 0) is the centre of the first pixel.\nsensor_type: camera\ncomment: camsim {name}\n\n\
-         # x_B = T_BS x_S, S the optical axes.\nT_BS:\n  cols: 4\n  rows: 4\n  data: {data}\n\n\
-         rate_hz: {rate}\nresolution: [{width}, {height}]\ncamera_model: pinhole\n\
-         intrinsics: {intrinsics} #fu, fv, cu, cv\ndistortion_model: {model}\n\
-         distortion_coefficients: {coefficients}\n",
-        name = camera.name,
-        data = matrix_list(&b_from_camera.matrix()),
-        rate = real(camera.spec.fps),
-        intrinsics = list(&[fx, fy, cx, cy]),
-        coefficients = list(&coefficients),
-    )
-}
-
-/// Name and coefficients of the lens in ASL's files; that of eight coefficients is OKVIS's.
-pub(super) fn distortion(intrinsics: &Intrinsics) -> (&'static str, Vec<f64>) {
-    match (intrinsics.equidistant(), intrinsics.radial_tangential()) {
-        (Some(k), _) => ("equidistant", k.to_vec()),
-        (None, Some(k)) => ("radial-tangential", k.to_vec()),
-        (None, None) => ("radialtangential8", intrinsics.coefficients.to_vec()),
-    }
 }
 
 /// Measurements of an inertial sensor, and its noise.

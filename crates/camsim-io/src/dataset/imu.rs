@@ -10,6 +10,7 @@ use super::{
     axes::{Rigid, flu_from_frd},
     csv_rows::CsvRows,
 };
+use crate::calibration::ImuReference;
 
 /// An inertial sensor, with a table of its measurements.
 #[derive(Clone, Debug)]
@@ -141,6 +142,11 @@ impl ImuSensor {
     /// Its measurements, row by row.
     pub(super) fn rows(&self) -> Result<ImuRows, DatasetError> {
         Ok(ImuRows(CsvRows::open(&self.path, &COLUMNS)?))
+    }
+
+    /// Its axes and clock.
+    pub(super) fn reference(&self) -> ImuReference {
+        ImuReference { body_from_imu: self.body_from_imu, clock_offset_s: self.clock_offset_s }
     }
 
     /// What is added to stamps of a camera to get the sensor's time of the image's centre, seconds.

@@ -1,22 +1,25 @@
 //! Kalibr: folders of its bag creator, `camchain.yaml`, `imu.yaml`, `target.yaml`.
 
-use std::{fmt::Write as _, io::Write};
+use std::io::Write;
 
-use camsim_core::scenario::{BoardKind, Readout};
+use camsim_core::scenario::BoardKind;
 
 use super::{
     DatasetError, ExportJob,
     euroc::{check_stamps, timing},
     imu::{ImuSensor, imus},
     page::{OPTICAL, PIXEL_CENTRE_0, Page},
-    run_folder::{Intrinsics, RunCamera},
-    text::{list, matrix_rows, real},
+    run_folder::RunCamera,
+    text::real,
 };
+use crate::calibration::kalibr::{PoseKey, chain_yaml};
 
 /// Writes the export; returns notes.
 pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     let imus = imus(job.run)?;
-    let chain = chain_yaml(job, imus.first(), "T_cam_imu")?;
+    let cameras = job.run.cameras.iter().map(RunCamera::calibration).collect::<Result<Vec<_>, _>>()?;
+    let reference = imus.first().map(ImuSensor::reference);
+    let chain = chain_yaml(&cameras, reference.as_ref(), PoseKey::CamImu)?;
     for (i, camera) in job.run.cameras.iter().enumerate() {
         camera.require(job.name(), &["color_png"])?;
         check_stamps(job.name(), camera)?;
@@ -63,85 +66,6 @@ pub(super) fn imu_yaml(i: usize, imu: &ImuSensor) -> String {
         real(imu.gyro_noise),
         real(imu.gyro_walk)
     )
-}
-
-/// Distortion model and its four coefficients.
-///
-/// # Errors
-/// The lens has more coefficients than Kalibr's models.
-fn distortion(
-    format: &str,
-    camera: &RunCamera,
-    lens: &Intrinsics,
-) -> Result<(&'static str, [f64; 4]), DatasetError> {
-    match (lens.equidistant(), lens.radial_tangential()) {
-        (Some(k), _) => Ok(("equidistant", k)),
-        (None, Some(k)) => Ok(("radtan", k)),
-        (None, None) => Err(DatasetError::Refused(format!(
-            "{}: {format} knows lenses with k1 k2 p1 p2 or equidistant k1 to k4, and this one has k3 to k6: set them \
-             to 0, or export the folder of a twin with lens = false",
-            camera.folder.display()
-        ))),
-    }
-}
-
-/// The chain of cameras; from the first inertial sensor, if there is one, by `T_cam_imu` or, as OpenVINS names it,
-/// the inverse `T_imu_cam`.
-pub(super) fn chain_yaml(
-    job: &ExportJob<'_>,
-    imu: Option<&ImuSensor>,
-    key: &str,
-) -> Result<String, DatasetError> {
-    let mut text = "# (0, 0) is the centre of the first pixel. T_a_b takes coordinates in b to those in a.\n\
-                    # t_imu = t_cam + timeshift_cam_imu, for the image's centre; line_delay (s) counts rows from there.\n"
-        .to_owned();
-    let mut before = None;
-    for (i, camera) in job.run.cameras.iter().enumerate() {
-        let lens = camera.intrinsics()?;
-        let (model, coefficients) = distortion(job.name(), camera, &lens)?;
-        let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
-        let camera_from_body = camera.body_from_camera().inverse();
-        let _ = writeln!(text, "cam{i}:");
-        if let Some(imu) = imu {
-            let camera_from_imu = camera_from_body.of(&imu.body_from_imu);
-            let pose = if key == "T_imu_cam" { camera_from_imu.inverse() } else { camera_from_imu };
-            let rows = matrix_rows(&pose.matrix(), "  ");
-            let _ = writeln!(text, "  {key}:\n{rows}  timeshift_cam_imu: {}", real(imu.shift_s(camera)));
-        }
-        if let Some(body_from_before) = before {
-            let _ = write!(
-                text,
-                "  T_cn_cnm1:\n{}",
-                matrix_rows(&camera_from_body.of(&body_from_before).matrix(), "  ")
-            );
-        }
-        let others: Vec<String> =
-            (0..job.run.cameras.len()).filter(|k| *k != i).map(|k| k.to_string()).collect();
-        let _ = write!(
-            text,
-            "  cam_overlaps: [{}]\n  camera_model: pinhole\n  distortion_coeffs: {}\n  distortion_model: {model}\n  \
-             intrinsics: {}\n  resolution: [{w}, {h}]\n  rostopic: /cam{i}/image_raw\n",
-            others.join(", "),
-            list(&coefficients),
-            list(&[fx, fy, cx, cy])
-        );
-        if let Some(delay_s) = line_delay_s(camera) {
-            let _ = writeln!(text, "  line_delay: {}", real(delay_s));
-        }
-        before = Some(camera.body_from_camera());
-    }
-    Ok(text)
-}
-
-/// Time from a row to the next one, of cameras that read rows.
-fn line_delay_s(camera: &RunCamera) -> Option<f64> {
-    let line_s = camera.shutter.readout_s() / f64::from(camera.shutter.lines());
-    match camera.spec.shutter.readout {
-        _ if line_s == 0.0 => None,
-        Readout::TopToBottom => Some(line_s),
-        Readout::BottomToTop => Some(-line_s),
-        Readout::LeftToRight | Readout::RightToLeft => None,
-    }
 }
 
 /// Kalibr's target file for the board of the scene, if it knows boards of this kind.

@@ -11,9 +11,10 @@ use super::{
     depth::DepthScale,
     euroc::timing,
     page::{PIXEL_CENTRE_HALF, Page, WORLD},
-    run_folder::{Intrinsics, RunCamera, RunFrame},
-    text::{list, real},
+    run_folder::{RunCamera, RunFrame},
+    text::list,
 };
+use crate::calibration::nerfstudio::model;
 
 /// Millimetres.
 const USUAL_STEPS: f64 = 1000.0;
@@ -46,8 +47,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
 
 /// Camera model and intrinsic keys of each camera; the model is one for all.
 fn models(job: &ExportJob<'_>) -> Result<Vec<(&'static str, String)>, DatasetError> {
-    let keys =
-        |camera: &RunCamera| camera.intrinsics().and_then(|intrinsics| model(&camera.name, &intrinsics));
+    let keys = |camera: &RunCamera| Ok::<_, DatasetError>(model(&camera.calibration()?)?);
     let models: Vec<_> = job.run.cameras.iter().map(keys).collect::<Result<_, _>>()?;
     if models.iter().any(|(model, _)| *model != models[0].0) {
         return Err(DatasetError::Refused(
@@ -57,33 +57,6 @@ fn models(job: &ExportJob<'_>) -> Result<Vec<(&'static str, String)>, DatasetErr
         ));
     }
     Ok(models)
-}
-
-/// Name of the model, and its keys.
-fn model(name: &str, intrinsics: &Intrinsics) -> Result<(&'static str, String), DatasetError> {
-    let ([fx, fy], [cx, cy], [w, h]) = (intrinsics.focal_px, intrinsics.principal_px, intrinsics.size_px);
-    let [k1, k2, p1, p2, k3, rational @ ..] = intrinsics.coefficients;
-    let (model, names, values) = match intrinsics.equidistant() {
-        Some(k) => ("OPENCV_FISHEYE", ["k1", "k2", "k3", "k4", ""], [k[0], k[1], k[2], k[3], 0.0]),
-        None if rational == [0.0; 3] => ("OPENCV", ["k1", "k2", "p1", "p2", "k3"], [k1, k2, p1, p2, k3]),
-        None => {
-            return Err(DatasetError::Refused(format!(
-                "camera {name}: nerfstudio has no k4, k5, k6: export the folder of a twin with lens = false"
-            )));
-        }
-    };
-    let shift = 0.5;
-    let mut text = format!(
-        "\"w\": {w}, \"h\": {h}, \"fl_x\": {}, \"fl_y\": {}, \"cx\": {}, \"cy\": {}",
-        real(fx),
-        real(fy),
-        real(cx + shift),
-        real(cy + shift)
-    );
-    for (name, value) in names.iter().zip(values).filter(|(name, _)| !name.is_empty()) {
-        text += &format!(", \"{name}\": {}", real(value));
-    }
-    Ok((model, text))
 }
 
 fn picture(folder: &str, prefix: &str, frame: &RunFrame) -> String {

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    mount::body_from_camera,
     pose::CameraPose,
-    scenario::{CameraSpec, FieldOr, FlowInstant, LensModel, LensSpec, TwinSpec},
+    scenario::{CameraSpec, FieldOr, FlowInstant, TwinSpec},
     shutter::Shutter,
 };
 use glam::{DQuat, DVec3};
@@ -13,6 +12,7 @@ use serde_json::Value;
 
 use super::{DatasetError, axes::Rigid, csv_rows::CsvRows};
 use crate::{
+    calibration::{Calibration, Intrinsics},
     manifest::RunManifest,
     write::{RIG_TOML, rig_names},
 };
@@ -75,21 +75,6 @@ pub struct PlatformState {
     pub ned_from_body: DQuat,
     /// Angular rate in body axes, rad/s.
     pub rate_body_rad_s: DVec3,
-}
-
-/// A camera as others describe it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intrinsics {
-    /// Width, height.
-    pub size_px: [u32; 2],
-    /// Focal lengths fx, fy.
-    pub focal_px: [f64; 2],
-    /// Principal point; (0, 0) is the centre of the first pixel.
-    pub principal_px: [f64; 2],
-    /// Lens model.
-    pub model: LensModel,
-    /// Its coefficients in camsim's order, with zeros behind them.
-    pub coefficients: [f64; 8],
 }
 
 impl RunFolder {
@@ -269,30 +254,21 @@ impl RunCamera {
     /// # Errors
     /// The camera zooms: no layout has a place for that.
     pub fn intrinsics(&self) -> Result<Intrinsics, DatasetError> {
-        let CameraSpec { size_px, focal_px, principal_point_px, zoom, lens, .. } = &self.spec;
-        if !zoom.is_empty() {
-            return Err(DatasetError::Refused(format!(
-                "{}: the camera zooms (camera.zoom), and this layout has one calibration for all pictures: export \
-                 a run with a fixed lens",
-                self.folder.display()
-            )));
-        }
-        let centre = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
-        let LensSpec { model, coefficients: given } = lens;
-        let mut coefficients = [0.0; 8];
-        coefficients.iter_mut().zip(given).for_each(|(place, value)| *place = *value);
-        let principal_px = principal_point_px.unwrap_or(centre);
-        Ok(Intrinsics { size_px: *size_px, focal_px: *focal_px, principal_px, model: *model, coefficients })
+        Ok(Intrinsics::of(&self.spec)?)
+    }
+
+    /// The camera as calibration files describe it.
+    ///
+    /// # Errors
+    /// As [`Self::intrinsics`].
+    pub fn calibration(&self) -> Result<Calibration, DatasetError> {
+        Ok(Calibration::new(&self.spec)?)
     }
 
     /// The camera's pose in the body (forward, right, down), without vibration.
     #[must_use]
     pub fn body_from_camera(&self) -> Rigid {
-        let mount = &self.spec.mount;
-        Rigid {
-            rotation: body_from_camera(mount.angles_deg),
-            translation_m: DVec3::from_array(mount.offset_m),
-        }
+        Rigid::of_mount(&self.spec.mount)
     }
 
     /// Whether the camera shakes against the body.
@@ -305,32 +281,6 @@ impl RunCamera {
     #[must_use]
     pub fn is_global(&self) -> bool {
         self.spec.shutter.readout_ms == 0.0 && self.spec.shutter.interlace_ms == FieldOr::Ms(0.0)
-    }
-}
-
-impl Intrinsics {
-    /// Whether the lens changes nothing.
-    #[must_use]
-    pub fn is_pinhole(&self) -> bool {
-        match self.model {
-            LensModel::Pinhole => true,
-            LensModel::BrownConrady => self.coefficients == [0.0; 8],
-            LensModel::KannalaBrandt => false,
-        }
-    }
-
-    /// k1 k2 p1 p2, where these are all.
-    #[must_use]
-    pub fn radial_tangential(&self) -> Option<[f64; 4]> {
-        let [k1, k2, p1, p2, rest @ ..] = self.coefficients;
-        (self.model != LensModel::KannalaBrandt && rest == [0.0; 4]).then_some([k1, k2, p1, p2])
-    }
-
-    /// k1 k2 k3 k4 of a Kannala-Brandt lens.
-    #[must_use]
-    pub fn equidistant(&self) -> Option<[f64; 4]> {
-        let [k1, k2, k3, k4, ..] = self.coefficients;
-        (self.model == LensModel::KannalaBrandt).then_some([k1, k2, k3, k4])
     }
 }
 

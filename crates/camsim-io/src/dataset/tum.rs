@@ -10,8 +10,12 @@ use super::{
     depth::DepthScale,
     euroc::{check_stamps, timing},
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
-    run_folder::{Intrinsics, RunCamera, RunFrame},
+    run_folder::{RunCamera, RunFrame},
     text::{seconds, xyzw},
+};
+use crate::calibration::{
+    Calibration, CalibrationError,
+    lens_names::{self, Family},
 };
 
 /// Steps per metre of the published dataset.
@@ -51,7 +55,7 @@ fn write_camera(
     camera: &RunCamera,
     scale: &DepthScale,
 ) -> Result<(), DatasetError> {
-    let intrinsics = camera.intrinsics()?;
+    let calibration_text = calibration(&camera.calibration()?)?;
     let file = |name: &str| format!("{prefix}{name}");
     job.each_frame(camera, |frame| {
         let stamp = stamp(camera, frame);
@@ -80,7 +84,7 @@ fn write_camera(
             Ok(writeln!(out, "{} {}", stamp(camera, frame), pose_text(&pose))?)
         })
     })?;
-    job.target.text(&file("calibration.txt"), &calibration(&intrinsics))
+    job.target.text(&file("calibration.txt"), &calibration_text)
 }
 
 /// `tx ty tz qx qy qz qw` of the optical axes in ENU.
@@ -90,26 +94,18 @@ pub(super) fn pose_text(pose: &CameraPose) -> String {
     values.map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
 }
 
-fn calibration(intrinsics: &Intrinsics) -> String {
-    let ([fx, fy], [cx, cy]) = (intrinsics.focal_px, intrinsics.principal_px);
-    let [k1, k2, p1, p2, k3, ..] = intrinsics.coefficients;
-    let header = "# (0, 0) is the centre of the first pixel\n";
-    match intrinsics.equidistant() {
-        Some([k1, k2, k3, k4]) => {
-            format!(
-                "{header}# equidistant: fx fy cx cy k1 k2 k3 k4\n{fx} {fy} {cx} {cy} {k1} {k2} {k3} {k4}\n"
-            )
-        }
-        None if intrinsics.coefficients[5..] == [0.0; 3] => {
-            format!(
-                "{header}# fx fy cx cy d0 d1 d2 d3 d4 (k1 k2 p1 p2 k3)\n{fx} {fy} {cx} {cy} {k1} {k2} {p1} {p2} {k3}\n"
-            )
-        }
-        None => {
-            let all = intrinsics.coefficients.map(|k| k.to_string()).join(" ");
-            format!("{header}# fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6\n{fx} {fy} {cx} {cy} {all}\n")
-        }
-    }
+/// Camera matrix and lens in one line, by ROS's orders.
+fn calibration(camera: &Calibration) -> Result<String, CalibrationError> {
+    let (model, d) = lens_names::lens(Family::Ros, camera)?;
+    let ([fx, fy], [cx, cy]) = (camera.intrinsics.focal_px, camera.intrinsics.principal_px);
+    let names = match model {
+        "equidistant" => "equidistant: fx fy cx cy k1 k2 k3 k4",
+        "plumb_bob" => "fx fy cx cy d0 d1 d2 d3 d4 (k1 k2 p1 p2 k3)",
+        _ => "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
+    };
+    let values = [fx, fy, cx, cy].into_iter().chain(d).map(|value| value.to_string());
+    let values = values.collect::<Vec<_>>().join(" ");
+    Ok(format!("# (0, 0) is the centre of the first pixel\n# {names}\n{values}\n"))
 }
 
 fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {

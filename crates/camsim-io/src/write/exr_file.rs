@@ -29,7 +29,7 @@ use super::WriteError;
 const ZIP_LEVEL: i32 = 1;
 
 /// Encodes interleaved samples as one channel per name. `path` is for messages only.
-pub(super) fn encode(
+pub(crate) fn encode(
     path: &Path,
     size_px: [u32; 2],
     names: &[&str],

@@ -5,13 +5,18 @@ use super::{
         DatasetError, ExportJob,
         axes::enu_from_camera,
         depth::read_depth,
-        run_folder::{Intrinsics, RunCamera, RunFrame},
+        run_folder::{RunCamera, RunFrame},
     },
     Bag, Source,
     messages::{
         Bytes, CameraInfo, CompressedImage, Header, Image, RegionOfInterest, StampedTransform,
         TransformMessage,
     },
+};
+use crate::calibration::{
+    Calibration, CalibrationError,
+    lens_names::{self, Family},
+    ros,
 };
 
 /// The frames of a camera, one after the other.
@@ -26,7 +31,7 @@ pub(super) struct Pictures<'a> {
 
 impl<'a> Pictures<'a> {
     pub(super) fn new(job: &'a ExportJob<'a>, i: usize, camera: &'a RunCamera) -> Result<Self, DatasetError> {
-        let info = camera_info(&camera.intrinsics()?);
+        let info = camera_info(&camera.calibration()?)?;
         Ok(Self { job, camera, name: format!("cam{i}"), info, has_depth: camera.has("depth"), next: 0 })
     }
 
@@ -88,24 +93,21 @@ impl Source for Pictures<'_> {
 }
 
 /// The calibration as ROS has it.
-fn camera_info(lens: &Intrinsics) -> CameraInfo {
-    let ([fx, fy], [cx, cy], [width, height]) = (lens.focal_px, lens.principal_px, lens.size_px);
-    let (model, d) = match lens.equidistant() {
-        Some(k) => ("equidistant", k.to_vec()),
-        None if lens.coefficients[5..] == [0.0; 3] => ("plumb_bob", lens.coefficients[..5].to_vec()),
-        None => ("rational_polynomial", lens.coefficients.to_vec()),
-    };
-    CameraInfo {
+fn camera_info(camera: &Calibration) -> Result<CameraInfo, CalibrationError> {
+    let (model, d) = lens_names::lens(Family::Ros, camera)?;
+    let lens = &camera.intrinsics;
+    let [width, height] = lens.size_px;
+    Ok(CameraInfo {
         header: Header::new(0, ""),
         height,
         width,
         distortion_model: model.to_owned(),
         d,
-        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        k: ros::camera_matrix(lens),
+        r: ros::NO_ROTATION,
+        p: ros::projection_matrix(lens),
         binning_x: 0,
         binning_y: 0,
         roi: RegionOfInterest::default(),
-    }
+    })
 }

@@ -8,10 +8,10 @@ use super::{
         axes::{Rigid, enu, enu_from_camera},
         run_folder::RunCamera,
     },
-    camera_model,
     observations::{FrameObservations, Observation, read_points},
     picture,
 };
+use crate::calibration::colmap::camera_model;
 
 /// Most observations that are held at once to write points with their tracks.
 const HELD: u64 = 4_000_000;
@@ -76,8 +76,8 @@ impl<'a> Model<'a> {
         let mut first_image = 0;
         let mut tables: Vec<(Vec<DVec3>, u64)> = Vec::new();
         for (i, camera) in job.run.cameras.iter().enumerate() {
-            let lens = camera.intrinsics()?;
-            let (name, number, parameters) = camera_model(&lens);
+            let calibration = camera.calibration()?;
+            let (name, number, parameters) = camera_model(&calibration)?;
             let own = read_points(&camera.folder.join("points.csv"))?;
             // Cameras of a rig that track the same points share them.
             let first_point = match tables.iter().find(|(points, _)| *points == own) {
@@ -93,7 +93,7 @@ impl<'a> Model<'a> {
                 id: i as u32 + 1,
                 name,
                 number,
-                size_px: lens.size_px,
+                size_px: calibration.intrinsics.size_px,
                 parameters,
                 camera,
                 prefix: job.prefix(i),

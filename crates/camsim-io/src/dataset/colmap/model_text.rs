@@ -6,6 +6,7 @@ use super::{
     super::{DatasetError, ExportJob, axes::Rigid, text::wxyz},
     model::Model,
 };
+use crate::calibration::colmap::camera_line;
 
 /// Writes the five files.
 pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Result<(), DatasetError> {
@@ -17,8 +18,7 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
             model.cameras().len()
         )?;
         model.cameras().iter().try_for_each(|camera| {
-            let ([width, height], parameters) = (camera.size_px, joined(&camera.parameters));
-            Ok(writeln!(out, "{} {} {width} {height} {parameters}", camera.id, camera.name)?)
+            Ok(writeln!(out, "{}", camera_line(camera.id, camera.name, camera.size_px, &camera.parameters))?)
         })
     })?;
     job.target.stream(&name("rigs"), &mut |out| {

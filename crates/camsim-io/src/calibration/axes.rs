@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use camsim_core::pose::CameraPose;
+use camsim_core::{mount::body_from_camera, pose::CameraPose, scenario::MountSpec};
 use glam::{DQuat, DVec3};
 
 /// A rigid transformation `a_from_b`: `x_a = rotation x_b + translation_m`.
@@ -17,6 +17,15 @@ pub struct Rigid {
 impl Rigid {
     /// The transformation that changes nothing.
     pub const IDENTITY: Self = Self { rotation: DQuat::IDENTITY, translation_m: DVec3::ZERO };
+
+    /// `body_from_camera` of a mount, without vibration.
+    #[must_use]
+    pub fn of_mount(mount: &MountSpec) -> Self {
+        Self {
+            rotation: body_from_camera(mount.angles_deg),
+            translation_m: DVec3::from_array(mount.offset_m),
+        }
+    }
 
     /// A rotation alone.
     #[must_use]

@@ -3,46 +3,51 @@
 use glam::DQuat;
 
 /// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals.
-pub(super) fn real(value: f64) -> String {
+pub(crate) fn real(value: f64) -> String {
     let text = format!("{value}");
     if text.contains('.') || !value.is_finite() { text } else { text + ".0" }
 }
 
 /// `[a, b, c]`.
-pub(super) fn list(values: &[f64]) -> String {
+pub(crate) fn list(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| real(*value)).collect::<Vec<_>>().join(", "))
 }
 
 /// Rows of a matrix, one list.
-pub(super) fn matrix_list(rows: &[[f64; 4]; 4]) -> String {
+pub(crate) fn matrix_list(rows: &[[f64; 4]; 4]) -> String {
     list(rows.as_flattened())
 }
 
 /// Rows of a matrix in YAML, as a list of lists.
-pub(super) fn matrix_rows(rows: &[[f64; 4]; 4], indent: &str) -> String {
+pub(crate) fn matrix_rows(rows: &[[f64; 4]; 4], indent: &str) -> String {
     rows.iter().map(|row| format!("{indent}- {}\n", list(row))).collect()
 }
 
 /// A matrix in OpenCV's YAML.
-pub(super) fn opencv_matrix(name: &str, rows: &[[f64; 4]; 4]) -> String {
-    let data = matrix_list(rows);
-    format!("{name}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: {data}\n")
+pub(crate) fn opencv_matrix(name: &str, rows: &[[f64; 4]; 4]) -> String {
+    opencv_matrix_n(name, [4, 4], rows.as_flattened())
+}
+
+/// A matrix of any size in OpenCV's YAML.
+pub(crate) fn opencv_matrix_n(name: &str, [rows, columns]: [usize; 2], data: &[f64]) -> String {
+    let data = list(data);
+    format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {data}\n")
 }
 
 /// Scalar first, not negative: q and -q are the same rotation.
-pub(super) fn wxyz(q: DQuat) -> [f64; 4] {
+pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
     let q = if q.w < 0.0 { -q } else { q };
     [q.w, q.x, q.y, q.z]
 }
 
 /// Scalar last, not negative.
-pub(super) fn xyzw(q: DQuat) -> [f64; 4] {
+pub(crate) fn xyzw(q: DQuat) -> [f64; 4] {
     let [w, x, y, z] = wxyz(q);
     [x, y, z, w]
 }
 
 /// Decimal seconds with all nine decimals.
-pub(super) fn seconds(t_ns: i64) -> String {
+pub(crate) fn seconds(t_ns: i64) -> String {
     let (whole, rest) = (t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000);
     format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
 }

@@ -1,0 +1,82 @@
+//! Names and orders of lens models in formats that have a name and a list of numbers.
+
+use camsim_core::scenario::LensModel;
+
+use super::{Calibration, CalibrationError};
+
+/// Formats that share names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Family {
+    /// Number of coefficients, or the module fisheye.
+    OpenCv,
+    /// `distortion_model` of `sensor_msgs/CameraInfo`.
+    Ros,
+    /// `distortion_model` of Kalibr.
+    Kalibr,
+    /// `distortion_model` of ASL's `sensor.yaml`; that of eight coefficients is OKVIS's.
+    Euroc,
+}
+
+impl Family {
+    fn title(self) -> &'static str {
+        match self {
+            Self::OpenCv => "OpenCV",
+            Self::Ros => "camera_info of ROS",
+            Self::Kalibr => "Kalibr",
+            Self::Euroc => "sensor.yaml",
+        }
+    }
+}
+
+/// Name and coefficients of the lens in a format, as short as the format allows.
+///
+/// # Errors
+/// The format does not have the lens.
+pub(crate) fn lens(
+    family: Family,
+    camera: &Calibration,
+) -> Result<(&'static str, Vec<f64>), CalibrationError> {
+    let lens = &camera.intrinsics;
+    if let Some(k) = lens.equidistant() {
+        let name = if family == Family::OpenCv { "fisheye" } else { "equidistant" };
+        return Ok((name, k.to_vec()));
+    }
+    let four = lens.brown::<4>().map(|k| k.to_vec());
+    let five = lens.brown::<5>().map(|k| k.to_vec());
+    let eight = lens.brown::<8>().map(|k| k.to_vec());
+    let named = |name| move |k| (name, k);
+    let found = match family {
+        // OpenCV's four could be those of a fisheye, so five are written.
+        Family::OpenCv => five.or(eight).map(named("radtan")),
+        Family::Ros => {
+            five.map(named("plumb_bob")).or_else(|| eight.map(named("rational_polynomial")))
+        }
+        Family::Kalibr => four.map(named("radtan")),
+        Family::Euroc => {
+            four.map(named("radial-tangential")).or_else(|| eight.map(named("radialtangential8")))
+        }
+    };
+    found.ok_or_else(|| no_such_lens(camera, family.title()))
+}
+
+/// The error of a format without the lens.
+pub(crate) fn no_such_lens(camera: &Calibration, format: &str) -> CalibrationError {
+    let reason = match camera.intrinsics.model {
+        LensModel::Pinhole | LensModel::BrownConrady => "lens with this many coefficients".to_owned(),
+        model => format!("lens of the model {}", model_name(model)),
+    };
+    CalibrationError::Refused(format!(
+        "{}: {format} has no {reason} ({:?}); `--as stmap` writes any lens",
+        camera.label(),
+        camera.spec.lens.coefficients
+    ))
+}
+
+/// Name of a model in camsim's files.
+pub(crate) fn model_name(model: LensModel) -> &'static str {
+    match model {
+        LensModel::Pinhole => "pinhole",
+        LensModel::BrownConrady => "brown-conrady",
+        LensModel::KannalaBrandt => "kannala-brandt",
+    }
+}

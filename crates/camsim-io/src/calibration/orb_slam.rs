@@ -1,0 +1,93 @@
+//! Settings of ORB-SLAM3 of version 1.0.
+
+use std::fmt::Write as _;
+
+use super::{
+    Calibration, CalibrationError, ImuReference, Intrinsics,
+    lens_names::no_such_lens,
+    text::{opencv_matrix, real},
+};
+
+/// The cameras, one or two, with the pose of the first in the inertial sensor.
+///
+/// # Errors
+/// ORB-SLAM3 does not have a lens, or the cameras are more than two or differ in what it has once.
+pub(crate) fn cameras(
+    cameras: &[Calibration],
+    imu: Option<&ImuReference>,
+) -> Result<String, CalibrationError> {
+    check_pair(cameras)?;
+    let mut text =
+        "%YAML:1.0\n\n# (0, 0) is the centre of the first pixel.\nFile.version: \"1.0\"\n".to_owned();
+    for (i, camera) in cameras.iter().enumerate() {
+        if i == 0 {
+            let _ = writeln!(text, "Camera.type: \"{}\"", kind(camera));
+        }
+        text += &camera_keys(i + 1, camera)?;
+    }
+    let Some(first) = cameras.first() else { return Ok(text) };
+    let [width, height] = first.intrinsics.size_px;
+    let _ = write!(
+        text,
+        "\nCamera.width: {width}\nCamera.height: {height}\nCamera.fps: {}\nCamera.RGB: 1\n",
+        first.spec.fps.round()
+    );
+    if let [left, right] = cameras {
+        let left_from_right = left.body_from_camera().inverse().of(&right.body_from_camera());
+        text += "\nStereo.ThDepth: 60.0\n";
+        text += &opencv_matrix("Stereo.T_c1_c2", &left_from_right.matrix());
+    }
+    if let Some(imu) = imu {
+        let b_from_camera = imu.body_from_imu.inverse().of(&first.body_from_camera());
+        let _ = write!(text, "\n{}", opencv_matrix("IMU.T_b_c1", &b_from_camera.matrix()));
+    }
+    Ok(text)
+}
+
+/// What it has once has to be the same for both.
+fn check_pair(cameras: &[Calibration]) -> Result<(), CalibrationError> {
+    let refuse = |message: String| Err(CalibrationError::Refused(message));
+    match cameras {
+        [_] => Ok(()),
+        [left, right] => {
+            let facts =
+                |camera: &Calibration| (kind(camera), camera.intrinsics.size_px, camera.spec.fps.round());
+            match facts(left) == facts(right) {
+                true => Ok(()),
+                false => refuse(format!(
+                    "ORB-SLAM3 has one camera type, size and fps for both cameras, and {} has {:?}, {} {:?}: choose \
+                     one with `--camera`",
+                    left.label(),
+                    facts(left),
+                    right.label(),
+                    facts(right)
+                )),
+            }
+        }
+        more => refuse(format!("ORB-SLAM3 has one or two cameras, not {}: choose one with `--camera`", more.len())),
+    }
+}
+
+fn kind(camera: &Calibration) -> &'static str {
+    if camera.intrinsics.equidistant().is_some() { "KannalaBrandt8" } else { "PinHole" }
+}
+
+fn camera_keys(number: usize, camera: &Calibration) -> Result<String, CalibrationError> {
+    let lens: &Intrinsics = &camera.intrinsics;
+    let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px);
+    let coefficients: Vec<(&str, f64)> = match (lens.equidistant(), lens.brown::<5>()) {
+        (Some([k1, k2, k3, k4]), _) => vec![("k1", k1), ("k2", k2), ("k3", k3), ("k4", k4)],
+        // A fifth coefficient is read if it is there.
+        (None, Some([k1, k2, p1, p2, k3])) => {
+            let all = [("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2), ("k3", k3)];
+            all.into_iter().filter(|(name, value)| *name != "k3" || *value != 0.0).collect()
+        }
+        (None, None) => return Err(no_such_lens(camera, "ORB-SLAM3")),
+    };
+    let mut text = "\n".to_owned();
+    let matrix = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
+    for (name, value) in matrix.into_iter().chain(coefficients) {
+        let _ = writeln!(text, "Camera{number}.{name}: {}", real(value));
+    }
+    Ok(text)
+}
