@@ -199,6 +199,42 @@ pub fn body_from_camera([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> DQuat {
     (turned * body_from_forward_camera).normalize()
 }
 
+/// Most that two rotation matrices differ that are the same to the rounding of a few products.
+const SAME_ROTATION: f64 = 2e-15;
+
+/// Roll, pitch, yaw in degrees of [`body_from_camera`]: the shortest decimals that give the rotation to rounding.
+/// Where the camera looks straight up or down roll is 0, as only its sum with yaw counts there.
+#[must_use]
+pub fn mount_angles_deg(body_from_camera_axes: DQuat) -> [f64; 3] {
+    let body_from_forward_camera = DQuat::from_mat3(&DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
+    let turned = DMat3::from_quat(body_from_camera_axes * body_from_forward_camera.inverse());
+    // Entries by row and column.
+    let m = |row: usize, column: usize| turned.col(column)[row];
+    let pitch = (-m(2, 0)).atan2(m(0, 0).hypot(m(1, 0)));
+    let yaw = m(1, 0).atan2(m(0, 0));
+    // Of a yaw that is rounding noise, the roll that goes with it.
+    let (sin, cos) = yaw.sin_cos();
+    let roll = (sin * m(0, 2) - cos * m(1, 2)).atan2(cos * m(1, 1) - sin * m(0, 1));
+    let upright = [0.0, pitch, (-m(0, 1)).atan2(m(1, 1))];
+    let wanted = DMat3::from_quat(body_from_camera_axes);
+    let is_same = |angles_deg: [f64; 3]| {
+        let difference = DMat3::from_quat(body_from_camera(angles_deg)) - wanted;
+        difference.abs_diff_eq(DMat3::ZERO, SAME_ROTATION)
+    };
+    let degrees = |angles: [f64; 3]| angles.map(|angle| angle.to_degrees() + 0.0);
+    let candidates = [degrees(upright), degrees([roll, pitch, yaw])];
+    let shortest = candidates.into_iter().find_map(|angles| {
+        (0..=13).map(|places| angles.map(|angle| rounded(angle, places))).find(|angles| is_same(*angles))
+    });
+    shortest.unwrap_or(candidates[1])
+}
+
+/// A number rounded to decimal places.
+fn rounded(value: f64, places: i32) -> f64 {
+    let scale = 10f64.powi(places);
+    (value * scale).round() / scale + 0.0
+}
+
 /// Body axis of a degree of freedom, and whether it is a rotation.
 fn body_axis(axis: Axis) -> (DVec3, bool) {
     match axis {
@@ -293,6 +329,33 @@ mod tests {
                     "yaw {yaw_deg}, mount {angles_deg:?}: {direction}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn angles_come_back_from_the_rotation() {
+        for angles_deg in [
+            [0.0, 0.0, 0.0],
+            [0.0, -90.0, 0.0],
+            [0.0, 90.0, 30.0],
+            [0.0, -90.0, -135.5],
+            [3.0, -60.0, 20.0],
+            [-178.25, 12.345_678_9, 179.0],
+            [90.0, 0.0, 180.0],
+            [0.1, -89.999, 45.0],
+        ] {
+            // Through a pose of another body and back, as files have it.
+            let other = DQuat::from_euler(glam::EulerRot::ZYX, 0.3, -1.1, 2.0);
+            let through = other.inverse() * (other * body_from_camera(angles_deg)).normalize();
+            assert_eq!(mount_angles_deg(through), angles_deg);
+        }
+        // Any rotation, to rounding.
+        for i in 0..1000 {
+            let x = f64::from(i);
+            let axis = DVec3::new((1.3 * x).sin(), (2.1 * x).cos(), (0.7 * x).sin());
+            let rotation = DQuat::from_scaled_axis(axis * (0.01 * x));
+            let back = DMat3::from_quat(body_from_camera(mount_angles_deg(rotation)));
+            assert!(back.abs_diff_eq(DMat3::from_quat(rotation), 4e-15), "{i}");
         }
     }
 

@@ -41,7 +41,7 @@ pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
-    validate, validate_camera, validate_rig,
+    validate, validate_camera, validate_cameras, validate_rig,
 };
 pub use video::{ImageFormat, VideoCodec, VideoSpec};
 

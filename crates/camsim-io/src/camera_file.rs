@@ -24,16 +24,21 @@ mod okvis;
 mod opencv;
 mod opensfm;
 mod orb_slam;
+mod poses;
 mod reference;
+mod rig;
 mod ros;
 mod ros_ini;
 mod selection;
+mod stated_size;
 mod syntax;
 mod timing;
 mod vikit;
 
 use document::{Document, KeyProblem};
 pub use format::CameraFormat;
+pub use poses::BodyAxes;
+pub use rig::{ImportedRig, import_rig};
 
 /// Why a camera file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +100,19 @@ pub struct ImportedCamera {
     pub notes: Vec<String>,
 }
 
+/// Choices of an import.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImportOptions<'a> {
+    /// Format of the file; `None`: the detected one.
+    pub format: Option<CameraFormat>,
+    /// Name of the camera in a file with several.
+    pub camera: Option<&'a str>,
+    /// Size of the pictures, for files that state none.
+    pub size_px: Option<[u32; 2]>,
+    /// Axes to which the poses of the file refer. `None`: poses and clocks are reported, not applied.
+    pub body: Option<BodyAxes>,
+}
+
 /// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Relative paths are relative to its
 /// folder.
 pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
@@ -129,7 +147,7 @@ pub fn import_camera_as(
 /// Names of the cameras in a file, for [`import_camera_named`]; one empty name for a single camera without
 /// name.
 pub fn camera_names(path: &Path, format: Option<CameraFormat>) -> Result<Vec<String>, CameraFileError> {
-    let (document, format) = open(path, format)?;
+    let (document, format) = open(path, &ImportOptions { format, ..ImportOptions::default() })?;
     let entries = format.entries(&document).map_err(|problem| key_error(path, problem))?;
     Ok(entries.into_iter().map(|entry| entry.name).collect())
 }
@@ -140,17 +158,40 @@ pub fn import_camera_named(
     format: Option<CameraFormat>,
     camera: Option<&str>,
 ) -> Result<ImportedCamera, CameraFileError> {
-    let is_explicit = format.is_some();
-    let (document, format) = open(path, format)?;
+    import_camera_with(path, &ImportOptions { format, camera, ..ImportOptions::default() })
+}
+
+/// Imports a camera of another program's calibration.
+///
+/// # Errors
+/// The file cannot be read, or does not hold one camera of the name that camsim can render.
+pub fn import_camera_with(
+    path: &Path,
+    options: &ImportOptions<'_>,
+) -> Result<ImportedCamera, CameraFileError> {
+    let (document, format) = open(path, options)?;
+    import_document(path, &document, format, options)
+}
+
+/// Imports a camera of a parsed file, and checks it.
+fn import_document(
+    path: &Path,
+    document: &Document,
+    format: CameraFormat,
+    options: &ImportOptions<'_>,
+) -> Result<ImportedCamera, CameraFileError> {
     let to_error = |problem| key_error(path, problem);
-    let mut imported = import(&document, format, is_explicit, camera).map_err(to_error)?;
+    let mut imported = import(document, format, options).map_err(to_error)?;
     imported.notes.extend(plausibility_notes(&imported.spec).map_err(to_error)?);
     check(path, &imported.spec)?;
     Ok(imported)
 }
 
 /// Parses a file and detects its format if none is given.
-fn open(path: &Path, format: Option<CameraFormat>) -> Result<(Document, CameraFormat), CameraFileError> {
+fn open(
+    path: &Path,
+    options: &ImportOptions<'_>,
+) -> Result<(Document, CameraFormat), CameraFileError> {
     refuse_other_files(path)?;
     let text = read(path)?;
     let document = Document::parse(&text).map_err(|problem| CameraFileError::Syntax {
@@ -158,14 +199,20 @@ fn open(path: &Path, format: Option<CameraFormat>) -> Result<(Document, CameraFo
         line: problem.line,
         message: problem.message,
     })?;
-    let format = match format {
+    let format = match options.format {
         Some(format) => format,
         None => {
             detect(&document).map_err(|problem| CameraFileError::Format { path: path.to_owned(), problem })?
         }
     };
-    let document =
-        if format == CameraFormat::Reference { reference::effective_document(&document) } else { document };
+    let mut document = match format {
+        CameraFormat::Reference => reference::effective_document(&document),
+        CameraFormat::OpenSfm => opensfm::effective_document(document),
+        _ => document,
+    };
+    if let Some(size_px) = options.size_px {
+        stated_size::complete(&mut document, format, size_px);
+    }
     Ok((document, format))
 }
 
@@ -176,21 +223,27 @@ fn key_error(path: &Path, problem: KeyProblem) -> CameraFileError {
 fn import(
     document: &Document,
     format: CameraFormat,
-    is_explicit: bool,
-    camera: Option<&str>,
+    options: &ImportOptions<'_>,
 ) -> Result<ImportedCamera, KeyProblem> {
     let entries = format.entries(document)?;
-    let entry = &entries[selection::select(&entries, camera)?];
+    let index = selection::select(&entries, options.camera)?;
+    let entry = &entries[index];
     let parts = format.table_leaves(document, &entries, entry);
     for part in &parts {
         key_table::refuse(part.keys, &part.leaves)?;
     }
     let mut imported = format
-        .import(document, entry, is_explicit)
+        .import(document, entry, options.format.is_some())
         .map_err(|problem| entry.with_full_key(document, problem))?;
+    stated_size::check(options.size_px, imported.spec.size_px)?;
     let mut applied =
         if format == CameraFormat::Reference { Vec::new() } else { timing::apply(&parts, &mut imported)? };
     applied.extend(entry.roots.iter().cloned());
+    if let Some(axes) = options.body {
+        let extrinsics = poses::read(format, document, &entries, index)?;
+        imported.notes.extend(extrinsics.apply(axes, &mut imported.spec));
+        applied.extend(extrinsics.applied);
+    }
     for part in &parts {
         imported.notes.extend(key_table::unapplied_notes(part.keys, &part.leaves, &applied));
     }

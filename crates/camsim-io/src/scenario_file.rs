@@ -151,6 +151,24 @@ pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
     deserialize(&tree)
 }
 
+/// Reads the cameras of a scenario, a `run.json`, a file with `[[cameras]]` alone, or a camera file, and checks
+/// them.
+///
+/// # Errors
+/// As [`read_rig`] or [`read_checked_camera`].
+pub fn read_cameras(path: &Path) -> Result<Vec<CameraSpec>, ScenarioError> {
+    let tree = Tree::read_scenario(path)?;
+    let is_scenario = ["camera", "flight", "scene"].iter().any(|key| tree.root.contains_key(*key));
+    if is_scenario {
+        let rig = finish(tree, &[], None)?;
+        return Ok(rig.scenarios().iter().map(|scenario| scenario.camera.clone()).collect());
+    }
+    if !tree.root.contains_key(CAMERAS) {
+        return Ok(vec![read_checked_camera(path)?]);
+    }
+    rig::read_cameras_alone(tree)
+}
+
 /// Reads a camera file and checks the ranges of all values.
 ///
 /// # Errors

@@ -8,7 +8,11 @@ use std::{
 
 use anyhow::{Context, anyhow, bail};
 use camsim_core::camera::{CameraModel, LensCheck};
-use camsim_io::{camera_file::read_camera_toml, scenario_file::read_rig};
+use camsim_core::scenario::CameraSpec;
+use camsim_io::{
+    camera_file::read_camera_toml,
+    scenario_file::{read_cameras, read_rig},
+};
 use glam::DVec2;
 
 use crate::{
@@ -78,8 +82,10 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
         .or_bad_input()?;
     // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
-    let spec = if ["camera", "cameras", "flight"].iter().any(|key| root.contains_key(*key)) {
+    let spec = if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
         choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone()
+    } else if root.contains_key("cameras") {
+        listed_camera(read_cameras(path).or_bad_input()?, name, console)?
     } else if let Some(name) = name {
         return Err(Failure::bad_input(anyhow!(
             "--camera {name} chooses one of the [[cameras]] of a scenario, and {} is a camera file: leave it out",
@@ -89,6 +95,20 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
         read_camera_toml(path).or_bad_input()?
     };
     CameraModel::from_spec(&spec).with_context(|| path.display().to_string()).or_bad_input()
+}
+
+/// The camera of a name in a file with `[[cameras]]` alone, or the first.
+fn listed_camera(
+    cameras: Vec<CameraSpec>,
+    name: Option<&str>,
+    console: &mut Console<'_>,
+) -> Result<CameraSpec, Failure> {
+    let names = cameras.iter().map(|camera| camera.name.clone()).collect::<Vec<_>>().join(", ");
+    if name.is_none() && cameras.len() > 1 {
+        console.note(format_args!("the first of {names}: --camera NAME chooses another"));
+    }
+    let chosen = cameras.into_iter().find(|camera| name.is_none_or(|name| camera.name == name));
+    chosen.ok_or_else(|| Failure::bad_input(anyhow!("there is no such camera; the cameras are {names}")))
 }
 
 fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {

@@ -17,7 +17,7 @@ mod tracks;
 mod twins;
 mod video;
 
-pub use rig::validate_rig;
+pub use rig::{validate_cameras, validate_rig};
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
 /// converged after this many never does.

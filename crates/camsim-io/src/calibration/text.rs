@@ -52,9 +52,27 @@ pub(crate) fn seconds(t_ns: i64) -> String {
     format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
 }
 
+/// The number with the fewest decimals within a tolerance.
+pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
+    let rounded = |places: i32| {
+        let scale = 10f64.powi(places);
+        (value * scale).round() / scale + 0.0
+    };
+    (0..=15).map(rounded).find(|short| (short - value).abs() <= tolerance).unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounding_noise_is_dropped_and_digits_stay() {
+        let third = 1.0 / 3.0;
+        assert_eq!(shortest(0.1 + 0.2, 1e-16), 0.3);
+        assert_eq!(shortest(-0.0, 0.0).to_bits(), 0);
+        assert_eq!(shortest(third, 1e-17), third);
+        assert_eq!(shortest(-5.618_603_727_452_336, 1e-17), -5.618_603_727_452_336);
+    }
 
     #[test]
     fn numbers_are_reals_to_every_parser() {

@@ -84,9 +84,13 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "value0.T_imu_cam.**",
         Treatment::Reported(Neutral::Never),
-        "pose of the camera to the IMU: set mount instead",
+        "pose of the camera to the IMU: `--body` or `--rig` applies it",
     ),
-    KeyRow::new("value0.cam_time_offset_ns", Treatment::Reported(Neutral::Zero), CLOCK),
+    KeyRow::new(
+        "value0.cam_time_offset_ns",
+        Treatment::Reported(Neutral::Zero),
+        "clock offset between cameras and IMU, ns: `--body` or `--rig` applies it",
+    ),
     KeyRow::new("value0.mocap_*", Treatment::Reported(Neutral::Zero), CLOCK),
     KeyRow::new("value0.T_mocap_world.**", Treatment::Ignored, "motion capture"),
     KeyRow::new("value0.T_imu_marker.**", Treatment::Ignored, "motion capture"),

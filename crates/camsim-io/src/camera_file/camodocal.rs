@@ -66,23 +66,22 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "td",
         Treatment::Reported(Neutral::Zero),
-        "clock offset between camera and IMU, s, which shifts all stamps; set shutter.delay_ms (-1000 td) if \
-         the pictures are to lag",
+        "clock offset between camera and IMU, s, which shifts all stamps: `--body` or `--rig` applies it",
     ),
     KeyRow::new(
         "extrinsicRotation",
         Treatment::Reported(Neutral::Identity),
-        "pose of the camera to the IMU: set mount instead",
+        "pose of the camera to the IMU: `--body` or `--rig` applies it",
     ),
     KeyRow::new(
         "extrinsicTranslation",
         Treatment::Reported(Neutral::Zero),
-        "pose of the camera to the IMU: set mount instead",
+        "pose of the camera to the IMU: `--body` or `--rig` applies it",
     ),
     KeyRow::new(
         "body_T_cam*",
         Treatment::Reported(Neutral::Identity),
-        "pose of the camera to the IMU: set mount instead",
+        "pose of the camera to the IMU: `--body` or `--rig` applies it",
     ),
     KeyRow::new(
         "fisheye",

@@ -8,9 +8,9 @@ use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
 const POSE: &str =
-    "pose relative to an IMU or another camera, whose axes are not the body's: set mount instead";
-const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all stamps: set shutter.delay_ms \
-                      if the pictures lag";
+    "pose relative to an IMU or another camera, whose axes are not the body's: `--body` or `--rig` applies it";
+const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all stamps: `--body` or `--rig` \
+                      applies it";
 
 pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("cam*.camera_model", Treatment::Applied, "pinhole; omni, ds, eucm and ucm are refused"),

@@ -53,7 +53,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "cameras.T_B_C",
         Treatment::Reported(Neutral::Identity),
-        "pose of the camera to the body: set mount instead",
+        "pose of the camera to the body: `--body` or `--rig` applies it",
     ),
     KeyRow::new("cameras.serial_no", Treatment::Ignored, "a name"),
     KeyRow::new("cameras.calib_date", Treatment::Ignored, "date or version"),

@@ -23,7 +23,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "cameras.T_SC",
         Treatment::Reported(Neutral::Identity),
-        "pose of the camera to the IMU: set mount instead",
+        "pose of the camera to the IMU: `--body` or `--rig` applies it",
     ),
     KeyRow::new("cameras.cam_model", Treatment::Applied, "pinhole; others are refused"),
     KeyRow::new("cameras.camera_model", Treatment::Applied, "pinhole; others are refused"),

@@ -436,7 +436,7 @@ pub(super) fn image_size(value: &Value) -> Result<[u32; 2], KeyProblem> {
     let missing = || {
         KeyProblem::new(
             "image_width",
-            "is missing: add `image_width` and `image_height` of the calibration pictures",
+            "is missing: add `image_width` and `image_height` of the calibration pictures, or give --size",
         )
     };
     stated.map(|(_, size_px)| size_px).ok_or_else(missing)

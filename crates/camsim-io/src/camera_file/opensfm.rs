@@ -19,7 +19,7 @@ pub(super) const KEYS: &[KeyRow] = &[
         "perspective (also if missing), simple_radial, radial, brown, fisheye, fisheye_opencv; others are \
          refused",
     ),
-    KeyRow::new("width", Treatment::Applied, "required; OpenSfM's camera database has none"),
+    KeyRow::new("width", Treatment::Applied, "required; OpenSfM's camera database has none: give --size"),
     KeyRow::new("height", Treatment::Applied, "required"),
     KeyRow::new("focal", Treatment::Applied, FRACTION),
     KeyRow::new("focal_x", Treatment::Applied, FRACTION),
@@ -71,13 +71,52 @@ pub(super) fn matches(document: &Document) -> bool {
             || is_camera_database(document))
 }
 
-pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
-    if is_camera_database(document) {
-        let text = "are OpenSfM's camera database, without image sizes, while all lengths are fractions of \
-                    the longer side: copy one camera to a file of its own, as {\"my camera\": \
-                    {\"projection_type\": ..., \"width\": ..., \"height\": ..., ...}}";
-        return Err(KeyProblem::new("cameras", text));
+/// The cameras of the database by maker and model, in a map like that of a reconstruction.
+pub(super) fn effective_document(document: Document) -> Document {
+    if !is_camera_database(&document) {
+        return document;
     }
+    let first = if let Value::Array(list) = &document.value { list.first() } else { Some(&document.value) };
+    let mut found = serde_json::Map::new();
+    for (maker, kinds) in first.and_then(Value::as_object).into_iter().flatten() {
+        for (kind, cameras) in kinds.as_object().into_iter().flatten() {
+            match kind.as_str() {
+                "ALL" => {
+                    found.insert(maker.clone(), cameras.clone());
+                }
+                _ => {
+                    let unit = if kind == "FOCAL" { " mm" } else { "" };
+                    for (model, camera) in cameras.as_object().into_iter().flatten() {
+                        found.insert(format!("{maker} {model}{unit}"), camera.clone());
+                    }
+                }
+            }
+        }
+    }
+    Document { root: document.root, value: serde_json::json!({ "cameras": found }) }
+}
+
+/// The cameras, to be completed.
+pub(super) fn cameras_mut(document: &mut Document) -> Vec<&mut Value> {
+    if is_camera(&document.value) {
+        return vec![&mut document.value];
+    }
+    let value = match &mut document.value {
+        Value::Array(list) => list.first_mut(),
+        value => Some(value),
+    };
+    let Some(Value::Object(map)) = value else { return Vec::new() };
+    let map = match map.get("cameras") {
+        Some(Value::Object(_)) => match map.get_mut("cameras") {
+            Some(Value::Object(cameras)) => cameras,
+            _ => return Vec::new(),
+        },
+        _ => map,
+    };
+    map.values_mut().filter(|value| is_camera(value)).collect()
+}
+
+pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
     if is_camera(&document.value) {
         return Ok(CameraEntry::single(&document.value));
     }
@@ -94,7 +133,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
         if find(value, key).is_none() {
             return Err(KeyProblem::new(
                 key,
-                "is missing: all lengths are fractions of the longer side; add width and height",
+                "is missing: all lengths are fractions of the longer side; add width and height, or give --size",
             ));
         }
     }

@@ -8,7 +8,7 @@ use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera};
 
-const POSE: &str = "pose of the camera, or of one to another: set mount instead";
+const POSE: &str = "pose of the camera, or of one to another: `--body` or `--rig` applies it";
 const COEFFICIENT: &str = "coefficient; k1 k2 p1 p2 k3 of PinHole, k1 k2 k3 k4 of KannalaBrandt8";
 
 pub(super) const KEYS: &[KeyRow] = &[
@@ -129,7 +129,7 @@ pub(super) fn import(value: &Value, name: &str) -> Result<ImportedCamera, KeyPro
     let (focal_px, principal_point_px) = ([get("fx")?, get("fy")?], [get("cx")?, get("cy")?]);
     if find(value, "Camera.width").is_none() {
         let text = "is missing: add `Camera.width` and `Camera.height` of the calibration pictures \
-                    (ORB-SLAM2 takes them from the pictures)";
+                    (ORB-SLAM2 takes them from the pictures), or give --size";
         return Err(KeyProblem::new("Camera.width", text));
     }
     let size_px = size("Camera.width", [number(value, "Camera.width")?, number(value, "Camera.height")?])?;

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::ImportedCamera;
 use super::document::{KeyProblem, as_flag, as_number};
+use crate::calibration::text::shortest;
 use super::key_table::{KeyRow, Leaf, TableLeaves, Treatment, row_of};
 
 /// Longest plausible readout (sensors need 1 to 190 ms), milliseconds.
@@ -137,6 +138,7 @@ fn read_leaf(
         }
         TimingKey::LineDelay(unit) => {
             let ms = readout_ms(leaf, number()? * rows, unit, notes)?;
+            let ms = shortest(ms, 4.0 * f64::EPSILON * ms.abs());
             if ms != 0.0 {
                 notes.push(format!("{} x {rows} rows is a readout of {ms} ms", leaf.path));
             }

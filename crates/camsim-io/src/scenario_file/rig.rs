@@ -1,11 +1,16 @@
 //! Scenarios of one camera or several as trees of values: `cameras` in place of `camera`.
 
-use camsim_core::scenario::{Rig, Scenario};
+use camsim_core::scenario::{CameraSpec, Rig, Scenario, validate_cameras};
 use serde::{Serialize, de::Error as _};
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
-use super::schema::CAMERAS;
+use super::{
+    ScenarioError, check,
+    schema::{self, CAMERAS},
+    tree::Tree,
+    unexpected,
+};
 
 /// The scenarios of a tree with paths resolved. Ranges are not checked.
 ///
@@ -50,6 +55,31 @@ pub fn rig_json(rig: &Rig) -> Result<Json, serde_json::Error> {
 
 fn json(value: &impl Serialize) -> Result<Json, serde_json::Error> {
     serde_json::to_value(value)
+}
+
+/// The cameras of a tree that has `[[cameras]]` and nothing else.
+pub(super) fn read_cameras_alone(mut tree: Tree) -> Result<Vec<CameraSpec>, ScenarioError> {
+    tree.resolve_cameras()?;
+    tree.check_cameras()?;
+    let missing = |problem: &String| schema::SCENARIO.required.iter().any(|(key, parent)| {
+        // A scenario needs a flight; a file of cameras does not.
+        parent.is_empty() && problem.contains(&format!(": {key}: is missing"))
+    });
+    let mut problems = check::check(&mut tree, &schema::SCENARIO, "");
+    problems.retain(|problem| !missing(problem));
+    if !problems.is_empty() {
+        return Err(ScenarioError::Problems(problems));
+    }
+    let cameras = tree.root.get(CAMERAS).cloned().unwrap_or(Value::Array(Vec::new()));
+    let cameras: Vec<CameraSpec> = cameras.try_into().map_err(|error| unexpected(&tree, &error))?;
+    let problems: Vec<String> = validate_cameras(&cameras)
+        .iter()
+        .map(|problem| format!("{}: {problem}", tree.location(&problem.key)))
+        .collect();
+    if !problems.is_empty() {
+        return Err(ScenarioError::Problems(problems));
+    }
+    Ok(cameras)
 }
 
 #[cfg(test)]

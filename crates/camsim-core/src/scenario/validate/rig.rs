@@ -1,7 +1,7 @@
 //! Checks of `[[cameras]]`.
 
-use super::{Check, Problem, twins::check_folder_name, validate};
-use crate::scenario::Rig;
+use super::{Check, Problem, twins::check_folder_name, validate, validate_camera};
+use crate::scenario::{CameraSpec, Rig, Scenario};
 
 /// As [`validate`], for every camera of a rig. Keys of `[[cameras]]` begin with `cameras.` and the camera's
 /// number.
@@ -11,8 +11,9 @@ pub fn validate_rig(rig: &Rig) -> Vec<Problem> {
         return validate(rig.first());
     }
     let mut check = Check::default();
-    check_names(&mut check, rig);
     let names: Vec<&str> = rig.names().collect();
+    check_names(&mut check, &names);
+    check_twins(&mut check, rig.first(), &names);
     let of_each: Vec<Vec<Problem>> = rig.scenarios().iter().map(validate).collect();
     for (i, problems) in of_each.iter().enumerate() {
         for problem in problems {
@@ -39,8 +40,21 @@ fn of_camera(problem: &Problem, index: usize, name: &str) -> Option<Problem> {
     Some(Problem { key: format!("cameras.{index}.{key}"), message })
 }
 
-fn check_names(check: &mut Check, rig: &Rig) {
-    let names: Vec<&str> = rig.names().collect();
+/// Checks the ranges of `[[cameras]]` without the rest of a scenario.
+#[must_use]
+pub fn validate_cameras(cameras: &[CameraSpec]) -> Vec<Problem> {
+    let mut check = Check::default();
+    let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+    check_names(&mut check, &names);
+    for (i, camera) in cameras.iter().enumerate() {
+        check.problems.extend(
+            validate_camera(camera).iter().filter_map(|problem| of_camera(problem, i, &camera.name)),
+        );
+    }
+    check.problems
+}
+
+fn check_names(check: &mut Check, names: &[&str]) {
     for (i, name) in names.iter().enumerate() {
         let key = format!("cameras.{i}.name");
         check_folder_name(check, &key, name);
@@ -49,7 +63,10 @@ fn check_names(check: &mut Check, rig: &Rig) {
             format!("\"{name}\" names two cameras; give each a name of its own, as it is a folder")
         });
     }
-    for (i, twin) in rig.first().output.twin.iter().enumerate() {
+}
+
+fn check_twins(check: &mut Check, scenario: &Scenario, names: &[&str]) {
+    for (i, twin) in scenario.output.twin.iter().enumerate() {
         let is_camera = names.iter().any(|name| name.eq_ignore_ascii_case(&twin.name));
         check.require(!is_camera, format!("output.twin.{i}.name"), || {
             format!("\"{}\" is the name of a camera too; choose another name for the twin", twin.name)
@@ -60,7 +77,7 @@ fn check_names(check: &mut Check, rig: &Rig) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{CameraSpec, TwinSpec, validate::tests::good};
+    use crate::scenario::{TwinSpec, validate::tests::good};
 
     fn camera(name: &str) -> CameraSpec {
         CameraSpec { name: name.into(), ..CameraSpec::default() }

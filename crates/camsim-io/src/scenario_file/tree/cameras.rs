@@ -8,9 +8,13 @@ use super::{super::schema::CAMERAS, KeyLocation, ScenarioError, Tree};
 const FILE: &str = "file";
 
 impl Tree {
-    /// Replaces camera files by their content: `camera = "file.toml"`, `file` of entries of `[[cameras]]`, and
-    /// entries that are only the name of a file.
+    /// Replaces camera files by their content: `camera = "file.toml"`, `cameras = "rig.toml"`, `file` of entries
+    /// of `[[cameras]]`, and entries that are only the name of a file.
     pub(in super::super) fn resolve_cameras(&mut self) -> Result<(), ScenarioError> {
+        if let Some(Value::String(name)) = self.root.get(CAMERAS) {
+            let name = name.clone();
+            self.rig_file(&name)?;
+        }
         if let Some(Value::String(name)) = self.root.get("camera") {
             let name = name.clone();
             let camera = self.camera_file(&name, "camera", "camera")?;
@@ -36,6 +40,35 @@ impl Tree {
         Ok(())
     }
 
+    /// Replaces `cameras = "NAME"` by the `[[cameras]]` of that file.
+    fn rig_file(&mut self, name: &str) -> Result<(), ScenarioError> {
+        let path = self.resolve(CAMERAS, name);
+        let mut rig = Self::read(&path, "").map_err(|error| self.named_by(CAMERAS, error))?;
+        let cameras = rig.root.remove(CAMERAS).filter(|cameras| cameras.is_array());
+        let (Some(cameras), None) = (cameras, rig.root.keys().next()) else {
+            return Err(ScenarioError::Problems(vec![format!(
+                "{}: {CAMERAS} = \"{name}\" names a file with [[cameras]] and nothing else, such as `camsim camera \
+                 import --rig` writes",
+                path.display()
+            )]));
+        };
+        self.root.insert(CAMERAS.into(), cameras);
+        for (key, location) in rig.locations {
+            self.locations.insert(key, location);
+        }
+        Ok(())
+    }
+
+    /// An error of reading the file that a key names.
+    fn named_by(&self, key: &str, error: ScenarioError) -> ScenarioError {
+        match error {
+            ScenarioError::Read { path, source } => {
+                ScenarioError::ReadCamera { key: key.to_owned(), path, scenario: self.file.clone(), source }
+            }
+            other => other,
+        }
+    }
+
     /// The entries of `[[cameras]]`.
     fn entries(&self) -> &[Value] {
         self.root.get(CAMERAS).and_then(Value::as_array).map_or(&[], Vec::as_slice)
@@ -45,13 +78,7 @@ impl Tree {
     /// stay.
     fn camera_file(&mut self, name: &str, named_by: &str, key: &str) -> Result<Table, ScenarioError> {
         let path = self.resolve(named_by, name);
-        let camera = Self::read_camera(&path, key).map_err(|error| match error {
-            ScenarioError::Read { path, source } => {
-                let (key, scenario) = (named_by.to_owned(), self.file.clone());
-                ScenarioError::ReadCamera { key, path, scenario, source }
-            }
-            other => other,
-        })?;
+        let camera = Self::read_camera(&path, key).map_err(|error| self.named_by(named_by, error))?;
         if named_by == key {
             self.locations.insert(key.into(), KeyLocation::File(path, 1));
         }
