@@ -229,10 +229,11 @@ pub fn mount_angles_deg(body_from_camera_axes: DQuat) -> [f64; 3] {
     shortest.unwrap_or(candidates[1])
 }
 
-/// A number rounded to decimal places.
-fn rounded(value: f64, places: i32) -> f64 {
+/// An angle rounded to decimal places; -180 is 180.
+fn rounded(angle_deg: f64, places: i32) -> f64 {
     let scale = 10f64.powi(places);
-    (value * scale).round() / scale + 0.0
+    let short = (angle_deg * scale).round() / scale + 0.0;
+    if short == -180.0 { 180.0 } else { short }
 }
 
 /// Body axis of a degree of freedom, and whether it is a rotation.

@@ -99,7 +99,7 @@ impl Calibration {
     /// What is added to a stamp to get the mid-exposure of the image's centre on the platform's clock, seconds.
     #[must_use]
     pub fn stamp_to_centre_s(&self) -> f64 {
-        let dt_s = self.shutter.dt_instant_s(FlowInstant::Centre) - self.spec.clock_offset_ns() as f64 * 1e-9;
+        let dt_s = self.shutter.dt_instant_s(FlowInstant::Centre) - 1e-3 * self.spec.clock_offset_ms;
         // Without the sign of a zero.
         dt_s + 0.0
     }

@@ -20,6 +20,7 @@ mod kalibr;
 mod key_table;
 mod lens_models;
 mod ncamera;
+mod nerfstudio;
 mod okvis;
 mod opencv;
 mod opensfm;

@@ -6,7 +6,7 @@ use super::document::{Document, KeyProblem, find};
 use super::key_table::{KeyRow, TableLeaves, leaves};
 use super::selection::CameraEntry;
 use super::{
-    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, okvis, opencv, opensfm,
+    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, nerfstudio, okvis, opencv, opensfm,
     orb_slam, reference, ros, vikit,
 };
 
@@ -47,11 +47,13 @@ pub enum CameraFormat {
     Vikit,
     /// OpenSfM and OpenDroneMap JSON.
     OpenSfm,
+    /// nerfstudio `transforms.json`.
+    Nerfstudio,
 }
 
 impl CameraFormat {
     /// Every format, in the order of detection.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Reference,
         Self::Agisoft,
         Self::Gyroflow,
@@ -69,6 +71,7 @@ impl CameraFormat {
         Self::NCamera,
         Self::Vikit,
         Self::OpenSfm,
+        Self::Nerfstudio,
     ];
 
     /// Name, as in `--format`.
@@ -91,6 +94,7 @@ impl CameraFormat {
             Self::NCamera => "ncamera",
             Self::Vikit => "vikit",
             Self::OpenSfm => "opensfm",
+            Self::Nerfstudio => "nerfstudio",
         }
     }
 
@@ -114,6 +118,7 @@ impl CameraFormat {
             Self::NCamera => "camera rigs of maplab, rpg_svo_pro and ESIM",
             Self::Vikit => "rpg_svo and FAST-LIVO YAML",
             Self::OpenSfm => "OpenSfM and OpenDroneMap JSON",
+            Self::Nerfstudio => "nerfstudio transforms.json",
         }
     }
 
@@ -137,6 +142,7 @@ impl CameraFormat {
             Self::NCamera => ncamera::matches(document),
             Self::Vikit => vikit::matches(document),
             Self::OpenSfm => opensfm::matches(document),
+            Self::Nerfstudio => nerfstudio::matches(document),
         }
     }
 
@@ -164,6 +170,7 @@ impl CameraFormat {
             | Self::Camodocal
             | Self::Reference
             | Self::Gyroflow
+            | Self::Nerfstudio
             | Self::Vikit => CameraEntry::single(&document.value),
         })
     }
@@ -190,6 +197,7 @@ impl CameraFormat {
             Self::NCamera => &[("", ncamera::KEYS)],
             Self::Vikit => &[("", vikit::KEYS)],
             Self::OpenSfm => &[("a camera, relative to its name", opensfm::KEYS)],
+            Self::Nerfstudio => &[("", nerfstudio::KEYS)],
         }
     }
 
@@ -246,6 +254,7 @@ impl CameraFormat {
             Self::NCamera => ncamera::import(value),
             Self::Vikit => vikit::import(value),
             Self::OpenSfm => opensfm::import(value),
+            Self::Nerfstudio => nerfstudio::import(value),
         }
     }
 }
@@ -269,13 +278,6 @@ pub(super) fn unsupported_hint(document: &Document) -> Option<String> {
     }
     if document.root == "lensdatabase" {
         return Some("this is a lens database without image sizes, not a camera".to_owned());
-    }
-    if find(value, "fl_x").is_some() && find(value, "w").is_some() {
-        let text = "this is nerfstudio's transforms.json, whose documentation has pixel centres at integers \
-                    and whose code at half-integers: write camera_matrix, distortion_coefficients, \
-                    image_width and image_height to a YAML file; subtract half a pixel from cx and cy if \
-                    they are from COLMAP";
-        return Some(text.to_owned());
     }
     if find(value, "ppx").is_some() {
         let text = "these are RealSense intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), \
