@@ -6,7 +6,7 @@
 #   JUDGES_DIR=DIR                 scenes and exports; default target/judges, made anew
 set -eu
 cd "$(dirname "$0")/.."
-say() { printf '%s\n' "camsim: $*" >&2; }
+. scripts/setup.sh
 
 python=$(command -v python3 || true)
 if [ -z "$python" ]; then
