@@ -253,13 +253,10 @@ fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
 
 fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficients: &[f64]) {
     check.finite(key, coefficients);
-    let (most, order) = match model {
-        LensModel::Pinhole => (0, "a pinhole has none; set camera.lens.model"),
-        LensModel::BrownConrady => (8, "the order is k1 k2 p1 p2 k3 k4 k5 k6"),
-        LensModel::KannalaBrandt => (4, "the order is k1 k2 k3 k4"),
-    };
+    let facts = model.facts();
+    let (most, order) = (facts.coefficients.len(), format!("the order is {}", facts.order()));
     check.require(coefficients.len() <= most, key, || {
-        format!("has {} values where at most {most} fit; {order}", coefficients.len())
+        format!("has {} values where at most {most} fit; {order}; {}", coefficients.len(), facts.fix)
     });
     // Three coefficients are what other programs call k1 k2 k3.
     let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
@@ -334,7 +331,8 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     let (quality, camera) = (&scenario.quality, &scenario.camera);
     let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
     let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
-    check.require(camera.lens.model != LensModel::KannalaBrandt && !rational, "quality.preset", || {
+    let is_papers = matches!(camera.lens.model, LensModel::Pinhole | LensModel::BrownConrady);
+    check.require(is_papers && !rational, "quality.preset", || {
         "\"paper\" supports only pinhole and brown-conrady lenses with k1 k2 p1 p2 k3; write \"default\""
             .into()
     });

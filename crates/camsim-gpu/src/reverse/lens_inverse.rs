@@ -86,7 +86,7 @@ impl LensUniform {
                     uniform.tangential = [p1, p2].map(finite_f32);
                 }
             }
-            Lens::KannalaBrandt(lens) => {
+            Lens::Radial(lens) => {
                 if let [k1, k2, k3, k4] = *camera.lens.coefficients() {
                     uniform.radial = [k1, k2, k3, k4].map(finite_f32);
                 }
