@@ -12,7 +12,11 @@
 //! A new model needs one file here with its facts and formula (of the radius, [`radial`], or of the ray,
 //! [`direction`]), a variant of [`LensModel`] and its line in [`facts`].
 
+use std::sync::Arc;
+
 use glam::{DMat2, DVec2, DVec3};
+
+use crate::scenario::CameraSpec;
 
 pub use crate::scenario::LensModel;
 
@@ -36,6 +40,7 @@ pub mod paper;
 mod pinhole;
 mod radial;
 mod radial_table;
+mod spline;
 mod table;
 mod ucm;
 
@@ -47,12 +52,14 @@ pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens};
 pub use pinhole::Pinhole;
 pub use radial::RadialLens;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
+pub use table::{GridOf, LensGrid, LensGridError, LensTable, RayChart};
 
 use facts::Shape;
+pub(crate) use fold::MAX_FIELD_RAD;
 
 /// Default distorted radius covered by the start table of [`Lens::new`], in units of the focal length; see
 /// [`Lens::with_reach`].
-const DEFAULT_REACH: f64 = 2.0;
+pub(crate) const DEFAULT_REACH: f64 = 2.0;
 
 /// Invalid lens coefficients.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -84,7 +91,9 @@ pub enum LensError {
         value: f64,
     },
     /// A model that is not made of coefficients.
-    #[error("lens.model \"table\" is a table of points: name its file in camera.lens_table")]
+    #[error(
+        "lens.model \"table\" is a table of points, and its file has not been read: name it in camera.lens_table"
+    )]
     NoTable,
     /// A reach that is not a positive finite number.
     #[error(
@@ -144,6 +153,21 @@ impl Lens {
             Shape::Direction(formula) => Self::Direction(Box::new(DirectionLens::new(model, all, formula))),
             Shape::Table => return Err(LensError::NoTable),
         })
+    }
+
+    /// A lens from a table of points.
+    pub fn from_grid(grid: &Arc<LensGrid>) -> Self {
+        let formula = table::formula(grid);
+        Self::Direction(Box::new(DirectionLens::new(LensModel::Table, Vec::new(), formula)))
+    }
+
+    /// The lens of a camera, with these coefficients instead of its own: the table that it names, or a model.
+    pub(crate) fn of_camera(spec: &CameraSpec, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
+        let grid = spec.lens_table.as_ref().and_then(|table| table.grid.as_ref());
+        match grid.filter(|_| spec.lens.model == LensModel::Table) {
+            Some(grid) => Ok(Self::from_grid(grid)),
+            None => Self::with_reach(spec.lens.model, coefficients, reach),
+        }
     }
 
     /// Which model this is.

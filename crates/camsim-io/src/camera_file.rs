@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use camsim_core::camera::CameraModel;
 use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 
+use crate::lens_table::{LensTableError, load_lens_table};
+
 mod agisoft;
 mod basalt;
 mod camodocal;
@@ -74,6 +76,9 @@ pub enum CameraFileError {
         /// The problem and the remedy.
         message: String,
     },
+    /// The file of a lens cannot be used.
+    #[error(transparent)]
+    LensTable(#[from] LensTableError),
     /// The values do not make a camera.
     #[error("{}: {source}", path.display())]
     Camera {
@@ -104,11 +109,14 @@ pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
         line: error.span().map(|span| line_of(&text, span.start)),
         message: with_nearest_key(error.message()),
     })?;
-    check(path, &spec)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    for file in [&mut spec.photometric.vignette, &mut spec.zoom_track].into_iter().flatten() {
+    let lens_table = spec.lens_table.as_mut().map(|table| &mut table.path);
+    let files = [spec.photometric.vignette.as_mut(), spec.zoom_track.as_mut(), lens_table];
+    for file in files.into_iter().flatten() {
         *file = folder.join(&*file);
     }
+    load_lens_table(&mut spec)?;
+    check(path, &spec)?;
     Ok(spec)
 }
 

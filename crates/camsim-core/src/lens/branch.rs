@@ -55,10 +55,18 @@ pub(super) struct Branch {
 }
 
 impl Branch {
-    /// The branch within a radius of the chart.
-    pub(super) fn new(map: &impl ChartMap, limit: f64) -> Self {
+    /// The branch within a radius of the chart. Where the map would not be one-to-one there, its limit is smaller,
+    /// but not below `least`.
+    pub(super) fn new(map: &impl ChartMap, limit: f64, least: f64) -> Self {
         let radius = |phi: f64| end_of_branch(map, DVec2::from_angle(phi), limit);
-        let border = FoldCurve::with_limit(radius, limit, false, |at| map.value(at));
+        let value = |at: DVec2| map.value(at);
+        let mut border = FoldCurve::with_limit(radius, limit, false, value);
+        let limit = one_to_one_limit(map, &border, limit, least);
+        if border.range().1 > limit {
+            let whole = border.clone();
+            // Directions of a curve are exact on its rays.
+            border = FoldCurve::with_limit(|phi| Some(whole.radius(phi).min(limit)), limit, false, value);
+        }
         let centre = map.value(DVec2::ZERO);
         let starts = starts(map, &border);
         let reach = reach(map, &border, centre);
@@ -68,6 +76,11 @@ impl Branch {
     /// Largest radius of the branch.
     pub(super) fn radius_max(&self) -> f64 {
         self.border.range().1
+    }
+
+    /// Radius of the branch in a direction; exact on the rays of a fold curve.
+    pub(super) fn radius(&self, phi_rad: f64) -> f64 {
+        self.border.radius(phi_rad)
     }
 
     /// Whether a point of the chart is inside.
@@ -97,6 +110,10 @@ impl Branch {
         if let Some(found) = self.newton(map, image, self.starts[index(cell)]) {
             return Some(found);
         }
+        let newton = |start: DVec2| {
+            self.newton(map, image, start)
+                .or_else(|| self.newton(map, image, self.approach(map, image, start)))
+        };
         let near = [[0, 1], [2, 1], [1, 0], [1, 2], [0, 0], [2, 0], [0, 2], [2, 2]].map(|step| {
             let [x, y] = [0, 1].map(|i| (cell[i] + step[i]).saturating_sub(1).min(CELLS - 1));
             self.starts[index([x, y])]
@@ -106,7 +123,7 @@ impl Branch {
             let phi = k as f64 * TAU / directions as f64;
             shares.map(|share| DVec2::from_angle(phi) * (share * self.border.radius(phi)))
         });
-        near.into_iter().chain(elsewhere).find_map(|start| self.newton(map, image, start))
+        [self.starts[index(cell)]].into_iter().chain(near).chain(elsewhere).find_map(newton)
     }
 
     /// Guarded Newton iteration: each step is pulled back where it would leave the branch, and halved where the
@@ -147,6 +164,35 @@ impl Branch {
         is_good.then_some(at)
     }
 
+    /// A point nearer to the solution, by guarded Newton steps on `F / sqrt(1 + |F|^2)`, which is as smooth near a
+    /// pole as elsewhere.
+    fn approach(&self, map: &impl ChartMap, image: DVec2, start: DVec2) -> DVec2 {
+        let flat = |image: DVec2| image / (1.0 + image.length_squared()).sqrt();
+        let wanted = flat(image);
+        let mut at = start;
+        let mut value = map.value(at);
+        let mut error = flat(value) - wanted;
+        for _ in 0..MAX_STEPS {
+            // d flat / d F = (I - f f^T) / sqrt(1 + |F|^2), whose inverse is (I + F F^T) sqrt(1 + |F|^2).
+            let full = (error + value * value.dot(error)) * (1.0 + value.length_squared()).sqrt();
+            let Some(mut step) = solve_linear(map.jacobian(at), -full) else { return at };
+            let mut moved = None;
+            for _ in 0..20 {
+                let next = self.inside(at, at + step);
+                let next_value = map.value(next);
+                let next_error = flat(next_value) - wanted;
+                if next_error.length_squared() < error.length_squared() {
+                    moved = Some((next, next_value, next_error));
+                    break;
+                }
+                step *= 0.5;
+            }
+            let Some(next) = moved else { return at };
+            (at, value, error) = next;
+        }
+        at
+    }
+
     /// `to`, or if that is outside, the point in its direction midway between the radius of `from` and the border.
     fn inside(&self, from: DVec2, to: DVec2) -> DVec2 {
         let radius = to.length();
@@ -159,6 +205,43 @@ impl Branch {
         }
         to.normalize_or_zero() * (0.5 * (from.length().min(border) + border))
     }
+}
+
+/// The largest limit, down to `least`, within which the image of the border is a simple curve.
+fn one_to_one_limit(map: &impl ChartMap, border: &FoldCurve, limit: f64, least: f64) -> f64 {
+    let is_simple = |limit: f64| {
+        let images: Vec<DVec2> = border
+            .radii()
+            .iter()
+            .enumerate()
+            .map(|(ray, radius)| {
+                let phi = ray as f64 * TAU / FOLD_RAYS as f64;
+                map.value(DVec2::from_angle(phi) * (radius.min(limit) * (1.0 - 1e-9)))
+            })
+            .collect();
+        !images.iter().all(|image| image.is_finite()) || is_simple_polygon(&images)
+    };
+    if limit <= least || is_simple(limit) || !is_simple(least) {
+        return limit;
+    }
+    let (mut low, mut high) = (least, limit);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        *(if is_simple(middle) { &mut low } else { &mut high }) = middle;
+    }
+    low
+}
+
+/// Whether no two sides of a closed polygon cross.
+fn is_simple_polygon(corners: &[DVec2]) -> bool {
+    let n = corners.len();
+    let side = |i: usize| (corners[i], corners[(i + 1) % n]);
+    let turn = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a);
+    let cross = |(a, b): (DVec2, DVec2), (c, d): (DVec2, DVec2)| {
+        let is_apart = a.max(b).cmplt(c.min(d)).any() || c.max(d).cmplt(a.min(b)).any();
+        !is_apart && turn(a, b, c) * turn(a, b, d) < 0.0 && turn(c, d, a) * turn(c, d, b) < 0.0
+    };
+    (0..n).all(|i| (i + 2..n).all(|j| !cross(side(i), side(j))))
 }
 
 fn end_of_branch(map: &impl ChartMap, axis: DVec2, limit: f64) -> Option<f64> {

@@ -6,7 +6,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::LensModel;
 use super::branch::{Branch, ChartMap};
-use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
+use super::fold::{FoldCurve, MAX_FIELD_RAD};
 
 /// A distorted point as a function of the ray.
 pub(super) trait DirectionFormula: Debug + Send + Sync {
@@ -66,18 +66,16 @@ impl DirectionLens {
     pub(super) fn new(model: LensModel, coefficients: Vec<f64>, formula: Arc<dyn DirectionFormula>) -> Self {
         let distort = |ideal: DVec2| formula.image(ideal.extend(1.0));
         let angles = Angles(&*formula);
-        let branch = formula
-            .closed_inverse()
-            .is_none()
-            .then(|| Arc::new(Branch::new(&angles, formula.angle_max().min(PI * (1.0 - 1e-9)))));
+        let branch = formula.closed_inverse().is_none().then(|| {
+            Arc::new(Branch::new(&angles, formula.angle_max().min(PI * (1.0 - 1e-9)), MAX_FIELD_RAD))
+        });
         let fold = match formula.closed_inverse() {
             Some(closed) => FoldCurve::new(|phi| closed.ideal_radius(phi), false, distort),
             None => {
-                let radius = |phi: f64| {
-                    let axis = DVec2::from_angle(phi);
-                    first_irregular_angle(|angle| angles.margins(axis * angle)).map(f64::tan)
-                };
-                FoldCurve::new(radius, false, distort)
+                // The rays of both curves are the same.
+                let radius = |phi: f64| branch.as_ref().map(|branch| branch.radius(phi));
+                let ideal = |phi: f64| radius(phi).filter(|angle| *angle < MAX_FIELD_RAD).map(f64::tan);
+                FoldCurve::new(ideal, false, distort)
             }
         };
         Self { model, coefficients, formula, fold, branch }

@@ -111,10 +111,13 @@ impl ModelFacts {
 
     /// All coefficients: those given, and the defaults of the others. `None` if too many are given.
     pub(super) fn complete(&self, given: &[f64]) -> Option<Vec<f64>> {
-        let left_out = given.len()..self.coefficients.len();
-        let of = |i: usize| self.defaults.get(i).copied().unwrap_or(0.0);
-        (given.len() <= self.coefficients.len())
-            .then(|| given.iter().copied().chain(left_out.map(of)).collect())
+        let all = || (0..self.coefficients.len()).map(|i| self.or_default(given, i)).collect();
+        (given.len() <= self.coefficients.len()).then(all)
+    }
+
+    /// A coefficient, or its default where it is left out.
+    pub(crate) fn or_default(&self, given: &[f64], i: usize) -> f64 {
+        given.get(i).or(self.defaults.get(i)).copied().unwrap_or(0.0)
     }
 }
 

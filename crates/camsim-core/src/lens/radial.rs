@@ -11,6 +11,9 @@ use super::radial_table::RadialTable;
 /// Below this ideal radius a lens is linear to the last bit.
 const ON_AXIS: f64 = 1e-9;
 
+/// Residual of a solution, in units of the focal length (relative beyond 1).
+const MAX_RESIDUAL: f64 = 1e-9;
+
 /// Distorted radius as a function of the angle off axis.
 pub(super) trait RadialFormula: Debug + Send + Sync {
     /// Distorted radius at an angle of 0 to pi, in units of the focal length; NaN where there is none.
@@ -210,7 +213,18 @@ impl RadialLens {
                 break;
             }
         }
-        theta
+        let is_there = (self.formula.radius(theta) - radius).abs() <= MAX_RESIDUAL * (1.0 + radius);
+        if is_there { theta } else { self.bisect(radius, angle_max) }
+    }
+
+    /// Beside a pole Newton's steps are too short.
+    fn bisect(&self, radius: f64, angle_max: f64) -> f64 {
+        let (mut low, mut high) = (0.0, angle_max);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if self.formula.radius(middle) > radius { &mut high } else { &mut low }) = middle;
+        }
+        0.5 * (low + high)
     }
 }
 

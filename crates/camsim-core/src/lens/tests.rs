@@ -157,7 +157,7 @@ fn non_finite_input_gives_none() {
             assert_eq!(lens.undistort(DVec2::new(0.1, bad)), None, "{name}");
             assert!(!lens.contains(DVec2::new(bad, 0.0)));
         }
-        assert_eq!(lens.undistort(DVec2::ZERO).unwrap(), DVec2::ZERO, "{name}");
+        assert!(lens.undistort(DVec2::ZERO).unwrap().length() < 1e-15, "{name}");
         assert!(lens.undistort(DVec2::splat(5e-324)).unwrap().length() < 1e-300, "{name}");
         if !matches!(lens, Lens::Pinhole(_)) {
             // Too far out for any of these lenses; the test is that nothing hangs or panics.
@@ -265,11 +265,12 @@ fn branches_end_where_their_formulas_do() {
     close(angle_max(LensModel::FTheta, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.2]), 1.2);
     // r = 1/sqrt(0.6) at the end of growth of r - 0.2 r^3.
     close(angle_max(LensModel::FThetaInverse, &[1.0, 0.0, -0.2]), (1.0 / 0.6_f64).sqrt() * (1.0 - 0.2 / 0.6));
-    // Double sphere of the paper: valid for cos t > -w2 (eq. 43), about 195 degrees for TUM-VI.
+    // Double sphere folds where its second sphere does, at cos p = -w of the unified model; the triangle of both
+    // centres gives the angle of the ray. (The paper's eq. 43 ends a little earlier.)
     let (xi, alpha): (f64, f64) = (-0.2396, 0.5589);
-    let w1 = (1.0 - alpha) / alpha;
-    let w2 = (w1 + xi) / (2.0 * w1 * xi + xi * xi + 1.0).sqrt();
-    close(angle_max(LensModel::DoubleSphere, &[xi, alpha]), (-w2).acos());
+    let cos = -(1.0 - alpha) / alpha;
+    let d = xi * cos + (1.0 - xi * xi * (1.0 - cos * cos)).sqrt();
+    close(angle_max(LensModel::DoubleSphere, &[xi, alpha]), (d * cos - xi).acos());
 }
 
 proptest! {
@@ -297,4 +298,80 @@ proptest! {
             prop_assert!((lens.distort(undistorted) - distorted).length() < 2e-9 * (1.0 + distorted.length()));
         }
     }
+}
+
+/// The points of a lens on a grid, and the lens that the table makes.
+fn tabled(lens: &Lens, chart: RayChart, of: GridOf, reach: f64, nodes: usize) -> Lens {
+    let step = 2.0 * reach / (nodes - 1) as f64;
+    let values: Vec<DVec2> = (0..nodes * nodes)
+        .map(|k| {
+            let at = DVec2::new((k % nodes) as f64, (k / nodes) as f64) * step - reach;
+            match (of, chart) {
+                (GridOf::Rays, RayChart::Ideal) => lens.distort(at),
+                (GridOf::Rays, RayChart::Angles) => lens.image(direction::ray_of(at)),
+                (GridOf::Points, RayChart::Ideal) => lens.undistort(at).unwrap(),
+                (GridOf::Points, RayChart::Angles) => direction::angles_of(lens.ray(at).unwrap()),
+            }
+        })
+        .collect();
+    let placement = [DVec2::splat(-reach), DVec2::splat(step)];
+    Lens::from_grid(&Arc::new(LensGrid::new(chart, of, placement, [nodes; 2], &values).unwrap()))
+}
+
+#[test]
+fn tables_stand_for_their_lenses() {
+    let euroc = Lens::new(LensModel::BrownConrady, &[-0.283, 0.074, 2e-4, 2e-5]).unwrap();
+    let wide = Lens::new(LensModel::KannalaBrandt, &[-0.02, 0.001, -2e-4, 1e-5]).unwrap();
+    for (name, lens, chart, of, reach) in [
+        ("ideal to points", &euroc, RayChart::Ideal, GridOf::Rays, 0.9),
+        ("points to ideal", &euroc, RayChart::Ideal, GridOf::Points, 0.6),
+        ("angles to points", &wide, RayChart::Angles, GridOf::Rays, 1.9),
+        ("points to angles", &wide, RayChart::Angles, GridOf::Points, 1.2),
+    ] {
+        let table = tabled(lens, chart, of, reach, 49);
+        assert_eq!(table.model(), LensModel::Table);
+        let mut seen = 0;
+        for k in 0..400 {
+            let at = DVec2::from_angle(f64::from(k) * 2.4) * (reach * 0.98 * f64::from(k) / 400.0);
+            let ray = match of {
+                GridOf::Rays if chart == RayChart::Ideal => at.extend(1.0).normalize(),
+                GridOf::Rays => direction::ray_of(at),
+                GridOf::Points => lens.ray(at).unwrap(),
+            };
+            // Third-order ends of the spline with 49 nodes.
+            let image = table.image(ray);
+            assert!((image - lens.image(ray)).length() < 2e-6, "{name} {at}: {image} {}", lens.image(ray));
+            assert!(table.contains_ray(ray), "{name} {at}");
+            let found = table.ray(image).unwrap_or_else(|| panic!("{name}: {at} has no inverse"));
+            assert!(found.distance(ray) < 1e-8, "{name} {at}: {ray} became {found}");
+            if ray.z > 0.1 {
+                let ideal = ray.truncate() / ray.z;
+                assert!(table.contains(ideal), "{name} {at}");
+                assert!(
+                    (table.jacobian(ideal) - lens.jacobian(ideal)).abs_diff_eq(DMat2::ZERO, 1e-3),
+                    "{name} {at}"
+                );
+            }
+            seen += 1;
+        }
+        assert_eq!(seen, 400);
+        // Beyond the grid there is nothing.
+        assert_eq!(table.ray(DVec2::splat(3.0)), None, "{name}");
+        assert!(!table.contains_ray(DVec3::new(0.1, 0.0, -1.0)), "{name}");
+        assert_eq!(table.undistort(DVec2::new(f64::NAN, 0.0)), None);
+    }
+}
+
+#[test]
+fn tables_that_are_no_lenses_are_refused() {
+    let grid = |first: f64, values: &dyn Fn(DVec2) -> DVec2| {
+        let nodes: Vec<DVec2> =
+            (0..25).map(|k| values(DVec2::new(f64::from(k % 5), f64::from(k / 5)) * 0.25 + first)).collect();
+        let placement = [DVec2::splat(first), DVec2::splat(0.25)];
+        LensGrid::new(RayChart::Ideal, GridOf::Rays, placement, [5; 2], &nodes).unwrap_err().to_string()
+    };
+    assert!(grid(0.5, &|at| at).contains("does not hold (0, 0)"));
+    assert!(grid(-0.5, &|at| DVec2::new(-at.x, at.y)).contains("mirrored"));
+    assert!(grid(-0.5, &|at| at / (at.x - 0.5)).contains("not finite"));
+    assert!(Lens::new(LensModel::Table, &[]).unwrap_err().to_string().contains("camera.lens_table"));
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::FieldOr;
+use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,9 @@ pub struct CameraSpec {
     pub mount: MountSpec,
     /// Distortion.
     pub lens: LensSpec,
+    /// File of a lens of model "table": a CSV of rays and points, or an STmap (EXR).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_table: Option<LensTable>,
     /// Calibrations by zoom, with ascending `at`; empty for a fixed lens.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub zoom: Vec<ZoomSpec>,
@@ -58,6 +62,7 @@ impl Default for CameraSpec {
             clock_offset_ms: 0.0,
             mount: MountSpec::default(),
             lens: LensSpec::default(),
+            lens_table: None,
             zoom: Vec::new(),
             zoom_track: None,
             shutter: ShutterSpec::default(),

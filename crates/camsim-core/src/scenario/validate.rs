@@ -188,6 +188,14 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     }
 
     check_coefficients(check, "camera.lens.coefficients", camera.lens.model, &camera.lens.coefficients);
+    let is_table = camera.lens.model == LensModel::Table;
+    check.require(is_table == camera.lens_table.is_some(), "camera.lens_table", || match is_table {
+        true => "is missing: camera.lens.model is \"table\"; name the file of its points".into(),
+        false => "goes with camera.lens.model = \"table\"; write that, or leave it out".into(),
+    });
+    check.require(!is_table || camera.zoom.is_empty(), "camera.zoom", || {
+        "cannot be combined with camera.lens.model = \"table\", which holds for one focal length".into()
+    });
     for (i, zoom) in camera.zoom.iter().enumerate() {
         check.finite(format!("camera.zoom.{i}.at"), &[zoom.at]);
         check_focal(check, &format!("camera.zoom.{i}.focal_px"), zoom.focal_px);

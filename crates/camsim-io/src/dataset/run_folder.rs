@@ -279,6 +279,14 @@ impl RunCamera {
         }
         let centre = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
         let LensSpec { model, coefficients: given } = lens;
+        if !matches!(model, LensModel::Pinhole | LensModel::BrownConrady | LensModel::KannalaBrandt) {
+            return Err(DatasetError::Refused(format!(
+                "{}: this layout has no place for a lens of model \"{}\": export a twin without lens \
+                 ([[output.twin]] lens = false), or a run with a brown-conrady or kannala-brandt lens",
+                self.folder.display(),
+                model.facts().name
+            )));
+        }
         let mut coefficients = [0.0; 8];
         coefficients.iter_mut().zip(given).for_each(|(place, value)| *place = *value);
         let principal_px = principal_point_px.unwrap_or(centre);
@@ -315,7 +323,7 @@ impl Intrinsics {
         match self.model {
             LensModel::Pinhole => true,
             LensModel::BrownConrady => self.coefficients == [0.0; 8],
-            LensModel::KannalaBrandt => false,
+            _ => false,
         }
     }
 
@@ -323,7 +331,8 @@ impl Intrinsics {
     #[must_use]
     pub fn radial_tangential(&self) -> Option<[f64; 4]> {
         let [k1, k2, p1, p2, rest @ ..] = self.coefficients;
-        (self.model != LensModel::KannalaBrandt && rest == [0.0; 4]).then_some([k1, k2, p1, p2])
+        let is_plain = matches!(self.model, LensModel::Pinhole | LensModel::BrownConrady);
+        (is_plain && rest == [0.0; 4]).then_some([k1, k2, p1, p2])
     }
 
     /// k1 k2 k3 k4 of a Kannala-Brandt lens.
