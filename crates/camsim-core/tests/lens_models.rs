@@ -67,26 +67,74 @@ fn forward_agrees_with_other_programs() {
 /// Twenty sets of each model, most of them far from any real lens.
 fn hostile_sets() -> Vec<Set> {
     use LensModel::{
-        BrownConradyPrism, Division, DoubleSphere, Eucm, FTheta, FThetaInverse, Fisheye624, Fov, KannalaBrandt,
-        Mei, Ucm,
+        BrownConradyPrism, Division, DoubleSphere, Eucm, FTheta, FThetaInverse, Fisheye624, Fov,
+        KannalaBrandt, Mei, Ucm,
     };
     // For each coefficient its middle and by how much it may differ.
     let models: [(LensModel, &[[f64; 2]]); 11] = [
-        (BrownConradyPrism, &[
-            [0.0, 0.5], [0.0, 0.3], [0.0, 0.05], [0.0, 0.05], [0.0, 0.1], [0.0, 0.3], [0.0, 0.1], [0.0, 0.05],
-            [0.0, 0.1], [0.0, 0.05], [0.0, 0.1], [0.0, 0.05], [0.0, 0.4], [0.0, 0.4],
-        ]),
-        (Fisheye624, &[
-            [0.0, 0.1], [0.0, 0.05], [0.0, 0.02], [0.0, 5e-3], [0.0, 1e-3], [0.0, 2e-4],
-            [0.0, 0.05], [0.0, 0.05], [0.0, 0.05], [0.0, 0.03], [0.0, 0.05], [0.0, 0.03],
-        ]),
+        (
+            BrownConradyPrism,
+            &[
+                [0.0, 0.5],
+                [0.0, 0.3],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.3],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.4],
+                [0.0, 0.4],
+            ],
+        ),
+        (
+            Fisheye624,
+            &[
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.02],
+                [0.0, 5e-3],
+                [0.0, 1e-3],
+                [0.0, 2e-4],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.03],
+                [0.0, 0.05],
+                [0.0, 0.03],
+            ],
+        ),
         (KannalaBrandt, &[[0.0, 0.3], [0.0, 0.1], [0.0, 0.02], [0.0, 2e-3]]),
-        (FTheta, &[
-            [1.0, 0.3], [0.0, 0.3], [0.0, 0.2], [0.0, 0.1], [0.0, 0.02], [1.0, 0.1], [0.0, 0.1], [0.0, 0.1],
-        ]),
-        (FThetaInverse, &[
-            [1.0, 0.3], [0.0, 0.2], [0.0, 0.1], [0.0, 0.05], [0.0, 0.02], [1.0, 0.1], [0.0, 0.1], [0.0, 0.1],
-        ]),
+        (
+            FTheta,
+            &[
+                [1.0, 0.3],
+                [0.0, 0.3],
+                [0.0, 0.2],
+                [0.0, 0.1],
+                [0.0, 0.02],
+                [1.0, 0.1],
+                [0.0, 0.1],
+                [0.0, 0.1],
+            ],
+        ),
+        (
+            FThetaInverse,
+            &[
+                [1.0, 0.3],
+                [0.0, 0.2],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.02],
+                [1.0, 0.1],
+                [0.0, 0.1],
+                [0.0, 0.1],
+            ],
+        ),
         (DoubleSphere, &[[0.0, 0.9], [0.5, 0.5]]),
         (Eucm, &[[0.5, 0.5], [2.0, 1.9]]),
         (Ucm, &[[0.5, 0.5]]),
@@ -123,7 +171,8 @@ impl Set {
     fn is_regular(&self, phi: f64, theta: f64) -> bool {
         let image = |at: DVec2| self.camera.project_ray(ray(at.y.atan2(at.x), at.length()));
         let (at, h) = (DVec2::from_angle(phi) * theta, 1e-6);
-        let [a, b] = [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
+        let [a, b] =
+            [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
         // A pole flings its neighbourhood away.
         let is_near = self.perspective() || image(at).length() < 1e9;
         is_near && a.perp_dot(b) > 0.0 && a.x + b.y > 0.0
@@ -171,7 +220,10 @@ fn judge(set: &Set) -> [usize; 2] {
     for (i, [last_good, first_bad]) in borders.iter().enumerate() {
         let phi = i as f64 * TAU / RAYS as f64;
         let end = last_good.min(limit);
-        assert!(!camera.lens.contains_ray(ray(phi, first_bad + 1e-3)) || first_bad + 1e-3 > set.limit(), "{name} {i}");
+        assert!(
+            !camera.lens.contains_ray(ray(phi, first_bad + 1e-3)) || first_bad + 1e-3 > set.limit(),
+            "{name} {i}"
+        );
         for k in 0..12 {
             let inside = ray(phi, end * (f64::from(k) + 0.7) / 12.2);
             let px = camera.project_ray(inside);
@@ -226,7 +278,11 @@ fn judge_pixels(set: &Set, borders: &[[f64; 2]], limit: f64, is_one_to_one: bool
         }
         let (turns, distance) = winding(&border, px);
         if has_border && distance > UNJUDGED_PX {
-            assert_eq!(answer.is_some(), turns > 0, "{name} {px}: {turns} turns, {distance} px from the border");
+            assert_eq!(
+                answer.is_some(),
+                turns > 0,
+                "{name} {px}: {turns} turns, {distance} px from the border"
+            );
             judged += 1;
         }
     }

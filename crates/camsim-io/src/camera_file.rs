@@ -257,7 +257,9 @@ fn plausibility_notes(spec: &CameraSpec) -> Result<Vec<String>, KeyProblem> {
             "the focal lengths {fx} and {fy} px differ by more than a factor of two: check them"
         ));
     }
-    if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
+    use LensModel::{BrownConrady, BrownConradyPrism, Pinhole};
+    let is_flat = matches!(spec.lens.model, Pinhole | BrownConrady | BrownConradyPrism);
+    if is_flat && fx > 0.0 && fx < 0.15 * width {
         let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
         notes.push(format!(
             "the horizontal field of view is about {degrees:.0} degrees, which is large for a lens that is \

@@ -257,3 +257,113 @@ pub fn lens_table_csv(camera: &CameraModel, nodes: u32) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use camsim_core::{
+        lens::LensTable,
+        scenario::{LensSpec, validate_camera},
+    };
+
+    use super::*;
+
+    fn camera(model: LensModel, coefficients: &[f64]) -> CameraSpec {
+        CameraSpec {
+            focal_px: [458.0, 457.0],
+            size_px: [752, 480],
+            principal_point_px: Some([367.0, 248.0]),
+            lens: LensSpec { model, coefficients: coefficients.to_vec() },
+            ..CameraSpec::default()
+        }
+    }
+
+    fn with_table(of: &CameraSpec, path: &Path) -> Result<CameraModel, LensTableError> {
+        let table = Some(LensTable { path: path.into(), grid: None });
+        let lens = LensSpec { model: LensModel::Table, coefficients: Vec::new() };
+        let mut spec = CameraSpec { lens, lens_table: table, ..of.clone() };
+        load_lens_table(&mut spec)?;
+        assert!(validate_camera(&spec).is_empty());
+        Ok(CameraModel::from_spec(&spec).unwrap())
+    }
+
+    /// Largest distance between the pixels of the same rays.
+    fn difference_px(a: &CameraModel, b: &CameraModel) -> f64 {
+        let px = |k: u32| DVec2::new(f64::from(k % 24) / 23.0 * 751.0, f64::from(k / 24) / 15.0 * 479.0);
+        let of = |k: u32| a.ray(px(k)).map(|ray| (b.project_ray(ray) - px(k)).length());
+        (0..24 * 16).filter_map(of).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn tables_of_lenses_stand_for_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lens.csv");
+        for (model, k) in [
+            (LensModel::BrownConrady, &[-0.28, 0.07, 2e-4, 2e-5][..]),
+            // 200 degrees from corner to corner.
+            (LensModel::KannalaBrandt, &[0.0, 0.1]),
+        ] {
+            let mut spec = camera(model, k);
+            if model == LensModel::KannalaBrandt {
+                spec.focal_px = [150.0, 151.0];
+            }
+            let exact = CameraModel::from_spec(&spec).unwrap();
+            let text = lens_table_csv(&exact, 97);
+            std::fs::write(&path, &text).unwrap();
+            let table = with_table(&spec, &path).unwrap();
+            let error_px = difference_px(&exact, &table);
+            assert!(error_px < 2e-3, "{model:?}: {error_px} px");
+            // Any order of the rows.
+            let mut lines: Vec<&str> = text.lines().collect();
+            lines[1..].reverse();
+            std::fs::write(&path, lines.join("\n")).unwrap();
+            assert!(difference_px(&with_table(&spec, &path).unwrap(), &table) < 1e-9);
+        }
+    }
+
+    #[test]
+    fn an_st_map_is_the_undistorted_place_of_every_pixel() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.exr");
+        let spec = camera(LensModel::BrownConrady, &[-0.28, 0.07, 2e-4, 2e-5]);
+        let exact = CameraModel::from_spec(&spec).unwrap();
+        let pinhole = CameraModel::from_spec(&camera(LensModel::Pinhole, &[])).unwrap();
+        let texel = |x: usize, y: usize| {
+            // Half the size of the picture.
+            let px = (DVec2::new(x as f64, y as f64) + 0.5) * 2.0 - 0.5;
+            let place = pinhole.project(exact.unproject(px).unwrap()) + 0.5;
+            ((place.x / 752.0) as f32, (1.0 - place.y / 480.0) as f32, 0.0_f32)
+        };
+        exr::prelude::write_rgb_file(&path, 376, 240, texel).unwrap();
+        let table = with_table(&spec, &path).unwrap();
+        let error_px = difference_px(&table, &exact);
+        assert!(error_px < 2e-3, "{error_px} px");
+        let centre = DVec2::new(300.3, 100.7);
+        assert!((table.unproject(centre).unwrap() - exact.unproject(centre).unwrap()).length() < 1e-6);
+    }
+
+    #[test]
+    fn errors_name_file_line_and_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lens.csv");
+        let error = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            with_table(&camera(LensModel::Pinhole, &[]), &path).unwrap_err().to_string()
+        };
+        assert!(error("u,v,a,b\n").contains("line 1: the header is `u,v,a,b`"));
+        assert!(error("u,v,x,y\n0,0,x,1\n").contains("line 2: `x` is no finite number"));
+        assert!(error("u,v,x,y\n0,0,0,0\n1,0,1,0\n0,1,0,1\n").contains("3 rows do not fill a grid of 2 x 2"));
+        let grid = |shift: f64| {
+            let row = |k: u32| {
+                let (u, v) = (f64::from(k % 5) / 4.0 - 0.5, f64::from(k / 5) / 4.0 - 0.5);
+                let u = if k == 7 { u + shift } else { u };
+                format!("{u},{v},{u},{v}\n")
+            };
+            (0..25).map(row).collect::<String>()
+        };
+        assert!(error(&format!("u,v,x,y\n{}", grid(0.05))).contains("is off the regular grid"));
+        assert!(error(&format!("u,v,y,x\n{}", grid(0.0))).contains("the header is"));
+        assert!(with_table(&camera(LensModel::Pinhole, &[]), Path::new("/no/lens.csv")).is_err());
+    }
+}

@@ -8,7 +8,11 @@ use std::{
 
 use anyhow::{Context, anyhow, bail};
 use camsim_core::camera::{CameraModel, LensCheck};
-use camsim_io::{camera_file::read_camera_toml, lens_table::load_lens_table, scenario_file::read_rig};
+use camsim_io::{
+    camera_file::read_camera_toml,
+    lens_table::{lens_table_csv, load_lens_table},
+    scenario_file::read_rig,
+};
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -42,6 +46,15 @@ enum LensCommand {
     Distort(PointsArgs),
     /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no inverse)
     Undistort(PointsArgs),
+    /// Write the pixels of a grid of rays: a file for camera.lens_table, and for other programs
+    Table {
+        /// Rays along each side of the grid
+        #[arg(long, default_value_t = 65, value_parser = clap::value_parser!(u32).range(5..=1025))]
+        nodes: u32,
+        /// Output CSV [default: standard output]
+        #[arg(short, long, value_name = "CSV")]
+        output: Option<PathBuf>,
+    },
     /// Show where the model folds, the share of the image with an inverse, and the largest round-trip error
     Check {
         /// Print JSON
@@ -69,6 +82,10 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
+        LensCommand::Table { nodes, output } => {
+            let text = lens_table_csv(&camera, *nodes);
+            write_output(output.as_deref(), console, |out| Ok(out.write_all(text.as_bytes())?))
+        }
         LensCommand::Check { json } => check(&camera, *json, console),
     }
 }

@@ -83,6 +83,11 @@ impl Branch {
         self.border.radius(phi_rad)
     }
 
+    /// The image of the border, a polygon.
+    pub(super) fn border_images(&self, map: &impl ChartMap) -> Vec<DVec2> {
+        border_images(map, &self.border, f64::INFINITY)
+    }
+
     /// Whether a point of the chart is inside.
     pub(super) fn contains(&self, map: &impl ChartMap, at: DVec2) -> bool {
         let radius = at.length();
@@ -210,15 +215,7 @@ impl Branch {
 /// The largest limit, down to `least`, within which the image of the border is a simple curve.
 fn one_to_one_limit(map: &impl ChartMap, border: &FoldCurve, limit: f64, least: f64) -> f64 {
     let is_simple = |limit: f64| {
-        let images: Vec<DVec2> = border
-            .radii()
-            .iter()
-            .enumerate()
-            .map(|(ray, radius)| {
-                let phi = ray as f64 * TAU / FOLD_RAYS as f64;
-                map.value(DVec2::from_angle(phi) * (radius.min(limit) * (1.0 - 1e-9)))
-            })
-            .collect();
+        let images = border_images(map, border, limit);
         !images.iter().all(|image| image.is_finite()) || is_simple_polygon(&images)
     };
     if limit <= least || is_simple(limit) || !is_simple(least) {
@@ -230,6 +227,15 @@ fn one_to_one_limit(map: &impl ChartMap, border: &FoldCurve, limit: f64, least: 
         *(if is_simple(middle) { &mut low } else { &mut high }) = middle;
     }
     low
+}
+
+/// Images of the border's points within a limit, slightly inside: the map is infinite at a pole.
+fn border_images(map: &impl ChartMap, border: &FoldCurve, limit: f64) -> Vec<DVec2> {
+    let point = |(ray, radius): (usize, &f64)| {
+        let phi = ray as f64 * TAU / FOLD_RAYS as f64;
+        map.value(DVec2::from_angle(phi) * (radius.min(limit) * (1.0 - 1e-9)))
+    };
+    border.radii().iter().enumerate().map(point).collect()
 }
 
 /// Whether no two sides of a closed polygon cross.
@@ -318,11 +324,8 @@ fn index([x, y]: [usize; 2]) -> usize {
 
 /// The image of the border encloses that of the branch.
 fn reach(map: &impl ChartMap, border: &FoldCurve, centre: DVec2) -> Vec<f64> {
-    // Slightly inside: the map is infinite at a pole.
-    let image = |ray: usize| {
-        let phi = (ray % FOLD_RAYS) as f64 * TAU / FOLD_RAYS as f64;
-        map.value(DVec2::from_angle(phi) * (border.radii()[ray % FOLD_RAYS] * (1.0 - 1e-9))) - centre
-    };
+    let images = border_images(map, border, f64::INFINITY);
+    let image = |ray: usize| images[ray % FOLD_RAYS] - centre;
     let mut reach = vec![0.0_f64; SECTORS];
     for ray in 0..FOLD_RAYS {
         let (here, next) = (image(ray), image(ray + 1));

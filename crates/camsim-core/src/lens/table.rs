@@ -159,7 +159,8 @@ pub(super) fn formula(grid: &Arc<LensGrid>) -> Arc<dyn DirectionFormula> {
         GridOf::Points => {
             let reach = grid.spline.reach();
             let branch = Branch::new(&Points(grid), reach, reach);
-            Arc::new(OfPoints { grid: grid.clone(), branch })
+            let rim = branch.border_images(&Points(grid));
+            Arc::new(OfPoints { grid: grid.clone(), branch, rim })
         }
     }
 }
@@ -200,6 +201,8 @@ impl DirectionFormula for OfRays {
 struct OfPoints {
     grid: Arc<LensGrid>,
     branch: Branch,
+    /// The border's image among rays, a polygon.
+    rim: Vec<DVec2>,
 }
 
 /// The spline as a map of the distorted plane.
@@ -248,18 +251,18 @@ impl ClosedInverse for OfPoints {
         is_inside.then(|| self.grid.ray(self.grid.spline.at(distorted).0))
     }
 
-    /// By bisection for the last ray that has a point.
+    /// Where the line from the axis first crosses the rim.
     fn ideal_radius(&self, phi_rad: f64) -> Option<f64> {
         let axis = DVec2::from_angle(phi_rad);
-        let is_seen = |angle: f64| self.solve((axis * angle.tan()).extend(1.0)).is_some();
-        if is_seen(MAX_FIELD_RAD) {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, MAX_FIELD_RAD);
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            *(if is_seen(middle) { &mut low } else { &mut high }) = middle;
-        }
-        Some(low.tan())
+        let sides = self.rim.iter().zip(self.rim.iter().cycle().skip(1));
+        let crossing = sides.filter_map(|(a, b)| {
+            let (from, to) = (axis.perp_dot(*a), axis.perp_dot(*b));
+            let place = a.lerp(*b, from / (from - to)).dot(axis);
+            (from * to <= 0.0 && from != to && place > 0.0).then_some(place)
+        });
+        let radius = crossing.fold(f64::INFINITY, f64::min);
+        let is_plane = self.grid.chart == RayChart::Ideal;
+        let angle = if is_plane { radius.atan() } else { radius };
+        (angle < MAX_FIELD_RAD).then(|| angle.tan())
     }
 }

@@ -97,11 +97,10 @@ pub fn planned() -> Vec<Case> {
 
 fn lens_models() -> [(LensModel, &'static [f64], f64); 11] {
     use LensModel::{
-        BrownConradyPrism, Division, DoubleSphere, Equirectangular, Eucm, FTheta, FThetaInverse, Fisheye624, Fov,
-        Mei, Ucm,
+        BrownConradyPrism, Division, DoubleSphere, Equirectangular, Eucm, FTheta, FThetaInverse, Fisheye624,
+        Fov, Mei, Ucm,
     };
-    const PRISM: &[f64] =
-        &[-0.28, 0.07, 2e-4, 2e-5, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, -0.02, 0.0, 0.05, -0.04];
+    const PRISM: &[f64] = &[-0.28, 0.07, 2e-4, 2e-5, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, -0.02, 0.0, 0.05, -0.04];
     const ARIA: &[f64] =
         &[-0.0232, 0.0924, -0.0591, 0.003, 0.0048, -9e-4, 2e-4, 5e-4, -9e-4, -1e-4, 7e-5, -1.7e-4];
     [
