@@ -6,7 +6,7 @@
 #   JUDGES_DIR=DIR                 scenes and exports; default target/judges, made anew
 set -eu
 cd "$(dirname "$0")/.."
-say() { printf '%s\n' "camsim: $*" >&2; }
+. scripts/setup.sh
 
 python=$(command -v python3 || true)
 if [ -z "$python" ]; then
@@ -46,4 +46,17 @@ judge trajectories "$dir/gs/run" "$dir/rs/run"
 judge colmap "$dir/gs/run" "$dir/fisheye/run"
 judge bag "$dir/gs/run" "$dir/fisheye/run"
 judge pictures "$dir/gs/run"
+calib="$dir/calibrations"
+"$venv/bin/python" scripts/judges/calibrations.py make "$calib"
+for camera in radtan rational prism fisheye; do
+    camsim -q lens "$calib/$camera.toml" distort --points "$calib/rays.csv" -o "$calib/$camera.px.csv"
+    for format in opencv ros colmap; do
+        camsim -q camera export "$calib/$camera.toml" --as "$format" -o "$calib/$camera.$format" ||
+            say "$format has no lens like $camera"
+    done
+done
+for format in kalibr euroc orbslam3 basalt stmap; do
+    camsim -q camera export "$calib/radtan.toml" --as "$format" -o "$calib/radtan.$format"
+done
+judge calibrations "$calib"
 say "judges: all agree"

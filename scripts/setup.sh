@@ -14,6 +14,16 @@ as_root() {
     fi
 }
 
+# cargo, which asks rustc about its target with /dev/null for a program. A tool that ran as root may have put a file in its place, and
+# what other programs have thrown away would be read as Rust; the device is made again, or the file emptied.
+cargo() {
+    if [ -e /dev/null ] && ! [ -c /dev/null ]; then
+        say "/dev/null is a file, not a device: mending it"
+        if mknod -m 666 /dev/null.new c 1 3; then mv -f /dev/null.new /dev/null; else : >/dev/null; fi
+    fi
+    command cargo "$@"
+}
+
 # apt_install REASON PACKAGE...
 apt_install() {
     reason=$1
@@ -70,12 +80,14 @@ setup_linker() {
     apt_install "no C linker (cc), which Rust needs" gcc libc6-dev || exit 2
 }
 
+has_cargo() { (unset -f cargo && command -v cargo >/dev/null 2>&1); }
+
 setup_cargo() {
-    if ! command -v cargo >/dev/null 2>&1 && [ -x "${CARGO_HOME:-${HOME:-/root}/.cargo}/bin/cargo" ]; then
+    if ! has_cargo && [ -x "${CARGO_HOME:-${HOME:-/root}/.cargo}/bin/cargo" ]; then
         PATH="${CARGO_HOME:-${HOME:-/root}/.cargo}/bin:$PATH"
         export PATH
     fi
-    if ! command -v cargo >/dev/null 2>&1; then
+    if ! has_cargo; then
         say "no cargo. Get Rust from https://rustup.rs and run this again in a new shell:"
         say "  curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh"
         exit 2

@@ -4,7 +4,7 @@
 //! Pixel coordinates are those of OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the
 //! top-left pixel, and a centred principal point is `((W - 1)/2, (H - 1)/2)`.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::lens::{Lens, LensError, LensModel};
 use crate::scenario::CameraSpec;
@@ -93,18 +93,16 @@ impl CameraModel {
         model: LensModel,
         coefficients: &[f64],
     ) -> Result<Self, CameraError> {
-        Self::with_key("camera", size_px, focal_px, principal_point_px, model, coefficients)
+        Self::with_key("camera", size_px, focal_px, principal_point_px, |reach| {
+            Lens::with_reach(model, coefficients, reach)
+        })
     }
 
     /// A camera from `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
-        Self::new(
-            spec.size_px,
-            spec.focal_px,
-            spec.principal_point_px,
-            spec.lens.model,
-            &spec.lens.coefficients,
-        )
+        Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, |reach| {
+            Lens::of_camera(spec, &spec.lens.coefficients, reach)
+        })
     }
 
     /// A camera from `[camera]` at one zoom value, by the zoom table if there is one, else as
@@ -121,8 +119,7 @@ impl CameraModel {
         size_px: [u32; 2],
         [fx, fy]: [f64; 2],
         principal_point_px: Option<[f64; 2]>,
-        model: LensModel,
-        coefficients: &[f64],
+        lens_with_reach: impl FnOnce(f64) -> Result<Lens, LensError>,
     ) -> Result<Self, CameraError> {
         let [width, height] = size_px;
         if width == 0 || height == 0 || width > MAX_SIZE_PX || height > MAX_SIZE_PX {
@@ -147,8 +144,8 @@ impl CameraModel {
             .into_iter()
             .map(|corner| ((corner - principal_point_px) / focal_px).length())
             .fold(0.0, f64::max);
-        let lens = Lens::with_reach(model, coefficients, reach)
-            .map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
+        let lens =
+            lens_with_reach(reach).map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
         Ok(Self { size_px, focal_px, principal_point_px, lens })
     }
 
@@ -157,6 +154,22 @@ impl CameraModel {
     #[inline]
     pub fn project(&self, ideal: DVec2) -> DVec2 {
         self.pixel_from_distorted(self.lens.distort(ideal))
+    }
+
+    /// Projection of a ray of any length, pixels; beyond the principal branch as [`Self::project`].
+    pub fn project_ray(&self, ray: DVec3) -> DVec2 {
+        self.pixel_from_distorted(self.lens.image(ray))
+    }
+
+    /// Unit ray at a pixel coordinate, also beyond what an ideal plane holds; `None` where the lens has no
+    /// inverse.
+    pub fn ray(&self, pixel: DVec2) -> Option<DVec3> {
+        self.lens.ray(self.distorted_from_pixel(pixel))
+    }
+
+    /// Focal lengths in the centre of the picture: those of a pinhole with as many pixels a radian there.
+    pub fn central_focal_px(&self) -> DVec2 {
+        self.focal_px * self.lens.axial_magnification()
     }
 
     /// Ideal `(u, v)` at a pixel coordinate; `None` where the lens has no inverse.

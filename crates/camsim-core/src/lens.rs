@@ -1,34 +1,65 @@
-//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and the inverse on the
-//! principal branch.
+//! Lens models: ideal `(u, v) = (x/z, y/z)` or a ray `(x, y, z)` to distorted normalised coordinates, and the
+//! inverse on the principal branch.
 //!
-//! A lens is regular in a star-shaped domain about its axis, bounded by [`Lens::fold_radius`]: there the
-//! Jacobian's determinant or trace, or the model's denominator, reaches zero for the first time along a ray
-//! from the axis. Beyond this fold the formula yields mirror images that no real lens shows, so the inverse
-//! is `None` for points whose only pre-images lie there.
+//! A lens is regular in a star-shaped domain about its axis, bounded among ideal points by
+//! [`Lens::fold_radius`]: there the Jacobian's determinant or trace, or the model's denominator, reaches zero for
+//! the first time along a ray from the axis. Beyond this fold the formula yields mirror images that no real lens
+//! shows, so the inverse is `None` for points whose only pre-images lie there.
 //!
-//! A new model needs one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain,
-//! start table), one WGSL file of the same name, and one line in each `match` below.
+//! An ideal plane ends before 90 degrees off axis; what reaches farther is asked by rays ([`Lens::image`],
+//! [`Lens::ray`], [`Lens::contains_ray`]).
+//!
+//! A new model needs one file here with its facts and formula (of the radius, [`radial`], or of the ray,
+//! [`direction`]), a variant of [`LensModel`] and its line in [`facts`].
 
-use glam::{DMat2, DVec2};
+use std::sync::Arc;
+
+use glam::{DMat2, DVec2, DVec3};
+
+use crate::scenario::CameraSpec;
 
 pub use crate::scenario::LensModel;
 
+mod branch;
 mod brown_conrady;
+mod brown_conrady_prism;
+mod direction;
+mod division;
+mod double_sphere;
+mod equirectangular;
+mod eucm;
+mod f_theta;
+mod facts;
+mod fisheye624;
 mod fold;
+mod foreign;
+mod fov;
 mod kannala_brandt;
+mod mei;
 pub mod paper;
 mod pinhole;
+mod radial;
 mod radial_table;
+mod spline;
+mod table;
+mod ucm;
 
 pub use brown_conrady::BrownConrady;
+pub use direction::DirectionLens;
+pub use facts::ModelFacts;
 pub use fold::{FOLD_RAYS, FoldCurve};
-pub use kannala_brandt::KannalaBrandt;
+pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens};
 pub use pinhole::Pinhole;
+pub use radial::RadialLens;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
+pub use table::{GridOf, LensGrid, LensGridError, LensTable, RayChart};
+
+use facts::Shape;
+pub(crate) use fold::MAX_FIELD_RAD;
 
 /// Default distorted radius covered by the start table of [`Lens::new`], in units of the focal length; see
 /// [`Lens::with_reach`].
-const DEFAULT_REACH: f64 = 2.0;
+pub(crate) const DEFAULT_REACH: f64 = 2.0;
 
 /// Invalid lens coefficients.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,7 +74,7 @@ pub enum LensError {
         /// Number of coefficients of the model.
         max: usize,
         /// Their names, in order.
-        names: &'static str,
+        names: String,
         /// Number of coefficients given.
         got: usize,
         /// How to correct it.
@@ -59,6 +90,11 @@ pub enum LensError {
         /// The value.
         value: f64,
     },
+    /// A model that is not made of coefficients.
+    #[error(
+        "lens.model \"table\" is a table of points, and its file has not been read: name it in camera.lens_table"
+    )]
+    NoTable,
     /// A reach that is not a positive finite number.
     #[error(
         "the lens must reach a positive finite distorted radius, not {0}: check focal_px, principal_point_px and size_px"
@@ -73,13 +109,15 @@ pub enum Lens {
     Pinhole(Pinhole),
     /// Radial (polynomial or rational) and tangential.
     BrownConrady(Box<BrownConrady>),
-    /// Equidistant fisheye polynomial.
-    KannalaBrandt(Box<KannalaBrandt>),
+    /// Rotation-symmetric, by the angle off axis.
+    Radial(Box<RadialLens>),
+    /// Any other function of the ray.
+    Direction(Box<DirectionLens>),
 }
 
 impl Lens {
-    /// A lens from its model and coefficients: `k1 k2 p1 p2 k3 k4 k5 k6` (Brown-Conrady), `k1 k2 k3 k4`
-    /// (Kannala-Brandt), none (pinhole); trailing zeros may be left out.
+    /// A lens from its model and coefficients in the order of [`LensModel::facts`]; trailing ones may be left
+    /// out.
     pub fn new(model: LensModel, coefficients: &[f64]) -> Result<Self, LensError> {
         Self::with_reach(model, coefficients, DEFAULT_REACH)
     }
@@ -94,31 +132,42 @@ impl Lens {
         if let Some((index, &value)) = coefficients.iter().enumerate().find(|(_, k)| !k.is_finite()) {
             return Err(LensError::NotFinite { index, value });
         }
-        Ok(match model {
-            LensModel::Pinhole => {
-                padded::<0>(
-                    coefficients,
-                    "pinhole",
-                    "none",
-                    "leave them out, or set lens.model to the model they belong to",
-                )?;
-                Self::Pinhole(Pinhole)
-            }
-            LensModel::BrownConrady => {
-                let fix = "OpenCV's thin-prism and tilt terms are not modelled; leave them out if they are zero, else recalibrate without";
-                let k = padded(coefficients, "brown-conrady", "k1 k2 p1 p2 k3 k4 k5 k6", fix)?;
+        let facts = model.facts();
+        let all = facts.complete(coefficients).ok_or_else(|| LensError::TooManyCoefficients {
+            model: facts.name,
+            max: facts.coefficients.len(),
+            names: facts.order(),
+            got: coefficients.len(),
+            fix: facts.fix,
+        })?;
+        Ok(match (facts.shape)(&all) {
+            Shape::Pinhole => Self::Pinhole(Pinhole),
+            Shape::BrownConrady => {
+                let mut k = [0.0; 8];
+                k.copy_from_slice(&all);
                 Self::BrownConrady(Box::new(BrownConrady::new(k, reach)))
             }
-            LensModel::KannalaBrandt => {
-                let k = padded(
-                    coefficients,
-                    "kannala-brandt",
-                    "k1 k2 k3 k4",
-                    "leave the others out, or set model = \"brown-conrady\"",
-                )?;
-                Self::KannalaBrandt(Box::new(KannalaBrandt::new(k, reach)))
+            Shape::Radial(formula, linear) => {
+                Self::Radial(Box::new(RadialLens::new(model, all, formula, linear, reach)))
             }
+            Shape::Direction(formula) => Self::Direction(Box::new(DirectionLens::new(model, all, formula))),
+            Shape::Table => return Err(LensError::NoTable),
         })
+    }
+
+    /// A lens from a table of points.
+    pub fn from_grid(grid: &Arc<LensGrid>) -> Self {
+        let formula = table::formula(grid);
+        Self::Direction(Box::new(DirectionLens::new(LensModel::Table, Vec::new(), formula)))
+    }
+
+    /// The lens of a camera, with these coefficients instead of its own: the table that it names, or a model.
+    pub(crate) fn of_camera(spec: &CameraSpec, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
+        let grid = spec.lens_table.as_ref().and_then(|table| table.grid.as_ref());
+        match grid.filter(|_| spec.lens.model == LensModel::Table) {
+            Some(grid) => Ok(Self::from_grid(grid)),
+            None => Self::with_reach(spec.lens.model, coefficients, reach),
+        }
     }
 
     /// Which model this is.
@@ -126,7 +175,8 @@ impl Lens {
         match self {
             Self::Pinhole(_) => LensModel::Pinhole,
             Self::BrownConrady(_) => LensModel::BrownConrady,
-            Self::KannalaBrandt(_) => LensModel::KannalaBrandt,
+            Self::Radial(lens) => lens.model,
+            Self::Direction(lens) => lens.model,
         }
     }
 
@@ -135,7 +185,8 @@ impl Lens {
         match self {
             Self::Pinhole(_) => &[],
             Self::BrownConrady(lens) => &lens.coefficients,
-            Self::KannalaBrandt(lens) => &lens.coefficients,
+            Self::Radial(lens) => &lens.coefficients,
+            Self::Direction(lens) => &lens.coefficients,
         }
     }
 
@@ -144,7 +195,7 @@ impl Lens {
         match self {
             Self::Pinhole(_) => true,
             Self::BrownConrady(lens) => lens.coefficients.iter().all(|k| *k == 0.0),
-            Self::KannalaBrandt(_) => false,
+            Self::Radial(_) | Self::Direction(_) => false,
         }
     }
 
@@ -155,16 +206,18 @@ impl Lens {
         match self {
             Self::Pinhole(lens) => lens.distort(ideal),
             Self::BrownConrady(lens) => lens.distort(ideal),
-            Self::KannalaBrandt(lens) => lens.distort(ideal),
+            Self::Radial(lens) => lens.distort(ideal),
+            Self::Direction(lens) => lens.distort(ideal),
         }
     }
 
-    /// `d distorted / d ideal`, analytic. Symmetric for every model here.
+    /// `d distorted / d ideal`, analytic.
     pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
         match self {
             Self::Pinhole(lens) => lens.jacobian(ideal),
             Self::BrownConrady(lens) => lens.jacobian(ideal),
-            Self::KannalaBrandt(lens) => lens.jacobian(ideal),
+            Self::Radial(lens) => lens.jacobian(ideal),
+            Self::Direction(lens) => lens.jacobian(ideal),
         }
     }
 
@@ -174,7 +227,67 @@ impl Lens {
         match self {
             Self::Pinhole(lens) => lens.undistort(distorted),
             Self::BrownConrady(lens) => lens.undistort(distorted),
-            Self::KannalaBrandt(lens) => lens.undistort(distorted),
+            Self::Radial(lens) => lens.undistort(distorted),
+            Self::Direction(lens) => lens.undistort(distorted),
+        }
+    }
+
+    /// Forward, from a ray of any length, also beside and behind the camera where the lens reaches so far
+    /// ([`Lens::contains_ray`]).
+    pub fn image(&self, ray: DVec3) -> DVec2 {
+        match self {
+            Self::Pinhole(_) | Self::BrownConrady(_) => self.distort(ray.truncate() / ray.z),
+            Self::Radial(lens) => lens.image(ray),
+            Self::Direction(lens) => lens.image(ray),
+        }
+    }
+
+    /// `d image / d (x, y, z)`, analytic: one column each. The product with the ray is zero.
+    pub fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        match self {
+            Self::Pinhole(_) | Self::BrownConrady(_) => {
+                direction::gradient_of_plane(self.jacobian(ray.truncate() / ray.z), ray)
+            }
+            Self::Radial(lens) => lens.gradient(ray),
+            Self::Direction(lens) => lens.gradient(ray),
+        }
+    }
+
+    /// Inverse on the principal branch: the unit ray with the image `distorted`. `None` if there is none.
+    pub fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+        match self {
+            Self::Pinhole(_) | Self::BrownConrady(_) => {
+                self.undistort(distorted).map(|ideal| ideal.extend(1.0).normalize())
+            }
+            Self::Radial(lens) => lens.ray(distorted),
+            Self::Direction(lens) => lens.ray(distorted),
+        }
+    }
+
+    /// Whether a ray lies on the principal branch, so that `ray(image(ray))` is its direction.
+    pub fn contains_ray(&self, ray: DVec3) -> bool {
+        match self {
+            Self::Pinhole(_) | Self::BrownConrady(_) => ray.z > 0.0 && self.contains(ray.truncate() / ray.z),
+            Self::Radial(lens) => lens.contains_ray(ray),
+            Self::Direction(lens) => lens.contains_ray(ray),
+        }
+    }
+
+    /// Largest angle off axis of a ray, radians.
+    pub fn angle_max_rad(&self) -> f64 {
+        match self {
+            Self::Pinhole(_) => std::f64::consts::FRAC_PI_2,
+            Self::BrownConrady(lens) => lens.fold.range().1.atan(),
+            Self::Radial(lens) => lens.angle_max_rad(),
+            Self::Direction(lens) => lens.angle_max_rad(),
+        }
+    }
+
+    /// How much the lens magnifies on its axis; 1 for models whose focal length is that of the centre.
+    pub fn axial_magnification(&self) -> f64 {
+        match self {
+            Self::Pinhole(_) | Self::BrownConrady(_) => 1.0,
+            Self::Radial(_) | Self::Direction(_) => self.jacobian(DVec2::ZERO).determinant().abs().sqrt(),
         }
     }
 
@@ -183,25 +296,27 @@ impl Lens {
         match self {
             Self::Pinhole(_) => None,
             Self::BrownConrady(lens) => Some(&lens.fold),
-            Self::KannalaBrandt(lens) => Some(&lens.fold),
+            Self::Radial(lens) => Some(&lens.fold),
+            Self::Direction(lens) => Some(&lens.fold),
         }
     }
 
     /// Start table of the inverse, or `None` for a model without one.
     pub fn radial_table(&self) -> Option<&RadialTable> {
         match self {
-            Self::Pinhole(_) => None,
+            Self::Pinhole(_) | Self::Direction(_) => None,
             Self::BrownConrady(lens) => Some(&lens.table),
-            Self::KannalaBrandt(lens) => Some(&lens.table),
+            Self::Radial(lens) => Some(&lens.table),
         }
     }
 
-    /// Bound on the distorted radius of the principal branch; infinite for a pinhole.
+    /// Bound on the distorted radius of ideal points of the principal branch; infinite for a pinhole.
     pub fn distorted_max(&self) -> f64 {
         match self {
             Self::Pinhole(_) => f64::INFINITY,
             Self::BrownConrady(lens) => lens.fold.distorted_max(),
-            Self::KannalaBrandt(lens) => lens.distorted_max(),
+            Self::Radial(lens) => lens.distorted_max(),
+            Self::Direction(lens) => lens.fold.distorted_max(),
         }
     }
 
@@ -223,29 +338,6 @@ impl Lens {
         let is_near = ideal.length_squared() < self.contained_radius().powi(2);
         is_near || ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
     }
-}
-
-/// Coefficients padded with zeros to the model's count.
-fn padded<const N: usize>(
-    coefficients: &[f64],
-    model: &'static str,
-    names: &'static str,
-    fix: &'static str,
-) -> Result<[f64; N], LensError> {
-    let mut all = [0.0; N];
-    match all.get_mut(..coefficients.len()) {
-        Some(head) => head.copy_from_slice(coefficients),
-        None => {
-            return Err(LensError::TooManyCoefficients {
-                model,
-                max: N,
-                names,
-                got: coefficients.len(),
-                fix,
-            });
-        }
-    }
-    Ok(all)
 }
 
 #[cfg(test)]

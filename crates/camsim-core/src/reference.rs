@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
-    lens::Lens,
+    lens::{DEFAULT_REACH, Lens},
     pose::CameraPose,
     scenario::CameraSpec,
     sequence::Sequence,
@@ -350,7 +350,7 @@ fn lens_inverse(
     principal_px: [f64; 2],
     coefficients: &[f64],
 ) -> Result<LensInverse, CameraError> {
-    let lens = Lens::new(camera.lens.model, coefficients)
+    let lens = Lens::of_camera(camera, coefficients, DEFAULT_REACH)
         .map_err(|source| CameraError::Lens { key: "camera".to_owned(), source })?;
     Ok(LensInverse::new(camera.size_px, focal_px, principal_px, lens))
 }
@@ -374,7 +374,7 @@ fn lens_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<LensInverse, CameraErr
     let principal_px =
         mix2(low.principal_point_px.unwrap_or(centre), high.principal_point_px.unwrap_or(centre));
     let count = low.coefficients.len().max(high.coefficients.len());
-    let coefficient = |of: &[f64], i: usize| of.get(i).copied().unwrap_or(0.0);
+    let coefficient = |of: &[f64], i: usize| camera.lens.model.facts().or_default(of, i);
     let coefficients: Vec<f64> = (0..count)
         .map(|i| mix(coefficient(&low.coefficients, i), coefficient(&high.coefficients, i)))
         .collect();

@@ -19,6 +19,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     camera::CameraModel,
+    lens::MAX_FIELD_RAD,
     mount::CameraPath,
     pose::CameraPose,
     scene::RigidMotion,
@@ -122,7 +123,7 @@ struct Projection {
 
 impl CameraModel {
     /// Pixel coordinates at which a camera shows a point at path time `t_s`, and its planar depth (infinite for
-    /// a direction); `None` if it is behind the camera or beyond the reach of the lens. Only a point on something
+    /// a direction); `None` if it is beyond the reach of the lens. What lies beside or behind the camera has its distance for a depth. Only a point on something
     /// that moves depends on the time.
     #[must_use]
     pub fn show(&self, pose: &CameraPose, t_s: f64, point: WorldPoint<'_>) -> Option<(DVec2, f64)> {
@@ -133,11 +134,20 @@ impl CameraModel {
             WorldPoint::Towards(direction_ned) => (camera_from_ned * direction_ned, true),
             WorldPoint::On { motion, at_start_ned_m } => from_camera(motion.state(t_s).point(at_start_ned_m)),
         };
-        if ray.z.is_nan() || ray.z <= 0.0 {
-            return None;
-        }
+        self.seen(ray, is_far)
+    }
+
+    /// Pixel coordinates and depth of what lies along a ray of the camera.
+    fn seen(&self, ray: DVec3, is_far: bool) -> Option<(DVec2, f64)> {
+        let depth_m = |depth_m: f64| if is_far { f64::INFINITY } else { depth_m };
         let uv = ray.truncate() / ray.z;
-        self.lens.contains(uv).then(|| (self.project(uv), if is_far { f64::INFINITY } else { ray.z }))
+        if ray.z > 0.0 && self.lens.contains(uv) {
+            return Some((self.project(uv), depth_m(ray.z)));
+        }
+        // What an ideal plane does not hold.
+        let is_beyond = self.lens.angle_max_rad() > MAX_FIELD_RAD && self.lens.contains_ray(ray);
+        let is_seen = is_beyond && (ray.z <= 0.0 || uv.length() >= MAX_FIELD_RAD.tan());
+        is_seen.then(|| (self.project_ray(ray), depth_m(if ray.z > 0.0 { ray.z } else { ray.length() })))
     }
 }
 

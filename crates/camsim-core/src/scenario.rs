@@ -86,6 +86,24 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// This flight over this scene; all other keys have their defaults.
+    #[must_use]
+    pub fn new(flight: FlightSpec, scene: SceneSpec) -> Self {
+        Self {
+            seed: 0,
+            flight,
+            tracker: TrackerSpec::default(),
+            camera: CameraSpec::default(),
+            scene,
+            quality: QualitySpec::default(),
+            output: OutputSpec::default(),
+            imu: Vec::new(),
+            gnss: Vec::new(),
+            barometer: Vec::new(),
+            magnetometer: Vec::new(),
+        }
+    }
+
     /// Seed of the camera's noise, from the scenario's seed and the camera's name.
     #[must_use]
     pub fn noise_seed(&self) -> u64 {
@@ -132,6 +150,27 @@ pub struct FlightSpec {
     /// Time scale: 2 flies the log twice as fast.
     #[serde(default = "one")]
     pub speed: f64,
+}
+
+impl FlightSpec {
+    /// A log in a layout of its own marks; all other keys have their defaults.
+    #[must_use]
+    pub fn new(log: impl Into<PathBuf>) -> Self {
+        Self {
+            log: log.into(),
+            format: LogFormat::default(),
+            time_unit: TimeUnit::default(),
+            angle_unit: AngleUnit::default(),
+            angles: AngleKind::default(),
+            attitude: AttitudeSource::default(),
+            origin: Origin::default(),
+            height: HeightReference::default(),
+            height_from: HeightSource::default(),
+            topic: None,
+            window_s: None,
+            speed: one(),
+        }
+    }
 }
 
 /// Column layouts of flight logs.

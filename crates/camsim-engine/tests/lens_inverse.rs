@@ -131,7 +131,7 @@ fn distance(border: &[DVec2], pixel: DVec2) -> f64 {
 /// for a fisheye, whose ideal plane stretches without bound.
 fn error_px(camera: &CameraModel, expected: DVec2, got: DVec2) -> f64 {
     match camera.lens {
-        Lens::KannalaBrandt(_) => (camera.project(got) - camera.project(expected)).length(),
+        Lens::Radial(_) => (camera.project(got) - camera.project(expected)).length(),
         _ => ((got - expected) * camera.focal_px).length() / expected.length().max(1.0),
     }
 }

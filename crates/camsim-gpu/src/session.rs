@@ -18,7 +18,7 @@ use crate::{
     recorder::{PassClock, PassTime, Recorder},
     reverse::{
         EMPTY_LIST, ReverseBindings, ReversePass,
-        lens_inverse::{LensInversePass, LensMap},
+        lens_inverse::{LensInversePass, LensMap, has_shader},
     },
     shaders::ComposeError,
     staging::Staging,
@@ -321,6 +321,13 @@ impl<'a> GpuSession<'a> {
         let (device, plan) = (&self.gpu.device, job.plan);
         let zoom_bits = plan.zoom.unwrap_or_default().to_bits();
         if self.lens_map.as_ref().is_some_and(|(of, _)| *of == zoom_bits) {
+            return;
+        }
+        if !has_shader(plan.camera.lens.model()) {
+            let (_, map) =
+                self.lens_map.take().unwrap_or_else(|| (0, LensMap::new(device, plan.camera.size_px)));
+            map.upload(device, recorder, &plan.camera);
+            self.lens_map = Some((zoom_bits, map));
             return;
         }
         let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(device));

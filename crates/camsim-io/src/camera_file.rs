@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use camsim_core::camera::CameraModel;
 use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 
+use crate::lens_table::{LensTableError, load_lens_table};
+
 mod agisoft;
 mod basalt;
 mod camodocal;
@@ -18,6 +20,7 @@ mod format;
 mod gyroflow;
 mod kalibr;
 mod key_table;
+mod lensfun;
 mod lens_models;
 mod ncamera;
 mod nerfstudio;
@@ -38,6 +41,7 @@ mod vikit;
 
 use document::{Document, KeyProblem};
 pub use format::CameraFormat;
+pub use lensfun::{LensfunCamera, LensfunQuery, import_lensfun};
 pub use poses::BodyAxes;
 pub use rig::{ImportedRig, import_rig};
 
@@ -80,6 +84,9 @@ pub enum CameraFileError {
         /// The problem and the remedy.
         message: String,
     },
+    /// The file of a lens cannot be used.
+    #[error(transparent)]
+    LensTable(#[from] LensTableError),
     /// The values do not make a camera.
     #[error("{}: {source}", path.display())]
     Camera {
@@ -123,11 +130,14 @@ pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
         line: error.span().map(|span| line_of(&text, span.start)),
         message: with_nearest_key(error.message()),
     })?;
-    check(path, &spec)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    for file in [&mut spec.photometric.vignette, &mut spec.zoom_track].into_iter().flatten() {
+    let lens_table = spec.lens_table.as_mut().map(|table| &mut table.path);
+    let files = [spec.photometric.vignette.as_mut(), spec.zoom_track.as_mut(), lens_table];
+    for file in files.into_iter().flatten() {
         *file = folder.join(&*file);
     }
+    load_lens_table(&mut spec)?;
+    check(path, &spec)?;
     Ok(spec)
 }
 
@@ -303,7 +313,9 @@ fn plausibility_notes(spec: &CameraSpec) -> Result<Vec<String>, KeyProblem> {
             "the focal lengths {fx} and {fy} px differ by more than a factor of two: check them"
         ));
     }
-    if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
+    use LensModel::{BrownConrady, BrownConradyPrism, Pinhole};
+    let is_flat = matches!(spec.lens.model, Pinhole | BrownConrady | BrownConradyPrism);
+    if is_flat && fx > 0.0 && fx < 0.15 * width {
         let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
         notes.push(format!(
             "the horizontal field of view is about {degrees:.0} degrees, which is large for a lens that is \
@@ -406,8 +418,12 @@ fn camera(
     mut coefficients: Vec<f64>,
 ) -> ImportedCamera {
     let used = coefficients.iter().rposition(|k| *k != 0.0).map_or(0, |last| last + 1);
-    // Three coefficients k1, k2, p1 could be mistaken for k1, k2, k3.
-    coefficients.truncate(if used == 3 && model == LensModel::BrownConrady { 4 } else { used });
+    match model {
+        // Three coefficients k1, k2, p1 could be mistaken for k1, k2, k3.
+        LensModel::BrownConrady if used == 3 => coefficients.truncate(4),
+        LensModel::BrownConrady | LensModel::KannalaBrandt => coefficients.truncate(used),
+        _ => {}
+    }
     let mut spec = CameraSpec {
         size_px,
         focal_px,

@@ -27,6 +27,7 @@ pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
     let mut paths = vec![scenario.flight.log.clone()];
     paths.extend(scenario.camera.photometric.vignette.clone());
     paths.extend(scenario.camera.zoom_track.clone());
+    paths.extend(scenario.camera.lens_table.iter().map(|table| table.path.clone()));
     for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
         paths.push(picture.clone());
         paths.extend(sidecar_files(picture));

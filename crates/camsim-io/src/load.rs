@@ -21,6 +21,7 @@ use crate::{
     board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
     gltf_file::{GltfError, MAX_RADIUS_M},
+    lens_table::{LensTableError, load_lens_table},
     pictures::{PictureError, read_gray_image},
     terrain::{TerrainFileError, TerrainSummary},
 };
@@ -190,6 +191,9 @@ pub enum LoadError {
         /// What is wrong.
         problem: String,
     },
+    /// The file of a lens cannot be used.
+    #[error(transparent)]
+    LensTable(#[from] LensTableError),
     /// A sensor cannot be simulated.
     #[error(transparent)]
     Sensor(#[from] SensorError),
@@ -311,8 +315,10 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let platform_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
     let epoch_ns = platform_ns.saturating_add(scenario.camera.clock_offset_ns());
+    let mut with_table = scenario.clone();
+    load_lens_table(&mut with_table.camera)?;
     let sequence = Sequence {
-        scenario: scenario.clone(),
+        scenario: with_table,
         path: Arc::new(path),
         epoch_ns,
         start_s,

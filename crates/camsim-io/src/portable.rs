@@ -85,8 +85,13 @@ pub fn portable_rig(rig: &Rig, folder: &Path) -> Result<serde_json::Value, serde
 /// A file cannot be read or written.
 pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError> {
     let mut portable = camera.clone();
-    for (path, name) in [(&mut portable.photometric.vignette, "vignette"), (&mut portable.zoom_track, "zoom")]
-    {
+    let lens_table = portable.lens_table.as_mut().map(|table| &mut table.path);
+    let files = [
+        (portable.photometric.vignette.as_mut(), "vignette"),
+        (portable.zoom_track.as_mut(), "zoom"),
+        (lens_table, "lens"),
+    ];
+    for (path, name) in files {
         if let Some(path) = path {
             *path = path_within(folder, path, name)?;
         }

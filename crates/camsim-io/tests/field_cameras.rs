@@ -45,12 +45,12 @@ fn vins_rolling_shutter_is_33_ms() {
 }
 
 #[test]
-fn mirror_parameter_is_refused() {
-    let error = refused("omni_sample.yml");
-    assert!(error.contains("xi: is 1.4") && error.contains("MEI (omnidirectional)"), "{error}");
-    let forced =
-        import_camera_as(&field("omni_sample.yml"), Some(CameraFormat::OpenCv)).unwrap_err().to_string();
-    assert!(forced.contains("MEI (omnidirectional)"), "{forced}");
+fn mirror_parameter_makes_a_mei_lens() {
+    let imported = import_camera_as(&field("omni_sample.yml"), None).unwrap();
+    let lens = &imported.spec.lens;
+    assert_eq!((lens.model, &lens.coefficients[..]), (LensModel::Mei, &[1.4, -0.1, 0.2, 0.001, 0.002][..]));
+    // Its lens has a focal length of 780 / 2.4 px.
+    assert_eq!(imported.spec.focal_px, [780.0, 780.3]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use camsim_core::{
     mount::{CameraPath, MountError},
     pose::BodyState,
-    scenario::{CameraSpec, FlightSpec, OutputSpec, QualitySpec, Scenario, SceneSpec, TrackerSpec},
+    scenario::{CameraSpec, FlightSpec, Scenario, SceneSpec},
     scene::{Scene, TerrainError},
     sequence::Sequence,
     trajectory::Trajectory,
@@ -185,32 +185,8 @@ impl ConstantTwist {
 /// The mount is invalid.
 pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Result<Sequence, MountError> {
     let path = CameraPath::new(trajectory, &camera.mount)?;
-    let scenario = Scenario {
-        seed: SEED,
-        flight: FlightSpec {
-            log: "in-memory".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            height_from: Default::default(),
-            topic: None,
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: TrackerSpec::default(),
-        camera,
-        scene: SceneSpec::default(),
-        quality: QualitySpec::default(),
-        output: OutputSpec::default(),
-        imu: Vec::new(),
-        gnss: Vec::new(),
-        barometer: Vec::new(),
-        magnetometer: Vec::new(),
-    };
+    let scenario =
+        Scenario { seed: SEED, camera, ..Scenario::new(FlightSpec::new("in-memory"), SceneSpec::default()) };
     Ok(Sequence {
         scenario,
         path: Arc::new(path),

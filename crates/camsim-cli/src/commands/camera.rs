@@ -6,7 +6,10 @@ use anyhow::anyhow;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
     calibration::{CalibrationFormat, export},
-    camera_file::{BodyAxes, CameraFormat, ImportOptions, import_camera_with, import_rig},
+    camera_file::{
+        BodyAxes, CameraFormat, ImportOptions, LensfunQuery, import_camera_with, import_lensfun, import_rig,
+    },
+    lens_table::load_lens_table,
     scenario_file::read_cameras,
     write::write_atomic,
 };
@@ -34,14 +37,16 @@ enum CameraCommand {
 ///
 /// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info (file, message, .ini),
 /// camodocal (VINS) YAML, COLMAP cameras.txt, Agisoft Metashape XML, OpenSfM and OpenDroneMap JSON, ORB-SLAM,
-/// OKVIS, Basalt, maplab, rpg_svo and ESIM files, the reference program's XML and Gyroflow lens profiles. The
+/// OKVIS, Basalt, maplab, rpg_svo and ESIM files, nerfstudio's transforms.json, the reference program's XML and
+/// Gyroflow lens profiles, and lenses of lensfun's database. The
 /// format is detected by content. If a file is ambiguous, it is not guessed: use --format or --camera.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   camsim camera import cam0.yaml -o CAMERA.toml
   camsim camera import camchain.yaml --rig -o RIG.toml    # then, in a scenario: cameras = \"RIG.toml\"
-  camsim camera import TUM1.yaml --size 640x480 -o CAMERA.toml")]
+  camsim camera import TUM1.yaml --size 640x480 -o CAMERA.toml
+  camsim camera import slr-canon.xml --lens 'EF 24-70mm f/2.8L USM' --focal 35 --size 6000x4000 -o CAMERA.toml")]
 struct ImportArgs {
     /// Calibration file
     file: PathBuf,
@@ -64,6 +69,15 @@ struct ImportArgs {
     /// Size of the pictures, for files that state none
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = parse_size)]
     size: Option<[u32; 2]>,
+    /// Lens of a lensfun database (XML), by its name or a part of it
+    #[arg(long, value_name = "NAME", requires_all = ["focal", "size"], conflicts_with_all = ["rig", "camera", "format", "body"])]
+    lens: Option<String>,
+    /// Focal length of that lens, mm
+    #[arg(long, value_name = "MM", requires = "lens")]
+    focal: Option<f64>,
+    /// Crop factor of the camera with that lens [default: that of the calibration]
+    #[arg(long, value_name = "FACTOR", requires = "lens")]
+    crop: Option<f64>,
 }
 
 /// `--body`.
@@ -115,6 +129,25 @@ pub fn run(args: &CameraArgs, console: &mut Console<'_>) -> Result<(), Failure> 
 }
 
 fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let (format, notes, text) = match (&args.lens, args.focal, args.size) {
+        (Some(lens), Some(focal_mm), Some(size_px)) => {
+            let query = LensfunQuery { lens, focal_mm, size_px, crop: args.crop };
+            let camera = import_lensfun(&args.file, &query).or_bad_input()?;
+            ("lensfun", camera.notes, toml::to_string(&camera.spec).or_failed()?)
+        }
+        _ => import_file(args)?,
+    };
+    console.note(format_args!("{}: read as {format}", args.file.display()));
+    for note in &notes {
+        console.note(format_args!("note: {note}"));
+    }
+    let header = format!("# Imported from {} ({format}).\n", file_name(&args.file));
+    let text = header + &text;
+    write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
+}
+
+/// Name of the format, notes, and the TOML of one camera or of all.
+fn import_file(args: &ImportArgs) -> Result<(&'static str, Vec<String>, String), Failure> {
     let format = match &args.format {
         None => None,
         Some(name) => {
@@ -142,13 +175,7 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     if args.rig && body.is_none() {
         notes.push("the file's body or IMU is read as x forward, y left, z up: --body frd is the other choice".into());
     }
-    console.note(format_args!("{}: read as {}", args.file.display(), format.name()));
-    for note in &notes {
-        console.note(format_args!("note: {note}"));
-    }
-    let header = format!("# Imported from {} ({}).\n", file_name(&args.file), format.name());
-    let text = header + &text;
-    write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
+    Ok((format.name(), notes, text))
 }
 
 /// A vignette is named relative to the calibration, and the CAMERA.toml may be written elsewhere. So the path
@@ -180,6 +207,7 @@ fn export_cameras(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Fa
         let index = cameras.iter().position(|camera| camera.name == *name).ok_or_else(unknown)?;
         cameras = vec![cameras.swap_remove(index)];
     }
+    cameras.iter_mut().try_for_each(load_lens_table).or_bad_input()?;
     let exported = export(&cameras, format).or_bad_input()?;
     for note in &exported.notes {
         console.note(format_args!("note: {note}"));

@@ -11,9 +11,10 @@ use camsim_core::camera::{CameraModel, LensCheck};
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
     camera_file::read_camera_toml,
+    lens_table::{lens_table_csv, load_lens_table},
     scenario_file::{read_cameras, read_rig},
 };
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
     console::Console,
@@ -46,6 +47,15 @@ enum LensCommand {
     Distort(PointsArgs),
     /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no inverse)
     Undistort(PointsArgs),
+    /// Write the pixels of a grid of rays: a file for camera.lens_table, and for other programs
+    Table {
+        /// Rays along each side of the grid
+        #[arg(long, default_value_t = 65, value_parser = clap::value_parser!(u32).range(5..=1025))]
+        nodes: u32,
+        /// Output CSV [default: standard output]
+        #[arg(short, long, value_name = "CSV")]
+        output: Option<PathBuf>,
+    },
     /// Show where the model folds, the share of the image with an inverse, and the largest round-trip error
     Check {
         /// Print JSON
@@ -62,6 +72,9 @@ struct PointsArgs {
     /// Output CSV, one row per input row [default: standard output]
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
+    /// Rays x,y,z (right, down, forward) instead of u,v: also beside and behind the camera
+    #[arg(long)]
+    rays: bool,
 }
 
 /// Runs a lens command.
@@ -70,6 +83,10 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
+        LensCommand::Table { nodes, output } => {
+            let text = lens_table_csv(&camera, *nodes);
+            write_output(output.as_deref(), console, |out| Ok(out.write_all(text.as_bytes())?))
+        }
         LensCommand::Check { json } => check(&camera, *json, console),
     }
 }
@@ -83,9 +100,14 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
     // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
     let spec = if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
-        choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone()
+        let mut spec =
+            choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone();
+        load_lens_table(&mut spec).or_bad_input()?;
+        spec
     } else if root.contains_key("cameras") {
-        listed_camera(read_cameras(path).or_bad_input()?, name, console)?
+        let mut spec = listed_camera(read_cameras(path).or_bad_input()?, name, console)?;
+        load_lens_table(&mut spec).or_bad_input()?;
+        spec
     } else if let Some(name) = name {
         return Err(Failure::bad_input(anyhow!(
             "--camera {name} chooses one of the [[cameras]] of a scenario, and {} is a camera file: leave it out",
@@ -112,12 +134,25 @@ fn listed_camera(
 }
 
 fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
-    let points = read_points(args.points.as_deref(), ["u", "v"]).or_bad_input()?;
-    let unknown = points.iter().filter(|ideal| !ideal.is_finite()).count();
-    let beyond = points.iter().filter(|ideal| ideal.is_finite() && !camera.lens.contains(**ideal)).count();
+    let path = args.points.as_deref();
+    let rays: Vec<DVec3> = match args.rays {
+        true => read_points(path, ["x", "y", "z"]).or_bad_input()?.into_iter().map(DVec3::from).collect(),
+        false => {
+            let points = read_points(path, ["u", "v"]).or_bad_input()?;
+            points.into_iter().map(|[u, v]| DVec3::new(u, v, 1.0)).collect()
+        }
+    };
+    let is_known = |ray: &DVec3| ray.is_finite() && *ray != DVec3::ZERO;
+    let unknown = rays.iter().filter(|ray| !is_known(ray)).count();
+    let is_seen = |ray: DVec3| match args.rays {
+        true => camera.lens.contains_ray(ray),
+        false => camera.lens.contains(ray.truncate()),
+    };
+    let beyond = rays.iter().filter(|ray| is_known(ray) && !is_seen(**ray)).count();
     write_output(args.output.as_deref(), console, |out| {
         writeln!(out, "x_px,y_px")?;
-        for pixel in points.iter().map(|ideal| camera.project(*ideal)) {
+        for ray in &rays {
+            let pixel = if args.rays { camera.project_ray(*ray) } else { camera.project(ray.truncate()) };
             match pixel.is_finite() {
                 true => writeln!(out, "{:?},{:?}", pixel.x, pixel.y)?,
                 false => writeln!(out, "NaN,NaN")?,
@@ -129,18 +164,18 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
         console.warn(format_args!(
             "{beyond} of {} points lie beyond the fold of the lens: the formula gives pixels for them, but \
              no real lens images them there",
-            points.len()
+            rays.len()
         ));
     }
     if unknown > 0 {
-        console.warn(format_args!("{unknown} of {} points are not finite and have no pixels", points.len()));
+        console.warn(format_args!("{unknown} of {} points are not finite and have no pixels", rays.len()));
     }
-    warn_if_empty(&points, console);
+    warn_if_empty(rays.is_empty(), console);
     Ok(())
 }
 
-fn warn_if_empty(points: &[DVec2], console: &mut Console<'_>) {
-    if points.is_empty() {
+fn warn_if_empty(is_empty: bool, console: &mut Console<'_>) {
+    if is_empty {
         console.warn("there are no points: only the header is written");
     }
 }
@@ -148,16 +183,21 @@ fn warn_if_empty(points: &[DVec2], console: &mut Console<'_>) {
 fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let points = read_points(args.points.as_deref(), ["x_px", "y_px"]).or_bad_input()?;
     write_output(args.output.as_deref(), console, |out| {
-        writeln!(out, "u,v,valid")?;
-        for ideal in points.iter().map(|pixel| camera.unproject(*pixel)) {
-            match ideal {
-                Some(ideal) => writeln!(out, "{:?},{:?},1", ideal.x, ideal.y)?,
-                None => writeln!(out, "NaN,NaN,0")?,
+        writeln!(out, "{},valid", if args.rays { "x,y,z" } else { "u,v" })?;
+        for pixel in points.iter().copied().map(DVec2::from) {
+            let (ray, ideal) = match args.rays {
+                true => (camera.ray(pixel), None),
+                false => (None, camera.unproject(pixel)),
+            };
+            match (ray, ideal) {
+                (Some(ray), _) => writeln!(out, "{:?},{:?},{:?},1", ray.x, ray.y, ray.z)?,
+                (_, Some(ideal)) => writeln!(out, "{:?},{:?},1", ideal.x, ideal.y)?,
+                _ => writeln!(out, "{},0", if args.rays { "NaN,NaN,NaN" } else { "NaN,NaN" })?,
             }
         }
         Ok(())
     })?;
-    warn_if_empty(&points, console);
+    warn_if_empty(points.is_empty(), console);
     Ok(())
 }
 
@@ -167,8 +207,11 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
         console.json(&check)?;
         return Ok(());
     }
-    let LensCheck { valid_fraction, fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective } = check;
+    let LensCheck { valid_fraction, ray_fraction, angle_max_deg, .. } = check;
+    let LensCheck { fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective, .. } = check;
     console.line(format_args!("pixels with an ideal ray       {:.3} %", 100.0 * valid_fraction))?;
+    console.line(format_args!("pixels with a ray              {:.3} %", 100.0 * ray_fraction))?;
+    console.line(format_args!("largest angle off axis         {angle_max_deg:.3} degrees"))?;
     match (fold_radius_min, fold_radius_max) {
         (Some(min), Some(max)) => {
             console.line(format_args!("folds at ideal radius |(u, v)|  {min:.6} to {max:.6}"))?
@@ -185,9 +228,9 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
     Ok(())
 }
 
-/// Points of a CSV by the names of their columns; two bare columns of numbers need no header. Lines that
+/// Points of a CSV by the names of their columns; as many bare columns of numbers need no header. Lines that
 /// begin with `#` are comments.
-fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
+fn read_points<const N: usize>(path: Option<&Path>, columns: [&str; N]) -> anyhow::Result<Vec<[f64; N]>> {
     let (name, input): (String, Box<dyn Read>) = match path {
         Some(path) => {
             let name = path.display().to_string();
@@ -199,7 +242,7 @@ fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DV
     parse_points(input, columns).with_context(|| name)
 }
 
-fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
+fn parse_points<const N: usize>(input: impl Read, columns: [&str; N]) -> anyhow::Result<Vec<[f64; N]>> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -216,14 +259,14 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
                 column_indices = Some(indices);
                 continue;
             }
-            if record.len() != 2 {
+            if record.len() != N {
                 bail!(
                     "line {line}: the columns {} are missing; give a header that names them",
                     columns.join(",")
                 );
             }
         }
-        let column_indices = *column_indices.get_or_insert([0, 1]);
+        let column_indices = *column_indices.get_or_insert(std::array::from_fn(|i| i));
         let number = |i: usize| -> anyhow::Result<f64> {
             let text = record
                 .get(column_indices[i])
@@ -236,17 +279,25 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
                 )
             })
         };
-        points.push(DVec2::new(number(0)?, number(1)?));
+        let mut point = [0.0; N];
+        for (i, value) in point.iter_mut().enumerate() {
+            *value = number(i)?;
+        }
+        points.push(point);
     }
     Ok(points)
 }
 
-/// Indices of the columns, if the row names both. A byte-order mark may precede the first name.
-fn header(row: &csv::StringRecord, columns: [&str; 2]) -> Option<[usize; 2]> {
+/// Indices of the columns, if the row names all. A byte-order mark may precede the first name.
+fn header<const N: usize>(row: &csv::StringRecord, columns: [&str; N]) -> Option<[usize; N]> {
     let index = |name: &str| {
         row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
     };
-    Some([index(columns[0])?, index(columns[1])?])
+    let mut indices = [0; N];
+    for (place, name) in indices.iter_mut().zip(columns) {
+        *place = index(name)?;
+    }
+    Some(indices)
 }
 
 #[cfg(test)]
@@ -259,7 +310,7 @@ mod tests {
 
     #[test]
     fn points_are_read_by_name_or_position() {
-        let both = vec![DVec2::new(1.0, 2.0), DVec2::new(-3.5, 4e-3)];
+        let both = vec![[1.0, 2.0], [-3.5, 4e-3]];
         for text in [
             "u,v\n1,2\n-3.5,4e-3\n",
             "1,2\n-3.5,0.004",
@@ -268,8 +319,8 @@ mod tests {
         ] {
             assert_eq!(parse_points(text.as_bytes(), UV).unwrap(), both, "{text}");
         }
-        assert_eq!(parse_points("".as_bytes(), UV).unwrap(), []);
-        assert_eq!(parse_points("u,v\n".as_bytes(), UV).unwrap(), []);
+        assert!(parse_points("".as_bytes(), UV).unwrap().is_empty());
+        assert!(parse_points("u,v\n".as_bytes(), UV).unwrap().is_empty());
     }
 
     #[test]

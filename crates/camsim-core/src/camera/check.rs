@@ -17,17 +17,41 @@ const BIJECTIVITY_GRID: u32 = 33;
 /// Report of [`CameraModel::check`] (`camsim lens CAMERA.toml check --json`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LensCheck {
-    /// Share of the pixels that have an ideal ray.
+    /// Share of the pixels that have an ideal ray, within what an ideal plane holds.
     pub valid_fraction: f64,
+    /// Share of the pixels that have a ray at any angle.
+    pub ray_fraction: f64,
+    /// Largest angle off axis of such a ray, degrees.
+    pub angle_max_deg: f64,
     /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it has neither
     /// within 89 degrees.
     pub fold_radius_min: Option<f64>,
     /// Largest such radius over all directions.
     pub fold_radius_max: Option<f64>,
-    /// Largest `|project(unproject(p)) - p|` over valid pixels.
+    /// Largest distance of a pixel from where its ray is imaged.
     pub worst_roundtrip_px: f64,
     /// Whether no pixel has two ideal rays on the principal branch.
     pub bijective: bool,
+}
+
+/// What some of the pixels see.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    valid: usize,
+    with_ray: usize,
+    angle_max_rad: f64,
+    worst_px: f64,
+}
+
+impl Seen {
+    fn and(self, other: Self) -> Self {
+        Self {
+            valid: self.valid + other.valid,
+            with_ray: self.with_ray + other.with_ray,
+            angle_max_rad: self.angle_max_rad.max(other.angle_max_rad),
+            worst_px: self.worst_px.max(other.worst_px),
+        }
+    }
 }
 
 impl CameraModel {
@@ -37,25 +61,33 @@ impl CameraModel {
         let area = f64::from(width) * f64::from(height);
         let stride = (area / MAX_SAMPLES).sqrt().max(1.0);
         let (xs, ys) = (samples(width, stride), samples(height, stride));
-        let (valid, worst_roundtrip_px) = ys
-            .par_iter()
-            .map(|&y| {
-                xs.iter().fold((0_usize, 0.0_f64), |(valid, worst), &x| {
-                    let pixel = DVec2::new(x, y);
-                    match self.unproject(pixel) {
-                        Some(ideal) => (valid + 1, worst.max((self.project(ideal) - pixel).length())),
-                        None => (valid, worst),
-                    }
-                })
-            })
-            .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)));
+        let row = |y: &f64| {
+            xs.iter().map(|&x| self.check_pixel(DVec2::new(x, *y))).fold(Seen::default(), Seen::and)
+        };
+        let seen = ys.par_iter().map(row).reduce(Seen::default, Seen::and);
+        let all = (xs.len() * ys.len()) as f64;
         let fold = self.lens.fold_curve().filter(|fold| fold.folds()).map(|fold| fold.range());
         LensCheck {
-            valid_fraction: valid as f64 / (xs.len() * ys.len()) as f64,
+            valid_fraction: seen.valid as f64 / all,
+            ray_fraction: seen.with_ray as f64 / all,
+            angle_max_deg: seen.angle_max_rad.to_degrees(),
             fold_radius_min: fold.map(|(min, _)| min),
             fold_radius_max: fold.map(|(_, max)| max),
-            worst_roundtrip_px,
+            worst_roundtrip_px: seen.worst_px,
             bijective: self.is_bijective(),
+        }
+    }
+
+    fn check_pixel(&self, pixel: DVec2) -> Seen {
+        let ray = self.ray(pixel);
+        let off_px = |image: DVec2| (image - pixel).length();
+        let ideal = self.unproject(pixel);
+        let worst_px = ray.map_or(0.0, |ray| off_px(self.project_ray(ray)));
+        Seen {
+            valid: usize::from(ideal.is_some()),
+            with_ray: usize::from(ray.is_some()),
+            angle_max_rad: ray.map_or(0.0, |ray| ray.truncate().length().atan2(ray.z)),
+            worst_px: ideal.map_or(worst_px, |ideal| worst_px.max(off_px(self.project(ideal)))),
         }
     }
 

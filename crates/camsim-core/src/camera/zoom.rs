@@ -1,6 +1,7 @@
 //! Calibrations by zoom value.
 
 use super::{CameraError, CameraModel};
+use crate::lens::Lens;
 use crate::scenario::{CameraSpec, LensModel, ZoomSpec};
 
 /// The `[[camera.zoom]]` table. Every number of a calibration is linear in the zoom value between two
@@ -28,11 +29,12 @@ impl ZoomTable {
             }
             last = entry.at;
         }
-        // The longest entry determines the number of coefficients; shorter ones end in zeros.
+        // The longest entry determines the number of coefficients; shorter ones end in defaults.
         let count = spec.zoom.iter().map(|entry| entry.coefficients.len()).max().unwrap_or(0);
         let mut entries = spec.zoom.clone();
         for (index, entry) in entries.iter_mut().enumerate() {
-            entry.coefficients.resize(count, 0.0);
+            let facts = spec.lens.model.facts();
+            entry.coefficients = (0..count).map(|i| facts.or_default(&entry.coefficients, i)).collect();
             camera(&format!("camera.zoom[{index}]"), spec.size_px, spec.lens.model, entry)?;
         }
         Ok(Some(Self { size_px: spec.size_px, model: spec.lens.model, entries }))
@@ -90,5 +92,7 @@ fn camera(
     model: LensModel,
     entry: &ZoomSpec,
 ) -> Result<CameraModel, CameraError> {
-    CameraModel::with_key(key, size_px, entry.focal_px, entry.principal_point_px, model, &entry.coefficients)
+    CameraModel::with_key(key, size_px, entry.focal_px, entry.principal_point_px, |reach| {
+        Lens::with_reach(model, &entry.coefficients, reach)
+    })
 }

@@ -3,8 +3,17 @@
 
 use glam::{DMat2, DVec2};
 
+use super::facts::{ModelFacts, Shape};
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
+
+pub(super) const FACTS: ModelFacts = ModelFacts {
+    name: "brown-conrady",
+    coefficients: &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"],
+    defaults: &[],
+    fix: "thin-prism and tilt terms are those of model \"brown-conrady-prism\"",
+    shape: |_| Shape::BrownConrady,
+};
 
 /// Most Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the
 /// error: 60 reach the last bit.
@@ -47,7 +56,7 @@ impl BrownConrady {
         let radial_fold = first_irregular_angle(|angle| radial.margins(DVec2::new(angle.tan(), 0.0)))
             .unwrap_or(MAX_FIELD_RAD)
             .tan();
-        let table = RadialTable::new(radial_fold, reach, |r| radial.distort(DVec2::new(r, 0.0)).x);
+        let table = RadialTable::new(radial_fold, reach, 1.0, |r| radial.distort(DVec2::new(r, 0.0)).x);
         Self { coefficients, fold, table }
     }
 
@@ -131,8 +140,8 @@ impl BrownConrady {
 }
 
 /// The formula without a domain.
-#[derive(Clone, Copy)]
-struct Formula {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Formula {
     k1: f64,
     k2: f64,
     k3: f64,
@@ -144,7 +153,7 @@ struct Formula {
 }
 
 impl Formula {
-    fn new(&[k1, k2, p1, p2, k3, k4, k5, k6]: &[f64; 8]) -> Self {
+    pub(super) fn new(&[k1, k2, p1, p2, k3, k4, k5, k6]: &[f64; 8]) -> Self {
         Self { k1, k2, k3, k4, k5, k6, p1, p2 }
     }
 
@@ -152,11 +161,11 @@ impl Formula {
         1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
     }
 
-    fn denominator(&self, r2: f64) -> f64 {
+    pub(super) fn denominator(&self, r2: f64) -> f64 {
         1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6))
     }
 
-    fn distort(&self, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
+    pub(super) fn distort(&self, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
         let r2 = u * u + v * v;
         let d = self.numerator(r2) / self.denominator(r2);
         DVec2::new(
@@ -165,7 +174,7 @@ impl Formula {
         )
     }
 
-    fn jacobian(&self, DVec2 { x: u, y: v }: DVec2) -> DMat2 {
+    pub(super) fn jacobian(&self, DVec2 { x: u, y: v }: DVec2) -> DMat2 {
         let r2 = u * u + v * v;
         let denominator = self.denominator(r2);
         let d = self.numerator(r2) / denominator;

@@ -37,7 +37,16 @@ impl FoldCurve {
         same_for_all: bool,
         distort: impl Fn(DVec2) -> DVec2,
     ) -> Self {
-        let limit = MAX_FIELD_RAD.tan();
+        Self::with_limit(radius_of_ray, MAX_FIELD_RAD.tan(), same_for_all, distort)
+    }
+
+    /// As [`Self::new`]; rays that are regular everywhere end at `limit`.
+    pub(super) fn with_limit(
+        radius_of_ray: impl Fn(f64) -> Option<f64>,
+        limit: f64,
+        same_for_all: bool,
+        distort: impl Fn(DVec2) -> DVec2,
+    ) -> Self {
         let angle = |ray: usize| ray as f64 * TAU / FOLD_RAYS as f64;
         let rays: Vec<Option<f64>> = if same_for_all {
             vec![radius_of_ray(0.0); FOLD_RAYS]
@@ -63,6 +72,13 @@ impl FoldCurve {
         let (here, next) = (self.radii[ray as usize % FOLD_RAYS], self.radii[(ray as usize + 1) % FOLD_RAYS]);
         let (near, far) = (here.min(next), here.max(next));
         if far > SHEET_RATIO * near { near } else { here + (next - here) * (position - ray) }
+    }
+
+    /// Smaller and larger radius of the two rays about a direction.
+    pub(super) fn neighbours(&self, phi_rad: f64) -> (f64, f64) {
+        let ray = ((phi_rad / TAU).rem_euclid(1.0) * FOLD_RAYS as f64) as usize;
+        let (here, next) = (self.radii[ray % FOLD_RAYS], self.radii[(ray + 1) % FOLD_RAYS]);
+        (here.min(next), here.max(next))
     }
 
     /// Smallest radius.
@@ -94,13 +110,17 @@ impl FoldCurve {
     }
 }
 
-/// First parameter of a ray in `(0, limit_of_last_step]` at which one of the `margins` is not positive.
-///
-/// `at(angle)` returns two functions that are positive on the regular part. They are sampled at
-/// [`SCAN_STEPS`] angles off axis; a dip below zero between two samples is found by searching every local
-/// minimum.
+/// First angle of a ray, up to [`MAX_FIELD_RAD`], at which one of the margins is not positive.
 pub(super) fn first_irregular_angle(at: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
-    let step = MAX_FIELD_RAD / SCAN_STEPS as f64;
+    first_irregular(MAX_FIELD_RAD, at)
+}
+
+/// First parameter of a ray in `(0, limit]` at which one of the margins is not positive.
+///
+/// `at(parameter)` returns two functions that are positive on the regular part. They are sampled at
+/// [`SCAN_STEPS`] parameters; a dip below zero between two samples is found by searching every local minimum.
+pub(super) fn first_irregular(limit: f64, at: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
+    let step = limit / SCAN_STEPS as f64;
     // Written so that NaN counts as irregular.
     let regular = |angle: f64| at(angle).iter().all(|margin| *margin > 0.0);
     let mut before_last = at(0.0);

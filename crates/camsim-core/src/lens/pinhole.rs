@@ -2,6 +2,16 @@
 
 use glam::{DMat2, DVec2};
 
+use super::facts::{ModelFacts, Shape};
+
+pub(super) const FACTS: ModelFacts = ModelFacts {
+    name: "pinhole",
+    coefficients: &[],
+    defaults: &[],
+    fix: "leave them out, or set lens.model to the model they belong to",
+    shape: |_| Shape::Pinhole,
+};
+
 /// The ideal camera: distorted = ideal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pinhole;

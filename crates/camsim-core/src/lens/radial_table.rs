@@ -15,7 +15,8 @@ pub struct RadialTable {
 
 impl RadialTable {
     /// Tabulates the inverse of `forward`, which increases on `0..=undistorted_max`, up to `reach` at most.
-    pub(super) fn new(undistorted_max: f64, reach: f64, forward: impl Fn(f64) -> f64) -> Self {
+    /// `at_axis` is the ratio on the axis.
+    pub(super) fn new(undistorted_max: f64, reach: f64, at_axis: f64, forward: impl Fn(f64) -> f64) -> Self {
         let at_end = forward(undistorted_max);
         let distorted_max = if at_end < reach { at_end } else { reach };
         let solve = |distorted: f64| {
@@ -34,7 +35,7 @@ impl RadialTable {
             .map(|i| {
                 let s = i as f64 / (RADIAL_TABLE_LEN - 1) as f64;
                 let distorted = distorted_max * (1.0 - s * s);
-                if distorted > 0.0 { solve(distorted) / distorted } else { 1.0 }
+                if distorted > 0.0 { solve(distorted) / distorted } else { at_axis }
             })
             .collect();
         Self { distorted_max, ratios }

@@ -52,12 +52,17 @@ impl ImageGain {
         let last = camera.size_px.map(|side| f64::from(side) - 1.0);
         let of_place = |i: u32| {
             let share = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| f64::from(k) / f64::from(SIDE));
-            let uv = camera.unproject(DVec2::new(share[0] * last[0], share[1] * last[1]))?;
+            let px = DVec2::new(share[0] * last[0], share[1] * last[1]);
+            // The norm of all elements bounds that of a matrix.
+            let norm = |columns: &[DVec2]| {
+                columns.iter().map(|column| (column * camera.focal_px).length_squared()).sum::<f64>().sqrt()
+            };
+            let Some(uv) = camera.unproject(px) else {
+                // Rays that an ideal plane does not hold.
+                return camera.ray(px).map(|ray| (norm(&camera.lens.gradient(ray)), 1.0));
+            };
             let jacobian = camera.lens.jacobian(uv);
-            // The norm of all elements bounds that of the matrix.
-            let gain = (jacobian.x_axis * camera.focal_px).length_squared()
-                + (jacobian.y_axis * camera.focal_px).length_squared();
-            Some((gain.sqrt(), 1.0 + uv.length_squared()))
+            Some((norm(&[jacobian.x_axis, jacobian.y_axis]), 1.0 + uv.length_squared()))
         };
         let places = (0..(SIDE + 1).pow(2)).filter_map(of_place);
         places.fold(Self { turn_px: 0.0, shift_px: 0.0 }, |most, (gain, secant2)| Self {
@@ -242,14 +247,12 @@ impl RowProjector<'_> {
     fn project(&self, row: usize, place: DVec3, is_far: bool) -> Option<Projection> {
         let Row { camera_from_ned, position_ned_m } = self.rows[row];
         let ray = camera_from_ned * if is_far { place } else { place - position_ned_m };
-        if ray.z.is_nan() || ray.z <= 0.0 {
-            return None;
-        }
         let camera = &self.frame.camera;
         let uv = ray.truncate() / ray.z;
-        (uv.length_squared() < self.contained_radius2 || camera.lens.contains(uv)).then(|| Projection {
-            px: camera.project(uv),
-            depth_m: if is_far { f64::INFINITY } else { ray.z },
-        })
+        if ray.z > 0.0 && uv.length_squared() < self.contained_radius2 {
+            let depth_m = if is_far { f64::INFINITY } else { ray.z };
+            return Some(Projection { px: camera.project(uv), depth_m });
+        }
+        camera.seen(ray, is_far).map(|(px, depth_m)| Projection { px, depth_m })
     }
 }

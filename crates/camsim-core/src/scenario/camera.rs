@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::FieldOr;
+use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,9 @@ pub struct CameraSpec {
     pub mount: MountSpec,
     /// Distortion.
     pub lens: LensSpec,
+    /// File of a lens of model "table": a CSV of rays and points, or an STmap (EXR).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_table: Option<LensTable>,
     /// Calibrations by zoom, with ascending `at`; empty for a fixed lens.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub zoom: Vec<ZoomSpec>,
@@ -58,6 +62,7 @@ impl Default for CameraSpec {
             clock_offset_ms: 0.0,
             mount: MountSpec::default(),
             lens: LensSpec::default(),
+            lens_table: None,
             zoom: Vec::new(),
             zoom_track: None,
             shutter: ShutterSpec::default(),
@@ -130,17 +135,17 @@ pub enum Axis {
     Z,
 }
 
-/// `[camera.lens]`: model and coefficients.
+/// `[camera.lens]`: model and coefficients. `docs/LENSES.md` lists the models.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LensSpec {
     /// Model.
     pub model: LensModel,
-    /// `k1 k2 p1 p2 k3 k4 k5 k6`, trailing zeros may be left out; Kannala-Brandt: `k1 k2 k3 k4`.
+    /// In the model's order, which [`crate::lens::ModelFacts`] names; trailing ones may be left out.
     pub coefficients: Vec<f64>,
 }
 
-/// Distortion models.
+/// Lens models.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LensModel {
@@ -151,6 +156,31 @@ pub enum LensModel {
     BrownConrady,
     /// Equidistant fisheye polynomial, as in OpenCV's fisheye module.
     KannalaBrandt,
+    /// Brown-Conrady with thin prism and tilted sensor, OpenCV's 12 and 14 coefficients.
+    BrownConradyPrism,
+    /// Fisheye with six radial, two tangential and four thin-prism terms, COLMAP's
+    /// RAD_TAN_THIN_PRISM_FISHEYE.
+    Fisheye624,
+    /// Distorted radius as a polynomial of the angle off axis.
+    FTheta,
+    /// Angle off axis as a polynomial of the distorted radius.
+    FThetaInverse,
+    /// Two spheres and a plane.
+    DoubleSphere,
+    /// Extended unified camera model: an ellipsoid and a plane.
+    Eucm,
+    /// Unified camera model: a sphere and a plane.
+    Ucm,
+    /// A sphere with Brown-Conrady distortion: OpenCV's omnidir, CamOdoCal's MEI, Kalibr's omni-radtan.
+    Mei,
+    /// Undistorted over distorted radius is `1 / (1 + k r^2)`.
+    Division,
+    /// Distorted radius proportional to the angle, by a field of view.
+    Fov,
+    /// Longitude and latitude: a panorama.
+    Equirectangular,
+    /// A table of points, `camera.lens_table`.
+    Table,
 }
 
 /// One row of the zoom table.

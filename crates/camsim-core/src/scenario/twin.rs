@@ -169,6 +169,7 @@ impl Scenario {
         }
         if twin.leaves_out(twin.lens) {
             camera.lens = LensSpec::default();
+            camera.lens_table = None;
             camera.zoom.iter_mut().for_each(|zoom| zoom.coefficients.clear());
         }
         if twin.leaves_out(twin.noise) {

@@ -188,6 +188,14 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     }
 
     check_coefficients(check, "camera.lens.coefficients", camera.lens.model, &camera.lens.coefficients);
+    let is_table = camera.lens.model == LensModel::Table;
+    check.require(is_table == camera.lens_table.is_some(), "camera.lens_table", || match is_table {
+        true => "is missing: camera.lens.model is \"table\"; name the file of its points".into(),
+        false => "goes with camera.lens.model = \"table\"; write that, or leave it out".into(),
+    });
+    check.require(!is_table || camera.zoom.is_empty(), "camera.zoom", || {
+        "cannot be combined with camera.lens.model = \"table\", which holds for one focal length".into()
+    });
     for (i, zoom) in camera.zoom.iter().enumerate() {
         check.finite(format!("camera.zoom.{i}.at"), &[zoom.at]);
         check_focal(check, &format!("camera.zoom.{i}.focal_px"), zoom.focal_px);
@@ -253,13 +261,10 @@ fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
 
 fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficients: &[f64]) {
     check.finite(key, coefficients);
-    let (most, order) = match model {
-        LensModel::Pinhole => (0, "a pinhole has none; set camera.lens.model"),
-        LensModel::BrownConrady => (8, "the order is k1 k2 p1 p2 k3 k4 k5 k6"),
-        LensModel::KannalaBrandt => (4, "the order is k1 k2 k3 k4"),
-    };
+    let facts = model.facts();
+    let (most, order) = (facts.coefficients.len(), format!("the order is {}", facts.order()));
     check.require(coefficients.len() <= most, key, || {
-        format!("has {} values where at most {most} fit; {order}", coefficients.len())
+        format!("has {} values where at most {most} fit; {order}; {}", coefficients.len(), facts.fix)
     });
     // Three coefficients are what other programs call k1 k2 k3.
     let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
@@ -334,7 +339,8 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     let (quality, camera) = (&scenario.quality, &scenario.camera);
     let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
     let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
-    check.require(camera.lens.model != LensModel::KannalaBrandt && !rational, "quality.preset", || {
+    let is_papers = matches!(camera.lens.model, LensModel::Pinhole | LensModel::BrownConrady);
+    check.require(is_papers && !rational, "quality.preset", || {
         "\"paper\" supports only pinhole and brown-conrady lenses with k1 k2 p1 p2 k3; write \"default\""
             .into()
     });

@@ -67,6 +67,14 @@ pub fn planned() -> Vec<Case> {
             all.push(case(format!("{name}, {scene_name}"), sequence, 2));
         }
     }
+    // Every model of a lens whose map no shader makes, over ground.
+    for (model, coefficients, focal_px) in lens_models() {
+        let mut scenario = camera(0.0);
+        scenario.camera.focal_px = [focal_px, 0.95 * focal_px];
+        scenario.camera.lens = LensSpec { model, coefficients: coefficients.to_vec() };
+        let sequence = sequence(scenario, turning(), pattern(6000.0));
+        all.push(case(format!("lens of model {}", model.facts().name), sequence, 2));
+    }
     let benches = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../benches");
     let read = |name: &str| read_scenario(&benches.join(name), &[], None).expect("scenario");
     let all_effects = load_sequence(&read("all_effects.toml")).expect("sequence").sequence;
@@ -85,6 +93,29 @@ pub fn planned() -> Vec<Case> {
         all.push(case(format!("houses, {exposure_ms} ms, k1 = {radial}"), houses, 40));
     }
     all
+}
+
+fn lens_models() -> [(LensModel, &'static [f64], f64); 11] {
+    use LensModel::{
+        BrownConradyPrism, Division, DoubleSphere, Equirectangular, Eucm, FTheta, FThetaInverse, Fisheye624,
+        Fov, Mei, Ucm,
+    };
+    const PRISM: &[f64] = &[-0.28, 0.07, 2e-4, 2e-5, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, -0.02, 0.0, 0.05, -0.04];
+    const ARIA: &[f64] =
+        &[-0.0232, 0.0924, -0.0591, 0.003, 0.0048, -9e-4, 2e-4, 5e-4, -9e-4, -1e-4, 7e-5, -1.7e-4];
+    [
+        (BrownConradyPrism, PRISM, 150.0),
+        (Fisheye624, ARIA, 150.0),
+        (FTheta, &[1.0, -0.02, 0.01, -0.03, 0.002, 1.01, 0.01, -0.02], 150.0),
+        (FThetaInverse, &[1.0, 0.02, -0.01, 0.03], 150.0),
+        (DoubleSphere, &[-0.2396, 0.5589], 115.0),
+        (Eucm, &[0.571, 1.18], 150.0),
+        (Ucm, &[0.6], 150.0),
+        (Mei, &[1.2, -0.2, 0.05, 1e-3, -5e-4], 330.0),
+        (Division, &[-0.3], 150.0),
+        (Fov, &[0.93], 140.0),
+        (Equirectangular, &[], 150.0),
+    ]
 }
 
 fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {

@@ -28,7 +28,7 @@ pub enum Start {
 }
 
 /// All variants of the stage, in the order of the pipelines of [`LensInversePass`]. A pinhole needs no
-/// initial value.
+/// initial value. The maps of models that are not here are solved in f64 and uploaded.
 pub const VARIANTS: [(LensModel, Start); 5] = [
     (LensModel::Pinhole, Start::Cold),
     (LensModel::BrownConrady, Start::Cold),
@@ -78,7 +78,7 @@ impl LensUniform {
             padding: [0.0; 2],
         };
         match &camera.lens {
-            Lens::Pinhole(_) => {}
+            Lens::Pinhole(_) | Lens::Direction(_) => {}
             Lens::BrownConrady(_) => {
                 if let [k1, k2, p1, p2, k3, k4, k5, k6] = *camera.lens.coefficients() {
                     uniform.radial = [k1, k2, k3, 0.0].map(finite_f32);
@@ -86,7 +86,7 @@ impl LensUniform {
                     uniform.tangential = [p1, p2].map(finite_f32);
                 }
             }
-            Lens::KannalaBrandt(lens) => {
+            Lens::Radial(lens) => {
                 if let [k1, k2, k3, k4] = *camera.lens.coefficients() {
                     uniform.radial = [k1, k2, k3, k4].map(finite_f32);
                 }
@@ -112,7 +112,6 @@ fn lens_table(lens: &Lens) -> Vec<f32> {
 /// WGSL of one variant.
 pub fn shader_source(model: LensModel, start: Start) -> String {
     let [table, formula] = match model {
-        LensModel::Pinhole => ["", include_str!("../../../../shaders/reverse/lens_inverse/pinhole.wgsl")],
         LensModel::BrownConrady => [
             include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
             include_str!("../../../../shaders/reverse/lens_inverse/brown_conrady.wgsl"),
@@ -121,6 +120,7 @@ pub fn shader_source(model: LensModel, start: Start) -> String {
             include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
             include_str!("../../../../shaders/reverse/lens_inverse/kannala_brandt.wgsl"),
         ],
+        _ => ["", include_str!("../../../../shaders/reverse/lens_inverse/pinhole.wgsl")],
     };
     let start = match start {
         Start::Cold => include_str!("../../../../shaders/reverse/lens_inverse/start_cold.wgsl"),
@@ -156,11 +156,43 @@ impl LensMap {
             format: LENS_MAP_FORMAT,
             usage: wgpu::TextureUsages::STORAGE_BINDING
                 | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC,
+                | wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
         Self { view: full_view(&texture), texture, groups: Vec::new() }
     }
+
+    /// Records the upload of a camera's map, solved in f64 here: for models without a shader.
+    pub fn upload(&self, device: &wgpu::Device, recorder: &mut Recorder<'_>, camera: &CameraModel) {
+        let [width, height] = camera.size_px;
+        let row_bytes = (width * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let mut bytes = Vec::with_capacity(row_bytes as usize * height as usize);
+        for row in camera.lens_inverse().chunks_exact(width as usize) {
+            bytes.extend_from_slice(bytemuck::cast_slice(row));
+            bytes.resize(bytes.len().next_multiple_of(row_bytes as usize), 0);
+        }
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camsim.lens_inverse.upload"),
+            size: bytes.len() as u64,
+            usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        recorder.write(&buffer, 0, &bytes);
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: None };
+        recorder.encoder().copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            self.texture.as_image_copy(),
+            self.texture.size(),
+        );
+    }
+}
+
+/// Whether a shader makes the lens maps of a model.
+#[must_use]
+pub fn has_shader(model: LensModel) -> bool {
+    VARIANTS.iter().any(|(of, _)| *of == model)
 }
 
 /// Pipelines of all variants, and the buffers of a lens.
@@ -208,7 +240,8 @@ impl LensInversePass {
         }
     }
 
-    /// Records the pass that writes the lens map of `camera` to `target`, a map of the camera's size. `warm`,
+    /// Records the pass that writes the lens map of `camera`, of a model with a shader, to `target`, a map of the
+    /// camera's size. `warm`,
     /// the map of a camera of the same size and nearby zoom, only shortens the iteration to the same
     /// solution: it must be a pure function of scenario and frame (the map of a zoom table entry, never that
     /// of the previous frame).
@@ -222,12 +255,9 @@ impl LensInversePass {
     ) {
         let model = camera.lens.model();
         let warm = warm.map(|map| &map.view).filter(|_| model != LensModel::Pinhole);
-        let variant = match (model, warm.is_some()) {
-            (LensModel::Pinhole, _) => 0,
-            (LensModel::BrownConrady, false) => 1,
-            (LensModel::BrownConrady, true) => 2,
-            (LensModel::KannalaBrandt, false) => 3,
-            (LensModel::KannalaBrandt, true) => 4,
+        let start = if warm.is_some() { Start::Warm } else { Start::Cold };
+        let Some(variant) = VARIANTS.iter().position(|variant| *variant == (model, start)) else {
+            return target.upload(device, recorder, camera);
         };
         let pipeline = &self.pipelines[variant];
         recorder.write(&self.uniform, 0, bytemuck::bytes_of(&LensUniform::new(camera)));

@@ -1,5 +1,6 @@
 //! Basalt's calibration JSON, which its cereal reader wants complete.
 
+use camsim_core::scenario::LensModel;
 use serde_json::{Map, Value, json};
 
 use super::{Calibration, CalibrationError, ImuReference, lens_names::no_such_lens, text::xyzw};
@@ -48,21 +49,37 @@ fn pose_value(camera: &Calibration, imu: &ImuReference) -> Value {
 
 fn camera_value(camera: &Calibration) -> Result<Value, CalibrationError> {
     let lens = &camera.intrinsics;
-    let (kind, names, values): (&str, &[&str], Vec<f64>) = match (lens.equidistant(), lens.brown::<8>()) {
-        (Some(k), _) => ("kb4", &["k1", "k2", "k3", "k4"], k.to_vec()),
-        (None, Some([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])) => ("pinhole", &[], Vec::new()),
-        // rpmax is the largest normalised radius; 0 is none.
-        (None, Some(k)) => (
-            "pinhole-radtan8",
-            &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "rpmax"],
-            [&k[..], &[0.0]].concat(),
-        ),
-        (None, None) => return Err(no_such_lens(camera, "Basalt")),
-    };
+    let (kind, names, values) = parameters(camera)?;
     let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px);
     let first = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
     let rest = names.iter().copied().zip(values);
     let parameters: Map<String, Value> =
         first.into_iter().chain(rest).map(|(name, value)| (name.to_owned(), json!(value))).collect();
     Ok(json!({"camera_type": kind, "intrinsics": parameters}))
+}
+
+/// `camera_type`, and names and values of what goes with it.
+type Parameters = (&'static str, &'static [&'static str], Vec<f64>);
+
+fn parameters(camera: &Calibration) -> Result<Parameters, CalibrationError> {
+    let lens = &camera.intrinsics;
+    if let Some(k) = lens.equidistant() {
+        return Ok(("kb4", &["k1", "k2", "k3", "k4"], k.to_vec()));
+    }
+    if let Some(k) = lens.of_model::<2>(LensModel::DoubleSphere) {
+        return Ok(("ds", &["xi", "alpha"], k.to_vec()));
+    }
+    if let Some(k) = lens.of_model::<2>(LensModel::Eucm) {
+        return Ok(("eucm", &["alpha", "beta"], k.to_vec()));
+    }
+    if let Some(k) = lens.of_model::<1>(LensModel::Ucm) {
+        return Ok(("ucm", &["alpha"], k.to_vec()));
+    }
+    if lens.is_pinhole() {
+        return Ok(("pinhole", &[], Vec::new()));
+    }
+    let k = lens.brown::<8>().ok_or_else(|| no_such_lens(camera, "Basalt"))?;
+    // rpmax is the largest normalised radius; 0 is none.
+    let names = &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "rpmax"];
+    Ok(("pinhole-radtan8", names, [&k[..], &[0.0]].concat()))
 }

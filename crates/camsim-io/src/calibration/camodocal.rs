@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use camsim_core::scenario::LensModel;
+
 use super::{
     Calibration, CalibrationError, ImuReference,
     lens_names::no_such_lens,
@@ -16,6 +18,16 @@ pub(crate) fn file(name: &str, camera: &Calibration) -> Result<String, Calibrati
     let lens = &camera.intrinsics;
     let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
     let pinhole = vec![("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
+    if let Some([xi, k1, k2, p1, p2]) = lens.of_model::<5>(LensModel::Mei) {
+        let distortion = vec![("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2)];
+        let projection = vec![("gamma1", fx), ("gamma2", fy), ("u0", cx), ("v0", cy)];
+        let tables = [
+            ("mirror_parameters", vec![("xi", xi)]),
+            ("distortion_parameters", distortion),
+            ("projection_parameters", projection),
+        ];
+        return Ok(yaml("MEI", name, [w, h], tables));
+    }
     let (model, distortion, projection) = match (lens.equidistant(), lens.brown::<4>(), lens.brown::<8>()) {
         // Its k1 is 1 and not written.
         (Some([k1, k2, k3, k4]), ..) => (
@@ -32,18 +44,31 @@ pub(crate) fn file(name: &str, camera: &Calibration) -> Result<String, Calibrati
         }
         (None, None, None) => return Err(no_such_lens(camera, "camodocal")),
     };
+    let tables = [
+        ("mirror_parameters", Vec::new()),
+        ("distortion_parameters", distortion),
+        ("projection_parameters", projection),
+    ];
+    Ok(yaml(model, name, [w, h], tables))
+}
+
+/// A model with its tables of numbers; empty ones are left out.
+fn yaml(
+    model: &str,
+    name: &str,
+    [w, h]: [u32; 2],
+    tables: [(&str, Vec<(&str, f64)>); 3],
+) -> String {
     let mut text = format!(
         "%YAML:1.0\n---\nmodel_type: {model}\ncamera_name: {name}\nimage_width: {w}\nimage_height: {h}\n"
     );
-    for (table, values) in [("distortion_parameters", distortion), ("projection_parameters", projection)] {
-        if !values.is_empty() {
-            let _ = writeln!(text, "{table}:");
-        }
+    for (table, values) in tables.into_iter().filter(|(_, values)| !values.is_empty()) {
+        let _ = writeln!(text, "{table}:");
         for (name, value) in values {
             let _ = writeln!(text, "   {name}: {}", real(value));
         }
     }
-    Ok(text)
+    text
 }
 
 /// The file of one camera with what VINS-Mono's settings say of it: pose, clock, rolling shutter.

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use camsim_core::scenario::LensModel;
+
 use super::{Calibration, CalibrationError, lens_names::no_such_lens};
 
 /// The file.
@@ -38,11 +40,24 @@ pub(crate) fn camera_model(
     if let Some([k1, k2, k3, k4]) = lens.equidistant() {
         return Ok(("OPENCV_FISHEYE", 5, vec![fx, fy, cx, cy, k1, k2, k3, k4]));
     }
+    let with = |k: &[f64]| [&[fx, fy, cx, cy], k].concat();
+    if let Some(k) = lens.of_model::<1>(LensModel::Fov) {
+        return Ok(("FOV", 7, with(&k)));
+    }
+    if let Some(k) = lens.of_model::<12>(LensModel::Fisheye624) {
+        return Ok(("RAD_TAN_THIN_PRISM_FISHEYE", 11, with(&k)));
+    }
+    if let Some(k) = lens.of_model::<1>(LensModel::Division) {
+        return Ok(("DIVISION", 13, with(&k)));
+    }
+    if let Some(k) = lens.of_model::<2>(LensModel::Eucm) {
+        return Ok(("EUCM", 16, with(&k)));
+    }
     let all = lens.brown::<8>().ok_or_else(|| no_such_lens(camera, "COLMAP"))?;
     let [k1, k2, p1, p2, rest @ ..] = all;
     let is_radial = fx == fy && [p1, p2] == [0.0; 2];
     Ok(match (rest == [0.0; 4], is_radial) {
-        (false, _) => ("FULL_OPENCV", 6, [&[fx, fy, cx, cy], &all[..]].concat()),
+        (false, _) => ("FULL_OPENCV", 6, with(&all)),
         (true, true) if [k1, k2] == [0.0; 2] => ("SIMPLE_PINHOLE", 0, vec![fx, cx, cy]),
         (true, true) if k2 == 0.0 => ("SIMPLE_RADIAL", 2, vec![fx, cx, cy, k1]),
         (true, true) => ("RADIAL", 3, vec![fx, cx, cy, k1, k2]),

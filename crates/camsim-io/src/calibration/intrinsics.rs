@@ -38,6 +38,10 @@ impl Intrinsics {
         }
         let centre = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
         let mut coefficients = [0.0; MOST];
+        if lens.model == LensModel::Eucm {
+            // The only model here whose left-out coefficient is not zero.
+            coefficients[1] = 1.0;
+        }
         coefficients.iter_mut().zip(&lens.coefficients).for_each(|(place, value)| *place = *value);
         Ok(Self {
             size_px: *size_px,
@@ -54,7 +58,7 @@ impl Intrinsics {
         match self.model {
             LensModel::Pinhole => true,
             LensModel::BrownConrady => self.coefficients == [0.0; MOST],
-            LensModel::KannalaBrandt => false,
+            _ => false,
         }
     }
 
@@ -65,6 +69,13 @@ impl Intrinsics {
         let has_model = matches!(self.model, LensModel::BrownConrady | LensModel::Pinhole);
         let (first, rest) = self.coefficients.split_first_chunk::<N>()?;
         (has_model && rest.iter().all(|k| *k == 0.0)).then_some(*first)
+    }
+
+    /// The N coefficients of a lens of another model.
+    #[must_use]
+    pub fn of_model<const N: usize>(&self, model: LensModel) -> Option<[f64; N]> {
+        let (first, _) = self.coefficients.split_first_chunk::<N>()?;
+        (self.model == model).then_some(*first)
     }
 
     /// k1 k2 k3 k4 of a Kannala-Brandt lens.

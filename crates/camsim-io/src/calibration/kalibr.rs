@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use camsim_core::scenario::LensModel;
+
 use super::{
     Calibration, CalibrationError, ImuReference,
     lens_names::{self, Family},
@@ -30,9 +32,10 @@ pub(crate) fn chain_yaml(
                     # t_imu = t_cam + timeshift_cam_imu, for the image's centre; line_delay (s) counts rows from there.\n"
         .to_owned();
     for (i, camera) in cameras.iter().enumerate() {
-        let (model, coefficients) = lens_names::lens(Family::Kalibr, camera)?;
+        let (projection, mut intrinsics, model, coefficients) = lens_of(camera)?;
         let lens = &camera.intrinsics;
         let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
+        intrinsics.extend([fx, fy, cx, cy]);
         let camera_from_body = camera.body_from_camera().inverse();
         let _ = writeln!(text, "cam{i}:");
         if let Some(imu) = imu {
@@ -52,15 +55,33 @@ pub(crate) fn chain_yaml(
         let others: Vec<String> = (0..cameras.len()).filter(|k| *k != i).map(|k| k.to_string()).collect();
         let _ = write!(
             text,
-            "  cam_overlaps: [{}]\n  camera_model: pinhole\n  distortion_coeffs: {}\n  distortion_model: {model}\n  \
+            "  cam_overlaps: [{}]\n  camera_model: {projection}\n  distortion_coeffs: {}\n  distortion_model: {model}\n  \
              intrinsics: {}\n  resolution: [{w}, {h}]\n  rostopic: /cam{i}/image_raw\n",
             others.join(", "),
             list(&coefficients),
-            list(&[fx, fy, cx, cy])
+            list(&intrinsics)
         );
         if let Some(delay_s) = camera.line_delay_s() {
             let _ = writeln!(text, "  line_delay: {}", real(delay_s));
         }
     }
     Ok(text)
+}
+
+/// Projection, its parameters before the focal lengths, distortion and its coefficients.
+type Lens = (&'static str, Vec<f64>, &'static str, Vec<f64>);
+
+fn lens_of(camera: &Calibration) -> Result<Lens, CalibrationError> {
+    let lens = &camera.intrinsics;
+    if let Some(k) = lens.of_model::<2>(LensModel::DoubleSphere) {
+        return Ok(("ds", k.to_vec(), "none", Vec::new()));
+    }
+    if let Some(k) = lens.of_model::<2>(LensModel::Eucm) {
+        return Ok(("eucm", k.to_vec(), "none", Vec::new()));
+    }
+    if let Some([xi, k @ ..]) = lens.of_model::<5>(LensModel::Mei) {
+        return Ok(("omni", vec![xi], "radtan", k.to_vec()));
+    }
+    let (model, coefficients) = lens_names::lens(Family::Kalibr, camera)?;
+    Ok(("pinhole", Vec::new(), model, coefficients))
 }

@@ -41,6 +41,15 @@ pub(crate) fn lens(
         let name = if family == Family::OpenCv { "fisheye" } else { "equidistant" };
         return Ok((name, k.to_vec()));
     }
+    if let Some(k) = lens.of_model::<14>(LensModel::BrownConradyPrism) {
+        let count = if k[12..] == [0.0; 2] { 12 } else { 14 };
+        return match family {
+            Family::OpenCv => Ok(("radtan", k[..count].to_vec())),
+            // OpenCV, which ROS hands them to, tells the models apart by their number.
+            Family::Ros => Ok(("rational_polynomial", k[..count].to_vec())),
+            Family::Kalibr | Family::Euroc => Err(no_such_lens(camera, family.title())),
+        };
+    }
     let four = lens.brown::<4>().map(|k| k.to_vec());
     let five = lens.brown::<5>().map(|k| k.to_vec());
     let eight = lens.brown::<8>().map(|k| k.to_vec());
@@ -63,20 +72,12 @@ pub(crate) fn lens(
 pub(crate) fn no_such_lens(camera: &Calibration, format: &str) -> CalibrationError {
     let reason = match camera.intrinsics.model {
         LensModel::Pinhole | LensModel::BrownConrady => "lens with this many coefficients".to_owned(),
-        model => format!("lens of the model {}", model_name(model)),
+        model => format!("lens of the model {}", model.facts().name),
     };
     CalibrationError::Refused(format!(
-        "{}: {format} has no {reason} ({:?}); `--as stmap` writes any lens",
+        "{}: {format} has no {reason} ({:?}): `camsim camera export --as stmap` writes any lens, and a twin without lens \
+         ([[output.twin]] lens = false) needs none",
         camera.label(),
         camera.spec.lens.coefficients
     ))
-}
-
-/// Name of a model in camsim's files.
-pub(crate) fn model_name(model: LensModel) -> &'static str {
-    match model {
-        LensModel::Pinhole => "pinhole",
-        LensModel::BrownConrady => "brown-conrady",
-        LensModel::KannalaBrandt => "kannala-brandt",
-    }
 }

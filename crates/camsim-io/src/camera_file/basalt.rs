@@ -15,7 +15,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "value0.intrinsics.camera_type",
         Treatment::Applied,
-        "pinhole, kb4, pinhole-radtan8; ds, eucm, ucm, fov are refused",
+        "pinhole, kb4, pinhole-radtan8, ds, eucm, ucm; others are refused",
     ),
     KeyRow::new("value0.intrinsics.intrinsics.fx", Treatment::Applied, "px"),
     KeyRow::new("value0.intrinsics.intrinsics.fy", Treatment::Applied, "px"),
@@ -66,10 +66,10 @@ pub(super) const KEYS: &[KeyRow] = &[
         Treatment::Reported(Neutral::Zero),
         "radius limit of the model; camsim computes the limit itself",
     ),
-    KeyRow::new("value0.intrinsics.intrinsics.xi", Treatment::Applied, "parameter of unsupported models"),
-    KeyRow::new("value0.intrinsics.intrinsics.alpha", Treatment::Applied, "parameter of unsupported models"),
-    KeyRow::new("value0.intrinsics.intrinsics.beta", Treatment::Applied, "parameter of unsupported models"),
-    KeyRow::new("value0.intrinsics.intrinsics.w", Treatment::Applied, "parameter of unsupported models"),
+    KeyRow::new("value0.intrinsics.intrinsics.xi", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
+    KeyRow::new("value0.intrinsics.intrinsics.alpha", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
+    KeyRow::new("value0.intrinsics.intrinsics.beta", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
+    KeyRow::new("value0.intrinsics.intrinsics.w", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
     KeyRow::new("value0.resolution", Treatment::Applied, "width and height of each camera"),
     KeyRow::new(
         "value0.vignette.**",
@@ -129,6 +129,9 @@ pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<Imp
     let (model, names): (LensModel, &[&str]) = match kind {
         "pinhole" => (LensModel::BrownConrady, &[]),
         "kb4" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"]),
+        "ds" => (LensModel::DoubleSphere, &["xi", "alpha"]),
+        "eucm" => (LensModel::Eucm, &["alpha", "beta"]),
+        "ucm" => (LensModel::Ucm, &["alpha"]),
         "pinhole-radtan8" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
         other => {
             let full_name =
@@ -136,7 +139,7 @@ pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<Imp
             return Err(KeyProblem::new(
                 "camera_type",
                 format!(
-                    "is `{other}`{full_name}, which is not supported: calibrate with kb4 or pinhole-radtan8"
+                    "is `{other}`{full_name}, which is not supported: calibrate with kb4, ds, eucm, ucm or pinhole-radtan8"
                 ),
             ));
         }

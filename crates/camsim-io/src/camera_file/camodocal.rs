@@ -13,7 +13,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "model_type",
         Treatment::Applied,
-        "PINHOLE, PINHOLE_FULL, KANNALA_BRANDT; MEI (omnidirectional) and SCARAMUZZA are refused",
+        "PINHOLE, PINHOLE_FULL, KANNALA_BRANDT, MEI; SCARAMUZZA is refused",
     ),
     KeyRow::new("image_width", Treatment::Applied, "width"),
     KeyRow::new("image_height", Treatment::Applied, "height"),
@@ -53,10 +53,13 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("projection_parameters.k3", Treatment::Applied, "k2 in camsim"),
     KeyRow::new("projection_parameters.k4", Treatment::Applied, "k3 in camsim"),
     KeyRow::new("projection_parameters.k5", Treatment::Applied, "k4 in camsim"),
+    KeyRow::new("mirror_parameters.xi", Treatment::Applied, "of MEI"),
+    KeyRow::new("projection_parameters.gamma1", Treatment::Applied, "fx of a MEI"),
+    KeyRow::new("projection_parameters.gamma2", Treatment::Applied, "fy of a MEI"),
     KeyRow::new("projection_parameters.mu", Treatment::Applied, "fx of a KANNALA_BRANDT"),
     KeyRow::new("projection_parameters.mv", Treatment::Applied, "fy of a KANNALA_BRANDT"),
-    KeyRow::new("projection_parameters.u0", Treatment::Applied, "cx of a KANNALA_BRANDT"),
-    KeyRow::new("projection_parameters.v0", Treatment::Applied, "cy of a KANNALA_BRANDT"),
+    KeyRow::new("projection_parameters.u0", Treatment::Applied, "cx of a KANNALA_BRANDT or MEI"),
+    KeyRow::new("projection_parameters.v0", Treatment::Applied, "cy of a KANNALA_BRANDT or MEI"),
     KeyRow::new("rolling_shutter", Treatment::RollingShutter, "1: rolling shutter"),
     KeyRow::new(
         "rolling_shutter_tr",
@@ -150,6 +153,11 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
                 all("distortion_parameters", &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"])?;
             (LensModel::BrownConrady, projection(["fx", "fy", "cx", "cy"])?, coefficients)
         }
+        "MEI" => {
+            let mut coefficients = all("mirror_parameters", &["xi"])?;
+            coefficients.extend(all("distortion_parameters", &["k1", "k2", "p1", "p2"])?);
+            (LensModel::Mei, projection(["gamma1", "gamma2", "u0", "v0"])?, coefficients)
+        }
         // Its k1 is 1 and not written: r = theta + k2 theta^3 + k3 theta^5 + k4 theta^7 + k5 theta^9.
         "KANNALA_BRANDT" => {
             let coefficients = all("projection_parameters", &["k2", "k3", "k4", "k5"])?;
@@ -159,8 +167,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
             let full_name = super::lens_models::unsupported_model_name(&other.to_ascii_lowercase())
                 .map_or(String::new(), |name| format!(" ({name})"));
             let text = format!(
-                "is `{other}`{full_name}, which is not supported: PINHOLE, PINHOLE_FULL and KANNALA_BRANDT \
-                 can be imported; calibrate with one of them"
+                "is `{other}`{full_name}, which is not supported: PINHOLE, PINHOLE_FULL, KANNALA_BRANDT and \
+                 MEI can be imported; a lens of another model is a table of points (docs/LENSES.md)"
             );
             return Err(KeyProblem::new("model_type", text));
         }

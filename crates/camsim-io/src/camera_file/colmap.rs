@@ -15,7 +15,8 @@ pub(super) const KEYS: &[KeyRow] = &[
         "cameras.model",
         Treatment::Applied,
         "MODEL: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, \
-         SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE; others are refused",
+         SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, FOV, SIMPLE_DIVISION, DIVISION, EUCM, \
+         RAD_TAN_THIN_PRISM_FISHEYE; others are refused",
     ),
     KeyRow::new("cameras.width", Treatment::Applied, "WIDTH"),
     KeyRow::new("cameras.height", Treatment::Applied, "HEIGHT"),
@@ -76,7 +77,7 @@ pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
 
 /// Lens model and names of the parameters, from COLMAP's source; `None` for unsupported models.
 fn parameter_names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
-    use LensModel::{BrownConrady, KannalaBrandt};
+    use LensModel::{BrownConrady, Division, Eucm, Fisheye624, Fov, KannalaBrandt};
     Some(match model {
         "SIMPLE_PINHOLE" => (BrownConrady, &["f", "cx", "cy"]),
         "PINHOLE" => (BrownConrady, &["fx", "fy", "cx", "cy"]),
@@ -89,6 +90,16 @@ fn parameter_names(model: &str) -> Option<(LensModel, &'static [&'static str])> 
         "OPENCV_FISHEYE" => (KannalaBrandt, &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"]),
         "SIMPLE_RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1"]),
         "RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1", "k2"]),
+        "FOV" => (Fov, &["fx", "fy", "cx", "cy", "omega"]),
+        "SIMPLE_DIVISION" => (Division, &["f", "cx", "cy", "k"]),
+        "DIVISION" => (Division, &["fx", "fy", "cx", "cy", "k"]),
+        "EUCM" => (Eucm, &["fx", "fy", "cx", "cy", "alpha", "beta"]),
+        "RAD_TAN_THIN_PRISM_FISHEYE" => (
+            Fisheye624,
+            &[
+                "fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3",
+            ],
+        ),
         _ => return None,
     })
 }
@@ -121,7 +132,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let f = or_zero("f");
     let coefficients = match lens {
         LensModel::KannalaBrandt => ["k1", "k2", "k3", "k4"].map(or_zero).to_vec(),
-        _ => ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(or_zero).to_vec(),
+        LensModel::BrownConrady => ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(or_zero).to_vec(),
+        _ => lens.facts().coefficients.iter().map(|name| or_zero(name)).collect(),
     };
     let size_px = size("WIDTH", [number(value, "width")?, number(value, "height")?])?;
     let focal_px = [get("fx").unwrap_or(f), get("fy").unwrap_or(f)];

@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::document::{Document, KeyProblem, find};
 use super::key_table::{KeyRow, TableLeaves, leaves};
 use super::selection::CameraEntry;
+use super::syntax::LENS_DATABASE;
 use super::{
     ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, nerfstudio, okvis, opencv, opensfm,
     orb_slam, reference, ros, vikit,
@@ -277,7 +278,7 @@ pub(super) fn unsupported_hint(document: &Document) -> Option<String> {
         ));
     }
     if document.root == "lensdatabase" {
-        return Some("this is a lens database without image sizes, not a camera".to_owned());
+        return Some(LENS_DATABASE.to_owned());
     }
     if find(value, "ppx").is_some() {
         let text = "these are RealSense intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), \

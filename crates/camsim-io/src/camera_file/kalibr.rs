@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::document::{Document, KeyProblem, find, numbers_n, one_of, size, word};
+use super::document::{Document, KeyProblem, find, numbers, numbers_n, one_of, size, word};
 use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera, lens_models};
@@ -13,8 +13,12 @@ const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all s
                       applies it";
 
 pub(super) const KEYS: &[KeyRow] = &[
-    KeyRow::new("cam*.camera_model", Treatment::Applied, "pinhole; omni, ds, eucm and ucm are refused"),
-    KeyRow::new("cam*.intrinsics", Treatment::Applied, "fx fy cx cy"),
+    KeyRow::new("cam*.camera_model", Treatment::Applied, "pinhole, omni (with radtan or none), ds, eucm, ucm"),
+    KeyRow::new(
+        "cam*.intrinsics",
+        Treatment::Applied,
+        "fx fy cx cy; before them xi (omni), xi alpha (ds), alpha beta (eucm), alpha (ucm)",
+    ),
     KeyRow::new("cam*.distortion_model", Treatment::Applied, "radtan, equidistant, none; others are refused"),
     KeyRow::new(
         "cam*.distortion_coeffs",
@@ -47,7 +51,7 @@ pub(super) const KEYS: &[KeyRow] = &[
 ];
 
 pub(super) const EUROC_KEYS: &[KeyRow] = &[
-    KeyRow::new("camera_model", Treatment::Applied, "pinhole; others are refused"),
+    KeyRow::new("camera_model", Treatment::Applied, "as in a Kalibr camchain"),
     KeyRow::new("intrinsics", Treatment::Applied, "fx fy cx cy"),
     KeyRow::new(
         "distortion_model",
@@ -97,16 +101,9 @@ pub(super) fn matches_euroc(document: &Document) -> bool {
 }
 
 pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCamera, KeyProblem> {
-    if let Some(model) = word(value, "camera_model")
-        && model != "pinhole"
-    {
-        let full_name =
-            lens_models::unsupported_model_name(model).map_or(String::new(), |name| format!(" ({name})"));
-        let text = format!(
-            "is `{model}`{full_name}: only `pinhole` can be imported, with radial-tangential or equidistant \
-             distortion; calibrate with one of these"
-        );
-        return Err(KeyProblem::new("camera_model", text));
+    let projection = word(value, "camera_model").unwrap_or("pinhole");
+    if projection != "pinhole" {
+        return import_wide(value, format, projection);
     }
     let [fx, fy, cx, cy] = numbers_n(value, "intrinsics")?;
     let size_px = size("resolution", numbers_n(value, "resolution")?)?;
@@ -116,4 +113,32 @@ pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCame
     let (model, list) =
         lens_models::lens_by_name("distortion_model", model, key.unwrap_or("distortion_coeffs"), list)?;
     Ok(camera(format, size_px, [fx, fy], [cx, cy], model, list))
+}
+
+/// A projection with parameters of its own before the focal lengths.
+fn import_wide(
+    value: &Value,
+    format: CameraFormat,
+    projection: &str,
+) -> Result<ImportedCamera, KeyProblem> {
+    let intrinsics = numbers(value, "intrinsics")?;
+    let Some((parameters, [fx, fy, cx, cy])) = intrinsics.split_last_chunk::<4>() else {
+        return Err(KeyProblem::new("intrinsics", format!("has {} numbers", intrinsics.len())));
+    };
+    let size_px = size("resolution", numbers_n(value, "resolution")?)?;
+    let key = one_of(value, &["distortion_coeffs", "distortion_coefficients"])?;
+    let model = word(value, "distortion_model").unwrap_or("none");
+    let distortion = lens_models::coefficients(value, "distortion_model", model, key)?;
+    let is_distorted = distortion.iter().any(|k| *k != 0.0);
+    let is_radtan = projection == "omni" && ["radtan", "radial-tangential", "none"].contains(&model);
+    if is_distorted && !(is_radtan && distortion.len() == 4) {
+        let text = format!(
+            "is `{model}` with `{projection}`: of these projections only omni is supported with distortion, radtan's \
+             four coefficients"
+        );
+        return Err(KeyProblem::new("distortion_model", text));
+    }
+    let all = if is_distorted { [parameters, &distortion].concat() } else { parameters.to_vec() };
+    let (model, coefficients) = lens_models::lens_by_name("camera_model", projection, "intrinsics", all)?;
+    Ok(camera(format, size_px, [*fx, *fy], [*cx, *cy], model, coefficients))
 }

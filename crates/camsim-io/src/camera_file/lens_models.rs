@@ -1,5 +1,6 @@
 //! Lens models by the names that several formats share.
 
+use camsim_core::lens::{ForeignLensError, foreign_lens};
 use camsim_core::scenario::LensModel;
 
 use serde_json::Value;
@@ -31,18 +32,24 @@ pub(super) fn lens_by_name(
             Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 5)?))
         }
         "radialtangential8" | "radtan8" | "rationalpolynomial" | "rational" => {
-            Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 8)?))
+            radial_tangential_or_prism(key, coefficients)
         }
         "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4" | "kannalabrandt8"
         | "kb4" => Ok((LensModel::KannalaBrandt, equidistant(key, coefficients)?)),
-        other => {
-            let full_name = unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
-            let text = format!(
-                "is `{model}`{full_name}, which is not supported: radial-tangential (radtan, plumb_bob, \
-                 rational_polynomial), equidistant and none can be imported; calibrate with one of these"
-            );
-            Err(KeyProblem::new(model_key, text))
-        }
+        other => match foreign_lens(other, &coefficients) {
+            Ok(lens) => Ok((lens.model, lens.coefficients)),
+            Err(error @ ForeignLensError::Count { .. }) => Err(KeyProblem::new(key, error.to_string())),
+            Err(ForeignLensError::Unknown(_)) => {
+                let full_name =
+                    unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
+                let text = format!(
+                    "is `{model}`{full_name}, which is not supported: radial-tangential (radtan, plumb_bob, \
+                     rational_polynomial), equidistant, omni, ds, eucm, ucm, fov and none can be imported; a lens of \
+                     another model is a table of points (docs/LENSES.md)"
+                );
+                Err(KeyProblem::new(model_key, text))
+            }
+        },
     }
 }
 
@@ -77,11 +84,7 @@ pub(super) fn coefficients(
 pub(super) fn unsupported_model_name(normalized: &str) -> Option<&'static str> {
     let has = |part: &str| normalized.contains(part);
     match normalized {
-        "ds" => Some("double sphere"),
-        "eucm" => Some("extended unified camera model"),
-        "ucm" | "unifiedprojection" => Some("unified camera model"),
-        "mei" => Some("MEI, omnidirectional"),
-        "fov" | "atan" => Some("field-of-view model"),
+        "unifiedprojection" => Some("unified camera model"),
         _ if has("omni") || has("mirror") => Some("MEI, omnidirectional"),
         _ if has("doublesphere") => Some("double sphere"),
         _ if has("scaramuzza") || has("ocam") => Some("OCamCalib's polynomial"),
@@ -116,6 +119,17 @@ pub(super) fn radial_tangential(
             Err(KeyProblem::new(key, text))
         }
     }
+}
+
+/// As [`radial_tangential`] with eight coefficients, or OpenCV's 12 or 14 with thin prism and tilt.
+pub(super) fn radial_tangential_or_prism(
+    key: &str,
+    coefficients: Vec<f64>,
+) -> Result<(LensModel, Vec<f64>), KeyProblem> {
+    if coefficients.iter().skip(8).any(|k| *k != 0.0) && [12, 14].contains(&coefficients.len()) {
+        return Ok((LensModel::BrownConradyPrism, coefficients));
+    }
+    Ok((LensModel::BrownConrady, radial_tangential(key, coefficients, 8)?))
 }
 
 /// Coefficients `k1 k2 k3 k4`.

@@ -1,6 +1,7 @@
 //! The camera rig of aslam (YAML), which maplab, rpg_svo_pro and ESIM read: `cameras: [{camera: ..., T_B_C:
 //! ...}]`.
 
+use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
 use super::document::{Document, KeyProblem, find, number, numbers_n, size, word};
@@ -12,15 +13,15 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "cameras.camera.type",
         Treatment::Applied,
-        "pinhole; omni (OCamCalib) and unified-projection are refused",
+        "pinhole, unified-projection; omni (OCamCalib) is refused",
     ),
     KeyRow::new("cameras.camera.image_width", Treatment::Applied, "width"),
     KeyRow::new("cameras.camera.image_height", Treatment::Applied, "height"),
-    KeyRow::new("cameras.camera.intrinsics", Treatment::Applied, "fx fy cx cy"),
+    KeyRow::new("cameras.camera.intrinsics", Treatment::Applied, "fx fy cx cy; xi before them in unified-projection"),
     KeyRow::new(
         "cameras.camera.distortion.type",
         Treatment::Applied,
-        "radial-tangential, equidistant, none; others (fisheye: the field-of-view model) are refused",
+        "radial-tangential, equidistant, fisheye (there the field-of-view model), none; others are refused",
     ),
     KeyRow::new(
         "cameras.camera.distortion.parameters",
@@ -93,13 +94,16 @@ pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
 
 pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let kind = word(value, "camera.type").unwrap_or("pinhole");
+    if kind == "unified-projection" {
+        return import_unified(value);
+    }
     if kind != "pinhole" {
         let full_name = if kind == "omni" { "OCamCalib's polynomial" } else { "another projection" };
         return Err(KeyProblem::new(
             "camera.type",
             format!(
                 "is `{kind}` ({full_name}), which is not supported: calibrate as pinhole, with equidistant \
-                 distortion if it is a fisheye"
+                 distortion if it is a fisheye, or make a table of points of it (docs/LENSES.md)"
             ),
         ));
     }
@@ -111,11 +115,30 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let key = "camera.distortion.parameters";
     let kind = word(value, "camera.distortion.type").unwrap_or_default();
     let coefficients = lens_models::coefficients(value, "camera.distortion.type", kind, Some(key))?;
-    if kind == "fisheye" {
-        let text = "is `fisheye` (there the field-of-view model), which is not supported: calibrate with \
-                    equidistant";
-        return Err(KeyProblem::new("camera.distortion.type", text));
-    }
+    // There `fisheye` is the field-of-view model.
+    let kind = if kind == "fisheye" { "fov" } else { kind };
     let (model, coefficients) = lens_models::lens_by_name("camera.distortion.type", kind, key, coefficients)?;
     Ok(camera(CameraFormat::NCamera, size_px, [fx, fy], [cx, cy], model, coefficients))
+}
+
+/// xi before the focal lengths, and radial-tangential distortion on the sphere's image: MEI.
+fn import_unified(value: &Value) -> Result<ImportedCamera, KeyProblem> {
+    let [xi, fx, fy, cx, cy] = numbers_n(value, "camera.intrinsics")?;
+    let size_px = size(
+        "camera.image_width",
+        [number(value, "camera.image_width")?, number(value, "camera.image_height")?],
+    )?;
+    let (model_key, key) = ("camera.distortion.type", "camera.distortion.parameters");
+    let kind = word(value, model_key).unwrap_or_default();
+    let distortion = lens_models::coefficients(value, model_key, kind, Some(key))?;
+    let distortion = match lens_models::lens_by_name(model_key, kind, key, distortion)? {
+        (LensModel::BrownConrady, list) if list.len() <= 4 => list,
+        _ => {
+            let text = format!("is `{kind}`: unified-projection can be imported with four radial-tangential \
+                                coefficients or none");
+            return Err(KeyProblem::new(model_key, text));
+        }
+    };
+    let coefficients = [&[xi], &distortion[..]].concat();
+    Ok(camera(CameraFormat::NCamera, size_px, [fx, fy], [cx, cy], LensModel::Mei, coefficients))
 }

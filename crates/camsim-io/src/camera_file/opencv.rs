@@ -31,8 +31,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "distortion_coefficients",
         Treatment::Applied,
-        "5, 8, or up to 14 with zeros after the eighth: k1 k2 p1 p2 k3 k4 k5 k6. Four need a model, or \
-         --format",
+        "5, 8, 12 or 14: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y. Four need a model, or --format",
     ),
     KeyRow::new("Distortion_Coefficients", Treatment::Applied, "as distortion_coefficients"),
     KeyRow::new("distortion_coeffs", Treatment::Applied, "as distortion_coefficients"),
@@ -66,6 +65,7 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("size", Treatment::Applied, "width and height, in this order"),
     KeyRow::new("resolution", Treatment::Applied, "width and height, in this order"),
     KeyRow::new("image_resolution", Treatment::Applied, "width and height, in this order"),
+    KeyRow::new("xi", Treatment::Applied, "mirror parameter of the module omnidir, with k1 k2 p1 p2"),
     KeyRow::new("fisheye_model", Treatment::Applied, "1: fisheye coefficients"),
     KeyRow::new("fisheye", Treatment::Applied, "as above"),
     KeyRow::new("is_fisheye", Treatment::Applied, "as above"),
@@ -335,6 +335,11 @@ pub(super) fn import(
     one_of(value, &names.each_ref().map(String::as_str))?;
     let size_px = image_size(value)?;
     let list = numbers(value, key)?;
+    if let Some(xi) = mirror(value)? {
+        let coefficients = [&[xi], &list[..]].concat();
+        let (model, coefficients) = lens_models::lens_by_name("xi", "omni", key, coefficients)?;
+        return Ok(camera(format, size_px, focal_px, principal_point_px, model, coefficients));
+    }
     let stated_model = model(value)?;
     let lens = match (format, stated_model) {
         (CameraFormat::OpenCvFisheye, Some((model_key, LensModel::BrownConrady))) => {
@@ -353,11 +358,20 @@ pub(super) fn import(
         }
         (_, None) => LensModel::BrownConrady,
     };
-    let list = match lens {
-        LensModel::KannalaBrandt => lens_models::equidistant(key, list)?,
-        _ => lens_models::radial_tangential(key, list, 8)?,
+    let (lens, list) = match lens {
+        LensModel::KannalaBrandt => (lens, lens_models::equidistant(key, list)?),
+        _ => lens_models::radial_tangential_or_prism(key, list)?,
     };
     Ok(camera(format, size_px, focal_px, principal_point_px, lens, list))
+}
+
+/// The mirror parameter of OpenCV's module omnidir, as a number or a matrix of one; zero is none.
+fn mirror(value: &Value) -> Result<Option<f64>, KeyProblem> {
+    if find(value, "xi").is_none() {
+        return Ok(None);
+    }
+    let [xi] = numbers_n(value, "xi")?;
+    Ok(Some(xi).filter(|xi| *xi != 0.0))
 }
 
 /// The stated model and its key.

@@ -65,7 +65,11 @@ impl Document {
         let options = roxmltree::ParsingOptions { allow_dtd: false, ..roxmltree::ParsingOptions::default() };
         let tree = roxmltree::Document::parse_with_options(text.trim_start(), options).map_err(|error| {
             let skipped = text[..text.len() - text.trim_start().len()].lines().count();
-            SyntaxProblem { line: Some(error.pos().row as usize + skipped), message: format!("XML: {error}") }
+            let message = match text.contains("<lensdatabase") {
+                true => LENS_DATABASE.to_owned(),
+                false => format!("XML: {error}"),
+            };
+            SyntaxProblem { line: Some(error.pos().row as usize + skipped), message }
         })?;
         let root = tree.root_element();
         Ok(Self { root: root.tag_name().name().to_owned(), value: xml_value(root, 0) })
@@ -179,6 +183,10 @@ impl<'de> Visitor<'de> for UniqueKeysVisitor {
         Ok(Value::Object(map))
     }
 }
+
+/// What to do with lensfun's files.
+pub(super) const LENS_DATABASE: &str =
+    "this is lensfun's database of lenses: name one of them, as in --lens NAME --focal 35 --size 6000x4000";
 
 /// Depth below which XML elements are ignored, so that a malicious file cannot exhaust the stack.
 const MAX_DEPTH: usize = 64;

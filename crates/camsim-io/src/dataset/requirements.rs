@@ -15,8 +15,11 @@ pub fn require(scenario: &mut Scenario, format: DatasetFormat) -> Result<Vec<Str
     let shutter = &scenario.camera.shutter;
     let is_prompt = shutter.delay_ms == 0.0 && shutter.interlace_ms == FieldOr::Ms(0.0);
     let lens = &scenario.camera.lens;
-    let has_lens = lens.model == LensModel::KannalaBrandt
-        || (lens.model == LensModel::BrownConrady && lens.coefficients.iter().any(|k| *k != 0.0));
+    let has_lens = match lens.model {
+        LensModel::Pinhole => false,
+        LensModel::BrownConrady => lens.coefficients.iter().any(|k| *k != 0.0),
+        _ => true,
+    };
     let mut added = Vec::new();
     if format == DatasetFormat::Colmap && scenario.output.tracks.is_none() {
         add_tracks(scenario, &mut added);

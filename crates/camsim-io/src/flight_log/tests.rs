@@ -4,27 +4,14 @@ use std::path::PathBuf;
 
 use camsim_core::{
     flight_log::{RawAttitude, RawPosition, body_from_euler_deg},
-    scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, Origin, TimeUnit},
+    scenario::AttitudeSource,
 };
 use glam::{DQuat, DVec3};
 
 use super::*;
 
 pub(super) fn spec(format: LogFormat) -> FlightSpec {
-    FlightSpec {
-        log: PathBuf::new(),
-        format,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
-        origin: Origin::First,
-        height: HeightReference::Ellipsoid,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
-    }
+    FlightSpec { format, ..FlightSpec::new(PathBuf::new()) }
 }
 
 fn raw(content: &str, format: LogFormat) -> Result<Vec<RawRow>, FlightLogError> {

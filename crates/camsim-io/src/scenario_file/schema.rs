@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use camsim_core::{
     scenario::{
-        MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
+        LensModel, MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_INSTANTS, MAX_ITERATIONS,
         MAX_SIDE_PX, PointSource, TracksSpec, VideoSpec,
     },
     temporal::SAMPLES,
@@ -179,8 +179,9 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("camera.mount.vibration.amplitude_m", Number),
     ("camera.mount.vibration.hz", Number),
     ("camera.mount.vibration.phase_deg", Number),
-    ("camera.lens.model", Word(&["pinhole", "brown-conrady", "kannala-brandt"])),
+    ("camera.lens.model", Word(&LensModel::NAMES)),
     ("camera.lens.coefficients", NumberList),
+    ("camera.lens_table", Path),
     ("camera.zoom", Tables),
     ("camera.zoom.at", Number),
     ("camera.zoom.focal_px", Numbers(2)),

@@ -165,10 +165,10 @@ fn basalt_models_are_imported_or_refused() {
     let expectations = [Lens(BrownConrady, &[0.1, 0.2, 0.01, 0.02, 0.3, 0.4, 0.5, 0.6]), Note("rpmax = 2.7")];
     check("radtan8", &read("calibration.json", &basalt("pinhole-radtan8", radtan)), &expectations);
     for (kind, numbers, words) in [
-        ("ds", r#""xi": -0.2, "alpha": 0.5"#, ["camera_type", "double sphere"]),
-        ("eucm", r#""alpha": 0.5, "beta": 1.1"#, ["camera_type", "extended unified"]),
-        ("ucm", r#""alpha": 0.5"#, ["camera_type", "unified camera model"]),
-        ("fov", r#""w": 0.5"#, ["camera_type", "field-of-view"]),
+        ("ds", r#""xi": -0.2, "alpha": 0.5, "beta": 1.1"#, ["beta", "no such parameter"]),
+        ("eucm", r#""alpha": 0.5"#, ["beta", "is missing"]),
+        ("ds", r#""xi": -0.2, "alpha": 0.5, "k1": 0.1"#, ["k1", "no such parameter"]),
+        ("fov", r#""w": 0.5"#, ["camera_type", "is `fov`"]),
         ("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3"#, ["k4", "is missing"]),
         ("pinhole", r#""k1": 0.1"#, ["k1", "no such parameter"]),
         ("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4, "p1": 0.01"#, ["p1", "no such parameter"]),

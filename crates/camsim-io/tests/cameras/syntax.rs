@@ -32,10 +32,11 @@ fn encodings_are_accepted() {
 #[test]
 fn malformed_kalibr_files_are_refused() {
     for (from, to, words) in [
-        ("pinhole", "omni", ["cam0.camera_model", "omnidirectional"]),
-        ("pinhole", "ds", ["cam0.camera_model", "double sphere"]),
-        ("pinhole", "eucm", ["cam0.camera_model", "extended unified"]),
-        ("radtan", "fov", ["cam0.distortion_model", "field-of-view"]),
+        ("pinhole", "omni", ["cam0.intrinsics", "has 4 parameters where `omni` has 1 or 5"]),
+        ("pinhole", "ds", ["cam0.distortion_model", "is `radtan` with `ds`"]),
+        ("pinhole", "eucm", ["cam0.distortion_model", "is `radtan` with `eucm`"]),
+        ("pinhole", "ocam", ["cam0.distortion_model", "is `radtan` with `ocam`"]),
+        ("radtan", "fov", ["cam0.distortion_coeffs", "has 4 parameters"]),
         ("radtan", "none", ["cam0.distortion_coeffs", "states no distortion"]),
         ("distortion_model: radtan", "distortion_mode: radtan", ["cam0.distortion_coeffs", "is empty"]),
         ("  distortion_coeffs: [0.1, 0.2, 0.003, 0.004]\n", "", ["cam0.distortion_coeffs", "is missing"]),
@@ -107,7 +108,7 @@ fn other_files_are_refused_with_a_hint() {
         "lensfun",
         "db.xml",
         "<lensdatabase><lens><model>x</model></lens></lensdatabase>",
-        &["lens database"],
+        &["database of lenses"],
     );
     refused(
         "a distortion alone",
@@ -116,10 +117,10 @@ fn other_files_are_refused_with_a_hint() {
         &["no 3 x 3 camera matrix"],
     );
     refused(
-        "nerfstudio",
+        "nerfstudio, a camera for each picture",
         "transforms.json",
-        r#"{"fl_x": 500, "fl_y": 501, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": []}"#,
-        &["half a pixel"],
+        r#"{"fl_x": 500, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": [{"fl_x": 1.0}]}"#,
+        &["frames[0].fl_x", "a camera of its own"],
     );
     refused(
         "RealSense",

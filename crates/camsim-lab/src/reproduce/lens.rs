@@ -72,11 +72,7 @@ fn calibrations(width_px: u32) -> [Calibration; 2] {
 /// it.
 fn poses(setup: &Setup<'_>, file: &str) -> Result<Vec<LogRow>, ReproduceError> {
     if let Some(path) = setup.data_file(file) {
-        let spec = FlightSpec {
-            log: path.clone(),
-            format: LogFormat::CsvNed,
-            ..test_bench::scenario(test_bench::pinhole(96)).flight
-        };
+        let spec = FlightSpec { format: LogFormat::CsvNed, ..FlightSpec::new(&path) };
         return Ok(read_flight_log(&path, &spec, HeightConversion::None)?.rows);
     }
     let pose = |i: u32| {

@@ -38,10 +38,7 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             };
             let own = test_bench::scenario(camera);
             let scenario = Scenario {
-                flight: FlightSpec {
-                    log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"),
-                    ..own.flight.clone()
-                },
+                flight: FlightSpec::new(data.join("flights/demo_sertig_lawnmower_x5.5.csv")),
                 tracker: TrackerSpec::default(),
                 scene: SceneSpec { terrain: Some(terrain), sky: SKY, ..own.scene.clone() },
                 ..own

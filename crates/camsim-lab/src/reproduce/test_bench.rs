@@ -114,30 +114,10 @@ impl Motion {
 pub fn scenario(camera: CameraSpec) -> Scenario {
     Scenario {
         seed: 12,
-        flight: FlightSpec {
-            log: "in-memory".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            height_from: Default::default(),
-            topic: None,
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: Default::default(),
         camera,
-        scene: Default::default(),
         // Frames of independent instants share no ideal frame.
         quality: QualitySpec { frames_per_ideal: 1, ..QualitySpec::default() },
-        output: Default::default(),
-        imu: Vec::new(),
-        gnss: Vec::new(),
-        barometer: Vec::new(),
-        magnetometer: Vec::new(),
+        ..Scenario::new(FlightSpec::new("in-memory"), Default::default())
     }
 }
 

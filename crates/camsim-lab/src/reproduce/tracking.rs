@@ -7,7 +7,7 @@ use camsim_core::{
 };
 use camsim_io::{builtin, flight_log::read_flight_log};
 
-use super::{ExperimentReport, ReproduceError, Setup, Table, short, test_bench};
+use super::{ExperimentReport, ReproduceError, Setup, Table, short};
 use crate::plot::{Plot, Series};
 
 /// The paper's limits: 2 g and 60 deg/s^2.
@@ -35,11 +35,7 @@ pub(super) struct TrackedFlight {
 pub(super) fn track_log(setup: &Setup<'_>) -> Result<(FlightLog, Vec<TrackedFlight>), ReproduceError> {
     let log = match setup.data_file("camsim/path_lawnmower.csv") {
         Some(path) => {
-            let spec = FlightSpec {
-                log: path.clone(),
-                format: LogFormat::CsvLla,
-                ..test_bench::scenario(test_bench::pinhole(96)).flight
-            };
+            let spec = FlightSpec { format: LogFormat::CsvLla, ..FlightSpec::new(&path) };
             read_flight_log(&path, &spec, HeightConversion::None)?
         }
         None => {

@@ -99,7 +99,7 @@ impl SilhouetteModel {
             contrast_dn: 255.0 * contrast2.sqrt(),
             disoccluded_share: disocclusion.share,
             strips: STRIPS * near.contrast2_between_surfaces() * disocclusion.weighted_share
-                + near.share * near.mean(|silhouette| silhouette.strip(key_pose, camera.focal_px))
+                + near.share * near.mean(|silhouette| silhouette.strip(key_pose, camera.central_focal_px()))
                 + skyline.strips(key_pose, plane),
             steps: uncertainty * (of_points.max(density * of_lines) - skyline_steps) + skyline_steps,
             steps_at_pixel_spacing: of_points.max(of_lines / density),

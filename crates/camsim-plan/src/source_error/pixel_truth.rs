@@ -93,7 +93,7 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn terrain_displacement_px(&self) -> f64 {
         let FramePlan { camera, ideal, terrain_error_px, .. } = self.plan;
-        let camera_from_ideal = (camera.focal_px / ideal.focal_px).max_element();
+        let camera_from_ideal = (camera.central_focal_px() / ideal.focal_px).max_element();
         self.surfaces.terrain().map_or(0.0, |_| terrain_error_px * camera_from_ideal)
     }
 

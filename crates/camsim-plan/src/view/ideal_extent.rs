@@ -31,7 +31,7 @@ impl IdealExtent {
 
     /// Its pixels. `scale` is that of its focal length to the camera's.
     pub fn pixels(self, camera: &CameraModel, scale: f64) -> IdealGeometry {
-        let focal_px = camera.focal_px * scale;
+        let focal_px = camera.central_focal_px() * scale;
         // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels
         // fall together.
         let principal_px = camera.principal_point_px;

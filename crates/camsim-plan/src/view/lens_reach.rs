@@ -104,7 +104,7 @@ fn least_stretch(camera: &CameraModel, uv: DVec2) -> f64 {
     let t = forward.x_axis.length_squared() + forward.y_axis.length_squared();
     let d = forward.determinant();
     let sigma2 = 0.5 * (t + (t * t - 4.0 * d * d).max(0.0).sqrt());
-    if sigma2 > 0.0 { 1.0 / sigma2.sqrt() } else { 1.0 }
+    if sigma2 > 0.0 { camera.lens.axial_magnification() / sigma2.sqrt() } else { 1.0 }
 }
 
 fn band_of(pixel: [u32; 2], size_px: [u32; 2]) -> u32 {

@@ -192,7 +192,7 @@ impl NeighbourhoodSearch<'_> {
     /// Side of a probe's pixel, and how far its path over the exposure goes: to and fro spreads a border no
     /// farther than that.
     fn sides_px(&self, points: &NinePoints<'_>) -> [f64; 2] {
-        let (probe, focal_px) = (points.probe, self.reach.camera.focal_px);
+        let (probe, focal_px) = (points.probe, self.reach.camera.central_focal_px());
         let exposure_s = self.shutter.exposure_s();
         let path = path_px(self.path, points.mid_s, exposure_s, probe.uv, points.middle(), focal_px);
         [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.0.length()]

@@ -14,33 +14,8 @@ use glam::{DQuat, DVec3};
 
 /// Looks straight down, the top of the image towards the nose.
 pub fn scenario() -> Scenario {
-    let flight = FlightSpec {
-        log: "in-memory".into(),
-        format: Default::default(),
-        time_unit: Default::default(),
-        angle_unit: Default::default(),
-        angles: Default::default(),
-        attitude: Default::default(),
-        origin: Default::default(),
-        height: Default::default(),
-        height_from: Default::default(),
-        topic: None,
-        window_s: None,
-        speed: 1.0,
-    };
-    let mut scenario = Scenario {
-        seed: 12,
-        flight,
-        tracker: Default::default(),
-        camera: Default::default(),
-        scene: Default::default(),
-        quality: Default::default(),
-        output: Default::default(),
-        imu: Vec::new(),
-        gnss: Vec::new(),
-        barometer: Vec::new(),
-        magnetometer: Vec::new(),
-    };
+    let mut scenario =
+        Scenario { seed: 12, ..Scenario::new(FlightSpec::new("in-memory"), Default::default()) };
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
     scenario
 }

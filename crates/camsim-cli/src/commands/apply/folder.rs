@@ -239,7 +239,9 @@ fn inputs(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<ApplyIn
     let text =
         |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::size_and_mtime(path));
     let mut camera = spec.clone();
-    for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
+    let lens_table = camera.lens_table.as_mut().map(|table| &mut table.path);
+    let paths = [camera.photometric.vignette.as_mut(), camera.zoom_track.as_mut(), lens_table];
+    for path in paths.into_iter().flatten() {
         *path = relative_to(path, folder);
     }
     let files = inputs::file_fingerprints(

@@ -9,41 +9,14 @@ use crate::scenario::{
 };
 
 pub(crate) fn good() -> Scenario {
-    Scenario {
-        seed: 0,
-        flight: FlightSpec {
-            log: "flight.csv".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            height_from: Default::default(),
-            topic: None,
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: Default::default(),
-        camera: Default::default(),
-        scene: SceneSpec {
-            pattern: Some(PatternSpec {
-                image: "grid.png".into(),
-                width_m: 100.0,
-                at: Default::default(),
-                name: None,
-                class: None,
-            }),
-            ..Default::default()
-        },
-        quality: Default::default(),
-        output: Default::default(),
-        imu: Vec::new(),
-        gnss: Vec::new(),
-        barometer: Vec::new(),
-        magnetometer: Vec::new(),
-    }
+    let pattern = PatternSpec {
+        image: "grid.png".into(),
+        width_m: 100.0,
+        at: Default::default(),
+        name: None,
+        class: None,
+    };
+    Scenario::new(FlightSpec::new("flight.csv"), SceneSpec { pattern: Some(pattern), ..SceneSpec::default() })
 }
 
 fn model() -> GltfSpec {

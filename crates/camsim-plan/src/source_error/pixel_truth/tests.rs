@@ -41,32 +41,8 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
         meshes: vec![roof(20.0, 25.0), Mesh { motion, ..roof(70.0, 35.0) }],
         ..Scene::default()
     };
-    let mut scenario = Scenario {
-        seed: 1,
-        flight: FlightSpec {
-            log: "in-memory".into(),
-            format: Default::default(),
-            time_unit: Default::default(),
-            angle_unit: Default::default(),
-            angles: Default::default(),
-            attitude: Default::default(),
-            origin: Default::default(),
-            height: Default::default(),
-            height_from: Default::default(),
-            topic: None,
-            window_s: None,
-            speed: 1.0,
-        },
-        tracker: Default::default(),
-        camera: Default::default(),
-        scene: Default::default(),
-        quality: Default::default(),
-        output: Default::default(),
-        imu: Vec::new(),
-        gnss: Vec::new(),
-        barometer: Vec::new(),
-        magnetometer: Vec::new(),
-    };
+    let mut scenario =
+        Scenario { seed: 1, ..Scenario::new(FlightSpec::new("in-memory"), Default::default()) };
     scenario.camera.size_px = [80, 60];
     scenario.camera.focal_px = [60.0, 62.0];
     scenario.camera.lens =

@@ -111,7 +111,7 @@ impl<'a> NinePoints<'a> {
             .iter()
             .zip(self.inverse_depth)
             .fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
-        (self.search.reach.camera.focal_px * (self.probe.uv_from_px * towards)).normalize_or_zero()
+        (self.search.reach.camera.central_focal_px() * (self.probe.uv_from_px * towards)).normalize_or_zero()
     }
 
     /// Whether models may be seen among the points. Lines through the probe are for models, which may be

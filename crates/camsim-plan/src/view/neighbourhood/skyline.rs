@@ -123,7 +123,7 @@ impl NeighbourhoodSearch<'_> {
         Skyline {
             points: places.into_iter().flatten().map(|point| (times, point)).collect(),
             across_px,
-            focal_px: self.reach.camera.focal_px,
+            focal_px: self.reach.camera.central_focal_px(),
             reach_px: if self.surfaces.blends() { 0.0 } else { SKY_REACH_PX },
         }
     }
@@ -139,7 +139,7 @@ impl NeighbourhoodSearch<'_> {
         };
         let contrast = light(uv, Some(&hit)) - light(self.reach.camera.unproject(sky_px)?, None);
         let pixel = surface_px.round().max(DVec2::ZERO).to_array().map(|px| px as u32);
-        let focal_px = self.reach.camera.focal_px;
+        let focal_px = self.reach.camera.central_focal_px();
         let normal = self.normal(surface_px);
         Some(SkylinePoint {
             pixel,
@@ -183,8 +183,10 @@ impl NeighbourhoodSearch<'_> {
                 (0..DIRECTIONS).filter(|&k| is_sky[k as usize]).map(|k| place(turns(k)) - point_px).sum();
             self.reach.camera.unproject(point_px + sky.normalize_or_zero() * f64::from(NEAR_PX))?
         };
-        let across = (self.reach.camera.focal_px * (end(one)? - end(other)?)).perp().try_normalize()?;
-        let towards_sky = self.reach.camera.focal_px * (uv_of_sky - self.reach.camera.unproject(point_px)?);
+        let across =
+            (self.reach.camera.central_focal_px() * (end(one)? - end(other)?)).perp().try_normalize()?;
+        let towards_sky =
+            self.reach.camera.central_focal_px() * (uv_of_sky - self.reach.camera.unproject(point_px)?);
         Some(across * across.dot(towards_sky).signum())
     }
 
@@ -198,7 +200,7 @@ impl NeighbourhoodSearch<'_> {
         let mid = self.path.pose(mid_s);
         let moved = |t_s: f64| {
             let shift = mid.relative_to(&self.path.pose(t_s)).1;
-            self.reach.camera.focal_px * inverse_depth * (shift.truncate() - shift.z * uv)
+            self.reach.camera.central_focal_px() * inverse_depth * (shift.truncate() - shift.z * uv)
         };
         let swept = moved(mid_s + half_s) - moved(mid_s - half_s);
         normal.map_or(swept.length(), |normal| normal.dot(swept).abs())
@@ -207,7 +209,7 @@ impl NeighbourhoodSearch<'_> {
     /// How near the surface is, as far behind the skyline as pixels of the sky look for it.
     fn followed_inverse_depth(&self, point_px: DVec2, normal: Option<DVec2>) -> Option<f64> {
         let (pose, uv, _) = self.ray_at(point_px)?;
-        let behind = uv - SKY_REACH_PX * normal? / self.reach.camera.focal_px;
+        let behind = uv - SKY_REACH_PX * normal? / self.reach.camera.central_focal_px();
         Some(
             self.surfaces
                 .first_hit(pose.position_ned_m, pose.ned_from_camera * behind.extend(1.0))?

@@ -4,15 +4,12 @@ use camsim_core::scenario::LensModel;
 
 /// Labels of a key's elements, in order; empty for keys without labels.
 pub fn element_labels(key: &str, lens: LensModel) -> &'static [&'static str] {
-    const BROWN_CONRADY: &[&str] = &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
-    const KANNALA_BRANDT: &[&str] = &["k1", "k2", "k3", "k4"];
     const NED: &[&str] = &["N", "E", "D"];
     const GEODETIC: &[&str] = &["lat", "lon", "h"];
     const ANGLES: &[&str] = &["roll", "pitch", "yaw"];
     let leaf = key.rsplit('.').next().unwrap_or(key);
     match (leaf, lens) {
-        ("coefficients", LensModel::BrownConrady) => BROWN_CONRADY,
-        ("coefficients", LensModel::KannalaBrandt) => KANNALA_BRANDT,
+        ("coefficients", lens) => lens.facts().coefficients,
         ("size_px", _) => &["W", "H"],
         ("focal_px", _) => &["fx", "fy"],
         ("principal_point_px", _) => &["cx", "cy"],

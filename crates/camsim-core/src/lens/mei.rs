@@ -1,0 +1,54 @@
+//! Omnidirectional model of Mei, Rives, "Single View Point Omnidirectional Camera Calibration from Planar Grids"
+//! (ICRA 2007): OpenCV's `omnidir`, CamOdoCal's MEI, Kalibr's omni-radtan.
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::brown_conrady::Formula;
+use super::direction::{DirectionFormula, direction};
+use super::facts::ModelFacts;
+
+pub(super) const FACTS: ModelFacts = ModelFacts {
+    name: "mei",
+    coefficients: &["xi", "k1", "k2", "p1", "p2"],
+    defaults: &[],
+    fix: "xi, two radial and two tangential terms; the focal length is camera.focal_px",
+    shape: |k| {
+        let formula = Formula::new(&[k[1], k[2], k[3], k[4], 0.0, 0.0, 0.0, 0.0]);
+        direction(Mei { xi: k[0], formula })
+    },
+};
+
+/// Brown-Conrady of `(x, y) / (z + xi |ray|)`.
+#[derive(Debug)]
+struct Mei {
+    xi: f64,
+    formula: Formula,
+}
+
+impl Mei {
+    fn below(&self, ray: DVec3) -> f64 {
+        ray.z + self.xi * ray.length()
+    }
+}
+
+impl DirectionFormula for Mei {
+    fn image(&self, ray: DVec3) -> DVec2 {
+        self.formula.distort(ray.truncate() / self.below(ray))
+    }
+
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        let (below, unit) = (self.below(ray), ray / ray.length());
+        let mirrored = ray.truncate() / below;
+        let of_lens: DMat2 = self.formula.jacobian(mirrored);
+        let rate = DVec3::new(self.xi * unit.x, self.xi * unit.y, 1.0 + self.xi * unit.z);
+        [
+            of_lens * ((DVec2::X - mirrored * rate.x) / below),
+            of_lens * ((DVec2::Y - mirrored * rate.y) / below),
+            of_lens * (-mirrored * (rate.z / below)),
+        ]
+    }
+
+    fn margin(&self, ray: DVec3) -> f64 {
+        self.below(ray)
+    }
+}

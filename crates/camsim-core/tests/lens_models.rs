@@ -1,0 +1,303 @@
+//! The lens models against other programs (scripts/goldens/lens_models.py) and against a scan: region of validity
+//! and inverse of real and hostile coefficient sets, judged by the forward function alone.
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::{PI, TAU};
+
+use camsim_core::camera::CameraModel;
+use camsim_core::lens::LensModel;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+const FORWARD_TOLERANCE_PX: f64 = 1e-6;
+const RAYS: usize = 240;
+const STEPS: usize = 900;
+/// Pixels nearer to the image of the border are not judged: it is a polygon here.
+const UNJUDGED_PX: f64 = 0.5;
+
+struct Set {
+    name: String,
+    camera: CameraModel,
+}
+
+fn model_by_name(name: &str) -> LensModel {
+    *LensModel::ALL.iter().find(|model| model.facts().name == name).unwrap()
+}
+
+fn golden_sets() -> Vec<Set> {
+    let text = include_str!("../../../tests/data/lens_models.csv");
+    let set = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |i: usize| cells[i].parse::<f64>().unwrap();
+        let k: Vec<f64> = cells[8].split_whitespace().map(|k| k.parse().unwrap()).collect();
+        let size_px = [number(2) as u32, number(3) as u32];
+        let (focal, centre) = ([number(4), number(5)], [number(6), number(7)]);
+        let camera = CameraModel::new(size_px, focal, Some(centre), model_by_name(cells[1]), &k).unwrap();
+        Set { name: cells[0].to_owned(), camera }
+    };
+    text.lines().skip(1).map(set).collect()
+}
+
+#[test]
+fn forward_agrees_with_other_programs() {
+    let sets = golden_sets();
+    let mut checked = vec![0; sets.len()];
+    for line in include_str!("../../../tests/data/lens_models_forward.csv").lines().skip(1) {
+        let (name, numbers) = line.split_once(',').unwrap();
+        let v: Vec<f64> = numbers.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let (ray, expected) = (DVec3::new(v[0], v[1], v[2]), DVec2::new(v[3], v[4]));
+        let i = sets.iter().position(|set| set.name == name).unwrap();
+        let camera = &sets[i].camera;
+        if !camera.lens.contains_ray(ray) {
+            continue;
+        }
+        let error_px = (camera.project_ray(ray) - expected).length();
+        assert!(error_px < FORWARD_TOLERANCE_PX, "{name} {ray}: {error_px} px from {expected}");
+        if ray.z > 0.02 {
+            let error_px = (camera.project(ray.truncate() / ray.z) - expected).length();
+            assert!(error_px < FORWARD_TOLERANCE_PX, "{name} {ray}, ideal point: {error_px} px");
+        }
+        checked[i] += 1;
+    }
+    for (set, checked) in sets.iter().zip(checked) {
+        assert!(checked >= 8, "{}: only {checked} rays", set.name);
+    }
+}
+
+/// Twenty sets of each model, most of them far from any real lens.
+fn hostile_sets() -> Vec<Set> {
+    use LensModel::{
+        BrownConradyPrism, Division, DoubleSphere, Eucm, FTheta, FThetaInverse, Fisheye624, Fov,
+        KannalaBrandt, Mei, Ucm,
+    };
+    // For each coefficient its middle and by how much it may differ.
+    let models: [(LensModel, &[[f64; 2]]); 11] = [
+        (
+            BrownConradyPrism,
+            &[
+                [0.0, 0.5],
+                [0.0, 0.3],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.3],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.4],
+                [0.0, 0.4],
+            ],
+        ),
+        (
+            Fisheye624,
+            &[
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.02],
+                [0.0, 5e-3],
+                [0.0, 1e-3],
+                [0.0, 2e-4],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.05],
+                [0.0, 0.03],
+                [0.0, 0.05],
+                [0.0, 0.03],
+            ],
+        ),
+        (KannalaBrandt, &[[0.0, 0.3], [0.0, 0.1], [0.0, 0.02], [0.0, 2e-3]]),
+        (
+            FTheta,
+            &[
+                [1.0, 0.3],
+                [0.0, 0.3],
+                [0.0, 0.2],
+                [0.0, 0.1],
+                [0.0, 0.02],
+                [1.0, 0.1],
+                [0.0, 0.1],
+                [0.0, 0.1],
+            ],
+        ),
+        (
+            FThetaInverse,
+            &[
+                [1.0, 0.3],
+                [0.0, 0.2],
+                [0.0, 0.1],
+                [0.0, 0.05],
+                [0.0, 0.02],
+                [1.0, 0.1],
+                [0.0, 0.1],
+                [0.0, 0.1],
+            ],
+        ),
+        (DoubleSphere, &[[0.0, 0.9], [0.5, 0.5]]),
+        (Eucm, &[[0.5, 0.5], [2.0, 1.9]]),
+        (Ucm, &[[0.5, 0.5]]),
+        (Mei, &[[2.0, 2.0], [0.0, 2.0], [0.0, 3.0], [0.0, 0.05], [0.0, 0.05]]),
+        (Division, &[[-1.0, 2.0]]),
+        (Fov, &[[1.5, 1.45]]),
+    ];
+    let mut state = 48_u64;
+    // Knuth's generator: -1 to 1.
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let mut sets = Vec::new();
+    for (model, bounds) in models {
+        for i in 0..20 {
+            let k: Vec<f64> = bounds.iter().map(|[middle, reach]| middle + reach * random()).collect();
+            let focal = [290.0 + 200.0 * random(), 290.0 + 200.0 * random()];
+            let centre = [320.0 + 120.0 * random(), 240.0 + 90.0 * random()];
+            let camera = CameraModel::new([640, 480], focal, Some(centre), model, &k).unwrap();
+            sets.push(Set { name: format!("{} {i} {k:?}", model.facts().name), camera });
+        }
+    }
+    sets
+}
+
+fn ray(phi: f64, theta: f64) -> DVec3 {
+    (DVec2::from_angle(phi) * theta.sin()).extend(theta.cos())
+}
+
+impl Set {
+    /// Whether the forward function is regular at the angle theta in the direction phi: finite, and with positive
+    /// determinant and trace of its finite differences in the plane of angles.
+    fn is_regular(&self, phi: f64, theta: f64) -> bool {
+        let image = |at: DVec2| self.camera.project_ray(ray(at.y.atan2(at.x), at.length()));
+        let (at, h) = (DVec2::from_angle(phi) * theta, 1e-6);
+        let [a, b] =
+            [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
+        // A pole flings its neighbourhood away.
+        let is_near = self.perspective() || image(at).length() < 1e9;
+        is_near && a.perp_dot(b) > 0.0 && a.x + b.y > 0.0
+    }
+
+    fn perspective(&self) -> bool {
+        self.camera.lens.model() == LensModel::BrownConradyPrism
+    }
+
+    /// Angles that a lens may have: those of a plane, or all.
+    fn limit(&self) -> f64 {
+        if self.perspective() { 89.0 * PI / 180.0 } else { PI * (1.0 - 1e-4) }
+    }
+
+    /// Angle of the first irregular step in a direction, and of the one before.
+    fn border(&self, phi: f64) -> [f64; 2] {
+        let step = self.limit() / STEPS as f64;
+        let first = (1..=STEPS).find(|i| !self.is_regular(phi, *i as f64 * step)).unwrap_or(STEPS + 1);
+        [(first - 1) as f64 * step, first as f64 * step]
+    }
+}
+
+#[test]
+fn validity_and_inverse_of_every_set() {
+    let sets: Vec<Set> = golden_sets()
+        .into_iter()
+        .chain(hostile_sets())
+        .filter(|set| set.camera.lens.model() != LensModel::Equirectangular)
+        .collect();
+    let [rays, pixels] = sets.par_iter().map(judge).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    eprintln!("{} sets, {rays} rays found again, {pixels} pixels judged", sets.len());
+    assert!(sets.len() > 250 && rays > 200_000 && pixels > 50_000);
+}
+
+/// Counts of the rays and pixels that were judged.
+fn judge(set: &Set) -> [usize; 2] {
+    let (name, camera) = (&set.name, &set.camera);
+    let borders: Vec<[f64; 2]> = (0..RAYS).map(|i| set.border(i as f64 * TAU / RAYS as f64)).collect();
+    // A branch that is not one-to-one has a smaller limit, which must be the same in all directions.
+    let limit = camera.lens.angle_max_rad();
+    // Every ray inside is found again.
+    let mut found = 0;
+    let size = DVec2::from(camera.size_px.map(f64::from));
+    let is_one_to_one = camera.check().bijective;
+    for (i, [last_good, first_bad]) in borders.iter().enumerate() {
+        let phi = i as f64 * TAU / RAYS as f64;
+        let end = last_good.min(limit);
+        assert!(
+            !camera.lens.contains_ray(ray(phi, first_bad + 1e-3)) || first_bad + 1e-3 > set.limit(),
+            "{name} {i}"
+        );
+        for k in 0..12 {
+            let inside = ray(phi, end * (f64::from(k) + 0.7) / 12.2);
+            let px = camera.project_ray(inside);
+            assert!(camera.lens.contains_ray(inside), "{name}: direction {i}, share {k} of {end}");
+            if !(px.cmpge(-size).all() && px.cmple(2.0 * size).all()) {
+                continue;
+            }
+            let again = camera.ray(px);
+            let again = again.unwrap_or_else(|| panic!("{name}: missed {inside} at {px}"));
+            assert!(!is_one_to_one || again.distance(inside) < 1e-5, "{name}: {inside} became {again}");
+            found += 1;
+        }
+    }
+    [found, judge_pixels(set, &borders, limit, is_one_to_one)]
+}
+
+/// No pixel has a ray that is not inside and does not show there; none that the image of the border winds about is
+/// without one.
+fn judge_pixels(set: &Set, borders: &[[f64; 2]], limit: f64, is_one_to_one: bool) -> usize {
+    let (name, camera) = (&set.name, &set.camera);
+    let border: Vec<DVec2> = borders
+        .iter()
+        .enumerate()
+        .map(|(i, [last_good, _])| {
+            let phi = i as f64 * TAU / RAYS as f64;
+            // The scan ends within a step of the border: here by bisection.
+            let (mut low, mut high) = (*last_good, borders[i][1].min(set.limit()));
+            for _ in 0..40 {
+                let middle = 0.5 * (low + high);
+                *(if set.is_regular(phi, middle) { &mut low } else { &mut high }) = middle;
+            }
+            camera.project_ray(ray(phi, low.min(limit) * (1.0 - 1e-6)))
+        })
+        .collect();
+    let has_border = is_one_to_one && border.iter().all(|px| px.is_finite() && px.length() < 1e5);
+    let mut judged = 0;
+    for k in 0..24 * 24 {
+        let share = DVec2::new(f64::from(k % 24), f64::from(k / 24)) / 23.0;
+        let px = share * DVec2::from(camera.size_px.map(|side| f64::from(side - 1)));
+        let answer = camera.ray(px);
+        if let Some(found) = answer {
+            let off_px = (camera.project_ray(found) - px).length();
+            assert!(off_px < 1e-4, "{name} {px}: {found} is imaged {off_px} px away");
+            let (theta, phi) = (found.truncate().length().atan2(found.z), found.y.atan2(found.x));
+            let [_, first_bad] = set.border(phi);
+            assert!(theta <= first_bad, "{name} {px}: {found} lies beyond the fold at {first_bad}");
+        }
+        // The map of a picture holds f32.
+        if let Some(ideal) = camera.unproject(px) {
+            let off_px = (camera.project(ideal.as_vec2().as_dvec2()) - px).length();
+            assert!(off_px < 1e-3, "{name} {px}: {off_px} px in f32");
+        }
+        let (turns, distance) = winding(&border, px);
+        if has_border && distance > UNJUDGED_PX {
+            assert_eq!(
+                answer.is_some(),
+                turns > 0,
+                "{name} {px}: {turns} turns, {distance} px from the border"
+            );
+            judged += 1;
+        }
+    }
+    judged
+}
+
+/// Winding number of a closed polygon about a point, and its distance.
+fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
+    let (mut turned, mut distance) = (0.0, f64::INFINITY);
+    for (i, a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (to_a, along) = (*a - point, b - *a);
+        turned += to_a.angle_to(b - point);
+        let share = (-to_a.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+        distance = distance.min((to_a + along * share).length());
+    }
+    ((turned / TAU).round() as i32, distance)
+}

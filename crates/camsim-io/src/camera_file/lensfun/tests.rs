@@ -1,0 +1,177 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use camsim_core::{
+    camera::CameraModel,
+    lens::{Lens, LensModel},
+};
+use glam::DVec2;
+
+use super::*;
+
+/// Made up, in the schema of lensfun-database.dtd.
+const DATABASE: &str = r#"<!DOCTYPE lensdatabase SYSTEM "lensfun-database.dtd">
+<lensdatabase version="2">
+    <camera><maker>Example</maker><model>Body</model><mount>E</mount><cropfactor>1.534</cropfactor></camera>
+    <lens>
+        <maker>Example</maker>
+        <model>Zoom 20-80mm f/4</model>
+        <model lang="de">Zoom 20-80mm</model>
+        <mount>E</mount>
+        <cropfactor>1.534</cropfactor>
+        <calibration>
+            <distortion model="ptlens" focal="20" a="0.012" b="-0.045" c="0.021"/>
+            <distortion model="ptlens" focal="35" a="0.004" b="-0.011" c="0.006"/>
+            <distortion model="ptlens" focal="50" real-focal="49.2" a="-0.001" b="0.002" c="0.003"/>
+            <distortion model="ptlens" focal="80" a="0" b="0.006" c="0.001"/>
+            <tca model="linear" focal="20" kr="1.0003" kb="0.9998"/>
+        </calibration>
+    </lens>
+    <lens>
+        <maker>Example</maker>
+        <model>Prime 35mm</model>
+        <mount>E</mount>
+        <cropfactor>1</cropfactor>
+        <aspect-ratio>4:3</aspect-ratio>
+        <calibration><distortion model="poly3" focal="35" k1="-0.021"/></calibration>
+    </lens>
+    <lens>
+        <maker>Example</maker>
+        <model>Prime 24mm</model>
+        <mount>E</mount>
+        <cropfactor>1.6</cropfactor>
+        <calibration><distortion model="poly5" focal="24" k1="-0.03" k2="0.004"/></calibration>
+    </lens>
+    <lens>
+        <maker>Example</maker>
+        <model>Fisheye 8mm</model>
+        <mount>E</mount>
+        <type>fisheye</type>
+        <cropfactor>1.5</cropfactor>
+        <calibration><distortion model="ptlens" focal="8" a="0.01" b="-0.03" c="0.02"/></calibration>
+    </lens>
+    <lens>
+        <maker>Example</maker><model>Ball 10mm</model><mount>E</mount><type>stereographic</type>
+        <cropfactor>1.5</cropfactor>
+        <calibration><distortion model="poly3" focal="10" k1="0.01"/></calibration>
+    </lens>
+</lensdatabase>
+"#;
+
+fn import(lens: &str, focal_mm: f64, crop: Option<f64>) -> Result<LensfunCamera, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lenses.xml");
+    std::fs::write(&path, DATABASE).unwrap();
+    let query = LensfunQuery { lens, focal_mm, size_px: [6000, 4000], crop };
+    import_lensfun(&path, &query).map_err(|error| error.to_string())
+}
+
+/// Largest difference in pixels from lensfun's own formula, in its own units: half the short side of the
+/// calibration's sensor. `undistorted` is that radius of an angle off axis for the nominal focal length.
+fn difference_px(
+    camera: &LensfunCamera,
+    half_short_mm: f64,
+    pitch_mm: f64,
+    nominal_mm: f64,
+    formula: impl Fn(f64) -> f64,
+    undistorted: impl Fn(f64) -> f64,
+) -> f64 {
+    let model = CameraModel::from_spec(&camera.spec).unwrap();
+    let centre = DVec2::from_array(camera.spec.principal_point_px.unwrap());
+    let corner_mm = pitch_mm * 3000f64.hypot(2000.0);
+    let mut worst: f64 = 0.0;
+    for i in 1..500 {
+        let angle = 1.2 * f64::from(i) / 500.0;
+        let image_mm = half_short_mm * formula(undistorted(angle) * nominal_mm / half_short_mm);
+        if image_mm > corner_mm {
+            break;
+        }
+        let found = model.lens.image(glam::DVec3::new(angle.sin(), 0.0, angle.cos())) * camera.spec.focal_px[0];
+        worst = worst.max((found.x - image_mm / pitch_mm).abs()).max(found.y.abs());
+    }
+    assert!(centre == DVec2::new(2999.5, 1999.5));
+    worst
+}
+
+fn half_short_mm(crop: f64, aspect: f64) -> f64 {
+    (36f64 * 36.0 + 24.0 * 24.0).sqrt() / crop / (aspect * aspect + 1.0).sqrt() / 2.0
+}
+
+fn pitch_mm(crop: f64) -> f64 {
+    (36f64 * 36.0 + 24.0 * 24.0).sqrt() / crop / (6000f64 * 6000.0 + 4000.0 * 4000.0).sqrt()
+}
+
+#[test]
+fn polynomials_are_lensfuns() {
+    // On a smaller sensor than that of the calibration, with another aspect ratio.
+    let camera = import("Prime 35mm", 35.0, Some(1.5)).unwrap();
+    assert_eq!(camera.spec.lens.model, LensModel::BrownConrady);
+    let poly3 = |r: f64| r * (1.0 + 0.021 - 0.021 * r * r);
+    let error = difference_px(&camera, half_short_mm(1.0, 4.0 / 3.0), pitch_mm(1.5), 35.0, poly3, f64::tan);
+    assert!(error < 1e-8, "{error}");
+
+    let camera = import("prime 24mm", 24.0, None).unwrap();
+    let poly5 = |r: f64| r * (1.0 - 0.03 * r * r + 0.004 * r.powi(4));
+    let error = difference_px(&camera, half_short_mm(1.6, 1.5), pitch_mm(1.6), 24.0, poly5, f64::tan);
+    assert!(error < 1e-8, "{error}");
+
+    let ptlens = |[a, b, c]: [f64; 3]| move |r: f64| r * (a * r.powi(3) + b * r * r + c * r + 1.0 - a - b - c);
+    // The angle of an equidistant fisheye: exact as f-theta.
+    let camera = import("Fisheye", 8.0, None).unwrap();
+    assert_eq!(camera.spec.lens.model, LensModel::FTheta);
+    let formula = ptlens([0.01, -0.03, 0.02]);
+    let error = difference_px(&camera, half_short_mm(1.5, 1.5), pitch_mm(1.5), 8.0, formula, |angle| angle);
+    assert!(error < 1e-8, "{error}");
+
+    // Fitted: the note states the error.
+    let camera = import("Zoom 20-80mm f/4", 20.0, None).unwrap();
+    let formula = ptlens([0.012, -0.045, 0.021]);
+    let error = difference_px(&camera, half_short_mm(1.534, 1.5), pitch_mm(1.534), 20.0, formula, f64::tan);
+    let note = camera.notes.iter().find(|note| note.contains("fitted")).unwrap();
+    let stated: f64 = note.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
+    assert!(error <= 1.1 * stated && stated < 0.1, "{error} {note}");
+    assert!(camera.notes.iter().any(|note| note.contains("not applied: tca")));
+}
+
+#[test]
+fn focal_lengths_between_are_lensfuns() {
+    // lensfun's Hermite interpolation of terms times focal length, written out for 42 mm.
+    let y = [0.012 * 20.0, 0.004 * 35.0, -0.001 * 50.0, 0.0];
+    let t: f64 = 7.0 / 15.0;
+    let (m2, m3) = (0.5 * (y[2] - y[0]), 0.5 * (y[3] - y[1]));
+    let h = [
+        2.0 * t.powi(3) - 3.0 * t * t + 1.0,
+        t.powi(3) - 2.0 * t * t + t,
+        -2.0 * t.powi(3) + 3.0 * t * t,
+        t.powi(3) - t * t,
+    ];
+    let wanted = (h[0] * y[1] + h[1] * m2 + h[2] * y[2] + h[3] * m3) / 42.0;
+    let tree = roxmltree::Document::parse_with_options(
+        DATABASE,
+        roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() },
+    )
+    .unwrap();
+    let all = find_lens(&tree, "Zoom 20-80mm f/4").unwrap();
+    let (entry, is_beyond) = at_focal(&all[0].entries, 42.0);
+    assert!((entry.terms[0] - wanted).abs() < 1e-15 && !is_beyond, "{entry:?} {wanted}");
+    assert_eq!(at_focal(&all[0].entries, 50.0), (all[0].entries[2], false));
+    assert_eq!(at_focal(&all[0].entries, 50.0).0.real_focal_mm, 49.2);
+    // Beyond the ends the nearest, with a note.
+    assert_eq!(at_focal(&all[0].entries, 90.0), (all[0].entries[3], true));
+    assert_eq!(at_focal(&all[0].entries, 10.0), (all[0].entries[0], true));
+    assert!(import("Zoom 20-80mm", 90.0, None).unwrap().notes[0].contains("80 mm is taken"));
+}
+
+#[test]
+fn lenses_that_do_not_fit_are_refused() {
+    for (lens, crop, wanted) in [
+        ("Prime", None, "2 lenses match"),
+        ("Nothing", None, "no lens of this file"),
+        ("Prime 24mm", Some(1.0), "larger sensor"),
+        ("Ball 10mm", None, "`stereographic`"),
+    ] {
+        let error = import(lens, 20.0, crop).unwrap_err();
+        assert!(error.contains(wanted), "{lens}: {error}");
+    }
+    assert!(import("Prime 24mm", f64::NAN, None).is_err());
+    assert!(Lens::new(LensModel::FTheta, &[1.0]).is_ok());
+}
