@@ -254,7 +254,7 @@ impl Extrinsics {
             None => notes.push("the file has no pose of the camera: the mount is the default".to_owned()),
         }
         if let Some(shift_s) = self.shift_s {
-            spec.clock_offset_ms = shortest(-1e3 * shift_s, 4.0 * f64::EPSILON * (1e3 * shift_s).abs());
+            spec.clock_offset_ms = shortest(-1e3 * shift_s, 1.5 * f64::EPSILON * (1e3 * shift_s).abs());
         }
         notes
     }

@@ -124,8 +124,9 @@ fn opencv_xml_is_imported() {
     let imported = import("camera.xml", xml).unwrap();
     assert_eq!(imported.spec.focal_px, [650.0, 660.0]);
     assert_eq!(imported.spec.lens.coefficients, [0.1, -0.2, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6]);
-    let prism = import("camera.xml", &xml.replace("0.6 0. 0.", "0.6 0. 0.01")).unwrap_err().to_string();
-    assert!(prism.contains("thin-prism"), "{prism}");
+    let prism = import("camera.xml", &xml.replace("0.6 0. 0.", "0.6 0. 0.01")).unwrap().spec.lens;
+    assert_eq!((prism.model, prism.coefficients.len()), (LensModel::BrownConradyPrism, 14));
+    assert_eq!(prism.coefficients[8..10], [0.0, 0.01]);
 }
 
 #[test]

@@ -53,7 +53,8 @@ fn colmap_models_are_imported_with_a_shift_of_half_a_pixel() {
         check(params, &imported, &[Size([640, 480]), Intrinsics(expected), lens, Note("half a pixel")]);
     }
     for (params, words) in [
-        ("FOV 640 480 500 500 320 240 0.9", ["MODEL", "FOV"]),
+        ("FOV 640 480 500 500 320 240", ["PARAMS", "has 4 parameters where FOV has 5"]),
+        ("THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0", ["MODEL", "THIN_PRISM_FISHEYE"]),
         ("THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0", ["MODEL", "THIN_PRISM_FISHEYE"]),
         (
             "RAD_TAN_THIN_PRISM_FISHEYE 640 480 500 500 320 240 0 0 0 0 0 0 0 0 0 0 0 0",
@@ -211,7 +212,7 @@ fn okvis_models_are_imported_or_refused() {
         &read("config.yaml", &text("radialtangential8", "1, 2, 3, 4, 5, 6, 7, 8")),
         &[Lens(BrownConrady, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])],
     );
-    refused("unknown", "config.yaml", &text("fov", "0.9"), &["distortion_type", "field-of-view"]);
+    refused("unknown", "config.yaml", &text("ocam", "0.9"), &["distortion_type", "OCamCalib"]);
     refused("short", "config.yaml", &text("radialtangential", "0.1, 0.2, 0.003"), &["has 3 numbers"]);
     refused(
         "none with numbers",

@@ -128,7 +128,8 @@ fn polynomials_are_lensfuns() {
     let error = difference_px(&camera, half_short_mm(1.534, 1.5), pitch_mm(1.534), 20.0, formula, f64::tan);
     let note = camera.notes.iter().find(|note| note.contains("fitted")).unwrap();
     let stated: f64 = note.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
-    assert!(error <= 1.1 * stated && stated < 0.1, "{error} {note}");
+    // numpy's least squares for the same rational function: 0.282 px.
+    assert!(error <= 1.1 * stated && (stated - 0.282).abs() < 0.02, "{error} {note}");
     assert!(camera.notes.iter().any(|note| note.contains("not applied: tca")));
 }
 
