@@ -8,9 +8,9 @@ use camsim_core::{
     scene::LodSelection,
     sequence::Sequence,
 };
-use camsim_engine::{Engine, Finished, FrameTimes, Session};
+use camsim_engine::{Engine, Finished, FrameTimes, Session, join_faces};
 use camsim_io::write::WriteError;
-use camsim_plan::{PlanError, Planner};
+use camsim_plan::{FramePlan, PlanError, Planner};
 
 use crate::failure::{Failure, OrFail};
 
@@ -98,7 +98,8 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 /// would choose it.
 #[derive(Debug)]
 pub struct ReferenceSource {
-    oracle: Oracle,
+    /// One, or one a face.
+    oracles: Vec<Oracle>,
     planner: Planner,
     options: RenderOptions,
 }
@@ -120,7 +121,24 @@ impl ReferenceSource {
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
             ..RenderOptions::default()
         };
-        Ok(Self { oracle: Oracle::new(sequence.clone()).or_bad_input()?, planner, options })
+        let oracle = |lane| match planner.lanes() {
+            1 => Oracle::new(sequence.clone()),
+            _ => Oracle::new(planner.lane(lane).sequence().clone()),
+        };
+        let oracles = (0..planner.lanes()).map(oracle).collect::<Result<_, _>>().or_bad_input()?;
+        Ok(Self { oracles, planner, options })
+    }
+
+    fn finished(&self, oracle: &Oracle, plan: FramePlan) -> Finished {
+        let options = RenderOptions { key: Some(plan.ideal_view()), ..self.options.clone() };
+        Finished {
+            frame: oracle.render(plan.frame, &options),
+            plan,
+            faces: Vec::new(),
+            lod: LodSelection::default(),
+            out_of_order: 0,
+            times: FrameTimes::default(),
+        }
     }
 }
 
@@ -152,17 +170,17 @@ impl FrameSource for ReferenceSource {
 
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {
         for &frame in frames {
-            let plan = self.planner.plan(frame).or_bad_input()?;
-            let options = RenderOptions { key: Some(plan.ideal_view()), ..self.options.clone() };
-            let frame = self.oracle.render(frame, &options);
-            sink(Finished {
-                frame,
-                plan,
-                lod: LodSelection::default(),
-                out_of_order: 0,
-                times: FrameTimes::default(),
-            })
-            .or_failed()?;
+            let plans = self.planner.plans(frame).or_bad_input()?;
+            if let [plan] = plans.as_slice() {
+                sink(self.finished(&self.oracles[0], plan.clone())).or_failed()?;
+                continue;
+            }
+            let rows = plans.first().map(|plan| self.planner.rows(plan)).unwrap_or_default();
+            let faces = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
+            if let Some(mut whole) = join_faces(faces) {
+                whole.frame.rows = rows;
+                sink(whole).or_failed()?;
+            }
         }
         Ok(())
     }

@@ -36,11 +36,19 @@ impl Tolerances {
     }
 
     /// Adds a frame.
-    pub fn add(&mut self, plan: &FramePlan) {
-        let predicted = &plan.predicted;
+    pub fn add<'a>(&mut self, plans: impl Iterator<Item = &'a FramePlan>) {
         self.frames += 1;
-        self.px.add(plan.frame, predicted.source_error_kept, predicted.total_px);
-        self.dn.add(plan.frame, predicted.picture_error_kept, predicted.picture_dn());
+        let (mut px, mut dn) = ((true, 0.0_f64), (true, 0.0_f64));
+        let mut number = None;
+        for plan in plans {
+            let predicted = &plan.predicted;
+            number = Some(plan.frame);
+            px = (px.0 && predicted.source_error_kept, px.1.max(predicted.total_px));
+            dn = (dn.0 && predicted.picture_error_kept, dn.1.max(predicted.picture_dn()));
+        }
+        let Some(frame) = number else { return };
+        self.px.add(frame, px.0, px.1);
+        self.dn.add(frame, dn.0, dn.1);
     }
 
     /// A warning for each tolerance that is exceeded.

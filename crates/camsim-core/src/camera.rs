@@ -177,6 +177,13 @@ impl CameraModel {
         self.lens.undistort(self.distorted_from_pixel(pixel))
     }
 
+    /// As [`CameraModel::unproject`] at a pixel's centre; `None` also where another face makes the pixel.
+    #[must_use]
+    pub fn unproject_pixel(&self, [x, y]: [u32; 2]) -> Option<DVec2> {
+        let distorted = self.distorted_from_pixel(DVec2::new(f64::from(x), f64::from(y)));
+        if self.lens.holds(distorted) { self.lens.undistort(distorted) } else { None }
+    }
+
     /// `f x + c`.
     #[inline]
     pub(crate) fn pixel_from_distorted(&self, distorted: DVec2) -> DVec2 {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
 
-use crate::scenario::CameraSpec;
+use crate::scenario::{CameraSpec, Face};
 
 pub use crate::scenario::LensModel;
 
@@ -29,6 +29,7 @@ mod double_sphere;
 mod equirectangular;
 mod eucm;
 mod f_theta;
+mod face;
 mod facts;
 mod fisheye624;
 mod fold;
@@ -46,6 +47,7 @@ mod ucm;
 
 pub use brown_conrady::BrownConrady;
 pub use direction::DirectionLens;
+pub use face::FaceLens;
 pub use facts::ModelFacts;
 pub use fold::{FOLD_RAYS, FoldCurve};
 pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens};
@@ -113,6 +115,8 @@ pub enum Lens {
     Radial(Box<RadialLens>),
     /// Any other function of the ray.
     Direction(Box<DirectionLens>),
+    /// Another lens in the axes of one of its faces.
+    Face(Box<FaceLens>),
 }
 
 impl Lens {
@@ -164,10 +168,14 @@ impl Lens {
     /// The lens of a camera, with these coefficients instead of its own: the table that it names, or a model.
     pub(crate) fn of_camera(spec: &CameraSpec, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
         let grid = spec.lens_table.as_ref().and_then(|table| table.grid.as_ref());
-        match grid.filter(|_| spec.lens.model == LensModel::Table) {
-            Some(grid) => Ok(Self::from_grid(grid)),
-            None => Self::with_reach(spec.lens.model, coefficients, reach),
-        }
+        let whole = match grid.filter(|_| spec.lens.model == LensModel::Table) {
+            Some(grid) => Self::from_grid(grid),
+            None => Self::with_reach(spec.lens.model, coefficients, reach)?,
+        };
+        Ok(match spec.face {
+            Some(face) => Self::Face(Box::new(FaceLens::new(whole, face))),
+            None => whole,
+        })
     }
 
     /// Which model this is.
@@ -177,6 +185,7 @@ impl Lens {
             Self::BrownConrady(_) => LensModel::BrownConrady,
             Self::Radial(lens) => lens.model,
             Self::Direction(lens) => lens.model,
+            Self::Face(lens) => lens.whole().model(),
         }
     }
 
@@ -187,6 +196,7 @@ impl Lens {
             Self::BrownConrady(lens) => &lens.coefficients,
             Self::Radial(lens) => &lens.coefficients,
             Self::Direction(lens) => &lens.coefficients,
+            Self::Face(lens) => lens.whole().coefficients(),
         }
     }
 
@@ -195,7 +205,7 @@ impl Lens {
         match self {
             Self::Pinhole(_) => true,
             Self::BrownConrady(lens) => lens.coefficients.iter().all(|k| *k == 0.0),
-            Self::Radial(_) | Self::Direction(_) => false,
+            Self::Radial(_) | Self::Direction(_) | Self::Face(_) => false,
         }
     }
 
@@ -208,6 +218,7 @@ impl Lens {
             Self::BrownConrady(lens) => lens.distort(ideal),
             Self::Radial(lens) => lens.distort(ideal),
             Self::Direction(lens) => lens.distort(ideal),
+            Self::Face(lens) => lens.distort(ideal),
         }
     }
 
@@ -218,6 +229,7 @@ impl Lens {
             Self::BrownConrady(lens) => lens.jacobian(ideal),
             Self::Radial(lens) => lens.jacobian(ideal),
             Self::Direction(lens) => lens.jacobian(ideal),
+            Self::Face(lens) => lens.jacobian(ideal),
         }
     }
 
@@ -229,6 +241,7 @@ impl Lens {
             Self::BrownConrady(lens) => lens.undistort(distorted),
             Self::Radial(lens) => lens.undistort(distorted),
             Self::Direction(lens) => lens.undistort(distorted),
+            Self::Face(lens) => lens.undistort(distorted),
         }
     }
 
@@ -239,6 +252,7 @@ impl Lens {
             Self::Pinhole(_) | Self::BrownConrady(_) => self.distort(ray.truncate() / ray.z),
             Self::Radial(lens) => lens.image(ray),
             Self::Direction(lens) => lens.image(ray),
+            Self::Face(lens) => lens.image(ray),
         }
     }
 
@@ -250,6 +264,7 @@ impl Lens {
             }
             Self::Radial(lens) => lens.gradient(ray),
             Self::Direction(lens) => lens.gradient(ray),
+            Self::Face(lens) => lens.gradient(ray),
         }
     }
 
@@ -261,6 +276,7 @@ impl Lens {
             }
             Self::Radial(lens) => lens.ray(distorted),
             Self::Direction(lens) => lens.ray(distorted),
+            Self::Face(lens) => lens.ray(distorted),
         }
     }
 
@@ -270,6 +286,7 @@ impl Lens {
             Self::Pinhole(_) | Self::BrownConrady(_) => ray.z > 0.0 && self.contains(ray.truncate() / ray.z),
             Self::Radial(lens) => lens.contains_ray(ray),
             Self::Direction(lens) => lens.contains_ray(ray),
+            Self::Face(lens) => lens.contains_ray(ray),
         }
     }
 
@@ -280,6 +297,8 @@ impl Lens {
             Self::BrownConrady(lens) => lens.fold.range().1.atan(),
             Self::Radial(lens) => lens.angle_max_rad(),
             Self::Direction(lens) => lens.angle_max_rad(),
+            // Measured from the axis of the face.
+            Self::Face(_) => std::f64::consts::PI,
         }
     }
 
@@ -287,6 +306,7 @@ impl Lens {
     pub fn axial_magnification(&self) -> f64 {
         match self {
             Self::Pinhole(_) | Self::BrownConrady(_) => 1.0,
+            Self::Face(lens) => lens.whole().axial_magnification(),
             Self::Radial(_) | Self::Direction(_) => self.jacobian(DVec2::ZERO).determinant().abs().sqrt(),
         }
     }
@@ -294,7 +314,7 @@ impl Lens {
     /// Border of the principal branch, or `None` for a model without one.
     pub fn fold_curve(&self) -> Option<&FoldCurve> {
         match self {
-            Self::Pinhole(_) => None,
+            Self::Pinhole(_) | Self::Face(_) => None,
             Self::BrownConrady(lens) => Some(&lens.fold),
             Self::Radial(lens) => Some(&lens.fold),
             Self::Direction(lens) => Some(&lens.fold),
@@ -304,7 +324,7 @@ impl Lens {
     /// Start table of the inverse, or `None` for a model without one.
     pub fn radial_table(&self) -> Option<&RadialTable> {
         match self {
-            Self::Pinhole(_) | Self::Direction(_) => None,
+            Self::Pinhole(_) | Self::Direction(_) | Self::Face(_) => None,
             Self::BrownConrady(lens) => Some(&lens.table),
             Self::Radial(lens) => Some(&lens.table),
         }
@@ -317,6 +337,7 @@ impl Lens {
             Self::BrownConrady(lens) => lens.fold.distorted_max(),
             Self::Radial(lens) => lens.distorted_max(),
             Self::Direction(lens) => lens.fold.distorted_max(),
+            Self::Face(lens) => lens.whole().distorted_max(),
         }
     }
 
@@ -329,14 +350,41 @@ impl Lens {
     /// Ideal radius within which all points lie on the principal branch; infinite for a pinhole.
     #[inline]
     pub fn contained_radius(&self) -> f64 {
+        if self.face().is_some() {
+            return 0.0;
+        }
         self.fold_curve().map_or(f64::INFINITY, FoldCurve::smallest)
     }
 
     /// Whether an ideal point lies on the principal branch, so that `undistort(distort(ideal))` is `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
+        if let Self::Face(_) = self {
+            return ideal.is_finite() && self.contains_ray(ideal.extend(1.0));
+        }
         // Most points are within every radius, and need no angle.
         let is_near = ideal.length_squared() < self.contained_radius().powi(2);
         is_near || ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
+    }
+}
+
+impl Lens {
+    /// The face whose axes this lens is in.
+    #[must_use]
+    pub fn face(&self) -> Option<Face> {
+        match self {
+            Self::Face(lens) => Some(lens.face()),
+            _ => None,
+        }
+    }
+
+    /// Whether an output point is made by this lens's camera: all are but for a face, which leaves to the
+    /// others what is theirs.
+    #[must_use]
+    pub fn holds(&self, distorted: DVec2) -> bool {
+        match self {
+            Self::Face(lens) => lens.holds(distorted),
+            _ => true,
+        }
     }
 }
 

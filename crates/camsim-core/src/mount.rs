@@ -118,6 +118,12 @@ impl CameraPath {
         })
     }
 
+    /// The path of a camera at the same place whose axes are turned.
+    #[must_use]
+    pub fn turned(&self, camera_from_turned: DQuat) -> Self {
+        Self { body_from_camera: self.body_from_camera * camera_from_turned, ..self.clone() }
+    }
+
     /// First and last instant of the log, seconds. Outside, the platform coasts and the mount continues to
     /// vibrate.
     pub fn span_s(&self) -> (f64, f64) {

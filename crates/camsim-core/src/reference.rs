@@ -325,7 +325,8 @@ impl FrameView<'_> {
             FrameLens::Zoomed(lens) => lens,
             FrameLens::Invalid => return None,
         };
-        lens.ray(DVec2::new(f64::from(x), f64::from(y)) + offset_px)
+        let pixel = DVec2::new(f64::from(x), f64::from(y));
+        if lens.holds(pixel) { lens.ray(pixel + offset_px) } else { None }
     }
 
     /// Mid-exposure of a pixel, path time, seconds.

@@ -12,6 +12,7 @@ mod auto;
 mod camera;
 mod channel;
 mod dataset;
+mod face;
 mod motion;
 mod rig;
 mod scene;
@@ -28,6 +29,7 @@ pub use camera::{
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
+pub use face::Face;
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use rig::Rig;
 pub use scene::{

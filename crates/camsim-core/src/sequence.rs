@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     mount::CameraPath,
     photometric::vignette_weights,
-    scenario::{Scenario, TwinSpec},
+    scenario::{Face, Scenario, TwinSpec},
     scene::Scene,
     shutter::ShutterError,
 };
@@ -44,6 +44,15 @@ impl Sequence {
         let has_vignette = scenario.camera.photometric.vignette.is_some();
         let vignette = self.vignette.clone().filter(|_| has_vignette);
         Ok(Self { scenario, vignette, ..self.clone() })
+    }
+
+    /// The sequence of one face of the camera ([`Face`]): the pixels of the same frames that it makes.
+    #[must_use]
+    pub fn face(&self, face: Face) -> Self {
+        let mut sequence = self.clone();
+        sequence.scenario.camera.face = Some(face);
+        sequence.path = Arc::new(self.path.turned(face.camera_from_face()));
+        sequence
     }
 
     /// Stamp of a frame of any number, beyond the sequence as well: path time, seconds.

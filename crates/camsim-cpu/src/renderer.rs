@@ -1,10 +1,10 @@
 //! Renderer of one sequence: scene, lens map, and the ideal frames drawn last.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
-    scenario::Preset,
+    scenario::{Face, Preset},
     scene::{LodTolerance, PlacedMesh, SceneBatches},
     sequence::Sequence,
     temporal::IdealGeometry,
@@ -22,7 +22,8 @@ use crate::{
     reverse::{IdealTexels, Kernel, KernelInputs, LensMap},
 };
 
-/// Number of buffers for ideal frames: one for the current frame, one for the next.
+/// Number of buffers for ideal frames of a camera without faces: one for the current frame, one for the next. A
+/// face has one: while it is drawn, the frame in flight is another face's.
 const BUFFERS: usize = 2;
 
 /// Handle of ideal frames that the renderer holds.
@@ -44,9 +45,9 @@ pub struct CpuRenderer {
     /// Created when an ideal frame is first cast.
     cast: Option<CastScene>,
     vignette: Vec<f32>,
-    /// Lens map, and the bits of its zoom value.
-    lens_map: Option<(u64, LensMap)>,
-    buffers: [Ideal; BUFFERS],
+    /// Lens map of each face, and the bits of its zoom value.
+    lens_maps: HashMap<Option<Face>, (u64, LensMap)>,
+    buffers: [Ideal; BUFFERS + Face::ALL.len()],
     last: usize,
 }
 
@@ -83,7 +84,7 @@ impl CpuRenderer {
             raster: None,
             cast: None,
             vignette: sequence.vignette_weights().1,
-            lens_map: None,
+            lens_maps: HashMap::new(),
             buffers: Default::default(),
             last: 0,
             sequence,
@@ -98,7 +99,7 @@ impl CpuRenderer {
 
     /// Switches to another sequence over the same scene.
     pub fn renew(&mut self, sequence: Arc<Sequence>) {
-        self.lens_map = None;
+        self.lens_maps.clear();
         self.vignette = sequence.vignette_weights().1;
         self.sequence = sequence;
     }
@@ -112,16 +113,22 @@ impl CpuRenderer {
         tolerance: &LodTolerance,
     ) -> IdealBuffer {
         // The frame in flight may still read the other buffer.
-        self.last = (self.last + 1) % BUFFERS;
+        let buffer = match plan.camera.lens.face() {
+            Some(face) => BUFFERS + face as usize,
+            None => {
+                self.last = (self.last + 1) % BUFFERS;
+                self.last
+            }
+        };
         let scene = &self.sequence.scene;
-        let ideal = &mut self.buffers[self.last];
+        let ideal = &mut self.buffers[buffer];
         ideal.size_px = plan.ideal.size_px;
         ideal.cast.clear();
         let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
         if self.general_only || !(self.rasterises && is_plain) {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
-            return IdealBuffer(self.last);
+            return IdealBuffer(buffer);
         }
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
         let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
@@ -130,7 +137,7 @@ impl CpuRenderer {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             cast.add_shadows(plan, key, &mut ideal.drawn);
         }
-        IdealBuffer(self.last)
+        IdealBuffer(buffer)
     }
 
     /// The first ideal frame of a buffer: linear R G B A (with the paper preset sRGB-encoded values) and
@@ -193,7 +200,7 @@ impl CpuRenderer {
         ideal: IdealTexels<'_>,
     ) -> (Vec<f32>, Option<Vec<Truth>>) {
         let &ReverseInputs { plan, uniforms, .. } = inputs;
-        let map = self.lens_map.as_ref().map(|(_, map)| map);
+        let map = self.lens_map(plan);
         self.kernel
             .render(plan, &KernelInputs { frame: uniforms, poses, map, vignette: &self.vignette, ideal })
     }
@@ -201,7 +208,7 @@ impl CpuRenderer {
     fn general(&self, inputs: &ReverseInputs<'_>, ideal: &[IdealImage]) -> (Vec<f32>, Option<Vec<Truth>>) {
         let frame = FrameInputs {
             rows: inputs.rows,
-            lens_map: self.lens_map.as_ref().map_or(&[][..], |(_, map)| map.rays()),
+            lens_map: self.lens_map(inputs.plan).map_or(&[][..], LensMap::rays),
             vignette: if self.vignette.len() > 1 { &self.vignette } else { &[] },
             coords_phase: inputs.uniforms.coords_phase,
         };
@@ -211,11 +218,16 @@ impl CpuRenderer {
     /// Makes the lens map of a plan, unless it is cached.
     fn fit_lens_map(&mut self, plan: &FramePlan) {
         let bits = plan.zoom.unwrap_or_default().to_bits();
-        let is_there = self.lens_map.as_ref().is_some_and(|(zoom, _)| *zoom == bits);
+        let face = plan.camera.lens.face();
+        let is_there = self.lens_maps.get(&face).is_some_and(|(zoom, _)| *zoom == bits);
         if plan.ray == RayStage::LensMap && !is_there {
             let camera: &CameraModel = &plan.camera;
-            self.lens_map = Some((bits, LensMap::new(camera)));
+            self.lens_maps.insert(face, (bits, LensMap::new(camera)));
         }
+    }
+
+    fn lens_map(&self, plan: &FramePlan) -> Option<&LensMap> {
+        self.lens_maps.get(&plan.camera.lens.face()).map(|(_, map)| map)
     }
 }
 

@@ -34,13 +34,30 @@ pub struct FrameTimes {
     pub passes: Vec<PassTime>,
 }
 
+impl FrameTimes {
+    /// Adds the times of another face of the same frame.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let sum = |a: Option<f64>, b: Option<f64>| a.zip(b).map(|(a, b)| a + b).or(a).or(b);
+        self.plan_ms += other.plan_ms;
+        self.record_ms += other.record_ms;
+        self.submit_ms += other.submit_ms;
+        self.ideal_ms = sum(self.ideal_ms, other.ideal_ms);
+        self.wait_ms += other.wait_ms;
+        self.reverse_ms = sum(self.reverse_ms, other.reverse_ms);
+        self.read_ms += other.read_ms;
+        self.passes.extend(other.passes.iter().cloned());
+    }
+}
+
 /// A finished frame with its plan.
 #[derive(Debug)]
 pub struct Finished {
     /// Colour and truth channels.
     pub frame: RenderedFrame,
-    /// The plan.
+    /// The plan; of a wide field that of its first face.
     pub plan: FramePlan,
+    /// The plans of the other faces that a wide field is divided among.
+    pub faces: Vec<FramePlan>,
     /// Level of detail of the terrain.
     pub lod: LodSelection,
     /// Number of blended triangles drawn in the wrong order because they overlap in cycles, over all ideal
@@ -48,6 +65,13 @@ pub struct Finished {
     pub out_of_order: u32,
     /// Times of the stages.
     pub times: FrameTimes,
+}
+
+impl Finished {
+    /// The plans of all faces; one without.
+    pub fn plans(&self) -> impl Iterator<Item = &FramePlan> {
+        std::iter::once(&self.plan).chain(&self.faces)
+    }
 }
 
 /// The channel `coords`: ray, source, time shift and point of each pixel, with the direction in place of the

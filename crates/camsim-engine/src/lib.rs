@@ -27,6 +27,7 @@
 mod engine;
 mod error;
 mod finished;
+mod lane;
 mod memory;
 mod moving;
 mod planner_threads;
@@ -39,5 +40,6 @@ pub use camsim_plan::Backend;
 pub use engine::Engine;
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
+pub use lane::join_faces;
 pub use memory::peak_memory_mb;
 pub use session::Session;

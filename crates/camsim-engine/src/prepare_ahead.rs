@@ -49,25 +49,37 @@ struct TerrainView {
     reads: PrefilterTaps,
 }
 
+/// A frame of one lane of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Job {
+    pub lane: usize,
+    pub frame: u64,
+}
+
 /// Prepares frames. The triangles of the last groups are cached for frames with the same view.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
+    lane: usize,
     /// Tiles of the terrain texture, if it is tiled.
     tiles: Option<Arc<TerrainTiles>>,
     mesh_cache: Mutex<VecDeque<(TerrainView, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
-    pub fn new(planner: Arc<Planner>, tiles: Option<Arc<TerrainTiles>>) -> Self {
-        Self { planner, tiles, mesh_cache: Mutex::default() }
+    pub fn new(planner: Arc<Planner>, lane: usize, tiles: Option<Arc<TerrainTiles>>) -> Self {
+        Self { planner, lane, tiles, mesh_cache: Mutex::default() }
+    }
+
+    fn planner(&self) -> &Planner {
+        self.planner.lane(self.lane)
     }
 
     fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
         let begin = Instant::now();
-        let plan = self.planner.plan(frame)?;
+        let plan = self.planner().plan(frame)?;
         let meshes = self.meshes(&plan);
-        let rows = RowTable::new(&plan, &self.planner.sequence().path);
+        let rows = RowTable::new(&plan, &self.planner().sequence().path);
         Ok(Prepared { plan, meshes, rows, plan_ms: ms_since(begin) })
     }
 
@@ -106,44 +118,46 @@ impl Preparer {
 }
 
 /// Prepared frames in the given order; preparation begins before a frame is taken.
-pub(super) struct PrepareAhead<'a, 'scope, I: Iterator<Item = u64>> {
+pub(super) struct PrepareAhead<'a, 'scope, I: Iterator<Item = Job>> {
     scope: &'a rayon::Scope<'scope>,
-    preparer: &'scope Preparer,
-    frames: Peekable<I>,
-    pending: VecDeque<Receiver<Result<Prepared, PlanError>>>,
+    /// One a lane.
+    preparers: &'scope [Preparer],
+    jobs: Peekable<I>,
+    pending: VecDeque<(Job, Receiver<Result<Prepared, PlanError>>)>,
     /// Number of frames in the last group.
     group_size: usize,
 }
 
-impl<'a, 'scope, I: Iterator<Item = u64>> PrepareAhead<'a, 'scope, I> {
+impl<'a, 'scope, I: Iterator<Item = Job>> PrepareAhead<'a, 'scope, I> {
     /// Begins to prepare the first frames. The scope ends when all begun frames are prepared.
-    pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
+    pub fn start(scope: &'a rayon::Scope<'scope>, preparers: &'scope [Preparer], jobs: I) -> Self {
         let mut ahead =
-            Self { scope, preparer, frames: frames.peekable(), pending: VecDeque::new(), group_size: 0 };
+            Self { scope, preparers, jobs: jobs.peekable(), pending: VecDeque::new(), group_size: 0 };
         ahead.begin();
         ahead
     }
 
     /// The next frame; `None` after the last.
-    pub fn next(&mut self) -> Option<Result<Prepared, PlanError>> {
-        let receiver = self.pending.pop_front()?;
+    pub fn next(&mut self) -> Option<(Job, Result<Prepared, PlanError>)> {
+        let (job, receiver) = self.pending.pop_front()?;
         // After a panic in planning nothing is received, and the scope panics when it ends.
         let prepared = wait(&receiver)?;
         self.begin();
-        Some(prepared)
+        Some((job, prepared))
     }
 
     /// The next frames for one task: those of one group.
-    fn next_group(&mut self) -> Vec<u64> {
-        let planner = &self.preparer.planner;
-        let mut frames: Vec<u64> = self.frames.next().into_iter().collect();
-        let Some(number) = frames.first().map(|&frame| planner.group_of(frame)) else { return frames };
-        while frames.len() < MOST_PER_TASK
-            && let Some(frame) = self.frames.next_if(|&frame| planner.group_of(frame) == number)
+    fn next_group(&mut self) -> Vec<Job> {
+        let preparers = self.preparers;
+        let group = |job: &Job| (job.lane, preparers[job.lane].planner().group_of(job.frame));
+        let mut jobs: Vec<Job> = self.jobs.next().into_iter().collect();
+        let Some(first) = jobs.first().map(group) else { return jobs };
+        while jobs.len() < MOST_PER_TASK
+            && let Some(job) = self.jobs.next_if(|job| group(job) == first)
         {
-            frames.push(frame);
+            jobs.push(job);
         }
-        frames
+        jobs
     }
 
     fn begin(&mut self) {
@@ -159,16 +173,16 @@ impl<'a, 'scope, I: Iterator<Item = u64>> PrepareAhead<'a, 'scope, I> {
             }
             self.group_size = group.len();
             let (senders, receivers): (Vec<_>, Vec<_>) = group.iter().map(|_| channel()).unzip();
-            let preparer = self.preparer;
+            self.pending.extend(group.iter().copied().zip(receivers));
+            let preparers = self.preparers;
             self.scope.spawn(move |_| {
-                for (frame, sender) in group.into_iter().zip(senders) {
+                for (job, sender) in group.into_iter().zip(senders) {
                     // After an error elsewhere nothing is received.
-                    if sender.send(preparer.prepare(frame)).is_err() {
+                    if sender.send(preparers[job.lane].prepare(job.frame)).is_err() {
                         return;
                     }
                 }
             });
-            self.pending.extend(receivers);
         }
     }
 }

@@ -4,11 +4,9 @@ use std::{sync::Arc, time::Instant};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
-    pose::CameraPose,
     scenario::{Channel, Preset},
-    scene::{LodSelection, LodTolerance, SceneBatches},
+    scene::{LodSelection, SceneBatches},
     sequence::Sequence,
-    temporal::IdealGeometry,
 };
 use camsim_cpu::{CpuRenderer, IdealBuffer, IdealTexels, ReverseInputs};
 use camsim_gpu::{
@@ -16,7 +14,7 @@ use camsim_gpu::{
     session::{FRAMES_IN_FLIGHT, IdealCopy},
 };
 use camsim_plan::{
-    EdgeStage, FramePlan, PixelHit, PlanError, Planner, PrefilterTaps, Renderer,
+    FramePlan, PixelHit, PlanError, Planner, Renderer,
     uniforms::{FrameUniforms, Truth, frame_uniforms},
 };
 
@@ -24,9 +22,10 @@ use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
     finished,
+    lane::{IdealCache, IdealKey, Lane, add_face, in_whole_camera},
     moving::MovingScene,
     planner_threads,
-    prepare_ahead::{PrepareAhead, Prepared, Preparer},
+    prepare_ahead::{Job, PrepareAhead, Prepared, Preparer},
     truth::{FramePixels, hits, planes},
 };
 
@@ -35,38 +34,16 @@ use crate::{
 pub struct Session<'a> {
     engine: &'a Engine,
     planner: Arc<Planner>,
-    cpu: CpuRenderer,
-    gpu: Option<GpuSession<'a>>,
-    ideal: Option<IdealCache>,
-    coords_phase: f32,
-    channels: Vec<Channel>,
-    moving: Option<MovingScene>,
     /// Knows everything in the scene, where something moves.
     scene_planner: Option<Arc<Planner>>,
+    /// One, or one a face.
+    lanes: Vec<Lane>,
+    cpu: CpuRenderer,
+    gpu: Option<GpuSession<'a>>,
+    coords_phase: f32,
+    channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
-}
-
-/// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
-#[derive(Clone, Debug, PartialEq)]
-struct IdealKey {
-    poses: Vec<CameraPose>,
-    ideal: IdealGeometry,
-    edges: EdgeStage,
-    terrain_error_px: f64,
-    models: LodTolerance,
-    surface_reads: PrefilterTaps,
-    samples_a_pixel: u32,
-    renderer: Renderer,
-}
-
-/// The last ideal frames, reused by frames with the same key.
-#[derive(Debug)]
-struct IdealCache {
-    key: IdealKey,
-    lod: LodSelection,
-    /// Buffer of the cpu renderer, if it drew them.
-    buffer: Option<IdealBuffer>,
 }
 
 /// Location of the ideal frame of a frame in flight.
@@ -80,9 +57,10 @@ enum IdealSource {
     Cpu(IdealBuffer),
 }
 
-/// A submitted frame.
+/// A submitted frame of a lane.
 #[derive(Debug)]
 struct InFlight {
+    job: Job,
     prepared: Prepared,
     uniforms: FrameUniforms,
     source: IdealSource,
@@ -102,25 +80,23 @@ impl<'a> Session<'a> {
             Some(_) => Some(Arc::new(Planner::new(sequence.clone(), channels, engine.max_side_px())?)),
             None => None,
         };
-        let sequence = moving.as_ref().map_or(sequence, |moving| moving.still().clone());
-        let planner = Planner::new(sequence.clone(), channels, engine.max_side_px())?;
+        let still = moving.as_ref().map_or(sequence, |moving| moving.still().clone());
+        let planner = Planner::new(still.clone(), channels, engine.max_side_px())?;
         let planner = Arc::new(planner.with_capabilities(engine.capabilities()));
-        let meshes = Arc::new(SceneBatches::new(&sequence.scene));
+        let meshes = Arc::new(SceneBatches::new(&still.scene));
         let gpu = engine
             .gpu()
-            .map(|gpu| GpuSession::new(gpu, &sequence, meshes.clone(), planner.wants_truth()))
+            .map(|gpu| GpuSession::new(gpu, &still, meshes.clone(), planner.wants_truth()))
             .transpose()?;
-        let cpu = CpuRenderer::new(sequence.clone(), meshes);
         Ok(Self {
             engine,
+            lanes: lanes(&planner, scene_planner.as_deref(), moving),
+            cpu: CpuRenderer::new(still, meshes),
             planner,
-            cpu,
+            scene_planner,
             gpu,
-            ideal: None,
             coords_phase: 0.0,
             channels: channels.into(),
-            moving,
-            scene_planner,
             hits: Vec::new(),
         })
     }
@@ -136,7 +112,7 @@ impl<'a> Session<'a> {
         channels: &[Channel],
     ) -> Result<(), RenderError<E>> {
         let before = self.planner.sequence();
-        let moving = MovingScene::new(&sequence, self.moving.as_ref());
+        let moving = MovingScene::new(&sequence, self.lanes.first().and_then(|lane| lane.moving.as_ref()));
         let still = moving.as_ref().map_or(&sequence, MovingScene::still).clone();
         let (old, new) = (&before.scenario, &sequence.scenario);
         if !Arc::ptr_eq(&before.scene, &still.scene) || old.quality.preset != new.quality.preset {
@@ -147,15 +123,14 @@ impl<'a> Session<'a> {
             Some(planner) => Some(Arc::new(planner.renewed(sequence, channels)?)),
             None => None,
         };
-        let sequence = still;
-        let planner = Arc::new(self.planner.renewed(sequence.clone(), channels)?);
+        let planner = Arc::new(self.planner.renewed(still.clone(), channels)?);
         if let Some(gpu) = &mut self.gpu {
-            gpu.renew((before, self.planner.wants_truth()), &sequence, planner.wants_truth())?;
+            gpu.renew((before, self.planner.wants_truth()), &still, planner.wants_truth())?;
         }
-        self.cpu.renew(sequence);
+        self.cpu.renew(still);
+        self.lanes = lanes(&planner, scene_planner.as_deref(), moving);
         self.planner = planner;
         self.channels = channels.into();
-        self.moving = moving;
         self.scene_planner = scene_planner;
         Ok(())
     }
@@ -194,8 +169,8 @@ impl<'a> Session<'a> {
     /// Clears the caches of plans and ideal frames. Pictures stay the same. For benchmarks, which render the
     /// same frames over and over.
     pub fn forget(&mut self) {
-        self.ideal = None;
         self.gpu.iter_mut().for_each(GpuSession::forget);
+        self.lanes.iter_mut().for_each(|lane| lane.ideal = None);
         self.planner.forget();
     }
 
@@ -209,18 +184,24 @@ impl<'a> Session<'a> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let preparer = Preparer::new(self.planner.clone(), self.gpu.as_ref().and_then(GpuSession::tiles));
+        let tiles = self.gpu.as_ref().and_then(GpuSession::tiles);
+        let lanes = self.lanes.len();
+        let preparer = |lane| Preparer::new(self.planner.clone(), lane, tiles.clone());
+        let preparers: Vec<Preparer> = (0..lanes).map(preparer).collect();
         let mut frames = frames.into_iter();
         let first: Vec<u64> = frames.by_ref().take(2).collect();
         let is_single = first.len() < 2;
+        let jobs = first.into_iter().chain(frames);
+        let jobs = jobs.flat_map(|frame| (0..lanes).map(move |lane| Job { lane, frame }));
         planner_threads::scope(self.engine.shares_processor(), is_single, |scope| {
-            let mut ahead = PrepareAhead::start(scope, &preparer, first.into_iter().chain(frames));
+            let mut ahead = PrepareAhead::start(scope, &preparers, jobs);
             let mut in_flight: Option<InFlight> = None;
+            let mut faces = Faces { wanted: lanes, whole: None };
             let mut slot = 0;
             loop {
                 let submitted = match ahead.next() {
-                    Some(Ok(prepared)) => self.submit(prepared, slot).map(Some),
-                    Some(Err(fault)) => Err(fault.into()),
+                    Some((job, Ok(prepared))) => self.submit(job, prepared, slot).map(Some),
+                    Some((_, Err(fault))) => Err(fault.into()),
                     None => Ok(None),
                 };
                 slot = (slot + 1) % FRAMES_IN_FLIGHT;
@@ -230,10 +211,9 @@ impl<'a> Session<'a> {
                 };
                 let is_last = next.is_none();
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
-                    && let Err(fault) = self
-                        .finish(done)
-                        .map_err(RenderError::lift)
-                        .and_then(|frame| sink(frame).map_err(RenderError::Sink))
+                    && let Err(fault) = self.finish(done).map_err(RenderError::lift).and_then(|done| {
+                        faces.add(done).map_or(Ok(()), &mut *sink).map_err(RenderError::Sink)
+                    })
                 {
                     // Buffers of the frame in flight are free only after it. A second error is not reported.
                     let _ = in_flight.map(|unwanted| self.finish(unwanted));
@@ -248,9 +228,11 @@ impl<'a> Session<'a> {
 
     /// Draws ideal frames on the cpu, or submits the gpu passes of a frame.
     // Long because: one path through both renderers.
-    fn submit(&mut self, prepared: Prepared, slot: usize) -> Result<InFlight, RenderErrorBase> {
+    fn submit(&mut self, job: Job, prepared: Prepared, slot: usize) -> Result<InFlight, RenderErrorBase> {
         let plan = &prepared.plan;
-        let sequence = self.planner.sequence().clone();
+        let planner = self.planner.lane(job.lane);
+        let lane = &mut self.lanes[job.lane];
+        let sequence = planner.sequence().clone();
         let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
         let key = IdealKey {
             poses: plan.key_poses(),
@@ -262,36 +244,36 @@ impl<'a> Session<'a> {
             samples_a_pixel: plan.samples_a_pixel,
             renderer: plan.placement.ideal,
         };
-        let redraws = self.ideal.as_ref().is_none_or(|ideal| ideal.key != key);
+        let redraws = lane.ideal.as_ref().is_none_or(|ideal| ideal.key != key);
         let mut times = FrameTimes { plan_ms: prepared.plan_ms, ..FrameTimes::default() };
         if redraws {
             let lod = prepared.meshes.get(plan.keys.len() / 2).map(|mesh| mesh.lod).unwrap_or_default();
-            self.ideal = Some(IdealCache { key: key.clone(), lod, buffer: None });
+            lane.ideal = Some(IdealCache { key: key.clone(), lod, buffer: None });
             if key.renderer == Renderer::Cpu {
                 let begin = Instant::now();
                 let terrain = prepared.meshes.first();
                 let buffer = self.cpu.draw_ideal(plan, terrain, &key.models);
-                self.ideal.iter_mut().for_each(|ideal| ideal.buffer = Some(buffer));
+                lane.ideal.iter_mut().for_each(|ideal| ideal.buffer = Some(buffer));
                 times.ideal_ms = Some(ms_since(begin));
             }
         }
-        let (lod, buffer) = self.ideal.as_ref().map(|ideal| (ideal.lod, ideal.buffer)).unwrap_or_default();
+        let (lod, buffer) = lane.ideal.as_ref().map(|ideal| (ideal.lod, ideal.buffer)).unwrap_or_default();
         let source = match (buffer, &mut self.gpu) {
             (Some(buffer), _) => IdealSource::Cpu(buffer),
             (None, Some(gpu)) => {
                 let makes_output = plan.placement.reverse == Renderer::Gpu;
-                let job = GpuJob {
+                let inputs = GpuJob {
                     plan,
                     scene: &sequence.scene,
                     terrain: &prepared.meshes,
                     rows: prepared.rows.bytes(),
                     uniforms: &uniforms,
                     models: &key.models,
-                    zoom: self.planner.zoom_table(),
+                    zoom: planner.zoom_table(),
                     redraws,
                     readback: if makes_output { Readback::Output } else { Readback::Ideal },
                 };
-                let submitted = gpu.submit(&job, slot).inspect_err(|_| self.ideal = None)?;
+                let submitted = gpu.submit(&inputs, slot).inspect_err(|_| lane.ideal = None)?;
                 times.record_ms = submitted.record_ms;
                 times.submit_ms = submitted.submit_ms;
                 match submitted.copy.filter(|_| !makes_output) {
@@ -301,13 +283,19 @@ impl<'a> Session<'a> {
             }
             (None, None) => return Err(GpuError::NoAdapter(String::new()).into()),
         };
-        Ok(InFlight { prepared, uniforms, source, lod, times })
+        if matches!(source, IdealSource::Gpu(_) | IdealSource::Copied(..)) {
+            // The gpu holds the ideal frames that it drew last only.
+            for other in (0..self.lanes.len()).filter(|&other| other != job.lane) {
+                self.lanes[other].ideal.take_if(|ideal| ideal.buffer.is_none());
+            }
+        }
+        Ok(InFlight { job, prepared, uniforms, source, lod, times })
     }
 
     /// Waits for a frame, and renders or reads its output frame.
     // Long because: one path through both renderers.
     fn finish(&mut self, done: InFlight) -> Result<Finished, RenderErrorBase> {
-        let InFlight { prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
+        let InFlight { job, prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
         let inputs = ReverseInputs { plan: &plan, uniforms: &uniforms, rows: &rows };
         let begin = Instant::now();
         if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
@@ -339,7 +327,7 @@ impl<'a> Session<'a> {
             IdealSource::Cpu(_) | IdealSource::Copied(..) => times.reverse_ms = Some(elapsed_ms),
         }
         let begin = Instant::now();
-        let frame = self.with_truth(&plan, color_rgba, truth)?;
+        let frame = self.with_truth(job.lane, &plan, color_rgba, truth)?;
         times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
         if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
@@ -348,26 +336,27 @@ impl<'a> Session<'a> {
             times.passes = gpu.pass_times(submitted)?;
             out_of_order = submitted.out_of_order;
         }
-        Ok(Finished { frame, plan, lod, out_of_order, times })
+        Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
     }
 
     /// The frame with its truth, from exact rays where depth look-ups are unreliable.
     fn with_truth(
         &mut self,
+        lane: usize,
         plan: &FramePlan,
         mut color_rgba: Vec<f32>,
         mut truth: Option<Vec<Truth>>,
     ) -> Result<RenderedFrame, PlanError> {
-        let sequence = self.planner.sequence().clone();
-        if let Some(moving) = &self.moving {
+        let sequence = self.planner.lane(lane).sequence().clone();
+        if let Some(moving) = &self.lanes[lane].moving {
             moving.paint(&mut color_rgba, plan);
         }
         let planes = match &mut truth {
-            Some(truth) => self.complete_truth(plan, &color_rgba, truth)?,
+            Some(truth) => self.complete_truth(lane, plan, &color_rgba, truth)?,
             None => Vec::new(),
         };
         let coords = truth.as_ref().map(|truth| finished::coords(truth, &color_rgba, plan, &sequence.path));
-        Ok(RenderedFrame {
+        let mut frame = RenderedFrame {
             index: plan.frame,
             stamp_ns: sequence.epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
             size_px: plan.camera.size_px,
@@ -376,22 +365,27 @@ impl<'a> Session<'a> {
             coords,
             rows: self.planner.rows(plan),
             planes,
-        })
+        };
+        if self.lanes.len() > 1 {
+            in_whole_camera(&mut frame, plan);
+        }
+        Ok(frame)
     }
 
     /// Corrects the truth of a renderer by rays, and computes the other truth channels.
     fn complete_truth(
         &mut self,
+        lane: usize,
         plan: &FramePlan,
         color_rgba: &[f32],
         truth: &mut Vec<Truth>,
     ) -> Result<Vec<Plane>, PlanError> {
         let mut hits = std::mem::take(&mut self.hits);
-        let planner = self.scene_planner();
+        let planner = self.scene_planner().lane(lane);
         let rays = planner.frame_rays(plan, f64::from(self.coords_phase));
         // What moves is not in the picture that depth is looked up in.
         let needs_every_ray =
-            self.moving.is_some() || self.channels.iter().any(|channel| channel.needs_every_ray());
+            self.scene_planner.is_some() || self.channels.iter().any(|channel| channel.needs_every_ray());
         if !needs_every_ray {
             if plan.has_exact_truth() {
                 hits::complete(truth, color_rgba, plan, &rays);
@@ -413,7 +407,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// Faults of the adapter.
     pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
-        let Some(IdealCache { key, buffer, .. }) = &self.ideal else { return Ok(None) };
+        let Some(IdealCache { key, buffer, .. }) = &self.lanes[0].ideal else { return Ok(None) };
         match (buffer, &self.gpu) {
             (Some(buffer), _) => {
                 let (color, inverse_depth) = self.cpu.ideal_images(*buffer);
@@ -437,6 +431,34 @@ impl<'a> Session<'a> {
     #[must_use]
     pub fn tiles_held(&self) -> Option<[usize; 2]> {
         self.gpu.as_ref().and_then(GpuSession::resident_tiles)
+    }
+}
+
+/// What is kept for each lane of a planner. `moving` is of the whole camera.
+fn lanes(planner: &Planner, scene_planner: Option<&Planner>, moving: Option<MovingScene>) -> Vec<Lane> {
+    let (Some(scene_planner), 2..) = (scene_planner, planner.lanes()) else {
+        return std::iter::once(Lane { moving, ideal: None })
+            .chain((1..planner.lanes()).map(|_| Lane::default()))
+            .collect();
+    };
+    let of_face = |number| MovingScene::new(scene_planner.lane(number).sequence(), moving.as_ref());
+    (0..planner.lanes()).map(|number| Lane { moving: of_face(number), ideal: None }).collect()
+}
+
+/// Collects the faces of a frame, which are finished one after the other.
+struct Faces {
+    wanted: usize,
+    whole: Option<Finished>,
+}
+
+impl Faces {
+    /// The frame, once this is its last face.
+    fn add(&mut self, done: Finished) -> Option<Finished> {
+        match &mut self.whole {
+            None => self.whole = Some(done),
+            Some(whole) => add_face(whole, done),
+        }
+        self.whole.take_if(|whole| whole.faces.len() + 1 >= self.wanted)
     }
 }
 

@@ -4,6 +4,7 @@ use std::{collections::HashMap, sync::Arc, time::Instant};
 
 use camsim_core::{
     camera::ZoomTable,
+    scenario::Face,
     scene::{LodTolerance, PlacedMesh, Scene, SceneBatches, TerrainTiles},
     sequence::Sequence,
 };
@@ -109,8 +110,8 @@ pub struct GpuSession<'a> {
     ideal_pass: IdealPass,
     reverse_pass: ReversePass,
     lens_pass: Option<LensInversePass>,
-    /// Current lens map, and the bits of its zoom value.
-    lens_map: Option<(u64, LensMap)>,
+    /// Current lens map of each face, and the bits of its zoom value.
+    lens_maps: HashMap<Option<Face>, (u64, LensMap)>,
     /// Lens maps of the zoom table's entries: initial values for the zoom values in between.
     zoom_maps: HashMap<usize, LensMap>,
     targets: Vec<SessionTarget>,
@@ -145,7 +146,7 @@ impl<'a> GpuSession<'a> {
             ideal_pass,
             reverse_pass: ReversePass::new(gpu),
             lens_pass: None,
-            lens_map: None,
+            lens_maps: HashMap::new(),
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             last_ideal: None,
@@ -179,7 +180,7 @@ impl<'a> GpuSession<'a> {
         if !same_size {
             self.lists = None;
         }
-        self.lens_map = None;
+        self.lens_maps.clear();
         self.zoom_maps.clear();
         self.vignette = tables::vignette(self.gpu, sequence);
         // Bind groups refer to what has just been replaced.
@@ -226,7 +227,8 @@ impl<'a> GpuSession<'a> {
         self.frame_slots[slot].staging = Some(staging);
         let commands = result.inspect_err(|_| {
             // Caches whose contents were recorded but never submitted are invalid.
-            (self.last_ideal, self.lens_map) = (None, None);
+            self.last_ideal = None;
+            self.lens_maps.clear();
             self.zoom_maps.clear();
             self.targets.clear();
             self.copies.forget();
@@ -320,14 +322,17 @@ impl<'a> GpuSession<'a> {
     fn lens_inverse(&mut self, recorder: &mut Recorder<'_>, job: &GpuJob<'_>) {
         let (device, plan) = (&self.gpu.device, job.plan);
         let zoom_bits = plan.zoom.unwrap_or_default().to_bits();
-        if self.lens_map.as_ref().is_some_and(|(of, _)| *of == zoom_bits) {
+        let face = plan.camera.lens.face();
+        if self.lens_maps.get(&face).is_some_and(|(of, _)| *of == zoom_bits) {
             return;
         }
-        if !has_shader(plan.camera.lens.model()) {
-            let (_, map) =
-                self.lens_map.take().unwrap_or_else(|| (0, LensMap::new(device, plan.camera.size_px)));
+        let mut map = match self.lens_maps.remove(&face) {
+            Some((_, map)) => map,
+            None => LensMap::new(device, plan.camera.size_px),
+        };
+        if !has_shader(&plan.camera.lens) {
             map.upload(device, recorder, &plan.camera);
-            self.lens_map = Some((zoom_bits, map));
+            self.lens_maps.insert(face, (zoom_bits, map));
             return;
         }
         let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(device));
@@ -343,12 +348,8 @@ impl<'a> GpuSession<'a> {
             }
             warm = self.zoom_maps.get(&entry);
         }
-        let mut map = match self.lens_map.take() {
-            Some((_, map)) => map,
-            None => LensMap::new(device, plan.camera.size_px),
-        };
         pass.encode(device, recorder, &plan.camera, &mut map, warm);
-        self.lens_map = Some((zoom_bits, map));
+        self.lens_maps.insert(face, (zoom_bits, map));
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
@@ -390,16 +391,23 @@ impl<'a> GpuSession<'a> {
     /// kind is dropped if there are too many.
     fn target(&mut self, plan: &FramePlan) -> usize {
         let size_px = IdealTarget::size_for(plan, self.gpu.max_side_px());
-        let cached = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
+        let face = plan.camera.lens.face();
+        let serves = |target: &SessionTarget| target.face == face && target.ideal.serves(size_px, plan);
+        let cached = self.targets.iter().position(serves);
         let target = cached.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let has_samples = plan.edges != EdgeStage::None || plan.samples_a_pixel > 1;
             let limit = if has_samples { MAX_FINE_TARGETS } else { MAX_TARGETS };
-            let is_same_kind = |target: &SessionTarget| target.ideal.has_samples() == has_samples;
+            let is_same_kind =
+                |target: &SessionTarget| target.face == face && target.ideal.has_samples() == has_samples;
             if self.targets.iter().filter(|target| is_same_kind(target)).count() >= limit {
                 let longest_unused = self.targets.iter().position(is_same_kind).unwrap_or_default();
                 self.targets.remove(longest_unused);
             }
-            SessionTarget { ideal: IdealTarget::new(self.gpu, size_px, plan), groups: Default::default() }
+            SessionTarget {
+                face,
+                ideal: IdealTarget::new(self.gpu, size_px, plan),
+                groups: Default::default(),
+            }
         });
         self.targets.push(target);
         self.targets.len() - 1
@@ -424,7 +432,7 @@ impl<'a> GpuSession<'a> {
             return Ok(());
         };
         let lens_map = match plan.ray {
-            RayStage::LensMap => self.lens_map.as_ref().map(|(_, map)| &map.view),
+            RayStage::LensMap => self.lens_maps.get(&plan.camera.lens.face()).map(|(_, map)| &map.view),
             _ => None,
         };
         let lists = (plan.edges != EdgeStage::None).then(|| {

@@ -441,7 +441,7 @@ fn invalid_pixels_warning(sequence: &Sequence) -> Option<String> {
     for y in (8..height).step_by(16) {
         for x in (8..width).step_by(16) {
             all += 1;
-            invalid += u32::from(camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_none());
+            invalid += u32::from(camera.ray(DVec2::new(f64::from(x), f64::from(y))).is_none());
         }
     }
     let share = 100.0 * f64::from(invalid) / f64::from(all.max(1));

@@ -10,7 +10,7 @@ use camsim_core::{
     mount::CameraPath,
     pose::CameraPose,
     row_time::FrameCamera,
-    scenario::{Channel, FlowInstant, Preset},
+    scenario::{Channel, Face, FlowInstant, Preset},
     sequence::Sequence,
     temporal::IdealGeometry,
 };
@@ -35,7 +35,7 @@ use crate::{
         pixel_truth::FrameRays,
         temporal_method::{TemporalMethod, is_of_twist},
     },
-    view::surfaces::Surfaces,
+    view::{faces::faces, surfaces::Surfaces},
 };
 use steps::Draft;
 
@@ -54,6 +54,8 @@ pub struct Planner {
     groups: RecentCache<FrameGroup>,
     /// The last plan of a frame by itself: callers may need it twice.
     last: RecentCache<FramePlan>,
+    /// The planners of the faces that a wide field is divided among.
+    faces: Vec<Self>,
 }
 
 /// The plan of a frame, step by step.
@@ -106,7 +108,16 @@ impl Planner {
         scene: SceneKnowledge,
     ) -> Result<Self, PlanError> {
         let cached_groups = CACHED_GROUPS + CACHED_GROUPS_A_GROUP * Self::groups_at_once();
+        let of_face = |&face: &Face| {
+            Self::with_scene(Arc::new(sequence.face(face)), channels, max_side_px, scene.clone())
+        };
+        let faces = faces(&sequence, channels)?;
+        if !faces.is_empty() && channels.contains(&Channel::Coords) {
+            return Err(PlanError::CoordsOfFaces);
+        }
+        let faces = faces.iter().map(of_face).collect::<Result<_, _>>()?;
         Ok(Self {
+            faces,
             inputs: PlanInputs::new(sequence, channels, max_side_px, scene)?,
             capabilities: Capabilities::default(),
             rasterises: false,
@@ -121,14 +132,16 @@ impl Planner {
     pub fn with_ideals_of_any_area(self) -> Self {
         let mut inputs = self.inputs;
         inputs.max_ideal_px = u64::MAX;
-        Self { inputs, ..self }
+        let faces = self.faces.into_iter().map(Self::with_ideals_of_any_area).collect();
+        Self { inputs, faces, ..self }
     }
 
     /// Plans for a machine with these capabilities; without, for a graphics card.
     #[must_use]
     pub fn with_capabilities(self, capabilities: Capabilities) -> Self {
         let rasterises = cpu_rasterises(&self.inputs.sequence.scene, capabilities.max_picture_px);
-        Self { capabilities, rasterises, ..self }
+        let faces = self.faces.into_iter().map(|face| face.with_capabilities(capabilities)).collect();
+        Self { capabilities, rasterises, faces, ..self }
     }
 
     /// The sequence.
@@ -155,11 +168,34 @@ impl Planner {
         self.inputs.stamp_s(frame)
     }
 
-    /// The plan of one frame.
+    /// Number of plans of a frame: 1, or that of the faces that a wide field is divided among.
+    #[must_use]
+    pub fn lanes(&self) -> usize {
+        self.faces.len().max(1)
+    }
+
+    /// The planner of a face, or this one where there are none.
+    #[must_use]
+    pub fn lane(&self, number: usize) -> &Self {
+        self.faces.get(number).unwrap_or(self)
+    }
+
+    /// The plans of one frame: one, or one a face.
+    ///
+    /// # Errors
+    /// As [`Planner::plan`].
+    pub fn plans(&self, frame: u64) -> Result<Vec<FramePlan>, PlanError> {
+        (0..self.lanes()).map(|number| self.lane(number).plan(frame)).collect()
+    }
+
+    /// The plan of one frame; where a wide field is divided among faces, that of the first face.
     ///
     /// # Errors
     /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
     pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        if let Some(face) = self.faces.first() {
+            return face.plan(frame);
+        }
         let mut plan = self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)?;
         if plan.shared_frames.is_none() {
             plan.unshared_reason = Some(unshared_reason(&self.inputs, &plan));
@@ -203,6 +239,7 @@ impl Planner {
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames
     /// over and over.
     pub fn forget(&self) {
+        self.faces.iter().for_each(Self::forget);
         self.inputs.forget();
         self.groups.forget();
         self.last.forget();
@@ -218,7 +255,14 @@ impl Planner {
     /// (-0.5 to 0.5).
     #[must_use]
     pub fn frame_rays<'a>(&'a self, plan: &'a FramePlan, phase: f64) -> FrameRays<'a> {
-        FrameRays::new(self.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
+        let of_face = self.of_face(plan);
+        FrameRays::new(of_face.inputs.path(), &self.inputs.scene.surfaces, plan, phase)
+    }
+
+    /// The planner that made a plan: that of its face, if it is of one.
+    fn of_face(&self, plan: &FramePlan) -> &Self {
+        let face = plan.camera.lens.face();
+        self.faces.iter().find(|planner| planner.sequence().scenario.camera.face == face).unwrap_or(self)
     }
 
     /// The surfaces of the scene.
@@ -274,7 +318,7 @@ impl Planner {
     /// # Errors
     /// As [`Planner::plan`].
     pub fn error_map(&self, plan: &FramePlan) -> Result<ErrorMap, PlanError> {
-        let inputs = &self.inputs;
+        let inputs = &self.of_face(plan).inputs;
         let context = FrameContext::new(inputs, plan.frame, None)?;
         let quarter = plan.shared_frames.and_then(|_| inputs.quarter_of_the_probes(plan.frame));
         let reach = quarter.unwrap_or_else(|| context.reach.clone());

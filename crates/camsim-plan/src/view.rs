@@ -2,6 +2,7 @@
 
 pub(crate) mod constant_twist;
 pub(crate) mod exposure;
+pub(crate) mod faces;
 pub(crate) mod gain;
 pub(crate) mod ideal_extent;
 pub(crate) mod lens_reach;

@@ -3,7 +3,7 @@
 mod twins;
 
 use camsim_core::{
-    scenario::{Auto, LightSpec, Solver},
+    scenario::{Auto, Face, LightSpec, Solver},
     scene::{self, ModelLod, SceneLods, TerrainDetail, TerrainTiles, TexelForm, tile_bytes},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
@@ -49,6 +49,12 @@ struct ExplainReport<'a> {
     terrain: Option<TerrainFacts>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
+    /// The face that `plan` is of, where a wide field is divided among several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    face: Option<&'static str>,
+    /// The plans of the other faces.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    faces: Vec<FaceFacts<'a>>,
     placement: Placement,
     source_frame: SourceFrameFields,
     level_of_detail: Option<LevelOfDetail>,
@@ -89,6 +95,33 @@ impl SourceFrameFields {
             ideal_q_wxyz: [q.w, q.x, q.y, q.z],
         }
     }
+}
+
+/// A face beside the first that a wide field is divided among.
+#[derive(Serialize)]
+struct FaceFacts<'a> {
+    face: &'static str,
+    #[serde(flatten)]
+    plan: PlanSummary<'a>,
+    placement: Placement,
+}
+
+impl<'a> FaceFacts<'a> {
+    fn of(plan: &'a FramePlan) -> Self {
+        let face = plan.camera.lens.face().map_or("", Face::name);
+        Self { face, plan: plan.summary(), placement: plan.placement }
+    }
+}
+
+fn print_faces(first: Face, others: &[FramePlan], console: &mut Console<'_>) -> Result<(), Failure> {
+    let others = others.iter().filter_map(|plan| plan.camera.lens.face());
+    let names: Vec<&str> = std::iter::once(first).chain(others).map(Face::name).collect();
+    console.line(format_args!(
+        "faces: the field is wider than a flat ideal frame holds; {} sides of a cube make it: {}",
+        names.len(),
+        names.join(", ")
+    ))?;
+    Ok(console.line(format_args!("face {}", first.name()))?)
 }
 
 #[derive(Serialize)]
@@ -178,7 +211,8 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, engine.max_side_px())
         .or_bad_input()?;
     let planner = planner.with_capabilities(engine.capabilities());
-    let plan = planner.plan(args.frame).or_bad_input()?;
+    let mut faces = planner.plans(args.frame).or_bad_input()?;
+    let plan = faces.remove(0);
     let twins = twins::plans(&loaded.sequence, &planner, args.frame)?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
@@ -197,6 +231,8 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
             terrain,
             warnings,
             plan: plan.summary(),
+            face: plan.camera.lens.face().map(Face::name),
+            faces: faces.iter().map(FaceFacts::of).collect(),
             placement: plan.placement,
             source_frame,
             level_of_detail,
@@ -225,7 +261,14 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
     }
     print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
+    if let Some(face) = plan.camera.lens.face() {
+        print_faces(face, &faces, console)?;
+    }
     console.print(&plan.to_string())?;
+    for plan in &faces {
+        console.line(format_args!("face {}", plan.camera.lens.face().map_or("", Face::name)))?;
+        console.print(&plan.to_string())?;
+    }
     print_source(&source_frame, &plan, console)?;
     let Placement { ideal, reverse } = plan.placement;
     console.line(format_args!("rendered on {engine}"))?;

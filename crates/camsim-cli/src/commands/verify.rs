@@ -11,10 +11,10 @@ use camsim_core::{
         CoordErrors, Disocclusion, ErrorVerdict, IdealView, Oracle, RenderOptions, coord_errors,
         disocclusion, image_errors, silhouettes, truth_errors,
     },
-    scenario::{Auto, Channel, Solver},
+    scenario::{Auto, Channel, Face, Solver},
 };
 use camsim_engine::{Finished, Session};
-use camsim_plan::{FramePlan, Predicted};
+use camsim_plan::{FramePlan, Planner, Predicted};
 
 use super::explain::level_of_detail;
 use crate::{
@@ -94,11 +94,11 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         Some(list) => list.resolve(sequence.frames).or_bad_input()?,
         None => spread(sequence.frames),
     };
-    let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
     let engine = args.backend.open()?;
     check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;
     let adapter = engine.to_string();
-    let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
+    let planner =
+        Planner::new(sequence.clone(), &scenario.output.channels, engine.max_side_px()).or_bad_input()?;
     let tolerance_px = scenario.quality.max_error_px;
     let tolerance_dn = scenario.quality.max_error_dn;
     let mut report = VerifyReport { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
@@ -113,16 +113,26 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         ))?;
         console.line(HEADER)?;
     }
-    for &frame in &frames {
-        let verified = verify(frame, &mut session, &oracle, tolerance_px, args.pictures)?;
-        report.kept &= verified.kept
-            && verified.picture.as_ref().is_none_or(|picture| picture.kept)
-            && verified.truth.as_ref().is_none_or(|truth| truth.kept)
-            && verified.planes.kept();
-        if !args.json {
-            print(&verified, tolerance_dn, console)?;
+    // A face is verified as the camera that it is, in its own ideal frame.
+    for lane in 0..planner.lanes() {
+        let sequence = planner.lane(lane).sequence();
+        let face = sequence.scenario.camera.face.map(Face::name);
+        let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
+        let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
+        if let Some(face) = face.filter(|_| !args.json) {
+            console.line(format_args!("face {face}"))?;
         }
-        report.frames.push(verified);
+        for &frame in &frames {
+            let verified = verify(frame, face, &mut session, &oracle, tolerance_px, args.pictures)?;
+            report.kept &= verified.kept
+                && verified.picture.as_ref().is_none_or(|picture| picture.kept)
+                && verified.truth.as_ref().is_none_or(|truth| truth.kept)
+                && verified.planes.kept();
+            if !args.json {
+                print(&verified, tolerance_dn, console)?;
+            }
+            report.frames.push(verified);
+        }
     }
     if args.json {
         console.json(&report)?;
@@ -204,6 +214,7 @@ fn spread(frames: u64) -> Vec<u64> {
 
 fn verify(
     frame: u64,
+    face: Option<&'static str>,
     session: &mut Session<'_>,
     oracle: &Oracle,
     tolerance_px: f64,
@@ -228,6 +239,7 @@ fn verify(
     let planes = planes(frame, session, oracle, tolerance_px)?;
     Ok(Verified {
         frame,
+        face,
         planes,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
         kept: p99_px <= tolerance_px,

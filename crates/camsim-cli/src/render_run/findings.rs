@@ -24,10 +24,12 @@ impl Findings {
     /// Adds a picture.
     pub fn add(&mut self, finished: &Finished) {
         self.pictures += 1;
-        self.sky_only += u64::from(finished.plan.motion.nearest_m.is_infinite());
+        self.sky_only += u64::from(finished.plans().all(|plan| plan.motion.nearest_m.is_infinite()));
         self.empty += u64::from(is_empty(&finished.frame));
         self.cycles.add(finished.plan.frame, finished.out_of_order);
-        self.tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
+        if let Some(tolerances) = &mut self.tolerances {
+            tolerances.add(finished.plans());
+        }
     }
 
     /// What to warn of.

@@ -1,6 +1,5 @@
 //! The lens map on the CPU: f64 twin of the GPU stage `lens_inverse`.
 
-use glam::DVec2;
 use rayon::prelude::*;
 
 use super::CameraModel;
@@ -16,7 +15,7 @@ impl CameraModel {
         let [width, height] = self.size_px;
         let row = |y: u32| {
             (0..width).map(move |x| {
-                let ideal = self.unproject(DVec2::new(f64::from(x), f64::from(y)));
+                let ideal = self.unproject_pixel([x, y]);
                 ideal.map_or([INVALID_UV; 2], |ideal| ideal.as_vec2().to_array())
             })
         };

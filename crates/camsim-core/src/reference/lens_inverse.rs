@@ -53,7 +53,7 @@ impl LensInverse {
             rim: Vec::new(),
             starts: Vec::new(),
         };
-        if !lens.plain {
+        if !lens.plain && !lens.is_face() {
             lens.border = (0..DIRECTIONS)
                 .into_par_iter()
                 .map(|direction_index| lens.end_of_branch(direction(direction_index)))
@@ -74,6 +74,9 @@ impl LensInverse {
         if self.plain {
             return wanted.is_finite().then_some(wanted);
         }
+        if self.is_face() {
+            return self.polish(self.lens.undistort(wanted)?, wanted);
+        }
         if !self.may_be_imaged(wanted) {
             return None;
         }
@@ -83,9 +86,22 @@ impl LensInverse {
         near.and_then(|start| self.polish(start, wanted)).or_else(|| self.solve_from_nothing(wanted))
     }
 
+    /// Whether the pixel is one that this camera makes, and not another face.
+    pub(super) fn holds(&self, pixel: DVec2) -> bool {
+        self.lens.holds(self.distorted(pixel))
+    }
+
+    /// The branch of a face is that of its whole lens, whose certified inverse gives the start.
+    fn is_face(&self) -> bool {
+        self.lens.face().is_some()
+    }
+
     /// Pixel at which an ideal ray is imaged; `None` beyond the principal branch.
     pub(super) fn image(&self, ideal: DVec2) -> Option<DVec2> {
-        let is_imaged = ideal.is_finite() && (self.plain || self.inside(ideal));
+        let is_imaged = match self.is_face() {
+            true => self.lens.contains(ideal),
+            false => ideal.is_finite() && (self.plain || self.inside(ideal)),
+        };
         is_imaged.then(|| self.lens.distort(ideal) * self.focal_px + self.principal_px)
     }
 
@@ -205,7 +221,8 @@ impl LensInverse {
 
     fn accept(&self, at: DVec2, wanted: DVec2) -> Option<DVec2> {
         let residual = (self.lens.distort(at) - wanted).length();
-        (residual <= RESIDUAL * (1.0 + wanted.length()) && self.regular(at) && self.inside(at)).then_some(at)
+        let is_on_branch = self.is_face() || self.regular(at) && self.inside(at);
+        (residual <= RESIDUAL * (1.0 + wanted.length()) && is_on_branch).then_some(at)
     }
 
     /// On the sheet of the axis both eigenvalues of the Jacobian are positive.

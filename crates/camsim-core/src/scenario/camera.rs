@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::FieldOr;
+use super::{Face, FieldOr};
 use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
@@ -44,6 +44,10 @@ pub struct CameraSpec {
     /// CSV `t_s,zoom`: zoom over log time, linear between rows, constant beyond the ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zoom_track: Option<PathBuf>,
+    /// The part of a wide field that this camera is for, where it is one of several ([`Face`]); files have
+    /// whole cameras.
+    #[serde(skip)]
+    pub face: Option<Face>,
     /// Exposure times of the rows.
     pub shutter: ShutterSpec,
     /// Vignette, light, noise, output encoding.
@@ -65,6 +69,7 @@ impl Default for CameraSpec {
             lens_table: None,
             zoom: Vec::new(),
             zoom_track: None,
+            face: None,
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
         }

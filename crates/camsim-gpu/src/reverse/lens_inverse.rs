@@ -78,7 +78,7 @@ impl LensUniform {
             padding: [0.0; 2],
         };
         match &camera.lens {
-            Lens::Pinhole(_) | Lens::Direction(_) => {}
+            Lens::Pinhole(_) | Lens::Direction(_) | Lens::Face(_) => {}
             Lens::BrownConrady(_) => {
                 if let [k1, k2, p1, p2, k3, k4, k5, k6] = *camera.lens.coefficients() {
                     uniform.radial = [k1, k2, k3, 0.0].map(finite_f32);
@@ -189,10 +189,10 @@ impl LensMap {
     }
 }
 
-/// Whether a shader makes the lens maps of a model.
+/// Whether a shader makes the map of a lens.
 #[must_use]
-pub fn has_shader(model: LensModel) -> bool {
-    VARIANTS.iter().any(|(of, _)| *of == model)
+pub fn has_shader(lens: &Lens) -> bool {
+    lens.face().is_none() && VARIANTS.iter().any(|(model, _)| *model == lens.model())
 }
 
 /// Pipelines of all variants, and the buffers of a lens.

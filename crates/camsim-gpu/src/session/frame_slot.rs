@@ -1,6 +1,6 @@
 //! Buffers of the frames in flight.
 
-use camsim_core::sequence::Sequence;
+use camsim_core::{scenario::Face, sequence::Sequence};
 
 use super::{FRAMES_IN_FLIGHT, readback::ReadbackBuffer};
 use crate::{
@@ -15,6 +15,8 @@ use crate::{
 /// Textures of ideal frames, and the bind groups with which each frame in flight reads them.
 #[derive(Debug)]
 pub(super) struct SessionTarget {
+    /// The face whose lens map the bind groups have.
+    pub face: Option<Face>,
     pub ideal: IdealTarget,
     pub groups: [ReverseBindGroups; FRAMES_IN_FLIGHT],
 }

@@ -18,6 +18,12 @@ pub enum PlanError {
         "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens SCENARIO.toml check`)"
     )]
     NoRay,
+    /// A wide field has no ideal frame that `coords` could refer to.
+    #[error(
+        "output.channels: \"coords\" gives rays and sources in one flat ideal frame, which cannot hold this lens's \
+         field; leave it out (depth, range, normal, flow, object have all that is true of the pixels)"
+    )]
+    CoordsOfFaces,
     /// The ideal frame would have too many pixels for any memory, though its sides fit.
     #[error(
         "frame {frame} needs an ideal frame of {width}x{height} px, {:.0} million pixels, more than {:.0} million: the field of view is too wide for a \

@@ -122,7 +122,7 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
             .chain((!(size - 1).is_multiple_of(STEP_PX)).then_some(size - 1))
             .collect::<Vec<u32>>()
     };
-    let ray = |x: u32, y: u32| camera.unproject(DVec2::new(f64::from(x), f64::from(y)));
+    let ray = |x: u32, y: u32| camera.unproject_pixel([x, y]);
     let (xs, ys) = (ticks(width), ticks(height));
     use rayon::prelude::*;
     let grid: Vec<Vec<Option<DVec2>>> =

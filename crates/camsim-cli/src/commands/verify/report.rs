@@ -24,6 +24,9 @@ pub struct VerifyReport {
 #[derive(Serialize)]
 pub struct Verified {
     pub frame: u64,
+    /// The face that was measured, where a wide field is divided among several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub face: Option<&'static str>,
     pub predicted: Predicted,
     pub measured: Measured,
     /// Errors of depths and points; `None` for solvers that compute sources without exact depths.

@@ -1,0 +1,79 @@
+//! A lens as one of several cameras sees it that share its optical centre: its faces.
+//!
+//! A flat ideal frame holds less than a half sphere. A wider field is divided among the six sides of a cube
+//! about the camera, of which the front one looks along the optical axis. A face's camera is turned, and its
+//! lens is the whole lens in the face's axes: the output pixels stay those of the whole camera.
+
+use glam::{DMat2, DMat3, DVec2, DVec3};
+
+use super::Lens;
+use crate::scenario::Face;
+
+/// Largest tangent at which a face is used: it holds tangents of 1, and what is about a pixel at its border.
+const MOST_TANGENT: f64 = 1.5;
+
+/// A lens seen by the camera of one of its faces: `distorted = whole(R ray)` with the rotation R from the
+/// face's axes to the camera's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceLens {
+    whole: Lens,
+    face: Face,
+    whole_from_face: DMat3,
+}
+
+impl FaceLens {
+    pub(super) fn new(whole: Lens, face: Face) -> Self {
+        Self { whole, face, whole_from_face: DMat3::from_quat(face.camera_from_face()) }
+    }
+
+    /// Which face this is.
+    #[must_use]
+    pub fn face(&self) -> Face {
+        self.face
+    }
+
+    /// The lens of the whole camera.
+    #[must_use]
+    pub fn whole(&self) -> &Lens {
+        &self.whole
+    }
+
+    pub(super) fn distort(&self, ideal: DVec2) -> DVec2 {
+        self.image(ideal.extend(1.0))
+    }
+
+    pub(super) fn jacobian(&self, ideal: DVec2) -> DMat2 {
+        let [x, y, _] = self.gradient(ideal.extend(1.0));
+        DMat2::from_cols(x, y)
+    }
+
+    /// `None` for points that other faces hold, but for those near the border.
+    pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+        let ray = self.ray(distorted)?;
+        let uv = ray.truncate() / ray.z;
+        (ray.z > 0.0 && uv.abs().max_element() <= MOST_TANGENT).then_some(uv)
+    }
+
+    pub(super) fn image(&self, ray: DVec3) -> DVec2 {
+        self.whole.image(self.whole_from_face * ray)
+    }
+
+    pub(super) fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        let [x, y, z] = self.whole.gradient(self.whole_from_face * ray);
+        let along = |axis: DVec3| x * axis.x + y * axis.y + z * axis.z;
+        [self.whole_from_face.x_axis, self.whole_from_face.y_axis, self.whole_from_face.z_axis].map(along)
+    }
+
+    pub(super) fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+        Some(self.whole_from_face.transpose() * self.whole.ray(distorted)?)
+    }
+
+    pub(super) fn contains_ray(&self, ray: DVec3) -> bool {
+        self.whole.contains_ray(self.whole_from_face * ray)
+    }
+
+    /// Whether this is the face that an output pixel is made from.
+    pub(super) fn holds(&self, distorted: DVec2) -> bool {
+        self.whole.ray(distorted).is_some_and(|ray| Face::of(ray) == self.face)
+    }
+}

@@ -1,0 +1,124 @@
+//! The camera of a session, or one of the faces that its field is divided among.
+
+use camsim_core::{
+    camera::CameraModel,
+    frame::{Plane, PlaneValues, RenderedFrame},
+    pose::CameraPose,
+    scenario::Channel,
+    scene::{LodSelection, LodTolerance},
+    temporal::IdealGeometry,
+};
+use camsim_cpu::IdealBuffer;
+use camsim_plan::{EdgeStage, FramePlan, PrefilterTaps, Renderer};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::{Finished, moving::MovingScene};
+
+/// What a session keeps for its camera, or for one of its faces, beside the planner.
+#[derive(Debug, Default)]
+pub(crate) struct Lane {
+    pub moving: Option<MovingScene>,
+    pub ideal: Option<IdealCache>,
+}
+
+/// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct IdealKey {
+    pub poses: Vec<CameraPose>,
+    pub ideal: IdealGeometry,
+    pub edges: EdgeStage,
+    pub terrain_error_px: f64,
+    pub models: LodTolerance,
+    pub surface_reads: PrefilterTaps,
+    pub samples_a_pixel: u32,
+    pub renderer: Renderer,
+}
+
+/// The last ideal frames, reused by frames with the same key.
+#[derive(Debug)]
+pub(crate) struct IdealCache {
+    pub key: IdealKey,
+    pub lod: LodSelection,
+    /// Buffer of the cpu renderer, if it drew them.
+    pub buffer: Option<IdealBuffer>,
+}
+
+/// Turns what a face's frame says in the face's axes to those of the whole camera: planar depth, normals.
+pub(crate) fn in_whole_camera(frame: &mut RenderedFrame, plan: &FramePlan) {
+    let Some(face) = plan.camera.lens.face() else { return };
+    let whole_from_face = face.camera_from_face();
+    let width = frame.size_px[0] as usize;
+    let camera: &CameraModel = &plan.camera;
+    if let Some(depth_m) = &mut frame.depth_m {
+        depth_m.par_iter_mut().enumerate().filter(|(_, depth_m)| **depth_m != 0.0).for_each(
+            |(i, depth_m)| {
+                let pixel = DVec2::new((i % width) as f64, (i / width) as f64);
+                let factor = camera.unproject(pixel).map_or(0.0, |uv| (whole_from_face * uv.extend(1.0)).z);
+                *depth_m = (f64::from(*depth_m) * factor) as f32;
+            },
+        );
+    }
+    for Plane { channel, values } in &mut frame.planes {
+        if let (Channel::Normal, PlaneValues::Float(normals)) = (channel, values) {
+            for normal in normals.chunks_exact_mut(3) {
+                let turned =
+                    whole_from_face * DVec3::new(normal[0].into(), normal[1].into(), normal[2].into());
+                normal.copy_from_slice(&turned.as_vec3().to_array());
+            }
+        }
+    }
+}
+
+/// The frame that faces make, each rendered as a camera of its own; `None` of none. Its rows are those of the
+/// first face.
+#[must_use]
+pub fn join_faces(faces: impl IntoIterator<Item = Finished>) -> Option<Finished> {
+    faces
+        .into_iter()
+        .map(|mut face| {
+            in_whole_camera(&mut face.frame, &face.plan);
+            face
+        })
+        .reduce(|mut whole, face| {
+            add_face(&mut whole, face);
+            whole
+        })
+}
+
+/// Adds what a face has made to the frame of those before it.
+pub(crate) fn add_face(whole: &mut Finished, face: Finished) {
+    let Finished { frame, plan, lod: _, out_of_order, times, faces } = face;
+    let held: Vec<bool> = frame.color_rgba.par_chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
+    let into = &mut whole.frame;
+    copy(&mut into.color_rgba, &frame.color_rgba, &held);
+    if let (Some(into), Some(from)) = (&mut into.depth_m, &frame.depth_m) {
+        copy(into, from, &held);
+    }
+    for (into, from) in into.planes.iter_mut().zip(&frame.planes) {
+        match (&mut into.values, &from.values) {
+            (PlaneValues::Float(into), PlaneValues::Float(from)) => copy(into, from, &held),
+            (PlaneValues::Index(into), PlaneValues::Index(from)) => copy(into, from, &held),
+            _ => {}
+        }
+    }
+    whole.out_of_order += out_of_order;
+    whole.times.add(&times);
+    whole.faces.push(plan);
+    whole.faces.extend(faces);
+}
+
+/// Copies the values of the pixels that are held; a pixel has equally many in both.
+fn copy<T: Copy + Send + Sync>(into: &mut [T], from: &[T], held: &[bool]) {
+    let count = from.len() / held.len().max(1);
+    if count == 0 {
+        return;
+    }
+    into.par_chunks_exact_mut(count).zip(from.par_chunks_exact(count)).zip(held).for_each(
+        |((into, from), &held)| {
+            if held {
+                into.copy_from_slice(from);
+            }
+        },
+    );
+}
