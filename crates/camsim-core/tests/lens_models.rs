@@ -5,13 +5,13 @@
 use std::f64::consts::{PI, TAU};
 
 use camsim_core::camera::CameraModel;
-use camsim_core::lens::LensModel;
+use camsim_core::lens::{Lens, LensModel};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 const FORWARD_TOLERANCE_PX: f64 = 1e-6;
 const RAYS: usize = 240;
-const STEPS: usize = 900;
+const STEPS: usize = 500;
 /// Pixels nearer to the image of the border are not judged: it is a polygon here.
 const UNJUDGED_PX: f64 = 0.5;
 
@@ -165,33 +165,49 @@ fn ray(phi: f64, theta: f64) -> DVec3 {
     (DVec2::from_angle(phi) * theta.sin()).extend(theta.cos())
 }
 
+/// Where a scan along a direction ends: the last regular angle and the first that is not.
+struct Border {
+    last_good: f64,
+    first_bad: f64,
+    /// The image was flung to infinity and came back from the other side.
+    is_pole: bool,
+}
+
 impl Set {
-    /// Whether the forward function is regular at the angle theta in the direction phi: finite, and with positive
-    /// determinant and trace of its finite differences in the plane of angles.
-    fn is_regular(&self, phi: f64, theta: f64) -> bool {
-        let image = |at: DVec2| self.camera.project_ray(ray(at.y.atan2(at.x), at.length()));
-        let (at, h) = (DVec2::from_angle(phi) * theta, 1e-6);
-        let [a, b] =
-            [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
-        // A pole flings its neighbourhood away.
-        let is_near = self.perspective() || image(at).length() < 1e9;
-        is_near && a.perp_dot(b) > 0.0 && a.x + b.y > 0.0
+    fn distorted(&self, ray: DVec3) -> DVec2 {
+        (self.camera.project_ray(ray) - self.camera.principal_point_px) / self.camera.focal_px
     }
 
-    fn perspective(&self) -> bool {
-        self.camera.lens.model() == LensModel::BrownConradyPrism
+    /// Whether the forward function is regular at the angle theta in the direction phi: finite, and with a positive
+    /// determinant of its finite differences in the plane of angles; of rotation-symmetric lenses both
+    /// magnifications are positive.
+    fn is_regular(&self, phi: f64, theta: f64) -> bool {
+        let image = |at: DVec2| self.distorted(ray(at.y.atan2(at.x), at.length()));
+        let (at, h) = (DVec2::from_angle(phi) * theta, 1e-6);
+        let [a, b] = [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
+        let is_positive = !matches!(self.camera.lens, Lens::Radial(_)) || a.x + b.y > 0.0;
+        a.perp_dot(b) > 0.0 && is_positive
     }
 
     /// Angles that a lens may have: those of a plane, or all.
     fn limit(&self) -> f64 {
-        if self.perspective() { 89.0 * PI / 180.0 } else { PI * (1.0 - 1e-4) }
+        let is_flat = self.camera.lens.model() == LensModel::BrownConradyPrism;
+        if is_flat { 89.0 * PI / 180.0 } else { PI * (1.0 - 1e-4) }
     }
 
-    /// Angle of the first irregular step in a direction, and of the one before.
-    fn border(&self, phi: f64) -> [f64; 2] {
+    fn border(&self, phi: f64, to: f64) -> Border {
         let step = self.limit() / STEPS as f64;
-        let first = (1..=STEPS).find(|i| !self.is_regular(phi, *i as f64 * step)).unwrap_or(STEPS + 1);
-        [(first - 1) as f64 * step, first as f64 * step]
+        let mut before = DVec2::ZERO;
+        for i in 1..=STEPS {
+            let theta = i as f64 * step;
+            let image = self.distorted(ray(phi, theta));
+            let is_pole = image.dot(before) < 0.0 && image.length().min(before.length()) > 1.0;
+            if is_pole || theta > to || !self.is_regular(phi, theta) {
+                return Border { last_good: theta - step, first_bad: theta, is_pole };
+            }
+            before = image;
+        }
+        Border { last_good: self.limit(), first_bad: self.limit() + step, is_pole: false }
     }
 }
 
@@ -210,20 +226,22 @@ fn validity_and_inverse_of_every_set() {
 /// Counts of the rays and pixels that were judged.
 fn judge(set: &Set) -> [usize; 2] {
     let (name, camera) = (&set.name, &set.camera);
-    let borders: Vec<[f64; 2]> = (0..RAYS).map(|i| set.border(i as f64 * TAU / RAYS as f64)).collect();
+    let borders: Vec<Border> =
+        (0..RAYS).map(|i| set.border(i as f64 * TAU / RAYS as f64, f64::INFINITY)).collect();
     // A branch that is not one-to-one has a smaller limit, which must be the same in all directions.
     let limit = camera.lens.angle_max_rad();
-    // Every ray inside is found again.
     let mut found = 0;
     let size = DVec2::from(camera.size_px.map(f64::from));
     let is_one_to_one = camera.check().bijective;
-    for (i, [last_good, first_bad]) in borders.iter().enumerate() {
+    for (i, Border { last_good, first_bad, .. }) in borders.iter().enumerate() {
         let phi = i as f64 * TAU / RAYS as f64;
         let end = last_good.min(limit);
+        let beyond = first_bad + 1e-3;
         assert!(
-            !camera.lens.contains_ray(ray(phi, first_bad + 1e-3)) || first_bad + 1e-3 > set.limit(),
-            "{name} {i}"
+            beyond > set.limit() || !camera.lens.contains_ray(ray(phi, beyond)),
+            "{name}: direction {i} ends at {first_bad}"
         );
+        // Every ray inside is found again.
         for k in 0..12 {
             let inside = ray(phi, end * (f64::from(k) + 0.7) / 12.2);
             let px = camera.project_ray(inside);
@@ -242,15 +260,15 @@ fn judge(set: &Set) -> [usize; 2] {
 
 /// No pixel has a ray that is not inside and does not show there; none that the image of the border winds about is
 /// without one.
-fn judge_pixels(set: &Set, borders: &[[f64; 2]], limit: f64, is_one_to_one: bool) -> usize {
+fn judge_pixels(set: &Set, borders: &[Border], limit: f64, is_one_to_one: bool) -> usize {
     let (name, camera) = (&set.name, &set.camera);
     let border: Vec<DVec2> = borders
         .iter()
         .enumerate()
-        .map(|(i, [last_good, _])| {
+        .map(|(i, Border { last_good, first_bad, .. })| {
             let phi = i as f64 * TAU / RAYS as f64;
             // The scan ends within a step of the border: here by bisection.
-            let (mut low, mut high) = (*last_good, borders[i][1].min(set.limit()));
+            let (mut low, mut high) = (*last_good, first_bad.min(set.limit()));
             for _ in 0..40 {
                 let middle = 0.5 * (low + high);
                 *(if set.is_regular(phi, middle) { &mut low } else { &mut high }) = middle;
@@ -258,17 +276,19 @@ fn judge_pixels(set: &Set, borders: &[[f64; 2]], limit: f64, is_one_to_one: bool
             camera.project_ray(ray(phi, low.min(limit) * (1.0 - 1e-6)))
         })
         .collect();
-    let has_border = is_one_to_one && border.iter().all(|px| px.is_finite() && px.length() < 1e5);
+    let has_pole = borders.iter().any(|border| border.is_pole);
+    let is_near = |px: &DVec2| px.is_finite() && px.length() < 1e5;
+    let has_border = is_one_to_one && !has_pole && border.iter().all(is_near);
     let mut judged = 0;
-    for k in 0..24 * 24 {
-        let share = DVec2::new(f64::from(k % 24), f64::from(k / 24)) / 23.0;
+    for k in 0..20 * 20 {
+        let share = DVec2::new(f64::from(k % 20), f64::from(k / 20)) / 19.0;
         let px = share * DVec2::from(camera.size_px.map(|side| f64::from(side - 1)));
         let answer = camera.ray(px);
         if let Some(found) = answer {
             let off_px = (camera.project_ray(found) - px).length();
             assert!(off_px < 1e-4, "{name} {px}: {found} is imaged {off_px} px away");
             let (theta, phi) = (found.truncate().length().atan2(found.z), found.y.atan2(found.x));
-            let [_, first_bad] = set.border(phi);
+            let first_bad = set.border(phi, theta).first_bad;
             assert!(theta <= first_bad, "{name} {px}: {found} lies beyond the fold at {first_bad}");
         }
         // The map of a picture holds f32.

@@ -103,6 +103,59 @@ fn points_are_found_where_a_search_of_all_instants_finds_them() {
     assert!(inside > 500, "{inside}");
 }
 
+/// Points all around a camera, in front and behind.
+fn points_around() -> impl Iterator<Item = WorldPoint<'static>> {
+    (0..400).map(|i| {
+        let height = (f64::from(i) + 0.5) / 200.0 - 1.0;
+        let around = DVec2::from_angle(2.4 * f64::from(i)) * (1.0 - height * height).sqrt();
+        let direction = around.extend(height);
+        match i % 3 {
+            0 => WorldPoint::Towards(direction),
+            _ => WorldPoint::At(DVec3::new(0.0, 0.0, -50.0) + 200.0 * direction),
+        }
+    })
+}
+
+#[test]
+fn a_wide_lens_shows_what_is_beside_and_behind() {
+    let k = [-0.02, 0.001, -2e-4, 1e-5];
+    let camera = Arc::new(CameraModel::new(SIZE_PX, [14.0; 2], None, LensModel::KannalaBrandt, &k).unwrap());
+    let mut behind = 0;
+    let pose = path(0.0).pose(0.5);
+    for point in points_around() {
+        let to_point = match point {
+            WorldPoint::At(place) => place - pose.position_ned_m,
+            WorldPoint::Towards(direction) => direction,
+            WorldPoint::On { .. } => continue,
+        };
+        let ray = pose.ned_from_camera.conjugate() * to_point;
+        let theta = ray.angle_between(DVec3::Z);
+        let radius = theta + (0..4).map(|i| k[i] * theta.powi(2 * i as i32 + 3)).sum::<f64>();
+        let wanted_px = ray.truncate().normalize() * radius * 14.0 + DVec2::new(31.5, 23.5);
+        let (px, depth_m) = camera.show(&pose, 0.5, point).unwrap();
+        assert!(px.distance(wanted_px) < 1e-9, "{point:?}: {px} instead of {wanted_px}");
+        let depth = if ray.z > 0.0 { ray.z } else { ray.length() };
+        assert!(matches!(point, WorldPoint::Towards(_)) == depth_m.is_infinite());
+        assert!(depth_m.is_infinite() || (depth_m - depth).abs() < 1e-9);
+        behind += usize::from(ray.z < 0.0);
+    }
+    assert!(behind > 150, "{behind}");
+    // With rows of their own instants.
+    let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
+    let frame = FrameCamera::new(path(0.0), camera, &shutter(spec), 0.5);
+    let mut inside = 0;
+    for point in points_around() {
+        let expected = search(&frame, &frame.fields[0], point);
+        let found = frame.find(point, DVec2::new(30.0, 20.0)).filter(|found| found.is_inside);
+        assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{point:?}");
+        inside += expected.len();
+        if let Some(shown) = frame.projector().by_steps(point, DVec2::new(30.0, 20.0)) {
+            assert!(expected.iter().any(|px| px.distance(shown.px) < 1e-3), "{point:?}: {shown:?} {expected:?}");
+        }
+    }
+    assert!(inside > 200, "{inside}");
+}
+
 #[test]
 fn a_fast_picture_shows_a_point_several_times_or_never() {
     // Fifteen degrees thirty times a second: the picture moves faster than the readout.
