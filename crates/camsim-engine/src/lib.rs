@@ -40,4 +40,5 @@ pub use engine::Engine;
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
 pub use memory::peak_memory_mb;
+pub use moving::MOVING_RAYS;
 pub use session::Session;
