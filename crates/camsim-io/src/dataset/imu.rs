@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use camsim_core::scenario::SensorCarrier;
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
@@ -9,6 +10,7 @@ use super::{
     DatasetError, RunCamera, RunFolder,
     axes::{Rigid, flu_from_frd},
     csv_rows::CsvRows,
+    run_folder::PlatformRows,
 };
 
 /// An inertial sensor, with a table of its measurements.
@@ -18,8 +20,10 @@ pub(super) struct ImuSensor {
     pub(super) path: PathBuf,
     /// Rows per second.
     pub(super) rate_hz: f64,
-    /// Its axes in the body (forward, right, down).
+    /// Its axes in the body (forward, right, down), without vibration.
     pub(super) body_from_imu: Rigid,
+    /// Whether it is on a camera that shakes against the body.
+    pub(super) shakes: bool,
     /// How much its clock is ahead of the platform's.
     pub(super) clock_offset_s: f64,
     /// Noise densities and bias random walks, as Kalibr defines them: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz),
@@ -52,7 +56,7 @@ pub(super) struct SensorDescription {
     #[serde(default)]
     noise: Noise,
     #[serde(default)]
-    scenario: ClockKeys,
+    scenario: SensorKeys,
 }
 
 /// Continuous-time densities of the worst axis.
@@ -66,9 +70,11 @@ struct Noise {
 
 /// Keys of the scenario.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
-struct ClockKeys {
+struct SensorKeys {
     #[serde(default)]
     clock_offset_ms: f64,
+    #[serde(default)]
+    attached_to: SensorCarrier,
 }
 
 /// The sensors of a run by their names.
@@ -104,6 +110,7 @@ pub(super) fn imus(run: &RunFolder) -> Result<Vec<ImuSensor>, DatasetError> {
                     rotation: DQuat::from_mat3(&axes).normalize(),
                     translation_m: column(3),
                 },
+                shakes: sensor.scenario.attached_to == SensorCarrier::Camera && run.cameras[0].vibrates(),
                 clock_offset_s: 1e-3 * sensor.scenario.clock_offset_ms,
                 gyro_noise: noise.gyroscope_noise_density,
                 gyro_walk: noise.gyroscope_random_walk,
@@ -141,6 +148,11 @@ impl ImuSensor {
     /// Its measurements, row by row.
     pub(super) fn rows(&self) -> Result<ImuRows, DatasetError> {
         Ok(ImuRows(CsvRows::open(&self.path, &COLUMNS)?))
+    }
+
+    /// Its own motion, in its own axes.
+    pub(super) fn states(&self) -> Result<PlatformRows, DatasetError> {
+        PlatformRows::of_sensor(&self.path)
     }
 
     /// What is added to stamps of a camera to get the sensor's time of the image's centre, seconds.
