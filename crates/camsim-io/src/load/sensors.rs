@@ -75,7 +75,7 @@ fn implausible_force(scenario: &Scenario, log: &FlightLog, trajectory: &Trajecto
             "set flight.speed = 1".to_owned(),
         )
     } else {
-        let rate_hz = (log.rows.len() - 1) as f64 / rows_s.max(1e-9);
+        let rate_hz = (log.rows.len() - 1) as f64 / (rows_s * speed).max(1e-9);
         let smoother = match scenario.tracker.kind {
             TrackerKind::Spline => "lower",
             _ => "set tracker.kind = \"spline\", or lower",
@@ -87,7 +87,7 @@ fn implausible_force(scenario: &Scenario, log: &FlightLog, trajectory: &Trajecto
     };
     Some(format!(
         "imus feel an implausible force: half of the time the platform accelerates by more than {median_m_s2:.1} m/s^2 \
-         ({:.1} g, beside gravity). {cause}: {remedy}",
+         ({:.1} g, beside gravity), since {cause}: {remedy}",
         median_m_s2 / STANDARD_GRAVITY_M_S2
     ))
 }
@@ -121,9 +121,9 @@ mod tests {
     use super::*;
     use crate::scenario_file::parse_scenario;
 
-    /// Warnings of the force on a flight of 20 m/s in a circle of 40 m, 10 rows a second, whose rows are off by
-    /// `noise_m` to and fro.
-    fn warned(keys: &str, noise_m: f64) -> Vec<String> {
+    /// Warnings of the force on a flight in a circle of 40 m, 10 rows a second, each `turn_rad` after the last and off
+    /// by `noise_m` to and fro.
+    fn warned(keys: &str, turn_rad: f64, noise_m: f64) -> Vec<String> {
         let text = format!(
             "[flight]\nlog = \"a.csv\"\n{keys}\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n[[imu]]\nname = \"imu0\""
         );
@@ -131,7 +131,7 @@ mod tests {
         let speed = scenario.flight.speed;
         let rows: Vec<LogRow> = (0..200)
             .map(|i| {
-                let angle = 0.05 * f64::from(i);
+                let angle = turn_rad * f64::from(i);
                 let off_m = noise_m * if i % 2 == 0 { 1.0 } else { -1.0 };
                 LogRow {
                     t_s: 0.1 * f64::from(i) / speed,
@@ -155,11 +155,12 @@ mod tests {
     #[test]
     fn an_implausible_force_is_told_with_cause_and_remedy() {
         // 10 m/s^2 towards the centre is 1.02 g.
-        let circle = warned("", 0.0);
+        let circle = warned("", 0.05, 0.0);
         assert!(circle.len() == 1 && circle[0].contains("more than 10.0 m/s^2 (1.0 g"), "{circle:?}");
-        let fast = warned("speed = 3.0", 0.0);
+        assert_eq!(warned("", 0.045, 0.0), [""; 0], "8.1 m/s^2");
+        let fast = warned("speed = 3.0", 0.045, 0.0);
         assert!(fast.len() == 1 && fast[0].contains("multiplies accelerations by 9"), "{fast:?}");
-        let noisy = warned("", 0.5);
+        let noisy = warned("", 0.045, 0.5);
         assert!(
             noisy.len() == 1
                 && noisy[0].contains("10.0 rows a second")
