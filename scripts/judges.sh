@@ -1,5 +1,5 @@
 #!/bin/sh
-# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV. Renders a small scene, and makes a Python
+# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, DuckDB. Renders a small scene, and makes a Python
 # environment with these packages (a download of about 300 MB, once).
 #   CAMSIM=target/release/camsim   the program; without it, it is built
 #   JUDGES_VENV=DIR                the environment; default target/judges-venv
@@ -18,7 +18,7 @@ if ! [ -x "$venv/bin/python" ]; then
     say "making $venv"
     "$python" -m venv "$venv" || { say "JUDGES SKIPPED: python3 has no venv (apt-get install python3-venv)"; rm -rf "$venv"; exit 0; }
 fi
-if ! "$venv/bin/python" -c "import cv2, evo, mcap, numpy, OpenEXR, pycolmap, rosbags" 2>/dev/null; then
+if ! "$venv/bin/python" -c "import cv2, duckdb, evo, mcap, numpy, OpenEXR, pycolmap, rosbags" 2>/dev/null; then
     say "installing the readers into $venv"
     "$venv/bin/pip" install --quiet --requirement scripts/judges/requirements.txt ||
         { say "JUDGES SKIPPED: the packages of scripts/judges/requirements.txt could not be installed"; exit 0; }
@@ -42,8 +42,9 @@ render() {
 render gs '["tum", "euroc", "kitti", "colmap", "mcap", "flo"]'
 render rs '["tum", "euroc", "kitti"]'
 render fisheye '["colmap", "mcap"]'
+render rig '["colmap", "webdataset"]'
 judge trajectories "$dir/gs/run" "$dir/rs/run"
-judge colmap "$dir/gs/run" "$dir/fisheye/run"
+judge colmap "$dir/gs/run" "$dir/fisheye/run" "$dir/rig/run"
 judge bag "$dir/gs/run" "$dir/fisheye/run"
 judge pictures "$dir/gs/run"
 calib="$dir/calibrations"
@@ -59,4 +60,5 @@ for format in kalibr euroc orbslam3 basalt stmap; do
     camsim -q camera export "$calib/radtan.toml" --as "$format" -o "$calib/radtan.$format"
 done
 judge calibrations "$calib"
+judge shards "$dir/rig/run"
 say "judges: all agree"

@@ -2,7 +2,7 @@
 """Writes the scenes that the judges look at into a folder: python3 scene.py DIR
 
 A camera flies before a chessboard: gs.toml with a global shutter and OpenCV's lens, fisheye.toml with OpenCV's fisheye lens, rs.toml with a
-rolling shutter, exposure, delay and a lens of eight coefficients.
+rolling shutter, exposure, delay and a lens of eight coefficients, rig.toml with two cameras of which one takes every second picture.
 """
 
 import math
@@ -56,6 +56,27 @@ KINDS = {
     ),
 }
 
+# The second camera of the rig.
+RIGHT = """\
+[[cameras]]
+name = "right"
+size_px = [320, 240]
+focal_px = [250.0, 250.0]
+fps = 5.0
+[cameras.mount]
+angles_deg = [-2.0, 1.0, -8.0]
+offset_m = [0.05, 0.15, -0.01]
+[cameras.lens]
+model = "kannala-brandt"
+coefficients = [-0.02, 0.005, -0.001, 0.0002]
+"""
+
+
+def rig():
+    text = SCENE.format(**{**KINDS["gs"], "channels": '["color"]', "end_s": 2.0})
+    text = text.replace("[camera]", '[[cameras]]\nname = "left"').replace("[camera.", "[cameras.")
+    return text.replace("[scene.board]", RIGHT + "[scene.board]")
+
 
 def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
@@ -68,6 +89,7 @@ def main(folder):
     (folder / "log.csv").write_text("\n".join(rows) + "\n")
     for name, keys in KINDS.items():
         (folder / f"{name}.toml").write_text(SCENE.format(**keys))
+    (folder / "rig.toml").write_text(rig())
 
 
 if __name__ == "__main__":

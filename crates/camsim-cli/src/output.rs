@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Context;
+use camsim_io::write::{is_special, open_special};
 
 use crate::{
     console::Console,
@@ -14,7 +15,7 @@ use crate::{
 };
 
 /// Calls `fill` to write to `path`, or to standard output without one. A file appears completely or not at
-/// all.
+/// all; devices and pipes are written into.
 pub fn write_output(
     path: Option<&Path>,
     console: &mut Console<'_>,
@@ -33,6 +34,10 @@ pub fn write_output(
 /// # Errors
 /// The error that [`write_output`] would return.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
+    if is_special(path) {
+        // To open a pipe would wait for its reader.
+        return Ok(());
+    }
     let checked = part_path(path)
         .and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
     checked.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
@@ -65,6 +70,11 @@ fn part_path(path: &Path) -> io::Result<PathBuf> {
 }
 
 fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    if let Some(special) = open_special(path)? {
+        let mut out = BufWriter::new(special);
+        fill(&mut out)?;
+        return out.flush();
+    }
     let part = part_path(path)?;
     let written = File::create(&part).and_then(|file| {
         let mut file = BufWriter::new(file);
@@ -100,6 +110,22 @@ mod tests {
         check_output(&path).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"a file", "what is there stays");
         assert_eq!(std::fs::read_dir(folder.path().join("a/b")).unwrap().count(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_written_into() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::read(pipe).unwrap()
+        });
+        check_output(&pipe).unwrap();
+        write_file(&pipe, |out| out.write_all(b"whole")).unwrap();
+        assert_eq!(reader.join().unwrap(), b"whole");
+        assert!(is_special(&pipe) && std::fs::read_dir(folder.path()).unwrap().count() == 1);
     }
 
     #[test]

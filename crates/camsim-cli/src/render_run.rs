@@ -104,6 +104,9 @@ pub fn run(
     for (job, pictures) in jobs.iter().zip(&pictures) {
         pictures.all().try_for_each(|pictures| folder::check(job, pictures, &adapter, console))?;
     }
+    for (job, pictures) in jobs.iter().zip(&pictures) {
+        pictures.all().try_for_each(|pictures| check_videos(job, pictures))?;
+    }
     let mut outcome = Outcome { cameras: rig.map_or(0, |_| jobs.len() as u64), ..Outcome::default() };
     // Planning errors are reported before anything is written.
     for (i, (job, pictures)) in jobs.iter().zip(&pictures).enumerate() {
@@ -146,6 +149,14 @@ fn todo(job: &Job<'_>, series: &Series) -> Vec<u64> {
         return ours;
     }
     ours.into_iter().filter(is_missing).collect()
+}
+
+/// Refuses videos that cannot be made, before anything is written.
+fn check_videos(job: &Job<'_>, pictures: &Pictures) -> Result<(), Failure> {
+    pictures.series.iter().try_for_each(|series| {
+        let fps = series.sequence.scenario.camera.fps;
+        series.files.check_videos(fps, &todo(job, series)).or_bad_input()
+    })
 }
 
 /// A run at work.

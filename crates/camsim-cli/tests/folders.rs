@@ -319,3 +319,29 @@ fn unknown_adapter_lists_available_ones() {
         "{err}"
     );
 }
+
+#[test]
+fn a_video_that_cannot_be_made_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let args = [
+        "render",
+        scenario.to_str().unwrap(),
+        "-o",
+        "out",
+        "--frames",
+        "0..2",
+        "--backend",
+        "cpu",
+        "--format",
+        "mp4",
+    ];
+    // No program is found.
+    let (code, err) = wait(program(folder.path(), &args).env("PATH", folder.path()).spawn().unwrap());
+    assert!(code == 2 && err.contains("ffmpeg, which is not on the PATH"), "{code} {err}");
+    assert!(!folder.path().join("out").exists());
+    let spaced = [&args[..3], &["out", "--frames", "0,1,3", "--backend", "cpu", "--format", "y4m"]].concat();
+    let (code, err) = camsim(folder.path(), &spaced);
+    assert!(code == 2 && err.contains("at equal distances"), "{code} {err}");
+    assert!(!folder.path().join("out").exists());
+}

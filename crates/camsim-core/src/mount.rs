@@ -17,16 +17,20 @@
 //! `amplitude sin(2 pi hz t + phase)` over the roll, pitch and yaw entries; the rotation is about the optical
 //! centre.
 
-use std::{f64::consts::TAU, sync::Arc};
+use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 use thiserror::Error;
 
 use crate::{
     pose::{BodyState, CameraPose},
-    scenario::{Axis, MountSpec, VibrationSpec},
+    scenario::{Axis, MountSpec},
     trajectory::{Trajectory, so3},
 };
+
+mod vibration;
+
+pub(crate) use vibration::Vibration;
 
 /// Invalid mount parameters.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -61,14 +65,6 @@ pub enum MountError {
     },
 }
 
-/// A sinusoid in one component of a vector.
-#[derive(Clone, Copy, Debug)]
-struct Sinusoid {
-    component: DVec3,
-    rate_rad_s: f64,
-    phase_rad: f64,
-}
-
 /// Pose, velocity and rate of the camera at any instant. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct CameraPath {
@@ -76,10 +72,7 @@ pub struct CameraPath {
     pub trajectory: Arc<Trajectory>,
     body_from_camera: DQuat,
     lever_body_m: DVec3,
-    /// Components in radians about body axes.
-    rotations: Vec<Sinusoid>,
-    /// Components in metres along body axes.
-    translations: Vec<Sinusoid>,
+    vibration: Vibration,
 }
 
 /// Contribution of the mount at one instant.
@@ -98,23 +91,11 @@ impl CameraPath {
                 return Err(MountError::NotFinite { key });
             }
         }
-        let (mut rotations, mut translations) = (Vec::new(), Vec::new());
-        for (i, entry) in spec.vibration.iter().enumerate() {
-            let (axis, turns) = body_axis(entry.axis);
-            let amplitude = amplitude(entry, i + 1, turns)?;
-            let sinusoid = Sinusoid {
-                component: axis * amplitude,
-                rate_rad_s: TAU * entry.hz,
-                phase_rad: entry.phase_deg.to_radians(),
-            };
-            if turns { &mut rotations } else { &mut translations }.push(sinusoid);
-        }
         Ok(Self {
             trajectory: trajectory.into(),
             body_from_camera: body_from_camera(spec.angles_deg),
             lever_body_m: DVec3::from_array(spec.offset_m),
-            rotations,
-            translations,
+            vibration: Vibration::new(&spec.vibration)?,
         })
     }
 
@@ -155,16 +136,12 @@ impl CameraPath {
 
     /// Highest frequency of any vibration with an amplitude, hertz; 0 for a rigid mount.
     pub fn highest_vibration_hz(&self) -> f64 {
-        self.rotations
-            .iter()
-            .chain(&self.translations)
-            .filter(|s| s.component != DVec3::ZERO)
-            .fold(0.0, |hz, s| hz.max(s.rate_rad_s / TAU))
+        self.vibration.highest_hz()
     }
 
     /// Bound on the vibration's angle at any time, radians; 0 for a rigid mount.
     pub fn peak_vibration_rad(&self) -> f64 {
-        peak(&self.rotations)
+        self.vibration.peak_rad()
     }
 
     /// Inlined, so that poses, the most frequent query, skip all rates.
@@ -180,13 +157,11 @@ impl CameraPath {
         // A sine has no value at an infinite instant. The trajectory stands still there, and so does the
         // mount.
         if t_s.is_finite() {
-            if !self.rotations.is_empty() {
-                let (angle_rad, angle_rate_rad_s) = sum(&self.rotations, t_s);
+            if let Some((angle_rad, angle_rate_rad_s)) = self.vibration.turn(t_s) {
                 offset.body_from_camera = so3::exp(angle_rad) * self.body_from_camera;
                 offset.rate_body_rad_s = so3::left_jacobian_times(angle_rad, angle_rate_rad_s);
             }
-            if !self.translations.is_empty() {
-                let (shift_m, shift_rate_m_s) = sum(&self.translations, t_s);
+            if let Some((shift_m, shift_rate_m_s)) = self.vibration.shift(t_s) {
                 offset.lever_body_m += shift_m;
                 offset.lever_rate_body_m_s = shift_rate_m_s;
             }
@@ -242,54 +217,11 @@ fn rounded(angle_deg: f64, places: i32) -> f64 {
     if short == -180.0 { 180.0 } else { short }
 }
 
-/// Body axis of a degree of freedom, and whether it is a rotation.
-fn body_axis(axis: Axis) -> (DVec3, bool) {
-    match axis {
-        Axis::Roll => (DVec3::X, true),
-        Axis::Pitch => (DVec3::Y, true),
-        Axis::Yaw => (DVec3::Z, true),
-        Axis::X => (DVec3::X, false),
-        Axis::Y => (DVec3::Y, false),
-        Axis::Z => (DVec3::Z, false),
-    }
-}
-
-/// Amplitude of an entry in radians or metres.
-fn amplitude(spec: &VibrationSpec, entry: usize, turns: bool) -> Result<f64, MountError> {
-    let (own, other, wanted, given) = if turns {
-        (spec.amplitude_deg.to_radians(), spec.amplitude_m, "amplitude_deg", "amplitude_m")
-    } else {
-        (spec.amplitude_m, spec.amplitude_deg, "amplitude_m", "amplitude_deg")
-    };
-    if other != 0.0 {
-        return Err(MountError::WrongAmplitude { entry, axis: spec.axis, wanted, given });
-    }
-    if !(own.is_finite() && spec.phase_deg.is_finite() && spec.hz.is_finite() && spec.hz >= 0.0) {
-        return Err(MountError::BadVibration { entry });
-    }
-    Ok(own)
-}
-
-/// Value and time derivative.
-fn sum(sinusoids: &[Sinusoid], t_s: f64) -> (DVec3, DVec3) {
-    let (mut value, mut derivative) = (DVec3::ZERO, DVec3::ZERO);
-    for s in sinusoids {
-        let (sin, cos) = (s.rate_rad_s * t_s + s.phase_rad).sin_cos();
-        value += s.component * sin;
-        derivative += s.component * (cos * s.rate_rad_s);
-    }
-    (value, derivative)
-}
-
-/// Bound on the length of the vector: each component with the sum of its amplitudes.
-fn peak(sinusoids: &[Sinusoid]) -> f64 {
-    sinusoids.iter().map(|s| s.component.abs()).sum::<DVec3>().length()
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::scenario::VibrationSpec;
 
     fn body(velocity_ned_m_s: DVec3, ned_from_body: DQuat, rate_body_rad_s: DVec3) -> Trajectory {
         let state = BodyState {

@@ -37,7 +37,8 @@ pub use scene::{
     PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
 };
 pub use sensors::{
-    BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec, PerAxis, SensorAxes, SensorMountSpec, TriadSpec,
+    BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec, PerAxis, SensorAxes, SensorCarrier, SensorMountSpec,
+    TriadSpec,
 };
 pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};

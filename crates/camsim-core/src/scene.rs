@@ -68,6 +68,18 @@ pub struct SceneObject {
 }
 
 impl Scene {
+    /// Names of the objects that move, in the order of their numbers; "unnamed" for what belongs to none.
+    #[must_use]
+    pub fn moving_objects(&self) -> Vec<&str> {
+        let moving = self.meshes.iter().filter(|mesh| mesh.motion.is_some());
+        let numbers: std::collections::BTreeSet<u32> = moving.map(|mesh| mesh.object).collect();
+        let name = |number: u32| number.checked_sub(1).and_then(|place| self.objects.get(place as usize));
+        numbers
+            .into_iter()
+            .map(|number| name(number).map_or("unnamed", |object| object.name.as_str()))
+            .collect()
+    }
+
     /// Number of the object that a surface belongs to (0 = terrain, 1 + i = mesh i), counted from 1; 0 if the
     /// surface belongs to none.
     #[must_use]

@@ -12,7 +12,8 @@ use thiserror::Error;
 
 use crate::{
     geodesy::LocalFrame,
-    scenario::{HeightReference, Scenario},
+    mount::MountError,
+    scenario::{HeightReference, MountSpec, Scenario},
     trajectory::Trajectory,
 };
 
@@ -73,6 +74,9 @@ pub enum SensorError {
         /// Their number.
         samples: f64,
     },
+    /// The camera's mount, for a sensor on it.
+    #[error(transparent)]
+    Mount(#[from] MountError),
     /// A place or day without field.
     #[error(
         "magnetometer \"{name}\": the World Magnetic Model has no field there: {problem}; give field_ned_ut"
@@ -96,6 +100,8 @@ pub struct SensorInput {
     pub epoch_ns: i64,
     /// First and last instant with samples, seconds of path time.
     pub span_s: [f64; 2],
+    /// Mount of the camera.
+    pub camera_mount: MountSpec,
 }
 
 /// The sensors of a scenario.
@@ -179,7 +185,8 @@ impl SensorInput {
         last_row_s: f64,
     ) -> Self {
         let earth = Earth::new(frame, frame_heights(scenario));
-        Self { trajectory, earth, epoch_ns, span_s: span_s(scenario, last_row_s) }
+        let span_s = span_s(scenario, last_row_s);
+        Self { trajectory, earth, epoch_ns, span_s, camera_mount: scenario.camera.mount.clone() }
     }
 }
 

@@ -42,4 +42,5 @@ pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
 pub use lane::join_faces;
 pub use memory::peak_memory_mb;
+pub use moving::MOVING_RAYS;
 pub use session::Session;

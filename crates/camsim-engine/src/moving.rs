@@ -9,6 +9,9 @@
 mod outline;
 mod sweep;
 
+/// Rays of a pixel in which something moves.
+pub const MOVING_RAYS: u32 = RAYS;
+
 use std::sync::{Arc, OnceLock};
 
 use camsim_core::{

@@ -328,7 +328,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         zoom_track,
     };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
-    warnings.extend(sensor_warnings(scenario, &log));
+    warnings.extend(sensor_warnings(scenario, &log, &sequence.path.trajectory));
     warnings.extend(scene_notes.iter().cloned());
     let output = &scenario.output;
     let has_numbers = output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));

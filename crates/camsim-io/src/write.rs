@@ -53,7 +53,7 @@ mod tables;
 mod tracks;
 mod video;
 
-pub use atomic::write_atomic;
+pub use atomic::{is_special, open_special, write_atomic};
 pub(crate) use atomic::{remove_all_temporaries, temporary_path, write_atomic_with};
 pub use channel_pictures::channel_pictures;
 pub use encode::{luminance, srgb_from_linear, srgb8};

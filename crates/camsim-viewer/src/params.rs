@@ -451,6 +451,7 @@ pub const PARAMS: &[Param] = &[
         "roll, pitch, yaw of the sensor on the platform",
     ),
     param("imu.mount.offset_m", "m", [-100.0, 100.0], 0.01, "lever arm forward, right, down"),
+    param("imu.attached_to", "", ANY, 1.0, "the platform, or the camera with its vibration"),
     param(
         "imu.axes",
         "",

@@ -1,5 +1,6 @@
 //! `camsim explain`: the plan of one frame, without rendering it.
 
+mod sensors;
 mod twins;
 
 use camsim_core::{
@@ -8,6 +9,7 @@ use camsim_core::{
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
+use camsim_engine::MOVING_RAYS;
 use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
 use camsim_plan::{FramePlan, Placement, PlanSummary, Planner};
 use serde::Serialize;
@@ -60,6 +62,11 @@ struct ExplainReport<'a> {
     level_of_detail: Option<LevelOfDetail>,
     models: Option<ModelFacts>,
     memory: Option<MemoryFacts>,
+    /// Objects that move: their pixels are rays of their own, which `plan` predicts nothing of.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    moving: Vec<&'a str>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sensors: Vec<sensors::SensorFacts<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     twins: Vec<twins::TwinReport<'a>>,
 }
@@ -219,6 +226,8 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
     let models = models(&loaded.sequence, &plan);
     let memory = memory(&loaded.sequence, &plan);
     let source_frame = SourceFrameFields::of(&source_frame(&loaded.sequence, &plan));
+    let moving = loaded.sequence.scene.moving_objects();
+    let sensors = sensors::facts(&loaded.sensors);
     let tracked = &loaded.tracked;
     let tracker =
         TrackerFacts { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
@@ -238,6 +247,8 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
             level_of_detail,
             models,
             memory,
+            moving,
+            sensors,
             twins: twins.iter().map(twins::TwinPlan::report).collect(),
         })?);
     }
@@ -260,6 +271,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         print_terrain(terrain, console)?;
     }
     print_light(&loaded, console)?;
+    sensors::print(&sensors, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     if let Some(face) = plan.camera.lens.face() {
         print_faces(face, &faces, console)?;
@@ -269,6 +281,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         console.line(format_args!("face {}", plan.camera.lens.face().map_or("", Face::name)))?;
         console.print(&plan.to_string())?;
     }
+    print_moving(&moving, console)?;
     print_source(&source_frame, &plan, console)?;
     let Placement { ideal, reverse } = plan.placement;
     console.line(format_args!("rendered on {engine}"))?;
@@ -432,6 +445,18 @@ fn print_source(
     ))?;
     if plan.shared_frames.is_some() {
         console.line("  this is the frame's own geometry, although several frames share one ideal frame")?;
+    }
+    Ok(())
+}
+
+/// Prints what moves, whose pixels the plan knows nothing of.
+fn print_moving(moving: &[&str], console: &mut Console<'_>) -> Result<(), Failure> {
+    if !moving.is_empty() {
+        let names = moving.join(", ");
+        console.line(format_args!(
+            "moves: {names}; pixels that show it, or its shadow, are means of {MOVING_RAYS} rays of their own, which \
+             the predicted errors do not cover"
+        ))?;
     }
     Ok(())
 }

@@ -140,7 +140,7 @@ fn write_sensor_tables(
              (docs/SENSORS.md)"
         )));
     }
-    for warning in sensor_warnings(scenario, log) {
+    for warning in sensor_warnings(scenario, log, &tracked.trajectory) {
         console.warn(warning);
     }
     let summary = write_sensors(folder, &sensors).or_failed()?;

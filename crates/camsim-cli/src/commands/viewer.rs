@@ -7,6 +7,7 @@ use camsim_engine::{Backend, Engine};
 use camsim_io::load::load_rig;
 use camsim_viewer::ExportJob;
 
+use super::export::{export_datasets, with_needs};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -34,11 +35,12 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let (mut out, mut err) = (io::sink(), io::sink());
     let mut console = Console::new(&mut out, &mut err);
     console.set_volume(true, false);
-    let loaded = load_rig(&job.rig).or_bad_input()?;
+    let rig = job.rig.clone().try_map(|scenario| with_needs(scenario, None, &mut console))?;
+    let loaded = load_rig(&rig).or_bad_input()?;
     let [first, end] = job.frames;
     let frames: Vec<u64> = (first..end.min(loaded[job.camera].sequence.frames)).collect();
     let selected = Selected {
-        rig: &job.rig,
+        rig: &rig,
         loaded: &loaded,
         folder: &job.folder,
         cameras: vec![job.camera],
@@ -59,13 +61,20 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
         |_: Option<&str>, _: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
     let outcome = selected.run(&mut *source, &mut console, &mut on_frame)?;
     let seconds = outcome.time.as_secs_f64();
-    Ok(format!("{} in {seconds:.1} s, {}, in {}", outcome.pictures(), outcome.rate(), job.folder.display()))
+    let datasets = &rig.first().output.datasets;
+    export_datasets(&job.folder, datasets, false, &mut console)?;
+    let names: Vec<&str> = datasets.iter().map(|dataset| dataset.name()).collect();
+    let and_datasets =
+        if names.is_empty() { String::new() } else { format!(", with datasets/{}", names.join(", ")) };
+    let (pictures, rate, folder) = (outcome.pictures(), outcome.rate(), job.folder.display());
+    Ok(format!("{pictures} in {seconds:.1} s, {rate}, in {folder}{and_datasets}"))
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
+    use camsim_core::scenario::DatasetFormat;
     use camsim_io::scenario_file::read_rig;
 
     use super::*;
@@ -92,6 +101,20 @@ mod tests {
         assert!(folder.path().join("all/run.json").is_file());
         let names: Vec<String> = (3..6).map(|frame| format!("all/color/frame_{frame:06}.png")).collect();
         assert!(names.iter().all(|name| folder.path().join(name).is_file()), "{names:?}");
+
+        let mut with_dataset = small();
+        with_dataset = with_dataset
+            .try_map(|mut scenario| {
+                scenario.output.format.clear();
+                scenario.output.datasets = vec![DatasetFormat::Euroc];
+                Ok::<_, ()>(scenario)
+            })
+            .expect("changed");
+        let job = ExportJob::new(with_dataset, 0, folder.path().join("euroc"), [0, 2]);
+        let summary = export(&job).expect("written");
+        assert!(summary.ends_with(", with datasets/euroc"), "{summary}");
+        let list = folder.path().join("euroc/datasets/euroc/mav0/cam0/data.csv");
+        assert_eq!(std::fs::read_to_string(list).expect("a list").lines().count(), 3);
 
         let stopped = ExportJob::new(small(), 0, folder.path().join("stopped"), [0, 40]);
         stopped.cancel();

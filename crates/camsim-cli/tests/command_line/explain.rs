@@ -27,6 +27,32 @@ fn explain_prints_the_frame_of_source_coordinates() {
 }
 
 #[test]
+fn what_moves_and_what_senses_is_listed() {
+    let scenario = assets().join("../examples/propeller/propeller.toml");
+    let imu = "imu=[{ name = \"imu0\", rate_hz = 100, attached_to = \"camera\", mount = { offset_m = [0.1, 0, 0] } }]";
+    let args = ["explain", text(&scenario), "--set", imu, "--set", "output.twin=[]"];
+    let (code, out, err) = camsim(args);
+    assert_eq!(code, 0, "{err}");
+    let moves = "moves: rotor; pixels that show it, or its shadow, are means of 64 rays of their own, which the predicted \
+                 errors do not cover";
+    assert!(out.contains(moves), "{out}");
+    // The window of two seconds, and one before and after.
+    assert!(
+        out.contains("sensors\n  imu imu0: 100 Hz, 401 samples, on the camera at 0.1, 0, 0 m\n"),
+        "{out}"
+    );
+    let (_, out, _) = camsim([&args[..], &["--json"]].concat());
+    let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(explained["moving"], serde_json::json!(["rotor"]));
+    assert_eq!(
+        (&explained["sensors"][0]["name"], &explained["sensors"][0]["samples"]),
+        (&"imu0".into(), &401.into())
+    );
+    let (_, out, _) = camsim(["explain", text(&assets().join("pattern.toml"))]);
+    assert!(!out.contains("moves:") && !out.contains("sensors"), "{out}");
+}
+
+#[test]
 fn predicted_error_is_listed_by_cause() {
     let scenario = assets().join("pattern.toml");
     let explain = |more: &[&str]| {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 mod imu;
 mod per_axis;
 
-pub use imu::{ImuSpec, TriadSpec};
+pub use imu::{ImuSpec, SensorCarrier, TriadSpec};
 pub use per_axis::PerAxis;
 
 use super::Scenario;

@@ -66,6 +66,12 @@ impl SampleClock {
         self.rate_hz
     }
 
+    /// Number of samples.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        (self.samples[1] - self.samples[0] + 1).max(0) as u64
+    }
+
     /// Number of the first sample.
     pub(super) fn first(&self) -> i64 {
         self.samples[0]

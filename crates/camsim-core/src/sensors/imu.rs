@@ -5,7 +5,8 @@
 //! ```text
 //! true rate            w + R_SN e                       e: the Earth's rotation, with `earth_rate`
 //! true specific force  R_SN (a_p - g(p) + 2 e x v_p)    g: normal gravity, centrifugal acceleration included
-//! a_p = a + R (alpha x r + w x (w x r))                 r: lever arm
+//! a_p = a + R (alpha x r + w x (w x r))                 r: lever arm, which shakes with the camera if the
+//!                                                       unit is on it (`mount`)
 //! gyro  = (I + scale + misalignment) true rate + sensitivity true specific force + bias + noise
 //! accel = (I + scale + misalignment) true specific force + bias + noise
 //! ```
@@ -18,8 +19,9 @@ use glam::{DMat3, DQuat, DVec3};
 use super::{
     SampleClock, SampleTime, SensorError, SensorInput, SensorMount,
     errors::{AxisErrors, ErrorFigures, Normals, Series, read_out},
+    mount::ShakingPart,
 };
-use crate::scenario::{ImuSpec, PerAxis, TriadSpec};
+use crate::scenario::{ImuSpec, PerAxis, SensorCarrier, TriadSpec};
 
 /// First stream of the gyroscope's and of the accelerometer's errors.
 const GYRO_STREAM: u32 = 20;
@@ -30,8 +32,10 @@ const ACCEL_STREAM: u32 = 24;
 pub struct Imu {
     /// Its keys.
     pub spec: ImuSpec,
-    /// Its place and axes.
+    /// Its place and axes, without vibration.
     pub mount: SensorMount,
+    /// The camera, if it shakes and the unit is on it.
+    shaking: Option<ShakingPart>,
     /// Its clock.
     pub clock: SampleClock,
     input: SensorInput,
@@ -127,7 +131,10 @@ impl Imu {
             })?,
         };
         let normals = Normals::new(seed, &spec.name);
+        let is_on_camera = spec.attached_to == SensorCarrier::Camera;
+        let shaking = is_on_camera && !input.camera_mount.vibration.is_empty();
         Ok(Self {
+            shaking: shaking.then(|| ShakingPart::new(&input.camera_mount)).transpose()?,
             mount: SensorMount::new(&spec.mount, spec.axes),
             gyro: Triad::new(&spec.gyro, spec.rate_hz, normals, GYRO_STREAM),
             accel: Triad::new(&spec.accel, spec.rate_hz, normals, ACCEL_STREAM),
@@ -144,7 +151,11 @@ impl Imu {
         let mut gyro_bias = Series::new(&self.gyro.errors, self.clock.first());
         let mut accel_bias = Series::new(&self.accel.errors, self.clock.first());
         self.clock.times().map(move |time| {
-            let motion = self.mount.motion(&self.input.trajectory.state(time.t_s));
+            let body = self.input.trajectory.state(time.t_s);
+            let motion = match &self.shaking {
+                Some(part) => self.mount.motion_on(part, time.t_s, &body),
+                None => self.mount.motion(&body),
+            };
             let gravity = earth.gravity_ned_m_s2(motion.position_ned_m);
             let coriolis = 2.0 * self.earth_rate_ned_rad_s.cross(motion.velocity_ned_m_s);
             let sensor_from_ned = motion.ned_from_sensor.inverse();

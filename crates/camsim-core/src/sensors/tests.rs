@@ -18,6 +18,7 @@ mod allan;
 mod figures;
 mod inertial;
 mod positions;
+mod shaking;
 mod strapdown;
 
 fn place() -> LocalFrame {
@@ -30,6 +31,7 @@ fn input(trajectory: Trajectory, frame: Option<LocalFrame>, span_s: [f64; 2]) ->
         earth: Earth::new(frame, HeightReference::Ellipsoid),
         epoch_ns: 1_000_000_000_000,
         span_s,
+        camera_mount: crate::scenario::MountSpec::default(),
     }
 }
 

@@ -60,6 +60,40 @@ pub(crate) fn left_jacobian_times(rotation_vector: DVec3, vector_rate: DVec3) ->
     vector_rate + first * across + second * rotation_vector.cross(across)
 }
 
+/// Time derivative of [`left_jacobian_times`]: the angular acceleration, in the outer frame, of `exp(v(t))`.
+///
+/// `v'' + a (v x v'') + a' (v x v') + b (v' x (v x v') + v x (v x v'')) + b' v x (v x v')`, where a and b are the
+/// coefficients of the Jacobian and `a' = (da/dx)/x (v . v')` for x = |v|.
+pub(crate) fn left_jacobian_rate(vector: DVec3, rate: DVec3, acceleration: DVec3) -> DVec3 {
+    let angle2 = vector.length_squared();
+    // The derivatives cancel to the fourth and fifth power of the angle, so that the series reach further.
+    let (first, second, first_slope, second_slope) = if angle2 < 0.04 {
+        let x = angle2;
+        (
+            0.5 - x / 24.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0 * (1.0 - x / 90.0))),
+            1.0 / 6.0 - x / 120.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0))),
+            -1.0 / 12.0 + x / 180.0 - x * x / 6720.0 + x * x * x / 453_600.0,
+            -1.0 / 60.0 + x / 1260.0 - x * x / 60_480.0 + x * x * x / 4_989_600.0,
+        )
+    } else {
+        let angle = angle2.sqrt();
+        let (sin, cos) = angle.sin_cos();
+        (
+            (1.0 - cos) / angle2,
+            (angle - sin) / (angle2 * angle),
+            (angle * sin - 2.0 * (1.0 - cos)) / (angle2 * angle2),
+            (angle * (1.0 - cos) - 3.0 * (angle - sin)) / (angle2 * angle2 * angle),
+        )
+    };
+    let stretch = vector.dot(rate);
+    let (across, across_rate) = (vector.cross(rate), vector.cross(acceleration));
+    acceleration
+        + first * across_rate
+        + first_slope * stretch * across
+        + second * (rate.cross(across) + vector.cross(across_rate))
+        + second_slope * stretch * vector.cross(across)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,6 +128,22 @@ mod tests {
             let numeric = log(change) / (2.0 * step);
             // Central difference: error step^2 times a third derivative of order one.
             assert!((numeric - left_jacobian_times(v, vector_rate)).length() < 1e-7, "{length}");
+        }
+    }
+
+    #[test]
+    fn the_rate_of_the_left_jacobian_is_its_derivative() {
+        let (rate, acceleration) = (DVec3::new(0.4, 1.0, -0.7), DVec3::new(-0.3, 0.2, 1.1));
+        for length in [0.0, 1e-3, 0.0999, 0.199, 0.201, 0.5, 2.5] {
+            let vector = DVec3::new(1.0, -2.0, 0.5).normalize() * length;
+            let at = |t: f64| {
+                left_jacobian_times(vector + rate * t + acceleration * (0.5 * t * t), rate + acceleration * t)
+            };
+            let step = 1e-4;
+            let numeric = (at(step) - at(-step)) / (2.0 * step);
+            // Central difference: error step^2 times a third derivative of order one, and rounding 1e-12.
+            let exact = left_jacobian_rate(vector, rate, acceleration);
+            assert!((numeric - exact).length() < 2e-8, "{length}: {}", (numeric - exact).length());
         }
     }
 }

@@ -142,7 +142,11 @@ fn fixed<'a>(job: &ExportJob<'_>, imus: &[super::imu::ImuSensor], t_ns: i64) -> 
     let base_from_body = super::Rigid::turn(super::flu_from_frd());
     let cameras = job.run.cameras.iter().enumerate().filter(|(_, camera)| !camera.vibrates());
     let cameras = cameras.map(|(i, camera)| (format!("cam{i}"), camera.body_from_camera()));
-    let imus = imus.iter().enumerate().map(|(i, imu)| (format!("imu{i}"), imu.body_from_imu));
+    let imus = imus
+        .iter()
+        .enumerate()
+        .filter(|(_, imu)| !imu.shakes)
+        .map(|(i, imu)| (format!("imu{i}"), imu.body_from_imu));
     cameras
         .chain(imus)
         .map(|(name, body_from_it)| {
@@ -170,7 +174,8 @@ fn page(job: &ExportJob<'_>) -> String {
         .line(
             "`/tf`, `/ground_truth/pose`",
             "`base_link` in `map`, exact, at the rate of trajectory.csv. A camera whose mount vibrates is a child of \
-             `map`, with its pose at each picture; the others are children of `base_link` in `/tf_static`",
+             `map`, with its pose at each picture, and an IMU on it has no transformation; the others are children of \
+             `base_link` in `/tf_static`",
         )
         .line("stamps", "on the run's clock, as the camera gives them: its delay is in them");
     for (i, camera) in job.run.cameras.iter().enumerate() {

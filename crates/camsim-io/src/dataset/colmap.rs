@@ -1,7 +1,7 @@
 //! COLMAP: `images/`, and the model with exact tracks, binary in `sparse/0` and as text in `sparse_text/0`.
 //!
-//! Each image is a frame and each camera a rig of its own: with a rolling shutter, a delay or vibration no pose
-//! between two cameras is the same in all frames.
+//! Cameras that share instants are one rig, and images of one instant one frame (`rigs`). A camera that shakes
+//! against the body is a rig of its own, since its pose in the rig is not the same in all frames.
 
 use super::{
     DatasetError, ExportJob,
@@ -14,6 +14,7 @@ mod model;
 mod model_binary;
 mod model_text;
 mod observations;
+mod rigs;
 
 use model::Model;
 
@@ -72,7 +73,8 @@ fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
             "those of `tracks.csv` that are visible and seen once in a picture; exact, not estimated. Colour is that of \
              the picture that sees them first",
         )
-        .line("rigs, frames", "each camera is a rig, each picture a frame; COLMAP before 3.12 does without these files")
+        .line("rigs, frames", "cameras that share instants are a rig, with the poses of their mounts, and pictures of one instant a frame; a \
+             camera that vibrates, or shares no instant, is a rig of its own. COLMAP before 3.12 does without these files")
         .line("`sparse/0`, `sparse_text/0`", "the same model, binary and as text");
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of camera {}", i + 1), &timing(camera));

@@ -118,7 +118,10 @@ fn write_truth(
     imu: Option<&ImuSensor>,
 ) -> Result<(), DatasetError> {
     let mut biases = imu.map(ImuSensor::biases).transpose()?;
-    let mut rows = job.run.platform()?;
+    let (mut rows, body_from_b) = match imu.filter(|imu| imu.shakes) {
+        Some(imu) => (imu.states()?, &Rigid::IDENTITY),
+        None => (job.run.platform()?, body_from_b),
+    };
     job.target.stream("mav0/state_groundtruth_estimate0/data.csv", &mut |out| {
         writeln!(
             out,

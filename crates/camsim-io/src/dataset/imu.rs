@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use camsim_core::scenario::SensorCarrier;
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
@@ -9,6 +10,7 @@ use super::{
     DatasetError, RunCamera, RunFolder,
     axes::{Rigid, flu_from_frd},
     csv_rows::CsvRows,
+    run_folder::PlatformRows,
 };
 use crate::calibration::ImuReference;
 
@@ -19,8 +21,10 @@ pub(super) struct ImuSensor {
     pub(super) path: PathBuf,
     /// Rows per second.
     pub(super) rate_hz: f64,
-    /// Its axes in the body (forward, right, down).
+    /// Its axes in the body (forward, right, down), without vibration.
     pub(super) body_from_imu: Rigid,
+    /// Whether it is on a camera that shakes against the body.
+    pub(super) shakes: bool,
     /// How much its clock is ahead of the platform's.
     pub(super) clock_offset_s: f64,
     /// Noise densities and bias random walks, as Kalibr defines them: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz),
@@ -53,7 +57,7 @@ pub(super) struct SensorDescription {
     #[serde(default)]
     noise: Noise,
     #[serde(default)]
-    scenario: ClockKeys,
+    scenario: SensorKeys,
 }
 
 /// Continuous-time densities of the worst axis.
@@ -67,9 +71,11 @@ struct Noise {
 
 /// Keys of the scenario.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
-struct ClockKeys {
+struct SensorKeys {
     #[serde(default)]
     clock_offset_ms: f64,
+    #[serde(default)]
+    attached_to: SensorCarrier,
 }
 
 /// The sensors of a run by their names.
@@ -105,6 +111,7 @@ pub(super) fn imus(run: &RunFolder) -> Result<Vec<ImuSensor>, DatasetError> {
                     rotation: DQuat::from_mat3(&axes).normalize(),
                     translation_m: column(3),
                 },
+                shakes: sensor.scenario.attached_to == SensorCarrier::Camera && run.cameras[0].vibrates(),
                 clock_offset_s: 1e-3 * sensor.scenario.clock_offset_ms,
                 gyro_noise: noise.gyroscope_noise_density,
                 gyro_walk: noise.gyroscope_random_walk,
@@ -147,6 +154,11 @@ impl ImuSensor {
     /// Its axes and clock.
     pub(super) fn reference(&self) -> ImuReference {
         ImuReference { body_from_imu: self.body_from_imu, clock_offset_s: self.clock_offset_s }
+    }
+
+    /// Its own motion, in its own axes.
+    pub(super) fn states(&self) -> Result<PlatformRows, DatasetError> {
+        PlatformRows::of_sensor(&self.path)
     }
 
     /// What is added to stamps of a camera to get the sensor's time of the image's centre, seconds.

@@ -307,24 +307,49 @@ fn read_frames(path: &Path) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError
     Ok((columns, frames))
 }
 
-/// Rows of `trajectory.csv`.
-pub(super) struct PlatformRows(CsvRows);
+/// Rows of `trajectory.csv`, or the true motion of an inertial sensor.
+pub(super) struct PlatformRows {
+    rows: CsvRows,
+    /// Whether times are nanoseconds, not seconds.
+    has_ns: bool,
+}
 
 impl PlatformRows {
     fn open(path: &Path) -> Result<Self, DatasetError> {
         let columns =
             ["t_s", "n_m", "e_m", "d_m", "vn", "ve", "vd", "qw", "qx", "qy", "qz", "wx", "wy", "wz"];
-        Ok(Self(CsvRows::open(path, &columns)?))
+        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: false })
+    }
+
+    /// The sensor is the body.
+    pub(super) fn of_sensor(path: &Path) -> Result<Self, DatasetError> {
+        let columns = [
+            "t_true_ns",
+            "true_n_m",
+            "true_e_m",
+            "true_d_m",
+            "true_vn_m_s",
+            "true_ve_m_s",
+            "true_vd_m_s",
+            "true_qw",
+            "true_qx",
+            "true_qy",
+            "true_qz",
+            "true_gyro_x_rad_s",
+            "true_gyro_y_rad_s",
+            "true_gyro_z_rad_s",
+        ];
+        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: true })
     }
 
     /// The next row; `None` at the end.
     pub(super) fn next_state(&mut self) -> Result<Option<PlatformState>, DatasetError> {
-        let rows = &mut self.0;
+        let rows = &mut self.rows;
         if !rows.advance()? {
             return Ok(None);
         }
         Ok(Some(PlatformState {
-            t_ns: rows.seconds_ns(0)?,
+            t_ns: if self.has_ns { rows.whole(0)? } else { rows.seconds_ns(0)? },
             position_ned_m: rows.vector(1)?,
             velocity_ned_m_s: rows.vector(4)?,
             ned_from_body: rows.wxyz(7)?,

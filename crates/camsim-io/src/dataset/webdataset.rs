@@ -1,4 +1,5 @@
-//! WebDataset: tar shards of samples, an index of shards (`index.json`) and one of samples (`samples.csv`).
+//! WebDataset: tar shards of samples, an index of shards (`index.json`) and one of samples (`samples.csv`,
+//! `samples.parquet`).
 
 use std::{
     fs::File,
@@ -15,6 +16,10 @@ use super::{
     text::wxyz,
 };
 use crate::write::WriteError;
+
+mod parquet_index;
+
+use parquet_index::SampleRow;
 
 /// Samples of a shard.
 const SHARD: usize = 500;
@@ -50,6 +55,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     }
     write_index(job, &shards)?;
     write_samples(job, &shards)?;
+    write_parquet(job, &shards)?;
     job.target.text("README.md", &page(job))?;
     Ok(Vec::new())
 }
@@ -175,6 +181,26 @@ fn write_samples(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) ->
     })
 }
 
+/// The same index for readers of columns, with the poses.
+fn write_parquet(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
+    let samples = || shards.iter().enumerate().flat_map(|(k, shard)| shard.iter().map(move |one| (k, one)));
+    job.target.stream("samples.parquet", &mut |out| {
+        let row = |(k, (series, frame)): (usize, &(&Series<'_>, &RunFrame))| {
+            let camera = series.camera;
+            let pose = enu_from_camera(&camera.centre_pose(job.name(), frame)?);
+            let ([x, y, z], [qw, qx, qy, qz]) = (pose.translation_m.to_array(), wxyz(pose.rotation));
+            Ok(SampleRow {
+                key: key(series, frame),
+                shard: shard_name(k),
+                camera: camera.name.clone(),
+                numbers: [frame.number as i64, frame.stamp_ns, camera.centre_ns(frame)],
+                pose: [x, y, z, qw, qx, qy, qz],
+            })
+        };
+        parquet_index::write(out, samples().map(row))
+    })
+}
+
 fn page(job: &ExportJob<'_>) -> String {
     let mut page = Page::new("WebDataset: tar shards", job.run);
     page.line(
@@ -187,7 +213,8 @@ fn page(job: &ExportJob<'_>) -> String {
     .line("pose", "world from camera at the mid-exposure of the image's centre; quaternions w x y z")
     .line("pixels", PIXEL_CENTRE_0)
     .line("`index.json`", "shards, as `wids` reads them")
-    .line("`samples.csv`", "shard and time of each sample");
+    .line("`samples.csv`", "shard and time of each sample")
+    .line("`samples.parquet`", "the same with the pose: x_m, y_m, z_m, qw, qx, qy, qz");
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of cam{i}"), &timing(camera));
     }

@@ -123,6 +123,7 @@ const CHANNELS: &[&str] = &[
     "blur_path",
 ];
 const SENSOR_AXES: &[&str] = &["frd", "flu", "rdf"];
+const SENSOR_CARRIER: &[&str] = &["body", "camera"];
 /// One value of all axes, or one of each.
 const PER_AXIS: ValueKind = NumberOrNumbers(3);
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
@@ -310,6 +311,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("imu.rate_hz", Number),
     ("imu.mount.angles_deg", Numbers(3)),
     ("imu.mount.offset_m", Numbers(3)),
+    ("imu.attached_to", Word(SENSOR_CARRIER)),
     ("imu.axes", Word(SENSOR_AXES)),
     ("imu.earth_rate", Flag),
     ("imu.gyro.noise_density", PER_AXIS),

@@ -3,7 +3,7 @@
 use std::{
     collections::{HashMap, HashSet},
     ffi::{OsStr, OsString},
-    fs::{self, File},
+    fs::{self, File, OpenOptions},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
@@ -12,7 +12,7 @@ use std::{
 use super::WriteError;
 
 /// Writes `bytes` under a temporary name in the same folder, which is created if missing, and renames the
-/// file. The temporary file is removed on failure.
+/// file. The temporary file is removed on failure. Devices and pipes are written into ([`open_special`]).
 ///
 /// # Errors
 /// [`WriteError`] with the path, the error of the system and what to do.
@@ -26,17 +26,38 @@ pub(crate) fn write_atomic_with(
     write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source: io::Error| WriteError::Io { path: path.into(), source };
-    let temporary = temporary_path(path)?;
-    let written = File::create(&temporary).and_then(|file| {
+    let mut fill = |file: File| {
         let mut out = BufWriter::new(file);
         write(&mut out)?;
         out.flush()
-    });
+    };
+    if let Some(special) = open_special(path).map_err(fail)? {
+        return fill(special).map_err(fail);
+    }
+    let temporary = temporary_path(path)?;
+    let written = File::create(&temporary).and_then(fill);
     written.and_then(|()| fs::rename(&temporary, path)).map_err(|source| {
         // The first error is reported; failure to remove the temporary file does no harm.
         let _ = fs::remove_file(&temporary);
         fail(source)
     })
+}
+
+/// Whether something is at `path` that is to be written into: a device, a pipe, or a name of standard output.
+/// To rename a file over it would take it away from everybody, if the user may.
+#[must_use]
+pub fn is_special(path: &Path) -> bool {
+    let is_other = |kind: fs::Metadata| !kind.is_file() && !kind.is_dir();
+    // /dev/stdout is a link, possibly to a file.
+    fs::metadata(path).is_ok_and(is_other) || (path.starts_with("/dev") && path.is_symlink())
+}
+
+/// Opens what [`is_special`]; `None` otherwise. A pipe waits for its reader.
+///
+/// # Errors
+/// That of the system.
+pub fn open_special(path: &Path) -> io::Result<Option<File>> {
+    is_special(path).then(|| OpenOptions::new().write(true).open(path)).transpose()
 }
 
 /// A temporary name in the folder of `path`, which is created if missing.
@@ -104,6 +125,33 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_and_devices_are_written_into_and_stay() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.csv");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let link = folder.path().join("link.csv");
+        std::os::unix::fs::symlink(&pipe, &link).unwrap();
+        for path in [&pipe, &link] {
+            let reader = std::thread::spawn({
+                let pipe = pipe.clone();
+                move || fs::read(pipe).unwrap()
+            });
+            write_atomic(path, b"whole").unwrap();
+            assert_eq!(reader.join().unwrap(), b"whole");
+        }
+        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo() && link.is_symlink());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no temporary file stays");
+        assert!(is_special(Path::new("/dev/null")) && is_special(Path::new("/dev/stdout")));
+        let file = folder.path().join("file.csv");
+        fs::write(&file, "old").unwrap();
+        for path in [file.as_path(), folder.path(), &folder.path().join("none")] {
+            assert!(!is_special(path), "{}", path.display());
+        }
+    }
 
     #[test]
     fn only_temporaries_of_the_given_paths_are_removed() {

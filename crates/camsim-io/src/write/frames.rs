@@ -110,6 +110,27 @@ impl FrameFiles {
         atomic::remove_temporaries(names.map(|(_, name)| self.folder.join(name)));
     }
 
+    /// Checks, before anything is written, that the videos of these frames can be made.
+    ///
+    /// # Errors
+    /// The frames are not equally spaced, or ffmpeg is needed and missing.
+    pub fn check_videos(&self, fps: f64, frames: &[u64]) -> Result<(), WriteError> {
+        self.videos().try_for_each(|(path, format)| {
+            video::Series::new(&path, fps, frames)?;
+            video::check_program(&path, format)
+        })
+    }
+
+    /// Paths and formats of the videos.
+    fn videos(&self) -> impl Iterator<Item = (PathBuf, ImageFormat)> + '_ {
+        self.files().into_iter().filter_map(|file| match file {
+            OutputFile::Color(format) if format.is_video() => {
+                Some((self.folder.join(file_name(file, 0, self.instant)), format))
+            }
+            _ => None,
+        })
+    }
+
     fn files(&self) -> Vec<OutputFile> {
         let mut files = Vec::new();
         if self.output.format.is_empty() {
@@ -342,13 +363,9 @@ impl FrameWriter {
     /// # Errors
     /// The frames are not equally spaced, or ffmpeg is needed and missing.
     pub fn with_videos(mut self, fps: f64, frames: &[u64]) -> Result<Self, WriteError> {
-        for file in self.files.files() {
-            let OutputFile::Color(format) = file else { continue };
-            if format.is_video() {
-                let path = self.files.folder.join(file_name(file, 0, self.files.instant));
-                let series = video::Series::new(&path, fps, frames)?;
-                self.videos.push(VideoWriter::start(path, format, self.files.output.video, series)?);
-            }
+        for (path, format) in self.files.videos() {
+            let series = video::Series::new(&path, fps, frames)?;
+            self.videos.push(VideoWriter::start(path, format, self.files.output.video, series)?);
         }
         Ok(self)
     }

@@ -59,6 +59,11 @@ impl Series {
     }
 }
 
+/// Checks that the program that makes a video is there.
+pub(super) fn check_program(path: &Path, format: ImageFormat) -> Result<(), WriteError> {
+    if format == ImageFormat::Y4m { Ok(()) } else { ffmpeg::find(path) }
+}
+
 /// A video that is being written.
 #[derive(Debug)]
 pub(super) struct VideoWriter {
@@ -77,9 +82,7 @@ impl VideoWriter {
         spec: VideoSpec,
         series: Series,
     ) -> Result<Self, WriteError> {
-        if format != ImageFormat::Y4m {
-            ffmpeg::find(&path)?;
-        }
+        check_program(&path, format)?;
         let (queue, frames) = sync_channel(2);
         let thread = std::thread::spawn(move || write_all(&path, format, spec, series, &frames));
         Ok(Self { queue: Some(queue), thread: Some(thread) })

@@ -4,6 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use super::{PerAxis, SensorAxes, SensorMountSpec};
 
+/// What a sensor is fixed to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SensorCarrier {
+    /// The platform.
+    #[default]
+    Body,
+    /// The camera, with its vibration.
+    Camera,
+}
+
 /// An inertial measurement unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -14,6 +25,8 @@ pub struct ImuSpec {
     pub rate_hz: f64,
     /// Place and orientation.
     pub mount: SensorMountSpec,
+    /// What the mount is fixed to. Its angles and lever arm are those without vibration.
+    pub attached_to: SensorCarrier,
     /// Axes of the output.
     pub axes: SensorAxes,
     /// Whether the gyroscope feels the Earth's rotation and the accelerometer its Coriolis acceleration.
@@ -36,6 +49,7 @@ impl Default for ImuSpec {
             name: String::new(),
             rate_hz: 200.0,
             mount: SensorMountSpec::default(),
+            attached_to: SensorCarrier::Body,
             axes: SensorAxes::Frd,
             earth_rate: false,
             gyro: TriadSpec::default(),

@@ -1,7 +1,7 @@
 //! Checks of `[[cameras]]`.
 
 use super::{Check, Problem, twins::check_folder_name, validate, validate_camera};
-use crate::scenario::{CameraSpec, Rig, Scenario};
+use crate::scenario::{CameraSpec, Rig, Scenario, SensorCarrier};
 
 /// As [`validate`], for every camera of a rig. Keys of `[[cameras]]` begin with `cameras.` and the camera's
 /// number.
@@ -11,6 +11,7 @@ pub fn validate_rig(rig: &Rig) -> Vec<Problem> {
         return validate(rig.first());
     }
     let mut check = Check::default();
+    check_carriers(&mut check, rig);
     let names: Vec<&str> = rig.names().collect();
     check_names(&mut check, &names);
     check_twins(&mut check, rig.first(), &names);
@@ -74,10 +75,23 @@ fn check_twins(check: &mut Check, scenario: &Scenario, names: &[&str]) {
     }
 }
 
+/// An imu is fixed to one of the cameras, and no key says to which.
+fn check_carriers(check: &mut Check, rig: &Rig) {
+    let shakes = rig.scenarios().iter().any(|scenario| !scenario.camera.mount.vibration.is_empty());
+    let is_ambiguous = shakes && rig.scenarios().len() > 1;
+    for (i, imu) in rig.first().imu.iter().enumerate() {
+        let is_clear = !is_ambiguous || imu.attached_to == SensorCarrier::Body;
+        check.require(is_clear, format!("imu.{i}.attached_to"), || {
+            "= \"camera\" names none of several cameras that vibrate: use \"body\", or render one camera with it"
+                .to_owned()
+        });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{TwinSpec, validate::tests::good};
+    use crate::scenario::{Axis, ImuSpec, TwinSpec, VibrationSpec, validate::tests::good};
 
     fn camera(name: &str) -> CameraSpec {
         CameraSpec { name: name.into(), ..CameraSpec::default() }
@@ -104,6 +118,31 @@ mod tests {
             let found = problems(names.map(camera).to_vec(), twin);
             assert!(found.len() == 1 && found[0].starts_with(wanted), "{names:?}: {found:?}");
         }
+    }
+
+    #[test]
+    fn an_imu_on_one_of_several_shaking_cameras_is_refused() {
+        let mut shared = good();
+        shared.imu =
+            vec![ImuSpec { name: "imu0".into(), attached_to: SensorCarrier::Camera, ..ImuSpec::default() }];
+        let mut right = camera("right");
+        let said = |right: &CameraSpec, shared: &Scenario| {
+            let rig = Rig::of_cameras(shared, vec![camera("left"), right.clone()]).expect("cameras");
+            validate_rig(&rig).iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        assert_eq!(said(&right, &shared), [""; 0]);
+        let pitch = VibrationSpec {
+            axis: Axis::Pitch,
+            amplitude_deg: 0.1,
+            amplitude_m: 0.0,
+            hz: 50.0,
+            phase_deg: 0.0,
+        };
+        right.mount.vibration.push(pitch);
+        let found = said(&right, &shared);
+        assert!(found.len() == 1 && found[0].starts_with("imu.0.attached_to: = \"camera\""), "{found:?}");
+        shared.imu[0].attached_to = SensorCarrier::Body;
+        assert_eq!(said(&right, &shared), [""; 0]);
     }
 
     #[test]

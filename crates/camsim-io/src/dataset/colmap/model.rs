@@ -10,6 +10,7 @@ use super::{
     },
     observations::{FrameObservations, Observation, read_points},
     picture,
+    rigs::{ModelRig, Moment, moments, rig_from_world, rigs},
 };
 use crate::calibration::colmap::camera_model;
 
@@ -19,6 +20,9 @@ const HELD: u64 = 4_000_000;
 /// Cameras, and numbers of images and points.
 pub(super) struct Model<'a> {
     cameras: Vec<ModelCamera<'a>>,
+    rigs: Vec<ModelRig>,
+    /// Of each rig.
+    moments: Vec<Vec<Moment>>,
     /// Positions in east, north, up.
     positions: Vec<DVec3>,
     /// Number of observations of each point.
@@ -53,6 +57,15 @@ pub(super) struct ModelImage<'m> {
     pub(super) points: &'m [(f64, f64, u64)],
 }
 
+/// A frame of the model: images of one instant.
+pub(super) struct ModelFrame<'m> {
+    pub(super) id: u32,
+    pub(super) rig: u32,
+    pub(super) rig_from_world: Rigid,
+    /// Numbers of cameras, and of images.
+    pub(super) images: &'m [(u32, u32)],
+}
+
 /// A point of the model.
 pub(super) struct ModelPoint<'m> {
     /// Number from 1.
@@ -66,8 +79,12 @@ pub(super) struct ModelPoint<'m> {
 impl<'a> Model<'a> {
     /// Reads cameras and points, and counts observations.
     pub(super) fn new(job: &'a ExportJob<'_>) -> Result<Self, DatasetError> {
+        let cameras: Vec<&RunCamera> = job.run.cameras.iter().collect();
+        let rigs = rigs(&cameras);
         let mut model = Self {
             cameras: Vec::new(),
+            moments: rigs.iter().map(|rig| moments(rig, &cameras)).collect(),
+            rigs,
             positions: Vec::new(),
             lengths: Vec::new(),
             colours: Vec::new(),
@@ -112,6 +129,15 @@ impl<'a> Model<'a> {
 
     pub(super) fn cameras(&self) -> &[ModelCamera<'a>] {
         &self.cameras
+    }
+
+    pub(super) fn rigs(&self) -> &[ModelRig] {
+        &self.rigs
+    }
+
+    /// Number of frames.
+    pub(super) fn frames(&self) -> u64 {
+        self.moments.iter().map(|moments| moments.len() as u64).sum()
     }
 
     pub(super) fn images(&self) -> u64 {
@@ -207,6 +233,27 @@ impl<'a> Model<'a> {
                     points: &points,
                 })?;
             }
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with each frame.
+    pub(super) fn each_frame(
+        &self,
+        visit: &mut dyn FnMut(&ModelFrame<'_>) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        let cameras: Vec<&RunCamera> = self.cameras.iter().map(|camera| camera.camera).collect();
+        let mut images = Vec::new();
+        let of_rigs = self.rigs.iter().zip(&self.moments);
+        let all = of_rigs.flat_map(|(rig, moments)| moments.iter().map(move |moment| (rig, moment)));
+        for (id, (rig, moment)) in (1..).zip(all) {
+            images.clear();
+            images.extend(moment.pictures.iter().map(|(sensor, place)| {
+                let camera = &self.cameras[rig.sensors[*sensor].camera];
+                (camera.id, camera.first_image + *place as u32 + 1)
+            }));
+            let rig_from_world = rig_from_world(rig, moment, &cameras, self.format)?;
+            visit(&ModelFrame { id, rig: rig.id, rig_from_world, images: &images })?;
         }
         Ok(())
     }

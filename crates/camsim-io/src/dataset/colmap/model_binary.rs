@@ -5,6 +5,7 @@ use std::io::Write;
 use super::{
     super::{DatasetError, ExportJob, axes::Rigid, text::wxyz},
     model::Model,
+    rigs::ModelRig,
 };
 
 /// Number of the sensors that are cameras.
@@ -24,14 +25,8 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
         Ok(())
     })?;
     job.target.stream(&name("rigs"), &mut |out| {
-        put_u64(out, model.cameras().len() as u64)?;
-        for camera in model.cameras() {
-            put_u32(out, camera.id)?;
-            put_u32(out, 1)?;
-            out.write_all(&CAMERA.to_le_bytes())?;
-            put_u32(out, camera.id)?;
-        }
-        Ok(())
+        put_u64(out, model.rigs().len() as u64)?;
+        model.rigs().iter().try_for_each(|rig| put_rig(out, model, rig))
     })?;
     job.target.stream(&name("images"), &mut |out| {
         put_u64(out, model.images())?;
@@ -50,15 +45,16 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
         })
     })?;
     job.target.stream(&name("frames"), &mut |out| {
-        put_u64(out, model.images())?;
-        model.each_image(&mut |image| {
-            put_u32(out, image.id)?;
-            put_u32(out, image.camera)?;
-            put_pose(out, &image.camera_from_world)?;
-            put_u32(out, 1)?;
-            out.write_all(&CAMERA.to_le_bytes())?;
-            put_u32(out, image.camera)?;
-            put_u64(out, u64::from(image.id))
+        put_u64(out, model.frames())?;
+        model.each_frame(&mut |frame| {
+            put_u32(out, frame.id)?;
+            put_u32(out, frame.rig)?;
+            put_pose(out, &frame.rig_from_world)?;
+            put_u32(out, frame.images.len() as u32)?;
+            frame.images.iter().try_for_each(|(camera, image)| {
+                put_sensor(out, *camera)?;
+                put_u64(out, u64::from(*image))
+            })
         })
     })?;
     job.target.stream(&name("points3D"), &mut |out| {
@@ -75,6 +71,25 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
             })
         })
     })
+}
+
+/// The sensor of reference, then the others with their poses.
+fn put_rig(out: &mut dyn Write, model: &Model<'_>, rig: &ModelRig) -> Result<(), DatasetError> {
+    put_u32(out, rig.id)?;
+    put_u32(out, rig.sensors.len() as u32)?;
+    for (place, sensor) in rig.sensors.iter().enumerate() {
+        put_sensor(out, model.cameras()[sensor.camera].id)?;
+        if place > 0 {
+            out.write_all(&[1])?;
+            put_pose(out, &sensor.sensor_from_rig)?;
+        }
+    }
+    Ok(())
+}
+
+fn put_sensor(out: &mut dyn Write, camera: u32) -> Result<(), DatasetError> {
+    out.write_all(&CAMERA.to_le_bytes())?;
+    put_u32(out, camera)
 }
 
 fn put_u64(out: &mut dyn Write, value: u64) -> Result<(), DatasetError> {

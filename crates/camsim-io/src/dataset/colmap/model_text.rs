@@ -24,13 +24,20 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
     job.target.stream(&name("rigs"), &mut |out| {
         writeln!(
             out,
-            "# RIG_ID, NUM_SENSORS, REF_SENSOR_TYPE, REF_SENSOR_ID, SENSORS[]\n# Number of rigs: {}",
-            model.cameras().len()
+            "# RIG_ID, NUM_SENSORS, REF_SENSOR_TYPE, REF_SENSOR_ID, SENSORS[] as (SENSOR_TYPE, SENSOR_ID, HAS_POSE, \
+             [QW, QX, QY, QZ, TX, TY, TZ])\n# Number of rigs: {}",
+            model.rigs().len()
         )?;
-        model
-            .cameras()
-            .iter()
-            .try_for_each(|camera| Ok(writeln!(out, "{} 1 CAMERA {}", camera.id, camera.id)?))
+        model.rigs().iter().try_for_each(|rig| {
+            write!(out, "{} {}", rig.id, rig.sensors.len())?;
+            for (place, sensor) in rig.sensors.iter().enumerate() {
+                write!(out, " CAMERA {}", model.cameras()[sensor.camera].id)?;
+                if place > 0 {
+                    write!(out, " 1 {}", pose(&sensor.sensor_from_rig))?;
+                }
+            }
+            Ok(writeln!(out)?)
+        })
     })?;
     job.target.stream(&name("images"), &mut |out| {
         writeln!(
@@ -53,11 +60,13 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
             out,
             "# FRAME_ID, RIG_ID, RIG_FROM_WORLD[QW, QX, QY, QZ, TX, TY, TZ], NUM_DATA_IDS, DATA_IDS[] as (SENSOR_TYPE, \
              SENSOR_ID, DATA_ID)\n# Number of frames: {}",
-            model.images()
+            model.frames()
         )?;
-        model.each_image(&mut |image| {
-            let (id, camera, pose) = (image.id, image.camera, pose(&image.camera_from_world));
-            Ok(writeln!(out, "{id} {camera} {pose} 1 CAMERA {camera} {id}")?)
+        model.each_frame(&mut |frame| {
+            let (id, rig, pose) = (frame.id, frame.rig, pose(&frame.rig_from_world));
+            write!(out, "{id} {rig} {pose} {}", frame.images.len())?;
+            frame.images.iter().try_for_each(|(camera, image)| write!(out, " CAMERA {camera} {image}"))?;
+            Ok(writeln!(out)?)
         })
     })?;
     job.target.stream(&name("points3D"), &mut |out| {

@@ -182,3 +182,40 @@ fn euroc_has_the_imu_as_its_body() {
     assert!(file("settings/vins/vins.yaml").contains("\ntd: -0.003\n"));
     assert!(file("settings/orb_slam3.yaml").contains("IMU.NoiseGyro: 0.01\n"));
 }
+
+#[test]
+fn an_imu_that_shakes_with_the_camera_is_a_body_of_its_own() {
+    let vibration = "[[camera.mount.vibration]]\naxis = \"pitch\"\namplitude_deg = 0.5\namplitude_m = 0.0\nhz = 50.0\nphase_deg = 0.0\n";
+    let sample = Sample::with(vibration, "");
+    sample.write(&["color_png"]);
+    write_sensors(&sample);
+    let sensors = sample.run().join("sensors");
+    let toml = text(&sensors.join("imu0.toml")) + "attached_to = \"camera\"\n";
+    fs::write(sensors.join("imu0.toml"), toml).unwrap();
+    let truth = ",true_n_m,true_e_m,true_d_m,true_vn_m_s,true_ve_m_s,true_vd_m_s,true_qw,true_qx,true_qy,true_qz,\
+                 true_gyro_x_rad_s,true_gyro_y_rad_s,true_gyro_z_rad_s\n";
+    let pose = ",7.5,8.5,-9.5,0.5,0.25,-0.125,0,1,0,0,0,0,0\n";
+    let csv = text(&sensors.join("imu0.csv")).replace(",0,0.", ",988000000,0.");
+    let line = |(i, line): (usize, &str)| line.to_owned() + if i == 0 { truth } else { pose };
+    fs::write(sensors.join("imu0.csv"), csv.lines().enumerate().map(line).collect::<String>()).unwrap();
+    exported(&sample, DatasetFormat::Euroc).unwrap();
+    let truth = text(&sample.out().join("mav0/state_groundtruth_estimate0/data.csv"));
+    // Forward, left, up and upright: x is north, y west, z up.
+    let cells: Vec<f64> =
+        truth.lines().nth(1).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert_eq!(cells[..4], [988_000_000.0, 8.5, 7.5, 9.5]);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(cells[4..8].iter().zip([half, 0.0, 0.0, half]).all(|(a, b)| (a - b).abs() < 1e-12), "{cells:?}");
+    assert_eq!(cells[8..11], [0.25, 0.5, 0.125]);
+
+    let bag = Sample::with(vibration, "");
+    bag.write(&["color_png"]);
+    for name in ["imu0.toml", "imu0.csv"] {
+        fs::create_dir_all(bag.run().join("sensors")).unwrap();
+        fs::copy(sensors.join(name), bag.run().join("sensors").join(name)).unwrap();
+    }
+    exported(&bag, DatasetFormat::Mcap).unwrap();
+    let (by_topic, _) = messages(&bag);
+    let Transforms(fixed) = decoded(&by_topic["/tf_static"][0].1);
+    assert!(fixed.is_empty() && by_topic.contains_key("/imu0"), "{:?}", by_topic.keys());
+}

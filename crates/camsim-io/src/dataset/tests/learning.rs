@@ -3,6 +3,11 @@
 use std::{collections::BTreeMap, fs, io::Read};
 
 use camsim_core::scenario::DatasetFormat;
+use glam::{DQuat, DVec3};
+use parquet::{
+    file::reader::{FileReader, SerializedFileReader},
+    record::RowAccessor,
+};
 
 use super::{Sample, exported, names, sample, text};
 
@@ -124,4 +129,29 @@ fn shards_hold_each_sample_side_by_side() {
         (shard["nsamples"].as_u64(), shard["filesize"].as_u64()),
         (Some(4), Some(path.metadata().unwrap().len()))
     );
+}
+
+#[test]
+fn the_index_of_columns_is_that_of_lines_with_poses() {
+    let sample = Sample::new("");
+    sample.write(&["color_png"]);
+    exported(&sample, DatasetFormat::Webdataset).unwrap();
+    let file = fs::File::open(sample.out().join("samples.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+    let csv = text(&sample.out().join("samples.csv"));
+    let lines: Vec<&str> = csv.lines().skip(1).collect();
+    assert_eq!((rows.len(), lines.len()), (4, 4));
+    for (row, line) in rows.iter().zip(lines) {
+        let strings = [0, 1, 3].map(|k| row.get_string(k).unwrap());
+        let numbers = [2, 4, 5].map(|k| row.get_long(k).unwrap());
+        let ([key, shard, camera], [frame, stamp, centre]) = (strings, numbers);
+        assert_eq!(format!("{key},{shard},{frame},{camera},{stamp},{centre}"), line);
+    }
+    // Frame 5 is a metre further north and has turned by 0.1 about down.
+    let pose: [f64; 7] = std::array::from_fn(|k| rows[1].get_double(6 + k).unwrap());
+    let back = DQuat::from_xyzw(pose[4], pose[5], pose[6], pose[3]);
+    let ahead = DVec3::new(0.1_f64.sin(), 0.1_f64.cos(), 0.0);
+    assert_eq!(pose[..3], [20.0, 11.0, 30.0]);
+    assert!((back * DVec3::Z - ahead).length() < 1e-14 && (back * DVec3::Y + DVec3::Z).length() < 1e-14);
 }

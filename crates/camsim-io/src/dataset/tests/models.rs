@@ -3,7 +3,7 @@
 use camsim_core::scenario::DatasetFormat;
 use glam::{DQuat, DVec3};
 
-use super::{Sample, exported, names, text};
+use super::{Sample, exported, names, sample::FRAMES, text};
 
 const POINTS: [[f64; 3]; 3] = [[40.0, 21.0, -29.0], [41.0, 19.5, -31.0], [50.0, 20.0, -30.0]];
 
@@ -138,6 +138,37 @@ fn rigs_and_frames_name_each_image() {
     assert_eq!((frames.u64(), frames.u32(), frames.u32()), (4, 1, 1));
     frames.take::<56>();
     assert_eq!((frames.u32(), frames.u32(), frames.u32(), frames.u64()), (1, 0, 1, 1));
+}
+
+#[test]
+fn cameras_that_share_instants_are_one_rig() {
+    let sample = Sample::new("");
+    sample.write_rig(&["color_png"]);
+    exported(&sample, DatasetFormat::Colmap).unwrap();
+    let file = |name: &str| text(&sample.out().join(format!("sparse_text/0/{name}.txt")));
+    // The right camera is half a metre along the left one's x.
+    assert!(file("rigs").ends_with("\n# Number of rigs: 1\n1 2 CAMERA 1 CAMERA 2 1 1 0 0 0 -0.5 0 0\n"));
+    let (frames, images) = (file("frames"), file("images"));
+    let rows: Vec<&str> = frames.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(rows.len(), 4);
+    for (i, row) in rows.iter().enumerate() {
+        let image = images.lines().find(|line| line.ends_with(&format!("cam0/frame_{:06}.png", FRAMES[i])));
+        let pose: Vec<&str> = image.unwrap().split(' ').skip(1).take(7).collect();
+        let pictures = format!("2 CAMERA 1 {} CAMERA 2 {}", i + 1, i + 5);
+        assert_eq!(*row, format!("{} 1 {} {pictures}", i + 1, pose.join(" ")));
+    }
+    let read =
+        |name: &str| Reader(std::fs::read(sample.out().join(format!("sparse/0/{name}.bin"))).unwrap(), 0);
+    let mut rigs = read("rigs");
+    assert_eq!((rigs.u64(), rigs.u32(), rigs.u32()), (1, 1, 2));
+    assert_eq!([rigs.u32(), rigs.u32(), rigs.u32(), rigs.u32()], [0, 1, 0, 2]);
+    assert_eq!((rigs.take::<1>(), rigs.f64()), ([1], 1.0));
+    assert_eq!([(); 6].map(|()| rigs.f64()), [0.0, 0.0, 0.0, -0.5, 0.0, 0.0]);
+    let mut frames = read("frames");
+    assert_eq!((rigs.end(), frames.u64(), frames.u32(), frames.u32()), (true, 4, 1, 1));
+    frames.take::<56>();
+    assert_eq!((frames.u32(), frames.u64(), frames.u64()), (2, 1 << 32, 1));
+    assert_eq!((frames.u64(), frames.u64()), (2 << 32, 5));
 }
 
 #[test]
