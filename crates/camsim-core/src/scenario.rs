@@ -12,6 +12,7 @@ mod auto;
 mod camera;
 mod channel;
 mod dataset;
+mod image_sensor;
 mod motion;
 mod rig;
 mod scene;
@@ -28,6 +29,10 @@ pub use camera::{
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
+pub(crate) use image_sensor::UNIT_MATRIX;
+pub use image_sensor::{
+    Companding, Demosaic, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve, SensorModel,
+};
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use rig::Rig;
 pub use scene::{

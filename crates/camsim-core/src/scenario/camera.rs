@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::FieldOr;
+use super::{FieldOr, ImageSensorSpec};
 
 /// Camera geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +44,9 @@ pub struct CameraSpec {
     pub shutter: ShutterSpec,
     /// Vignette, light, noise, output encoding.
     pub photometric: PhotometricSpec,
+    /// The image sensor, in place of `photometric`'s light and noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<ImageSensorSpec>,
 }
 
 impl Default for CameraSpec {
@@ -62,6 +65,7 @@ impl Default for CameraSpec {
             zoom_track: None,
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
+            sensor: None,
         }
     }
 }
