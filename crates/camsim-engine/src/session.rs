@@ -4,8 +4,9 @@ use std::{sync::Arc, time::Instant};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
+    imaging::ImageSensor,
     pose::CameraPose,
-    scenario::{Channel, Preset},
+    scenario::{Channel, Preset, Scenario},
     scene::{LodSelection, LodTolerance, SceneBatches},
     sequence::Sequence,
     temporal::IdealGeometry,
@@ -45,6 +46,7 @@ pub struct Session<'a> {
     scene_planner: Option<Arc<Planner>>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
+    sensor: Option<ImageSensor>,
 }
 
 /// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
@@ -110,6 +112,8 @@ impl<'a> Session<'a> {
             .gpu()
             .map(|gpu| GpuSession::new(gpu, &sequence, meshes.clone(), planner.wants_truth()))
             .transpose()?;
+        let Scenario { camera, seed, .. } = &sequence.scenario;
+        let sensor = ImageSensor::new(camera, *seed);
         let cpu = CpuRenderer::new(sequence.clone(), meshes);
         Ok(Self {
             engine,
@@ -122,6 +126,7 @@ impl<'a> Session<'a> {
             moving,
             scene_planner,
             hits: Vec::new(),
+            sensor,
         })
     }
 
@@ -152,6 +157,8 @@ impl<'a> Session<'a> {
         if let Some(gpu) = &mut self.gpu {
             gpu.renew((before, self.planner.wants_truth()), &sequence, planner.wants_truth())?;
         }
+        let Scenario { camera, seed, .. } = &sequence.scenario;
+        self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
         self.cpu.renew(sequence);
         self.planner = planner;
         self.channels = channels.into();
@@ -367,7 +374,7 @@ impl<'a> Session<'a> {
             None => Vec::new(),
         };
         let coords = truth.as_ref().map(|truth| finished::coords(truth, &color_rgba, plan, &sequence.path));
-        Ok(RenderedFrame {
+        let mut frame = RenderedFrame {
             index: plan.frame,
             stamp_ns: sequence.epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
             size_px: plan.camera.size_px,
@@ -376,7 +383,12 @@ impl<'a> Session<'a> {
             coords,
             rows: self.planner.rows(plan),
             planes,
-        })
+            raw: None,
+        };
+        if let Some(sensor) = &self.sensor {
+            sensor.expose(&mut frame);
+        }
+        Ok(frame)
     }
 
     /// Corrects the truth of a renderer by rays, and computes the other truth channels.

@@ -21,6 +21,9 @@ pub struct ImageSensorSpec {
     /// Or: irradiance on the sensor where it sees white, of light of `wavelength_nm`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_w_m2: Option<f64>,
+    /// Time for which light and dark current are collected; else `camera.shutter.exposure_ms`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure_ms: Option<f64>,
     /// Focal length over aperture, for `white_lux`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
@@ -120,6 +123,7 @@ impl Default for ImageSensorSpec {
             white_e: None,
             white_lux: None,
             white_w_m2: None,
+            exposure_ms: None,
             f_number: None,
             lens_transmission: 1.0,
             wavelength_nm: 550.0,
@@ -204,14 +208,17 @@ impl PerChannel {
     }
 }
 
-/// Sensors whose facts are known.
+/// Sensors whose facts are known ([`crate::imaging::facts`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[allow(missing_docs, reason = "the names of the makers")]
 pub enum SensorModel {
-    /// Sony IMX250.
+    Icx625,
+    Imx174,
+    Imx249,
     Imx250,
-    /// Sony IMX255.
     Imx255,
+    Imx273,
 }
 
 /// Colours of the pixels of a sensor; the corner at the top left is named first, row by row.

@@ -2,8 +2,9 @@
 
 use camsim_core::scenario::{
     Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
-    FlowInstant, GnssSpec, HeightUnit, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf,
-    OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
+    FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec,
+    ObjectsOf, OutputSpec, PerChannel, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
+    TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -130,6 +131,8 @@ fn every_key_of_the_structs_is_in_the_schema() {
     if let Some(light) = &mut scenario.scene.light {
         light.shadows = true;
     }
+    scenario.output.raw_format = camsim_core::scenario::RawFormat::Tiff;
+    scenario.camera.sensor = Some(full_sensor());
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
     let terrain = scenario.scene.terrain.as_mut().unwrap();
@@ -169,6 +172,33 @@ fn every_key_of_the_structs_is_in_the_schema() {
             !is_unsupported,
             "{key} stands in the schema but not in the struct, or the other way round"
         );
+    }
+}
+
+/// Every key has a value.
+fn full_sensor() -> ImageSensorSpec {
+    ImageSensorSpec {
+        model: Some(SensorModel::Imx250),
+        white_e: Some(1.0),
+        white_lux: Some(1.0),
+        white_w_m2: Some(1.0),
+        exposure_ms: Some(1.0),
+        f_number: Some(1.0),
+        pixel_um: Some(1.0),
+        quantum_efficiency: Some(PerChannel::Each(vec![0.4, 0.6, 0.5])),
+        dark_current_e_s: Some(1.0),
+        read_noise_e: Some(1.0),
+        dsnu_e: Some(1.0),
+        prnu: Some(1.0),
+        full_well_e: Some(1.0),
+        gain_e_per_dn: Some(1.0),
+        adc_bits: Some(12),
+        bits: Some(12),
+        companding_points: vec![[0.0, 0.0], [1.0, 1.0]],
+        white_balance: Some([1.0; 3]),
+        color_matrix: Some([1.0; 9]),
+        response_points: vec![[0.0, 0.0], [1.0, 1.0]],
+        ..ImageSensorSpec::default()
     }
 }
 
@@ -302,7 +332,10 @@ fn errors_name_file_line_and_key() {
             "expected a number or \"field\", found \"feild\"; did you mean \"field\"?",
         ),
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
-        ("[camera.sensor]\ngain = 1", "dir/s.toml:6: camera.sensor: is not supported by this version"),
+        (
+            "[camera.sensor]\ngain = 1",
+            "dir/s.toml:7: camera.sensor.gain: unknown key; did you mean `camera.sensor.gamma`?",
+        ),
         ("[quality]\nsolver = \"rk3\"", "did you mean \"rk2\"?"),
         ("[quality]\nsolver = \"rk2\"\niterations = 3", "quality.iterations: counts the depth look-ups"),
         (
