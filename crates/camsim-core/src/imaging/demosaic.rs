@@ -203,3 +203,8 @@ fn malvar(v: [[f32; 5]; 5]) -> [f32; 4] {
         0.125 * (5.0 * own + 4.0 * vertical - far_vertical - diagonal + 0.5 * far_horizontal),
     ]
 }
+
+#[cfg(test)]
+mod golden;
+#[cfg(test)]
+mod tests;

@@ -220,3 +220,91 @@ fn check_colors(check: &mut Check, spec: &ImageSensorSpec) {
     let is_table = spec.response == ResponseCurve::Table;
     check_curve(check, "response_points", is_table, "response = \"table\"", &spec.response_points);
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::{
+        Channel, Companding, ImageFormat, ImageSensorSpec, Mosaic, OutputEncoding, PerChannel, ResponseCurve,
+        Scenario, SensorModel, good_scenario, validate,
+    };
+
+    fn good() -> Scenario {
+        let mut scenario = good_scenario();
+        scenario.camera.photometric.noise_sigma = 0.0;
+        scenario.camera.sensor =
+            Some(ImageSensorSpec { white_e: Some(5000.0), ..ImageSensorSpec::default() });
+        scenario
+    }
+
+    #[test]
+    fn a_scale_is_all_that_is_needed() {
+        assert_eq!(validate(&good()), []);
+        let mut by_lux = good();
+        let sensor = by_lux.camera.sensor.as_mut().unwrap();
+        (sensor.white_e, sensor.white_lux, sensor.f_number) = (None, Some(1e4), Some(4.0));
+        (sensor.model, sensor.quantum_efficiency) = (Some(SensorModel::Imx250), Some(PerChannel::One(0.6)));
+        sensor.exposure_ms = Some(2.0);
+        assert_eq!(validate(&by_lux), []);
+    }
+
+    #[test]
+    fn wrong_values_are_named_with_a_remedy() {
+        type Change = fn(&mut Scenario, &mut ImageSensorSpec);
+        let cases: [(&str, Change); 24] = [
+            ("camera.sensor.white_e", |_, s| s.white_e = None),
+            ("camera.sensor.white_e", |_, s| s.white_e = Some(0.0)),
+            ("camera.sensor.white_e", |_, s| {
+                (s.white_lux, s.f_number, s.pixel_um, s.quantum_efficiency, s.exposure_ms) =
+                    (Some(1.0), Some(1.0), Some(1.0), Some(PerChannel::One(0.5)), Some(1.0));
+            }),
+            // No source states its quantum efficiency.
+            ("camera.sensor.quantum_efficiency", |_, s| {
+                (s.white_e, s.white_w_m2, s.model, s.exposure_ms) =
+                    (None, Some(1.0), Some(SensorModel::Imx250), Some(1.0));
+            }),
+            ("camera.sensor.quantum_efficiency", |_, s| s.quantum_efficiency = Some(PerChannel::One(60.0))),
+            ("camera.sensor.quantum_efficiency", |_, s| {
+                s.quantum_efficiency = Some(PerChannel::Each(vec![0.5, 0.5]));
+            }),
+            ("camera.sensor.read_noise_e", |_, s| s.read_noise_e = Some(f64::NAN)),
+            ("camera.sensor.prnu", |_, s| s.prnu = Some(-0.1)),
+            ("camera.sensor.temperature_c", |_, s| s.temperature_c = 1e9),
+            ("camera.sensor.hot_pixels", |_, s| s.hot_pixels = 2.0),
+            ("camera.sensor.full_well_e", |_, s| s.full_well_e = Some(-1.0)),
+            ("camera.sensor.bits", |_, s| s.bits = Some(20)),
+            ("camera.sensor.adc_bits", |_, s| s.adc_bits = Some(7)),
+            ("camera.sensor.black_dn", |_, s| s.black_dn = 5000.0),
+            ("camera.sensor.companding_points", |_, s| s.companding = Companding::Piecewise),
+            ("camera.sensor.companding_points", |_, s| s.companding_points = vec![[0.0, 0.0], [1.0, 1.0]]),
+            ("camera.sensor.spectral_matrix", |_, s| s.spectral_matrix = [1.0; 9]),
+            ("camera.sensor.mosaic", |_, s| {
+                (s.mosaic, s.white_balance) = (Mosaic::Mono, Some([1.0; 3]));
+            }),
+            ("camera.sensor.gamma", |_, s| s.gamma = 0.0),
+            ("camera.photometric.output", |_, s| s.response = ResponseCurve::Gamma),
+            ("camera.photometric.output", |scenario, _| {
+                scenario.camera.photometric.output = OutputEncoding::Luma8;
+            }),
+            ("camera.photometric.noise_sigma", |scenario, _| scenario.camera.photometric.noise_sigma = 0.1),
+            ("camera.photometric.light", |scenario, _| scenario.camera.photometric.light = 2.0),
+            ("camera.sensor.response", |scenario, s| {
+                s.response = ResponseCurve::Srgb;
+                scenario.camera.photometric.output = OutputEncoding::Linear8;
+                scenario.output.format = vec![ImageFormat::Y4m];
+            }),
+        ];
+        for (key, change) in cases {
+            let mut scenario = good();
+            let mut sensor = scenario.camera.sensor.take().unwrap();
+            change(&mut scenario, &mut sensor);
+            scenario.camera.sensor = Some(sensor);
+            let problems = validate(&scenario);
+            let keys: Vec<&str> = problems.iter().map(|problem| problem.key.as_str()).collect();
+            assert_eq!(keys, [key], "{problems:?}");
+        }
+        let mut raw_without = good();
+        raw_without.camera.sensor = None;
+        raw_without.output.channels.push(Channel::Raw);
+        assert_eq!(validate(&raw_without)[0].key, "output.channels");
+    }
+}
