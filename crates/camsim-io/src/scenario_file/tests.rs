@@ -52,13 +52,33 @@ fn every_word_of_the_schema_deserialises() {
         };
         for value in values {
             let text = print_default().replace("# pattern", "pattern");
-            let sets = [((*key).to_owned(), value.clone())];
+            let mut sets = vec![((*key).to_owned(), value.clone())];
+            let needs = needs_of_sensor(key, &value);
+            sets.extend(needs.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
             match parse_scenario(&text, Path::new("s.toml"), &sets) {
                 Ok(_) => {}
                 Err(error) => assert_eq!(value, "paper", "{key} = {value}: {error}"),
             }
         }
     }
+}
+
+/// Other keys that a word of the image sensor needs.
+fn needs_of_sensor(key: &str, value: &str) -> Vec<(&'static str, &'static str)> {
+    let points = "[[0, 0], [0.2, 0.5], [1, 1]]";
+    let mut needs = Vec::new();
+    if key.starts_with("camera.sensor.") || value == "[\"raw\"]" {
+        needs.push(("camera.sensor.white_e", "5000"));
+    }
+    match (key, value) {
+        ("camera.sensor.companding", "piecewise") => needs.push(("camera.sensor.companding_points", points)),
+        ("camera.sensor.response", "table") => needs.push(("camera.sensor.response_points", points)),
+        _ => {}
+    }
+    if key == "camera.sensor.response" {
+        needs.push(("camera.photometric.output", "linear8"));
+    }
+    needs
 }
 
 #[test]
@@ -334,7 +354,7 @@ fn errors_name_file_line_and_key() {
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
         (
             "[camera.sensor]\ngain = 1",
-            "dir/s.toml:7: camera.sensor.gain: unknown key; did you mean `camera.sensor.gamma`?",
+            "dir/s.toml:7: camera.sensor.gain: unknown key; did you mean `camera.sensor.gain_e_per_dn`?",
         ),
         ("[quality]\nsolver = \"rk3\"", "did you mean \"rk2\"?"),
         ("[quality]\nsolver = \"rk2\"\niterations = 3", "quality.iterations: counts the depth look-ups"),
