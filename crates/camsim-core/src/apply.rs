@@ -303,7 +303,8 @@ impl<'a> Pipeline<'a> {
             ..RenderedFrame::default()
         };
         if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
-            sensor.expose(&mut frame);
+            // These frames have no place on a clock: the stamp is 0.
+            sensor.expose(&mut frame, 0.0);
         }
         (frame, counts)
     }

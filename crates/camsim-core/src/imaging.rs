@@ -9,6 +9,7 @@ mod develop;
 mod draw;
 mod facts;
 mod fixed_pattern;
+mod flicker;
 mod settings;
 
 use std::sync::LazyLock;
@@ -18,7 +19,8 @@ use rayon::prelude::*;
 use crate::{
     frame::{RawPicture, RenderedFrame},
     noise::camera_seed,
-    scenario::{CameraSpec, ImageSensorSpec, Mosaic},
+    scenario::{CameraSpec, ImageSensorSpec, Mosaic, ShutterSpec},
+    shutter::Shutter,
 };
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
@@ -26,6 +28,7 @@ pub use facts::{Fact, facts, with_facts};
 
 use develop::Development;
 use fixed_pattern::FixedPattern;
+use flicker::Flicker;
 pub(crate) use settings::BITS;
 use settings::Settings;
 
@@ -54,6 +57,7 @@ pub struct ImageSensor {
     draws: &'static Draws,
     fixed: FixedPattern,
     develop: Development,
+    flicker: Option<Flicker>,
 }
 
 /// What a sensor is made of.
@@ -62,6 +66,8 @@ struct SensorKey {
     spec: ImageSensorSpec,
     size_px: [u32; 2],
     exposure_ms: f64,
+    shutter: ShutterSpec,
+    fps: f64,
     seed: u64,
     name: String,
 }
@@ -73,6 +79,8 @@ impl SensorKey {
             spec: sensor.clone(),
             size_px: camera.size_px,
             exposure_ms: sensor.exposure_ms.unwrap_or(camera.shutter.exposure_ms),
+            shutter: camera.shutter.clone(),
+            fps: camera.fps,
             seed,
             name: camera.name.clone(),
         })
@@ -103,20 +111,24 @@ impl ImageSensor {
         let name = key.name.split('/').next().unwrap_or_default();
         let fixed = FixedPattern::new(&settings, draws, key.size_px, camera_seed(key.seed, name));
         let develop = Development::new(&with_facts(&key.spec), &settings);
-        Self { key, settings, draws, fixed, develop }
+        // An invalid shutter has no frames.
+        let shutter = Shutter::from_spec(&key.shutter, key.fps, key.size_px).ok();
+        let lamp = key.spec.flicker.as_ref().zip(shutter);
+        let flicker = lamp.map(|(spec, shutter)| Flicker::new(spec, shutter, key.exposure_ms * 1e-3));
+        Self { key, settings, draws, fixed, develop, flicker }
     }
 
-    /// Takes the picture of a frame, whose colours are the light: makes its raw picture, and of that its
-    /// colours.
-    pub fn expose(&self, frame: &mut RenderedFrame) {
-        let raw = self.raw(frame.index as u32, &frame.color_rgba);
+    /// Takes the picture of a frame with this stamp in path time, whose colours are the light: makes its raw
+    /// picture, and of that its colours.
+    pub fn expose(&self, frame: &mut RenderedFrame, stamp_s: f64) {
+        let raw = self.raw(frame.index as u32, stamp_s, &frame.color_rgba);
         self.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
         frame.raw = Some(raw);
     }
 
     /// Digital numbers of the light of a frame: linear R G B A, row-major.
     #[must_use]
-    pub fn raw(&self, frame: u32, color_rgba: &[f32]) -> RawPicture {
+    pub fn raw(&self, frame: u32, stamp_s: f64, color_rgba: &[f32]) -> RawPicture {
         let width = self.key.size_px[0] as usize;
         let channels = self.settings.channels();
         let mut values = vec![0_u16; self.key.size_px[1] as usize * width * channels];
@@ -130,7 +142,7 @@ impl ImageSensor {
             .for_each_init(
                 || RowScratch::new(width),
                 |scratch, (y, (codes, rgba))| {
-                    let row = RowJob { sensor: self, y: y as u32, frame, seed, columns: &columns };
+                    let row = RowJob { sensor: self, y: y as u32, frame, stamp_s, seed, columns: &columns };
                     row.expose(rgba, codes, scratch);
                 },
             );
@@ -164,6 +176,7 @@ struct RowJob<'a> {
     sensor: &'a ImageSensor,
     y: u32,
     frame: u32,
+    stamp_s: f64,
     seed: u64,
     columns: &'a [f32],
 }
@@ -174,6 +187,9 @@ impl RowJob<'_> {
         let channels = settings.channels();
         for channel in 0..channels {
             self.light(rgba, channel, &mut scratch.electrons);
+            if let Some(flicker) = &self.sensor.flicker {
+                flicker.light(self.y, self.stamp_s, &mut scratch.electrons);
+            }
             self.dark(channel, &mut scratch.electrons);
             self.words(channel as u32, &mut scratch.words);
             self.count(scratch);

@@ -31,7 +31,8 @@ pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
 pub(crate) use image_sensor::UNIT_MATRIX;
 pub use image_sensor::{
-    Companding, Demosaic, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve, SensorModel,
+    Companding, Demosaic, FlickerSpec, FlickerWave, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve,
+    SensorModel,
 };
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use rig::Rig;

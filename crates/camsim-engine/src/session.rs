@@ -386,7 +386,7 @@ impl<'a> Session<'a> {
             raw: None,
         };
         if let Some(sensor) = &self.sensor {
-            sensor.expose(&mut frame);
+            sensor.expose(&mut frame, plan.stamp_s);
         }
         Ok(frame)
     }

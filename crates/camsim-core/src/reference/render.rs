@@ -166,7 +166,7 @@ impl Oracle {
             raw: None,
         };
         if let Some(sensor) = self.sensor.as_ref().filter(|_| options.photometric) {
-            sensor.expose(&mut rendered);
+            sensor.expose(&mut rendered, self.stamp_s(frame));
         }
         (rendered, convergence)
     }

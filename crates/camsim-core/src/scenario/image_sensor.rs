@@ -111,6 +111,9 @@ pub struct ImageSensorSpec {
     /// Corners of the curve `table`, from [0, 0] to [1, 1].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub response_points: Vec<[f64; 2]>,
+    /// Lamps in place of steady light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flicker: Option<FlickerSpec>,
 }
 
 /// No colours mixed.
@@ -159,6 +162,7 @@ impl Default for ImageSensorSpec {
             response: ResponseCurve::Linear,
             gamma: 2.2,
             response_points: Vec::new(),
+            flicker: None,
         }
     }
 }
@@ -264,6 +268,39 @@ pub enum Companding {
     Sqrt,
     /// Straight lines between given corners.
     Piecewise,
+}
+
+/// `[camera.sensor.flicker]`: light that rises and falls, with the mean of steady light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FlickerSpec {
+    /// Periods a second: twice the frequency of the mains.
+    pub hz: f64,
+    /// Share of the light that flickers.
+    pub depth: f64,
+    /// Course of that share.
+    pub wave: FlickerWave,
+    /// Share of the period in which `pulse` is alight.
+    pub duty: f64,
+    /// Phase at path time 0, the log's first good row: of the brightest instant, or of the begin of the pulse.
+    pub phase_deg: f64,
+}
+
+impl Default for FlickerSpec {
+    fn default() -> Self {
+        Self { hz: 100.0, depth: 1.0, wave: FlickerWave::Sine, duty: 0.5, phase_deg: 0.0 }
+    }
+}
+
+/// Courses of flickering light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FlickerWave {
+    /// Of lamps at the mains.
+    #[default]
+    Sine,
+    /// On and off, as of LEDs with pulse width modulation.
+    Pulse,
 }
 
 /// Curves of the picture's values.

@@ -218,6 +218,7 @@ fn full_sensor() -> ImageSensorSpec {
         white_balance: Some([1.0; 3]),
         color_matrix: Some([1.0; 9]),
         response_points: vec![[0.0, 0.0], [1.0, 1.0]],
+        flicker: Some(camsim_core::scenario::FlickerSpec::default()),
         ..ImageSensorSpec::default()
     }
 }

@@ -22,6 +22,7 @@ pub(super) fn check_image_sensor(check: &mut Check, camera: &CameraSpec) {
     check_noise(check, spec);
     check_digits(check, spec);
     check_colors(check, spec);
+    check_flicker(check, spec);
     let photometric = &camera.photometric;
     check.require(photometric.noise_sigma == 0.0, "camera.photometric.noise_sigma", || {
         "belongs to the simple model; with [camera.sensor] set camera.sensor.read_noise_e, and leave it out".into()
@@ -108,6 +109,18 @@ fn check_light(check: &mut Check, camera: &CameraSpec, spec: &ImageSensorSpec) {
     );
     check.positive(key("wavelength_nm"), spec.wavelength_nm, "550 is green");
     check_efficiency(check, spec);
+}
+
+fn check_flicker(check: &mut Check, spec: &ImageSensorSpec) {
+    let Some(flicker) = &spec.flicker else { return };
+    check.positive(key("flicker.hz"), flicker.hz, "100 is that of 50 Hz mains");
+    check.require((0.0..=1.0).contains(&flicker.depth), key("flicker.depth"), || {
+        format!("must be the share of the light that flickers, 0 to 1, not {}", flicker.depth)
+    });
+    check.require(flicker.duty > 0.0 && flicker.duty <= 1.0, key("flicker.duty"), || {
+        format!("must be a share of the period, above 0 and at most 1, not {}", flicker.duty)
+    });
+    check.finite(key("flicker.phase_deg"), &[flicker.phase_deg]);
 }
 
 fn check_efficiency(check: &mut Check, spec: &ImageSensorSpec) {
@@ -224,8 +237,8 @@ fn check_colors(check: &mut Check, spec: &ImageSensorSpec) {
 #[cfg(test)]
 mod tests {
     use crate::scenario::{
-        Channel, Companding, ImageFormat, ImageSensorSpec, Mosaic, OutputEncoding, PerChannel, ResponseCurve,
-        Scenario, SensorModel, good_scenario, validate,
+        Channel, Companding, FlickerSpec, ImageFormat, ImageSensorSpec, Mosaic, OutputEncoding, PerChannel,
+        ResponseCurve, Scenario, SensorModel, good_scenario, validate,
     };
 
     fn good() -> Scenario {
@@ -250,7 +263,7 @@ mod tests {
     #[test]
     fn wrong_values_are_named_with_a_remedy() {
         type Change = fn(&mut Scenario, &mut ImageSensorSpec);
-        let cases: [(&str, Change); 24] = [
+        let cases: [(&str, Change); 26] = [
             ("camera.sensor.white_e", |_, s| s.white_e = None),
             ("camera.sensor.white_e", |_, s| s.white_e = Some(0.0)),
             ("camera.sensor.white_e", |_, s| {
@@ -279,6 +292,12 @@ mod tests {
             ("camera.sensor.spectral_matrix", |_, s| s.spectral_matrix = [1.0; 9]),
             ("camera.sensor.mosaic", |_, s| {
                 (s.mosaic, s.white_balance) = (Mosaic::Mono, Some([1.0; 3]));
+            }),
+            ("camera.sensor.flicker.hz", |_, s| {
+                s.flicker = Some(FlickerSpec { hz: 0.0, ..FlickerSpec::default() })
+            }),
+            ("camera.sensor.flicker.duty", |_, s| {
+                s.flicker = Some(FlickerSpec { duty: 0.0, ..FlickerSpec::default() });
             }),
             ("camera.sensor.gamma", |_, s| s.gamma = 0.0),
             ("camera.photometric.output", |_, s| s.response = ResponseCurve::Gamma),
