@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use crate::{
     camera::CameraModel,
     frame::RenderedFrame,
+    imaging::ImageSensor,
     noise::{camera_seed, tail_table},
     photometric::{photometric, vignette_weights},
     scenario::{CameraSpec, Preset, Solver},
@@ -294,13 +295,17 @@ impl<'a> Pipeline<'a> {
         let depth_m = pixels.iter().map(|found| found.map_or(0.0, |(_, depth_m)| depth_m)).collect();
         let mut counts = NoSourceCounts::default();
         pixels.iter().filter_map(|found| found.err()).for_each(|why| counts.add(why));
-        let frame = RenderedFrame {
+        let mut frame = RenderedFrame {
             index: self.settings.frame,
             size_px,
             color_rgba,
             depth_m: Some(depth_m),
             ..RenderedFrame::default()
         };
+        if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
+            // These frames have no place on a clock: the stamp is 0.
+            sensor.expose(&mut frame, 0.0);
+        }
         (frame, counts)
     }
 

@@ -51,6 +51,19 @@ pub struct RenderedFrame {
     pub rows: Vec<RowRecord>,
     /// The other truth channels ([`Channel::plane`]).
     pub planes: Vec<Plane>,
+    /// Digital numbers of the image sensor, if the camera has one; `color_rgba` is developed of them then.
+    pub raw: Option<RawPicture>,
+}
+
+/// Digital numbers of an image sensor, row-major.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RawPicture {
+    /// Numbers of each pixel, side by side: 1 of a mosaic, 3 of a sensor that measures all colours.
+    pub channels: u32,
+    /// Bits of each number.
+    pub bits: u32,
+    /// The numbers.
+    pub values: Vec<u16>,
 }
 
 /// A truth channel.

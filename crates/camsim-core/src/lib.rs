@@ -30,6 +30,7 @@
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`imaging`] | the image sensor: electrons, digital numbers, mosaics |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
 //! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
@@ -57,6 +58,7 @@ pub mod camera;
 pub mod flight_log;
 pub mod frame;
 pub mod geodesy;
+pub mod imaging;
 pub mod lens;
 pub mod metrics;
 pub mod mount;

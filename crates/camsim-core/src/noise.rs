@@ -111,7 +111,7 @@ pub(crate) fn sample_words(index: i64, seed: u64, stream: u32) -> [u32; 4] {
 
 /// `z` with `1 - Phi(z) = p` for `0 < p <= 0.5`: Newton on an erfc continued fraction or series, to f64
 /// rounding.
-fn upper_quantile(p: f64) -> f64 {
+pub(crate) fn upper_quantile(p: f64) -> f64 {
     if p >= 0.5 {
         return 0.0;
     }

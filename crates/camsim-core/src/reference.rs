@@ -14,6 +14,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
+    imaging::ImageSensor,
     lens::{DEFAULT_REACH, Lens},
     pose::CameraPose,
     scenario::CameraSpec,
@@ -86,6 +87,7 @@ pub struct Oracle {
     shading: Shading,
     /// Whether the scene has blended surfaces.
     blends: bool,
+    sensor: Option<ImageSensor>,
 }
 
 /// What one image position sees at one instant.
@@ -166,6 +168,7 @@ impl Oracle {
             moving: moving_meshes(&scene.meshes, scene.light),
             shading: Shading::new(scene),
             blends: scene.has_blended(),
+            sensor: ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed),
             sequence,
         })
     }

@@ -13,6 +13,7 @@ mod camera;
 mod channel;
 mod dataset;
 mod face;
+mod image_sensor;
 mod motion;
 mod rig;
 mod scene;
@@ -30,6 +31,11 @@ pub use camera::{
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
 pub use face::Face;
+pub(crate) use image_sensor::UNIT_MATRIX;
+pub use image_sensor::{
+    Companding, Demosaic, FlickerSpec, FlickerWave, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve,
+    SensorModel,
+};
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use rig::Rig;
 pub use scene::{
@@ -46,7 +52,7 @@ pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
     validate, validate_camera, validate_cameras, validate_rig,
 };
-pub use video::{ImageFormat, VideoCodec, VideoSpec};
+pub use video::{ImageFormat, RawFormat, VideoCodec, VideoSpec};
 
 #[cfg(test)]
 pub(crate) use validate::tests::good as good_scenario;
@@ -475,6 +481,9 @@ pub struct OutputSpec {
     pub exr_pixel: ExrPixel,
     /// EXR compression.
     pub exr_compression: ExrCompression,
+    /// File format of `raw`.
+    #[serde(skip_serializing_if = "RawFormat::is_default")]
+    pub raw_format: RawFormat,
     /// Encoding of `mp4` and `mkv`.
     #[serde(skip_serializing_if = "VideoSpec::is_default")]
     pub video: VideoSpec,
@@ -506,6 +515,7 @@ impl Default for OutputSpec {
             epoch_ns: 0,
             exr_pixel: ExrPixel::Half,
             exr_compression: ExrCompression::Zip1,
+            raw_format: RawFormat::Png,
             video: VideoSpec::default(),
             flow_step: 1,
             flow_instant: FlowInstant::Centre,

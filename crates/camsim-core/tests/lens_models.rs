@@ -184,7 +184,8 @@ impl Set {
     fn is_regular(&self, phi: f64, theta: f64) -> bool {
         let image = |at: DVec2| self.distorted(ray(at.y.atan2(at.x), at.length()));
         let (at, h) = (DVec2::from_angle(phi) * theta, 1e-6);
-        let [a, b] = [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
+        let [a, b] =
+            [DVec2::X, DVec2::Y].map(|axis| (image(at + h * axis) - image(at - h * axis)) / (2.0 * h));
         let is_positive = !matches!(self.camera.lens, Lens::Radial(_)) || a.x + b.y > 0.0;
         a.perp_dot(b) > 0.0 && is_positive
     }

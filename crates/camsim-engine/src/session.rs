@@ -4,7 +4,8 @@ use std::{sync::Arc, time::Instant};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
-    scenario::{Channel, Preset},
+    imaging::ImageSensor,
+    scenario::{Channel, Preset, Scenario},
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
 };
@@ -44,6 +45,7 @@ pub struct Session<'a> {
     channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
+    sensor: Option<ImageSensor>,
 }
 
 /// Location of the ideal frame of a frame in flight.
@@ -88,6 +90,8 @@ impl<'a> Session<'a> {
             .gpu()
             .map(|gpu| GpuSession::new(gpu, &still, meshes.clone(), planner.wants_truth()))
             .transpose()?;
+        let Scenario { camera, seed, .. } = &still.scenario;
+        let sensor = ImageSensor::new(camera, *seed);
         Ok(Self {
             engine,
             lanes: lanes(&planner, scene_planner.as_deref(), moving),
@@ -98,6 +102,7 @@ impl<'a> Session<'a> {
             coords_phase: 0.0,
             channels: channels.into(),
             hits: Vec::new(),
+            sensor,
         })
     }
 
@@ -127,6 +132,8 @@ impl<'a> Session<'a> {
         if let Some(gpu) = &mut self.gpu {
             gpu.renew((before, self.planner.wants_truth()), &still, planner.wants_truth())?;
         }
+        let Scenario { camera, seed, .. } = &still.scenario;
+        self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
         self.cpu.renew(still);
         self.lanes = lanes(&planner, scene_planner.as_deref(), moving);
         self.planner = planner;
@@ -212,7 +219,8 @@ impl<'a> Session<'a> {
                 let is_last = next.is_none();
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
                     && let Err(fault) = self.finish(done).map_err(RenderError::lift).and_then(|done| {
-                        faces.add(done).map_or(Ok(()), &mut *sink).map_err(RenderError::Sink)
+                        let whole = faces.add(done).map(|whole| self.exposed(whole));
+                        whole.map_or(Ok(()), &mut *sink).map_err(RenderError::Sink)
                     })
                 {
                     // Buffers of the frame in flight are free only after it. A second error is not reported.
@@ -339,6 +347,14 @@ impl<'a> Session<'a> {
         Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
     }
 
+    /// What the image sensor makes of the light of a frame, if the camera has one.
+    fn exposed(&self, mut whole: Finished) -> Finished {
+        if let Some(sensor) = &self.sensor {
+            sensor.expose(&mut whole.frame, whole.plan.stamp_s);
+        }
+        whole
+    }
+
     /// The frame with its truth, from exact rays where depth look-ups are unreliable.
     fn with_truth(
         &mut self,
@@ -365,6 +381,7 @@ impl<'a> Session<'a> {
             coords,
             rows: self.planner.rows(plan),
             planes,
+            raw: None,
         };
         if self.lanes.len() > 1 {
             in_whole_camera(&mut frame, plan);

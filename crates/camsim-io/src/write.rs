@@ -17,6 +17,7 @@
 //! OUT/valid/frame_000123.png      255 where a ray exists, else 0
 //! OUT/coords/frame_000123.exr     u v x y dt n e d; n e d is the direction where depth is 0 (sky)
 //! OUT/rows/frame_000123.csv       time, pose and velocity of each row
+//! OUT/raw/frame_000123.png        digital numbers of the image sensor   (.tiff, .exr)
 //! OUT/sharp/...                   a twin of every frame: run.json, camera.toml, frames.csv and channels of its own
 //! OUT/burst/color/frame_000123_7.png   a burst of each frame
 //! ```
@@ -47,6 +48,7 @@ mod frame_table;
 mod frames;
 mod picture;
 mod png_file;
+mod raw_picture;
 mod rig;
 mod sensors;
 mod tables;

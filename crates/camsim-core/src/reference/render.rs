@@ -154,7 +154,7 @@ impl Oracle {
             sum_of_squares += row.sum_of_squares;
         }
         convergence.rms_error_dn = (sum_of_squares / convergence.pixels.max(1) as f64).sqrt();
-        let rendered = RenderedFrame {
+        let mut rendered = RenderedFrame {
             index: frame,
             stamp_ns: self.log_ns(self.stamp_s(frame)),
             size_px,
@@ -163,7 +163,11 @@ impl Oracle {
             coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
             rows: self.row_records(frame),
             planes: self.planes(frame, options),
+            raw: None,
         };
+        if let Some(sensor) = self.sensor.as_ref().filter(|_| options.photometric) {
+            sensor.expose(&mut rendered, self.stamp_s(frame));
+        }
         (rendered, convergence)
     }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Face, FieldOr};
+use super::{Face, FieldOr, ImageSensorSpec};
 use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
@@ -52,6 +52,9 @@ pub struct CameraSpec {
     pub shutter: ShutterSpec,
     /// Vignette, light, noise, output encoding.
     pub photometric: PhotometricSpec,
+    /// The image sensor, in place of `photometric`'s light and noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<ImageSensorSpec>,
 }
 
 impl Default for CameraSpec {
@@ -72,6 +75,7 @@ impl Default for CameraSpec {
             face: None,
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
+            sensor: None,
         }
     }
 }

@@ -18,6 +18,8 @@ pub enum Channel {
     Valid,
     /// `rows.csv`: time, pose and velocity of each row.
     Rows,
+    /// Digital numbers of the image sensor (`[camera.sensor]`).
+    Raw,
     /// Ideal ray, source coordinate, time and world point of each pixel.
     Coords,
     /// Distance from the optical centre along the ray, metres; 0 = nothing.
@@ -78,11 +80,12 @@ pub enum FlowState {
 
 impl Channel {
     /// All channels.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Color,
         Self::Depth,
         Self::Valid,
         Self::Rows,
+        Self::Raw,
         Self::Coords,
         Self::Range,
         Self::Normal,
@@ -105,6 +108,7 @@ impl Channel {
             Self::Depth => "depth",
             Self::Valid => "valid",
             Self::Rows => "rows",
+            Self::Raw => "raw",
             Self::Coords => "coords",
             Self::Range => "range",
             Self::Normal => "normal",
@@ -125,7 +129,7 @@ impl Channel {
     #[must_use]
     pub fn plane(self) -> Option<PlaneKind> {
         match self {
-            Self::Color | Self::Depth | Self::Valid | Self::Rows | Self::Coords => None,
+            Self::Color | Self::Depth | Self::Valid | Self::Rows | Self::Raw | Self::Coords => None,
             Self::Range => Some(PlaneKind::Float(&["range"])),
             Self::Normal => Some(PlaneKind::Float(&["x", "y", "z"])),
             Self::NormalWorld => Some(PlaneKind::Float(&["n", "e", "d"])),

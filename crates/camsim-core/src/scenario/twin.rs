@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Channel, FieldOr, FlowInstant, LensSpec, PlaneKind, Scenario};
+use super::{Channel, FieldOr, FlowInstant, ImageSensorSpec, LensSpec, PlaneKind, Scenario};
 use crate::shutter::{Shutter, ShutterError};
 
 /// Largest number of pictures of a burst.
@@ -161,6 +161,10 @@ impl Scenario {
             camera.phase += shift_s * camera.fps;
         }
         if twin.is_sharp() {
+            // The sensor still collects light.
+            if let Some(sensor) = &mut camera.sensor {
+                sensor.exposure_ms.get_or_insert(camera.shutter.exposure_ms);
+            }
             camera.shutter.exposure_ms = 0.0;
         }
         if twin.is_global() {
@@ -174,11 +178,12 @@ impl Scenario {
         }
         if twin.leaves_out(twin.noise) {
             camera.photometric.noise_sigma = 0.0;
+            camera.sensor = camera.sensor.as_ref().map(ImageSensorSpec::without_noise);
         }
         if twin.leaves_out(twin.vignette) {
             camera.photometric.vignette = None;
         }
-        if let Some(k) = instant.filter(|_| camera.photometric.noise_sigma > 0.0) {
+        if let Some(k) = instant.filter(|_| camera.photometric.noise_sigma > 0.0 || camera.sensor.is_some()) {
             camera.name += &format!("/{}/{k}", twin.name);
         }
         scenario.output.twin.clear();

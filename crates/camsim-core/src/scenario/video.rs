@@ -41,6 +41,36 @@ impl ImageFormat {
     }
 }
 
+/// File formats of raw pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawFormat {
+    /// PNG of 16 bits.
+    #[default]
+    Png,
+    /// TIFF of 16 bits.
+    Tiff,
+    /// OpenEXR with numbers of 32 bits.
+    Exr,
+}
+
+impl RawFormat {
+    /// Word in `output.raw_format`, and ending of the files.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Tiff => "tiff",
+            Self::Exr => "exr",
+        }
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// `[output.video]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -100,7 +100,12 @@ pub(crate) fn planes(pixels: &FramePixels<'_>, channels: &[Channel]) -> Result<V
     let mut planes = Vec::new();
     for &channel in channels {
         let values = match channel {
-            Channel::Color | Channel::Depth | Channel::Valid | Channel::Rows | Channel::Coords => continue,
+            Channel::Color
+            | Channel::Depth
+            | Channel::Valid
+            | Channel::Rows
+            | Channel::Raw
+            | Channel::Coords => continue,
             Channel::Range => pixels.floats(|pixel| {
                 let range_m = pixel.hit.map_or(0.0, |hit| hit.depth_m * pixel.uv.extend(1.0).length());
                 [range_m as f32]

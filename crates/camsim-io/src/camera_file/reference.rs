@@ -11,7 +11,8 @@ use super::key_table::{KeyRow, Neutral, Treatment};
 use super::{CameraFormat, ImportedCamera, camera};
 
 const RUN: &str = "a setting of the run, not of the camera";
-const FIXED: &str = "fixed-pattern noise of that program: set photometric.sensor instead";
+const FIXED: &str =
+    "fixed-pattern noise of that program: set sensor.dsnu_e, row_offset_e or column_offset_e instead";
 
 pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("idealParams.width", Treatment::Applied, "times resolutionScale"),

@@ -155,6 +155,9 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         ValueKind::NumberOrNumbers(n) => {
             (number(value) || all(value, Some(n), &number), format!("a number or a list of {n} numbers"))
         }
+        ValueKind::NumberOrList => {
+            (number(value) || all(value, None, &number), "a number or a list of numbers".to_owned())
+        }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
         ValueKind::Points(n) => (
             all(value, None, &|point| all(point, Some(n), &number)),

@@ -3,8 +3,9 @@
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
     Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
-    FlowInstant, GnssSpec, HeightUnit, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf,
-    OutputSpec, QualitySpec, Readout, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
+    FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec,
+    ObjectsOf, OutputSpec, PerChannel, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
+    TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -52,7 +53,9 @@ fn every_word_of_the_schema_deserialises() {
         };
         for value in values {
             let text = print_default().replace("# pattern", "pattern");
-            let sets = [((*key).to_owned(), value.clone())];
+            let mut sets = vec![((*key).to_owned(), value.clone())];
+            let needs = needs_of_sensor(key, &value);
+            sets.extend(needs.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
             match parse_scenario(&text, Path::new("s.toml"), &sets) {
                 Ok(_) => {}
                 // These need more keys.
@@ -62,6 +65,24 @@ fn every_word_of_the_schema_deserialises() {
             }
         }
     }
+}
+
+/// Other keys that a word of the image sensor needs.
+fn needs_of_sensor(key: &str, value: &str) -> Vec<(&'static str, &'static str)> {
+    let points = "[[0, 0], [0.2, 0.5], [1, 1]]";
+    let mut needs = Vec::new();
+    if key.starts_with("camera.sensor.") || value == "[\"raw\"]" {
+        needs.push(("camera.sensor.white_e", "5000"));
+    }
+    match (key, value) {
+        ("camera.sensor.companding", "piecewise") => needs.push(("camera.sensor.companding_points", points)),
+        ("camera.sensor.response", "table") => needs.push(("camera.sensor.response_points", points)),
+        _ => {}
+    }
+    if key == "camera.sensor.response" {
+        needs.push(("camera.photometric.output", "linear8"));
+    }
+    needs
 }
 
 #[test]
@@ -135,6 +156,8 @@ fn every_key_of_the_structs_is_in_the_schema() {
     if let Some(light) = &mut scenario.scene.light {
         light.shadows = true;
     }
+    scenario.output.raw_format = camsim_core::scenario::RawFormat::Tiff;
+    scenario.camera.sensor = Some(full_sensor());
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
     let terrain = scenario.scene.terrain.as_mut().unwrap();
@@ -174,6 +197,34 @@ fn every_key_of_the_structs_is_in_the_schema() {
             !is_unsupported,
             "{key} stands in the schema but not in the struct, or the other way round"
         );
+    }
+}
+
+/// Every key has a value.
+fn full_sensor() -> ImageSensorSpec {
+    ImageSensorSpec {
+        model: Some(SensorModel::Imx250),
+        white_e: Some(1.0),
+        white_lux: Some(1.0),
+        white_w_m2: Some(1.0),
+        exposure_ms: Some(1.0),
+        f_number: Some(1.0),
+        pixel_um: Some(1.0),
+        quantum_efficiency: Some(PerChannel::Each(vec![0.4, 0.6, 0.5])),
+        dark_current_e_s: Some(1.0),
+        read_noise_e: Some(1.0),
+        dsnu_e: Some(1.0),
+        prnu: Some(1.0),
+        full_well_e: Some(1.0),
+        gain_e_per_dn: Some(1.0),
+        adc_bits: Some(12),
+        bits: Some(12),
+        companding_points: vec![[0.0, 0.0], [1.0, 1.0]],
+        white_balance: Some([1.0; 3]),
+        color_matrix: Some([1.0; 9]),
+        response_points: vec![[0.0, 0.0], [1.0, 1.0]],
+        flicker: Some(camsim_core::scenario::FlickerSpec::default()),
+        ..ImageSensorSpec::default()
     }
 }
 
@@ -307,7 +358,10 @@ fn errors_name_file_line_and_key() {
             "expected a number or \"field\", found \"feild\"; did you mean \"field\"?",
         ),
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
-        ("[camera.sensor]\ngain = 1", "dir/s.toml:6: camera.sensor: is not supported by this version"),
+        (
+            "[camera.sensor]\ngain = 1",
+            "dir/s.toml:7: camera.sensor.gain: unknown key; did you mean `camera.sensor.gain_e_per_dn`?",
+        ),
         ("[quality]\nsolver = \"rk3\"", "did you mean \"rk2\"?"),
         ("[quality]\nsolver = \"rk2\"\niterations = 3", "quality.iterations: counts the depth look-ups"),
         (

@@ -11,12 +11,12 @@ use std::{
 };
 
 use camsim_core::{
-    frame::{COORDS_CHANNELS, RenderedFrame},
-    scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec, PlaneKind},
+    frame::{COORDS_CHANNELS, RawPicture, RenderedFrame},
+    scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec, PlaneKind, RawFormat},
 };
 
 use super::{
-    WriteError, atomic, exr_file, png_file, tables,
+    WriteError, atomic, exr_file, png_file, raw_picture, tables,
     video::{self, VideoWriter},
     write_atomic,
 };
@@ -38,6 +38,7 @@ enum OutputFile {
     Valid,
     Coords,
     Rows,
+    Raw(RawFormat),
     /// A channel of [`RenderedFrame::planes`].
     Plane(Channel, PlaneKind),
     /// A channel of numbers in colour.
@@ -145,6 +146,7 @@ impl FrameFiles {
                 Channel::Valid => vec![OutputFile::Valid],
                 Channel::Coords => vec![OutputFile::Coords],
                 Channel::Rows => vec![OutputFile::Rows],
+                Channel::Raw => vec![OutputFile::Raw(self.output.raw_format)],
                 plane => {
                     let palette = (self.output.palette && plane.plane() == Some(PlaneKind::Index))
                         .then_some(OutputFile::Palette(plane));
@@ -191,6 +193,11 @@ impl FrameFiles {
                     exr(&["u", "v", "x", "y", "dt", "n", "e", "d"], samples, ExrPixel::Float)?
                 }
                 OutputFile::Rows => tables::rows_csv(&frame.rows).into_bytes(),
+                OutputFile::Raw(format) => {
+                    let nothing = RawPicture::default();
+                    let raw = frame.raw.as_ref().unwrap_or(&nothing);
+                    raw_picture::encode(&path, frame.size_px, raw, format, self.output.exr_compression)?
+                }
                 OutputFile::Plane(channel, PlaneKind::Float(names)) => {
                     exr(names, frame.floats(channel).unwrap_or_default(), ExrPixel::Float)?
                 }
@@ -253,6 +260,7 @@ fn column_name(file: OutputFile) -> &'static str {
         OutputFile::Valid => "valid",
         OutputFile::Coords => "coords",
         OutputFile::Rows => "rows",
+        OutputFile::Raw(_) => "raw",
         OutputFile::Plane(channel, _) => channel.name(),
         OutputFile::Palette(Channel::Class) => "class_palette",
         OutputFile::Palette(_) => "object_palette",
@@ -271,6 +279,7 @@ fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
         OutputFile::Valid => ("valid", "png"),
         OutputFile::Coords => ("coords", "exr"),
         OutputFile::Rows => ("rows", "csv"),
+        OutputFile::Raw(format) => ("raw", format.ending()),
         OutputFile::Plane(channel, PlaneKind::Float(_)) => (channel.name(), "exr"),
         OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
         OutputFile::Palette(_) => (column_name(file), "png"),
@@ -288,6 +297,10 @@ fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteE
             ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS)
         }
         OutputFile::Rows => ("rows", frame.rows.len().min(1), 1),
+        OutputFile::Raw(_) => {
+            let (size, channels) = frame.raw.as_ref().map_or((0, 1), |raw| (raw.values.len(), raw.channels));
+            ("raw", size, pixels * channels as usize)
+        }
         OutputFile::Plane(channel, PlaneKind::Float(names)) => {
             (channel.name(), frame.floats(channel).map_or(0, <[f32]>::len), pixels * names.len())
         }

@@ -94,7 +94,7 @@ pub(super) fn hue_rgb8(hue: f64, saturation: f64, value: f64) -> [u8; 3] {
     })
 }
 
-fn encode(
+pub(super) fn encode(
     path: &Path,
     [width, height]: [u32; 2],
     bytes: &[u8],

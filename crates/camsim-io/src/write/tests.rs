@@ -34,6 +34,7 @@ fn frame(index: u64) -> RenderedFrame {
             velocity_ned_m_s: DVec3::X,
         }],
         planes: Vec::new(),
+        raw: None,
     }
 }
 

@@ -15,6 +15,7 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
         camera.photometric.vignette = None;
         camera.photometric.light = 1.0;
         camera.photometric.noise_sigma = 0.0;
+        camera.sensor = None;
     }
     if stage < Stage::Time {
         camera.shutter = ShutterSpec::default();

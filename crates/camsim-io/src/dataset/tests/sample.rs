@@ -204,6 +204,7 @@ fn frame(number: u64) -> RenderedFrame {
         depth_m: Some((0..pixels).map(|pixel| depth_m(number, pixel)).collect()),
         coords: None,
         rows: (0..SIZE[1]).map(row).collect(),
+        raw: None,
         planes: [Channel::Flow, Channel::FlowGlobal]
             .map(|channel| Plane { channel, values: PlaneValues::Float(flows.clone()) })
             .to_vec(),

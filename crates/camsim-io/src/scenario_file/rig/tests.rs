@@ -148,7 +148,7 @@ fn what_is_no_rig_is_refused_with_its_place() {
         ("[cameras]\nleft = { fps = 3 }\n", "cameras: expected a list of tables; write [[cameras]]"),
         ("[[cameras]]\nname = \"a\"\nfile = 3\n", "cameras.0.file: expected a path in quotes"),
         ("[[cameras]]\nname = \"a\"\n[[cameras.zoom]]\nat = 3\n", "cameras.0.zoom.0.focal_px: is missing"),
-        ("[[cameras]]\nname = \"a\"\nsensor = 3\n", "cameras.0.sensor: is not supported"),
+        ("[[cameras]]\nname = \"a\"\nsensor = 3\n", "cameras.0.sensor: expected a table"),
     ] {
         let error = parse(cameras, &[]).unwrap_err().to_string();
         assert!(error.contains(wanted), "{wanted}: {error}");

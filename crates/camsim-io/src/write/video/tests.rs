@@ -26,6 +26,7 @@ fn frame(index: u64) -> RenderedFrame {
         coords: None,
         rows: Vec::new(),
         planes: Vec::new(),
+        raw: None,
     }
 }
 

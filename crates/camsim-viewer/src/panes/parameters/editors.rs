@@ -23,7 +23,9 @@ const TWINS: &str = "output.twin.";
 
 /// Whether a key is one of a sensor beside the camera, all of which but the name may be left out.
 fn is_of_sensor(key: &str) -> bool {
-    ["imu.", "gnss.", "barometer.", "magnetometer."].iter().any(|table| key.starts_with(table))
+    ["imu.", "gnss.", "barometer.", "magnetometer.", "camera.sensor."]
+        .iter()
+        .any(|table| key.starts_with(table))
 }
 
 /// The edit that a pass over an editor made.
@@ -53,7 +55,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
         ValueKind::Text => text(ui, key, value, param),
         ValueKind::Numbered(..) => numbered(ui, key, value, param),
-        ValueKind::NumberOrNumbers(_) => as_written(ui, key, value, param),
+        ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => as_written(ui, key, value, param),
         ValueKind::Points(_) if is_of_sensor(key) => as_written(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
         ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
