@@ -30,6 +30,7 @@
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
 //! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
@@ -54,6 +55,7 @@
 
 pub mod apply;
 pub mod camera;
+pub mod distribution;
 pub mod flight_log;
 pub mod frame;
 pub mod geodesy;

@@ -111,7 +111,7 @@ pub(crate) fn sample_words(index: i64, seed: u64, stream: u32) -> [u32; 4] {
 
 /// `z` with `1 - Phi(z) = p` for `0 < p <= 0.5`: Newton on an erfc continued fraction or series, to f64
 /// rounding.
-fn upper_quantile(p: f64) -> f64 {
+pub(crate) fn upper_quantile(p: f64) -> f64 {
     if p >= 0.5 {
         return 0.0;
     }
@@ -128,7 +128,7 @@ fn upper_quantile(p: f64) -> f64 {
 }
 
 /// `1 - Phi(z)` for `z >= 0`.
-fn upper_tail(z: f64) -> f64 {
+pub(crate) fn upper_tail(z: f64) -> f64 {
     let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
     if z < 3.0 {
         // Phi(z) = 1/2 + density * (z + z^3/3 + z^5/(3*5) + ...)
