@@ -10,6 +10,7 @@ use camsim_core::{
     distribution::Draws,
     scenario::{Preset, Rig},
 };
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
@@ -182,6 +183,16 @@ impl RandomScenario {
             .and_then(|()| rig_of_tree(tree, self.preset))
             .map_err(|source| of_variation(index, &drawn, source))?;
         Ok(Variation { index, rig, drawn, seed: spec.seed })
+    }
+
+    /// Checks the scenarios of these variations.
+    ///
+    /// # Errors
+    /// The first of [`Self::variation`].
+    pub fn check(&self, indices: &[u64]) -> Result<(), ScenarioError> {
+        let found =
+            indices.par_iter().map(|index| self.variation(*index).map(|_| ())).find_first(Result::is_err);
+        found.unwrap_or(Ok(()))
     }
 
     /// What variation `index` draws, without a check of the scenario.

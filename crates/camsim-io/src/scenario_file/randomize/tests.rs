@@ -270,7 +270,10 @@ fn problems_name_file_line_and_key() {
         assert!(error.contains(wanted), "{text}\n  gives {error}\n  not   {wanted}");
     }
     assert!(
-        read("randomize = 3").unwrap_err().to_string().contains("dir/s.toml:8: randomize: expected a table")
+        parse_random_scenario("randomize = 3", Path::new("dir/s.toml"), &[])
+            .unwrap_err()
+            .to_string()
+            .contains("dir/s.toml:1: randomize: expected a table")
     );
 }
 
