@@ -1,0 +1,39 @@
+//! The native half of the Python package `camsim`: thin functions over the `camsim` crate. What users see, with
+//! its documentation, is in `python/camsim`.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`error`] | failures as Python exceptions |
+//! | [`engine`] | the renderers of this process, and sessions that wait for their next frames |
+//! | [`scenario`] | a scenario with what it has loaded |
+//! | [`stream`] | frames one after the other, rendered ahead on a thread of their own |
+//! | [`frame`] | a frame as numpy arrays that own what Rust has allocated |
+//! | [`command`] | the command line |
+
+use pyo3::prelude::*;
+
+mod command;
+mod engine;
+mod error;
+mod frame;
+mod scenario;
+mod stream;
+
+/// Native half of camsim; import `camsim` instead.
+#[pymodule]
+mod _camsim {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::{
+        command::{run, run_main},
+        frame::write_picture,
+        scenario::{Scenario, default_scenario},
+        stream::{Stream, stop_streams},
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
