@@ -21,23 +21,56 @@ if "XDG_RUNTIME_DIR" not in _os.environ:
 from . import _camsim
 from ._errors import AdapterError, Error, InputError, RunError, ScenarioWarning
 from .frame import Frame, Rows, Source
+from .inputs import HeightMap, PoseTable
+from .lens import Lens
+from .pictures import Applied, Board, Comparison, Flow, Poses, Twist, apply, board, compare, verify
 from .scenario import Frames, Scenario, default_scenario, load_rig
+
+from .trajectory import (
+    BarometerSamples,
+    BodyStates,
+    CameraStates,
+    GnssSamples,
+    ImuSamples,
+    MagnetometerSamples,
+    Trajectory,
+)
 
 __version__ = _camsim.__version__
 
 __all__ = [
     "AdapterError",
+    "Applied",
+    "BarometerSamples",
+    "Board",
+    "BodyStates",
+    "CameraStates",
+    "Comparison",
     "Error",
+    "Flow",
     "Frame",
     "Frames",
+    "GnssSamples",
+    "HeightMap",
+    "ImuSamples",
     "InputError",
+    "Lens",
+    "MagnetometerSamples",
+    "PoseTable",
+    "Poses",
     "Rows",
     "RunError",
     "Scenario",
     "ScenarioWarning",
     "Source",
+    "Trajectory",
+    "Twist",
+    "apply",
+    "board",
+    "compare",
     "default_scenario",
     "load_rig",
+    "verify",
 ]
 
 # Threads that render must end before drivers are unloaded.

@@ -14,6 +14,9 @@ from typing import Any, overload
 from . import _camsim, _command, _toml
 from ._errors import InputError, ScenarioWarning
 from .frame import Frame
+from .inputs import InputFiles
+from .lens import Lens
+from .trajectory import BarometerSamples, GnssSamples, ImuSamples, MagnetometerSamples, Trajectory
 
 Path = str | os.PathLike[str]
 
@@ -30,9 +33,13 @@ class Scenario(Sequence[Frame]):
     ...     print(frame.index, frame.stamp_ns, float(frame.depth.max()))
     """
 
-    def __init__(self, native: _camsim.Scenario) -> None:
+    def __init__(self, native: _camsim.Scenario, files: InputFiles, known: Iterable[str] = ()) -> None:
+        """Not for users: `Scenario.load` and `Scenario.from_dict` make scenarios."""
         self._native = native
-        self._warn()
+        self._files = files
+        for warning in native.warnings():
+            if warning not in known:
+                warnings.warn(warning, ScenarioWarning, stacklevel=3)
 
     @classmethod
     def load(
@@ -55,7 +62,8 @@ class Scenario(Sequence[Frame]):
 
         >>> scenario = Scenario.load("flight.toml", sets={"camera.shutter.readout_ms": 0})
         """
-        return cls(_camsim.Scenario.load(path, _set_pairs(sets or {}), preset, camera, backend))
+        files = InputFiles()
+        return cls(_camsim.Scenario.load(path, _set_pairs(sets or {}, files), preset, camera, backend), files)
 
     @classmethod
     def from_dict(
@@ -68,7 +76,8 @@ class Scenario(Sequence[Frame]):
     ) -> Scenario:
         """A scenario from a tree of keys, as `to_dict` gives it.
 
-        :param tree: Tables, lists, numbers and text; what is left out has its default.
+        :param tree: Tables, lists, numbers and text; what is left out has its default. In place of paths there may be
+            a `PoseTable` (log), a `HeightMap` (DEM), and pictures as arrays of bytes.
         :param folder: The folder that relative paths are in.
 
         >>> scenario = Scenario.from_dict({
@@ -77,12 +86,13 @@ class Scenario(Sequence[Frame]):
         ...     "scene": {"pattern": {"cell_m": 10.0}},
         ... })
         """
-        name = pathlib.Path(folder) / "<dict>"
-        return cls(_camsim.Scenario.parse(_toml.document_text(tree), name, camera, backend))
+        files = InputFiles()
+        text = _toml.document_text(files.placed(tree))
+        return cls(_camsim.Scenario.parse(text, pathlib.Path(folder) / "<dict>", camera, backend), files)
 
     def to_dict(self) -> dict[str, Any]:
         """Every key with its value, those of defaults too. Times are as in the file (s, ms), angles in degrees."""
-        tree: dict[str, Any] = json.loads(self._native.json())
+        tree: dict[str, Any] = json.loads(self._native.json(False))
         return tree
 
     def to_toml(self) -> str:
@@ -97,14 +107,14 @@ class Scenario(Sequence[Frame]):
 
         >>> scenario.set("camera.shutter.readout_ms", 20)
         """
-        self._native.set(key, _toml.value_text(value, key))
+        self._native.set(key, self._files.text(value, key))
 
     def replace(self, sets: Mapping[str, Any]) -> Scenario:
         """A copy with changed keys. What they do not touch (log, scene) is shared, and loaded once.
 
         >>> sharp = scenario.replace({"camera.shutter.exposure_ms": 0, "camera.shutter.readout_ms": 0})
         """
-        return Scenario(self._native.changed(_set_pairs(sets)))
+        return Scenario(self._native.changed(_set_pairs(sets, self._files)), self._files, self.warnings)
 
     @property
     def camera(self) -> str:
@@ -117,7 +127,8 @@ class Scenario(Sequence[Frame]):
 
         >>> left, right = scenario.cameras["left"], scenario.cameras["right"]
         """
-        return {name: Scenario(self._native.of_camera(name)) for name in self._native.cameras}
+        known = self.warnings
+        return {name: Scenario(self._native.of_camera(name), self._files, known) for name in self._native.cameras}
 
     @property
     def channels(self) -> list[str]:
@@ -129,9 +140,46 @@ class Scenario(Sequence[Frame]):
         """What camsim has noticed while loading."""
         return self._native.warnings()
 
-    def _warn(self) -> None:
-        for warning in self._native.warnings():
-            warnings.warn(warning, ScenarioWarning, stacklevel=4)
+    @property
+    def objects(self) -> list[tuple[str, int]]:
+        """Name and class of every object; number n of the channel `object` is `objects[n - 1]`."""
+        return self._native.objects()
+
+    @property
+    def lens(self) -> Lens:
+        """The camera's lens."""
+        return Lens._of(self._native.camera_keys().lens())
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Motion of platform and camera at any instant."""
+        return Trajectory(self._native.trajectory())
+
+    def imu(self, name: str | None = None) -> ImuSamples:
+        """Samples of an `[[imu]]`; of several it is named.
+
+        >>> imu = scenario.imu()
+        >>> imu.t_ns, imu.gyro_rad_s, imu.accel_m_s2
+        """
+        return ImuSamples(**self._native.samples("imu", name))
+
+    def gnss(self, name: str | None = None) -> GnssSamples:
+        """Samples of a `[[gnss]]`."""
+        return GnssSamples(**self._native.samples("gnss", name))
+
+    def barometer(self, name: str | None = None) -> BarometerSamples:
+        """Samples of a `[[barometer]]`."""
+        return BarometerSamples(**self._native.samples("barometer", name))
+
+    def magnetometer(self, name: str | None = None) -> MagnetometerSamples:
+        """Samples of a `[[magnetometer]]`."""
+        return MagnetometerSamples(**self._native.samples("magnetometer", name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Scenarios travel to other processes with their keys and arrays; what they load is loaded there."""
+        camera = self.camera if len(self._native.cameras) > 1 else None
+        folder = str(self._files.folder) if self._files.contents() else ""
+        return _restored, (self._native.json(True), camera, self._native.backend, folder, self._files.contents())
 
     def __len__(self) -> int:
         """Number of frames in the window."""
@@ -198,7 +246,7 @@ class Scenario(Sequence[Frame]):
         text = self._command(words)
         return json.loads(text) if as_dict else text
 
-    def _command(self, words: Sequence[str]) -> str:
+    def _command(self, words: Sequence[str], *, fails_with_output: bool = False) -> str:
         """What a command prints of this scenario; `{scenario}` among the words is its file."""
         with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
             path = os.path.join(folder, "scenario.json")
@@ -207,7 +255,7 @@ class Scenario(Sequence[Frame]):
             camera = ["--camera", self.camera] if len(self._native.cameras) > 1 else []
             backend = [] if self._native.backend == "auto" else ["--backend", self._native.backend]
             command = [path if word == "{scenario}" else word for word in words]
-            return _command.output([*command, *camera, *backend])
+            return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
 
     def __repr__(self) -> str:
         camera = f" of {self.camera}" if self.camera else ""
@@ -257,8 +305,17 @@ def default_scenario() -> str:
     return _camsim.default_scenario()
 
 
-def _set_pairs(sets: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(key, _toml.value_text(value, key)) for key, value in sets.items()]
+def _set_pairs(sets: Mapping[str, Any], files: InputFiles) -> list[tuple[str, str]]:
+    return [(key, files.text(value, key)) for key, value in sets.items()]
+
+
+def _restored(text: str, camera: str | None, backend: str, folder: str, contents: Mapping[str, bytes]) -> Scenario:
+    files = InputFiles(contents)
+    if contents:
+        text = text.replace(json.dumps(folder)[1:-1], json.dumps(str(files.folder))[1:-1])
+    document = _toml.document_text(json.loads(text))
+    native = _camsim.Scenario.parse(document, pathlib.Path("scenario"), camera, backend)
+    return Scenario(native, files, known=native.warnings())
 
 
 def _names(channels: Iterable[str] | None) -> list[str] | None:

@@ -13,7 +13,10 @@ use camsim::{
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyDict};
 
-use crate::error::{OrRaise, input_error};
+use crate::{
+    arrays::{column, quaternions, vectors, wxyz},
+    error::{OrRaise, input_error},
+};
 
 /// A finished frame on its way to Python.
 #[derive(Debug)]
@@ -43,24 +46,13 @@ impl Delivery {
     }
 }
 
-/// Rows of `width` values each.
-pub fn table<'py, T: Element>(py: Python<'py>, values: Vec<T>, width: usize) -> PyResult<Bound<'py, PyAny>> {
-    let rows = values.len() / width;
-    Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
-}
-
 fn rows<'py>(py: Python<'py>, rows: &[RowRecord]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let flat = |part: &dyn Fn(&RowRecord) -> Vec<f64>| rows.iter().flat_map(part).collect::<Vec<f64>>();
-    dict.set_item("row", PyArray1::from_iter(py, rows.iter().map(|row| row.row)))?;
-    dict.set_item("t_mid_ns", PyArray1::from_iter(py, rows.iter().map(|row| row.t_mid_ns)))?;
-    dict.set_item("position_ned_m", table(py, flat(&|row| row.position_ned_m.to_array().into()), 3)?)?;
-    let wxyz = |row: &RowRecord| {
-        let q = row.ned_from_camera;
-        vec![q.w, q.x, q.y, q.z]
-    };
-    dict.set_item("ned_from_camera_wxyz", table(py, flat(&wxyz), 4)?)?;
-    dict.set_item("velocity_ned_m_s", table(py, flat(&|row| row.velocity_ned_m_s.to_array().into()), 3)?)?;
+    dict.set_item("row", column(py, rows, |row| row.row))?;
+    dict.set_item("t_mid_ns", column(py, rows, |row| row.t_mid_ns))?;
+    dict.set_item("position_ned_m", vectors(py, rows, |row| row.position_ned_m)?)?;
+    dict.set_item("ned_from_camera_wxyz", quaternions(py, rows, |row| row.ned_from_camera)?)?;
+    dict.set_item("velocity_ned_m_s", vectors(py, rows, |row| row.velocity_ned_m_s)?)?;
     Ok(dict)
 }
 
@@ -70,9 +62,8 @@ fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py
     dict.set_item("focal_px", (source.focal_px[0], source.focal_px[1]))?;
     dict.set_item("principal_px", (source.principal_px[0], source.principal_px[1]))?;
     dict.set_item("t_ns", source.t_ns)?;
-    let q = source.pose.ned_from_camera;
     dict.set_item("position_ned_m", PyArray1::from_slice(py, &source.pose.position_ned_m.to_array()))?;
-    dict.set_item("ned_from_camera_wxyz", PyArray1::from_slice(py, &[q.w, q.x, q.y, q.z]))?;
+    dict.set_item("ned_from_camera_wxyz", PyArray1::from_slice(py, &wxyz(source.pose.ned_from_camera)))?;
     Ok(dict)
 }
 
@@ -109,7 +100,7 @@ fn arrays<'py>(py: Python<'py>, frame: RenderedFrame, channels: &[Channel]) -> P
 }
 
 /// An array of height x width, and x components where a pixel has several.
-fn image<'py, T: Element>(
+pub fn image<'py, T: Element>(
     py: Python<'py>,
     values: Vec<T>,
     [height, width]: [usize; 2],
@@ -131,7 +122,7 @@ fn table_image<'py, T: Element, const N: usize>(
 }
 
 /// A frame of a colour picture alone.
-fn frame_of(color: &PyReadonlyArray3<'_, f32>) -> PyResult<RenderedFrame> {
+pub fn frame_of(color: &PyReadonlyArray3<'_, f32>) -> PyResult<RenderedFrame> {
     let [height, width, components] = [color.shape()[0], color.shape()[1], color.shape()[2]];
     let color_rgba = match components {
         4 => color.as_array().iter().copied().collect(),

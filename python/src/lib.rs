@@ -8,16 +8,26 @@
 //! | [`scenario`] | a scenario with what it has loaded |
 //! | [`stream`] | frames one after the other, rendered ahead on a thread of their own |
 //! | [`frame`] | a frame as numpy arrays that own what Rust has allocated |
+//! | [`camera`], [`lens`], [`trajectory`], [`sensors`] | parts of a scenario, over arrays |
+//! | [`apply`], [`pictures`] | the camera on pictures from elsewhere; comparison; boards |
 //! | [`command`] | the command line |
+//! | [`arrays`] | tables of numbers from numpy and to it |
 
 use pyo3::prelude::*;
 
+mod apply;
+mod arrays;
+mod camera;
 mod command;
 mod engine;
 mod error;
 mod frame;
+mod lens;
+mod pictures;
 mod scenario;
+mod sensors;
 mod stream;
+mod trajectory;
 
 /// Native half of camsim; import `camsim` instead.
 #[pymodule]
@@ -26,10 +36,15 @@ mod _camsim {
 
     #[pymodule_export]
     use super::{
+        apply::apply,
+        camera::Camera,
         command::{run, run_main},
         frame::write_picture,
+        lens::Lens,
+        pictures::{board_of_file, board_of_keys, compare},
         scenario::{Scenario, default_scenario},
         stream::{Stream, stop_streams},
+        trajectory::Trajectory,
     };
 
     #[pymodule_init]

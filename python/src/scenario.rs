@@ -1,7 +1,7 @@
 //! A scenario with what it has loaded.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
 
@@ -13,15 +13,20 @@ use camsim::{
     engine::Backend,
     io::{
         load::{LoadError, Loaded, load_sequence, reload_sequence},
+        portable::portable_rig,
         scenario_file::{self, ScenarioError, parse_rig, read_rig, rig_json, rig_table},
     },
 };
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
+    camera::Camera,
     engine::{self, SessionKey, SessionPool, in_own_pool, lock},
     error::{OrRaise, input_error},
+    pictures::board_of,
+    sensors,
     stream::{FrameNumbers, Stream, render_one},
+    trajectory::Trajectory,
 };
 
 /// Where a scenario comes from.
@@ -260,15 +265,47 @@ impl Scenario {
         engine::backend_name(self.backend)
     }
 
-    /// Every key with its value, as JSON.
-    fn json(&self) -> PyResult<String> {
-        Ok(rig_json(&self.snapshot().rig).or_run_error()?.to_string())
+    /// Every key with its value, as JSON; with `absolute` all paths are.
+    fn json(&self, absolute: bool) -> PyResult<String> {
+        let rig = self.snapshot().rig;
+        // Nothing is near the root, so that paths relative to it are absolute ones.
+        let tree = if absolute { portable_rig(&rig, Path::new("/")) } else { rig_json(&rig) };
+        Ok(tree.or_run_error()?.to_string())
     }
 
     /// Every key with its value, as TOML.
     fn toml(&self) -> PyResult<String> {
         let table = rig_table(&self.snapshot().rig).or_run_error()?;
         toml::to_string(&table).or_run_error()
+    }
+
+    /// The keys of the camera.
+    fn camera_keys(&self) -> Camera {
+        let state = self.snapshot();
+        Camera { spec: state.rig.scenarios()[state.camera].camera.clone() }
+    }
+
+    /// Motion of platform and camera.
+    fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
+        Ok(Trajectory::of(&*self.sequence(py)?))
+    }
+
+    /// Columns of the samples of a sensor.
+    fn samples<'py>(&self, py: Python<'py>, kind: &str, name: Option<&str>) -> PyResult<Bound<'py, PyDict>> {
+        let loaded = py.detach(|| self.loaded()).or_input_error()?;
+        sensors::samples(py, &loaded.sensors, kind, name)
+    }
+
+    /// The board of the scene.
+    fn board<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let loaded = py.detach(|| self.loaded()).or_input_error()?;
+        board_of(py, &loaded)
+    }
+
+    /// Number, name and class of every object of the scene.
+    fn objects(&self, py: Python<'_>) -> PyResult<Vec<(String, u16)>> {
+        let sequence = self.sequence(py)?;
+        Ok(sequence.scene.objects.iter().map(|object| (object.name.clone(), object.class)).collect())
     }
 
     /// One frame.
