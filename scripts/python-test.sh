@@ -13,7 +13,7 @@ if ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null
     say "PYTHON NOT TESTED: no $python of version 3.10 or newer"
     exit 0
 fi
-target=${CARGO_TARGET_DIR:-target}
+target=${CARGO_TARGET_DIR:-$PWD/target}
 venv=$target/python-venv
 if ! [ -x "$venv/bin/pytest" ] && ! { "$python" -m venv "$venv" && "$venv/bin/pip" install -q numpy pytest mypy; }; then
     say "PYTHON NOT TESTED: cannot install numpy, pytest and mypy into $venv"
@@ -30,6 +30,6 @@ esac
 cp -f "$target/debug/$library" python/camsim/_camsim.abi3.so
 
 say "Python package: types"
-"$venv/bin/mypy" --strict python/camsim
+"$venv/bin/mypy" --strict python/camsim examples/python/*.py
 say "Python package: tests"
-PYTHONPATH=python CAMSIM_PROGRAM=$target/debug/camsim "$venv/bin/pytest" -q python/tests
+PYTHONPATH=$PWD/python CAMSIM_PROGRAM=$target/debug/camsim "$venv/bin/pytest" -q python/tests

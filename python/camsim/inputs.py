@@ -27,7 +27,7 @@ class PoseTable:
 
     >>> t_s = np.linspace(0, 10, 101)
     >>> log = camsim.PoseTable(t_s, position_ned_m=np.c_[20 * t_s, 0 * t_s, 0 * t_s - 100])
-    >>> scenario = camsim.Scenario.from_dict({"flight": {"log": log}, ...})
+    >>> scenario = camsim.Scenario.from_dict({"flight": {"log": log, "attitude": "track"}, ...})
     """
 
     t_s: ArrayLike
@@ -39,7 +39,8 @@ class PoseTable:
     ned_from_body_wxyz: ArrayLike | None = None
     """Attitudes, scalar first, from body axes (forward, right, down); shape (N, 4)."""
     angles_deg: ArrayLike | None = None
-    """In place of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes the nose looks along the way."""
+    """In place of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes set
+    `flight.attitude = "track"`: the nose looks along the way."""
 
     def csv(self) -> str:
         """The table as text of a log file, with all digits."""

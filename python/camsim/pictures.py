@@ -229,7 +229,7 @@ class Board:
 def board(source: Scenario | Mapping[str, Any] | Path) -> Board:
     """The board of a scenario, of the keys of `[scene.board]`, or of Kalibr's target YAML.
 
-    >>> board = camsim.board({"kind": "chessboard", "columns": 9, "rows": 6, "square_m": 0.03})
+    >>> board = camsim.board({"kind": "chessboard", "columns": 9, "rows": 6, "size_m": 0.03})
     >>> board.points_m.shape
     (54, 2)
     """
