@@ -24,6 +24,19 @@ from .frame import Frame, Rows, Source
 from .inputs import HeightMap, PoseTable
 from .lens import Lens
 from .pictures import Applied, Board, Comparison, Flow, Poses, Twist, apply, board, compare, verify
+from .randomize import (
+    Choice,
+    Distribution,
+    Integer,
+    LogUniform,
+    Normal,
+    Piece,
+    Plus,
+    Times,
+    Uniform,
+    Variations,
+    randomize,
+)
 from .scenario import Frames, Scenario, default_scenario, load_rig
 
 from .trajectory import (
@@ -45,7 +58,9 @@ __all__ = [
     "Board",
     "BodyStates",
     "CameraStates",
+    "Choice",
     "Comparison",
+    "Distribution",
     "Error",
     "Flow",
     "Frame",
@@ -54,7 +69,12 @@ __all__ = [
     "HeightMap",
     "ImuSamples",
     "InputError",
+    "Integer",
     "Lens",
+    "LogUniform",
+    "Normal",
+    "Piece",
+    "Plus",
     "MagnetometerSamples",
     "PoseTable",
     "Poses",
@@ -63,13 +83,17 @@ __all__ = [
     "Scenario",
     "ScenarioWarning",
     "Source",
+    "Times",
     "Trajectory",
     "Twist",
+    "Uniform",
+    "Variations",
     "apply",
     "board",
     "compare",
     "default_scenario",
     "load_rig",
+    "randomize",
     "verify",
 ]
 

@@ -16,6 +16,7 @@ from ._errors import InputError, ScenarioWarning
 from .frame import Frame
 from .inputs import InputFiles
 from .lens import Lens
+from .randomize import Variations
 from .trajectory import BarometerSamples, GnssSamples, ImuSamples, MagnetometerSamples, Trajectory
 
 Path = str | os.PathLike[str]
@@ -115,6 +116,25 @@ class Scenario(Sequence[Frame]):
         >>> sharp = scenario.replace({"camera.shutter.exposure_ms": 0, "camera.shutter.readout_ms": 0})
         """
         return Scenario(self._native.changed(_set_pairs(sets, self._files)), self._files, self.warnings)
+
+    @property
+    def variations(self) -> Variations:
+        """The scenarios that `[randomize]` of the file describes; `camsim.randomize` adds one."""
+        return Variations(self)
+
+    @property
+    def variation(self) -> int | None:
+        """Number of the variation that it is; None if nothing was drawn."""
+        return self._native.variation_index
+
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """What was drawn for this variation, by key."""
+        index = self.variation
+        return {} if index is None else dict(json.loads(self._native.drawn(index)))
+
+    def _variation(self, index: int) -> Scenario:
+        return Scenario(self._native.variation(index), self._files, self.warnings)
 
     @property
     def camera(self) -> str:

@@ -14,7 +14,10 @@ use camsim::{
     io::{
         load::{LoadError, Loaded, load_sequence, reload_sequence},
         portable::portable_rig,
-        scenario_file::{self, ScenarioError, parse_rig, read_rig, rig_json, rig_table},
+        scenario_file::{
+            self, RANDOMIZE, RandomScenario, ScenarioError, drawn_json, parse_random_scenario,
+            read_random_scenario, rig_json, rig_table,
+        },
     },
 };
 use pyo3::{prelude::*, types::PyDict};
@@ -37,13 +40,23 @@ struct Source {
     text: Option<String>,
     sets: Vec<(String, String)>,
     preset: Option<Preset>,
+    /// Which variation of a scenario with `[randomize]` it is.
+    variation: Option<u64>,
 }
 
 impl Source {
-    fn rig(&self) -> Result<Rig, ScenarioError> {
+    fn random(&self) -> Result<RandomScenario, ScenarioError> {
         match &self.text {
-            Some(text) if self.preset.is_none() => parse_rig(text, &self.path, &self.sets),
-            _ => read_rig(&self.path, &self.sets, self.preset),
+            Some(text) if self.preset.is_none() => parse_random_scenario(text, &self.path, &self.sets),
+            _ => read_random_scenario(&self.path, &self.sets, self.preset),
+        }
+    }
+
+    fn rig(&self) -> Result<Rig, ScenarioError> {
+        let scenario = self.random()?;
+        match self.variation {
+            None => Ok(scenario.into_base()),
+            Some(index) => Ok(scenario.variation(index)?.rig),
         }
     }
 }
@@ -85,6 +98,16 @@ impl Scenario {
         })?;
         let state = State { source, rig: Arc::new(rig), camera, loaded: None, before: None };
         Ok(Self { state: Mutex::new(state), backend, sessions: SessionPool::default() })
+    }
+
+    /// Another scenario, that shares what the change does not touch.
+    fn with_source(&self, change: impl FnOnce(&mut Source)) -> PyResult<Self> {
+        let mut state = self.snapshot();
+        change(&mut state.source);
+        state.rig = Arc::new(state.source.rig().or_input_error()?);
+        state.camera = state.camera.min(state.rig.scenarios().len() - 1);
+        state.before = state.loaded.take().or(state.before);
+        Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: self.sessions.clone() })
     }
 
     fn snapshot(&self) -> State {
@@ -167,7 +190,7 @@ impl Scenario {
     ) -> PyResult<Self> {
         let preset = preset(preset_name)?;
         py.detach(|| {
-            let mut source = Source { path, text: None, sets, preset };
+            let mut source = Source { path, text: None, sets, preset, variation: None };
             // The first reading says what is wrong with the file itself.
             source.rig().or_input_error()?;
             let text = std::fs::read_to_string(&source.path).unwrap_or_default();
@@ -186,20 +209,43 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let source = Source { path, text: Some(text), sets: Vec::new(), preset: None };
+        let source = Source { path, text: Some(text), sets: Vec::new(), preset: None, variation: None };
         py.detach(|| Self::new(source, camera, backend))
     }
 
     /// Another scenario with changes on top, that shares what these do not touch.
     fn changed(&self, py: Python<'_>, sets: Vec<(String, String)>) -> PyResult<Self> {
-        py.detach(|| {
-            let mut state = self.snapshot();
-            state.source.sets.extend(sets);
-            state.rig = Arc::new(state.source.rig().or_input_error()?);
-            state.camera = state.camera.min(state.rig.scenarios().len() - 1);
-            state.before = state.loaded.take().or(state.before);
-            Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: self.sessions.clone() })
-        })
+        py.detach(|| self.with_source(|source| source.sets.extend(sets)))
+    }
+
+    /// Variation `index` of a scenario with `[randomize]`.
+    fn variation(&self, py: Python<'_>, index: u64) -> PyResult<Self> {
+        py.detach(|| self.with_source(|source| source.variation = Some(index)))
+    }
+
+    /// Number of the variation that it is.
+    #[getter]
+    fn variation_index(&self) -> Option<u64> {
+        self.snapshot().source.variation
+    }
+
+    /// Whether it has `[randomize]`.
+    #[getter]
+    fn is_random(&self) -> PyResult<bool> {
+        Ok(self.snapshot().source.random().or_input_error()?.is_random())
+    }
+
+    /// Number of variations, if it is stated.
+    #[getter]
+    fn variations(&self) -> PyResult<Option<u64>> {
+        Ok(self.snapshot().source.random().or_input_error()?.variations())
+    }
+
+    /// What variation `index` draws, as JSON by key.
+    fn drawn(&self, index: u64) -> PyResult<String> {
+        let scenario = self.snapshot().source.random().or_input_error()?;
+        let values = drawn_json(&scenario.drawn(index).or_input_error()?);
+        Ok(serde_json::Value::Object(values).to_string())
     }
 
     /// Changes a key of this scenario.
@@ -265,12 +311,19 @@ impl Scenario {
         engine::backend_name(self.backend)
     }
 
-    /// Every key with its value, as JSON; with `absolute` all paths are.
+    /// Every key with its value, as JSON; with `absolute` all paths are, and `[randomize]` is among the keys.
     fn json(&self, absolute: bool) -> PyResult<String> {
-        let rig = self.snapshot().rig;
+        let State { rig, source, .. } = self.snapshot();
         // Nothing is near the root, so that paths relative to it are absolute ones.
         let tree = if absolute { portable_rig(&rig, Path::new("/")) } else { rig_json(&rig) };
-        Ok(tree.or_run_error()?.to_string())
+        let mut tree = tree.or_run_error()?;
+        if absolute && source.variation.is_none() {
+            let table = source.random().or_input_error()?.randomize_table().or_input_error()?;
+            if let (Some(table), Some(root)) = (table, tree.as_object_mut()) {
+                root.insert(RANDOMIZE.into(), table);
+            }
+        }
+        Ok(tree.to_string())
     }
 
     /// Every key with its value, as TOML.

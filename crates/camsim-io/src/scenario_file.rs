@@ -21,8 +21,8 @@ mod wrong_file_kind;
 
 pub(crate) use paths::for_each_path;
 pub use randomize::{
-    Drawn, RANDOMIZE, RandomScenario, Variation, VariationRecord, parse_random_scenario, randomize,
-    read_random_scenario,
+    Drawn, RANDOMIZE, RandomScenario, Variation, VariationRecord, drawn_json, parse_random_scenario,
+    randomize, read_random_scenario,
 };
 pub use rig::{rig_json, rig_of_table, rig_table};
 pub use schema::{CAMERAS, ValueKind};

@@ -22,7 +22,7 @@ mod law;
 mod written;
 
 use draw::Draw;
-use written::Written;
+use written::{Written, schema_key};
 
 /// The table.
 pub const RANDOMIZE: &str = "randomize";
@@ -40,6 +40,8 @@ pub struct RandomScenario {
     preset: Option<Preset>,
     /// Without one there are no variations.
     spec: Option<RandomizeSpec>,
+    /// The table that `spec` was read from.
+    written: Option<Written>,
 }
 
 /// `[randomize]`.
@@ -129,7 +131,11 @@ impl RandomScenario {
         let mut fixed = Vec::new();
         for (key, text) in sets {
             match key.strip_prefix(RANDOMIZE).and_then(|rest| rest.strip_prefix('.')) {
-                Some(rest) => Written::set(&mut written, &mut tree, rest, text),
+                Some(rest) => {
+                    Written::set(&mut written, &mut tree, rest, text);
+                    // The later word counts.
+                    fixed.retain(|key: &String| !overlaps(&schema_key(key), &schema_key(rest)));
+                }
                 None => {
                     tree.set(key, text)?;
                     fixed.extend(tree.numbered(key));
@@ -140,8 +146,8 @@ impl RandomScenario {
         let base = rig_of_tree(tree.clone(), preset)?;
         let defaults = rig_table(&base)
             .map_err(|error| ScenarioError::Problems(vec![format!("{}: {error}", tree.file.display())]))?;
-        let spec = written.map(|written| written.spec(&tree, &defaults, base.first().seed, &fixed));
-        Ok(Self { spec: spec.transpose()?, tree, base, defaults, preset })
+        let spec = written.as_ref().map(|written| written.spec(&tree, &defaults, base.first().seed, &fixed));
+        Ok(Self { spec: spec.transpose()?, written, tree, base, defaults, preset })
     }
 
     /// The scenario without what is drawn.
@@ -166,6 +172,24 @@ impl RandomScenario {
     #[must_use]
     pub fn variations(&self) -> Option<u64> {
         self.spec.as_ref()?.variations
+    }
+
+    /// `[randomize]` with absolute paths, for the same scenario in another place; `None` without one.
+    ///
+    /// # Errors
+    /// Of a key with `*`, only some elements are drawn, which a table cannot say.
+    pub fn randomize_table(&self) -> Result<Option<Json>, ScenarioError> {
+        let (Some(spec), Some(written)) = (&self.spec, &self.written) else { return Ok(None) };
+        let mut table = Map::new();
+        for draw in &spec.draws {
+            table.insert(draw.name().to_owned(), written.portable(draw, &self.tree)?);
+        }
+        table.insert(SEED.into(), spec.seed.into());
+        table.insert("own_seed".into(), spec.own_seed.into());
+        if let Some(count) = spec.variations {
+            table.insert("variations".into(), count.into());
+        }
+        Ok(Some(Json::Object(table)))
     }
 
     /// The concrete scenario of variation `index`; without `[randomize]` it is that of the file.
@@ -232,10 +256,23 @@ impl Variation {
     /// The record for `run.json`.
     #[must_use]
     pub fn record(&self) -> VariationRecord {
-        let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
-        let values = self.drawn.iter().map(|drawn| (drawn.key.clone(), json(&drawn.value)));
-        VariationRecord { index: self.index, seed: self.seed, values: values.collect() }
+        VariationRecord { index: self.index, seed: self.seed, values: drawn_json(&self.drawn) }
     }
+}
+
+/// Drawn values by their keys.
+#[must_use]
+pub fn drawn_json(drawn: &[Drawn]) -> Map<String, Json> {
+    let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
+    drawn.iter().map(|drawn| (drawn.key.clone(), json(&drawn.value))).collect()
+}
+
+/// Whether one of two keys is the other, or stands below it.
+fn overlaps(a: &str, b: &str) -> bool {
+    let is_below = |key: &str, table: &str| {
+        key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    is_below(a, b) || is_below(b, a)
 }
 
 /// An error of a variation, with the values that it may come from.

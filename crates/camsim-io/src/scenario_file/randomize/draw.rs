@@ -10,7 +10,7 @@ use super::{
     },
     Drawn, RANDOMIZE,
     law::Law,
-    problems,
+    overlaps, problems,
 };
 
 /// A key of `[randomize]` with its distribution.
@@ -21,6 +21,8 @@ pub(super) struct Draw {
     /// Keys that get the value, of one draw.
     targets: Vec<Target>,
     law: Law,
+    /// Whether some of its keys are fixed.
+    is_part: bool,
 }
 
 /// A key that gets a value.
@@ -59,7 +61,7 @@ impl Draw {
             return Err("takes no numbers: write { choice = [...] } with values that it can have".into());
         }
         let targets = targets(name, tree)?;
-        let draw = Self { name: name.into(), targets, law };
+        let draw = Self { name: name.into(), targets, law, is_part: false };
         // Whether values fit the place does not depend on what is drawn.
         let (mut tree, mut drawn) = (tree.clone(), Vec::new());
         match draw.put(&mut tree, defaults, 0, 0, &mut drawn) {
@@ -69,15 +71,21 @@ impl Draw {
         }
     }
 
+    /// The key as written.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether some of its keys are fixed.
+    pub(super) fn is_part(&self) -> bool {
+        self.is_part
+    }
+
     /// Without what stands at these keys, above or below them; `None` if nothing is left.
     pub(super) fn without(mut self, fixed: &[String]) -> Option<Self> {
-        let is_below = |key: &str, table: &str| {
-            key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        };
-        let is_fixed = |target: &Target| {
-            fixed.iter().any(|key| is_below(key, &target.key) || is_below(&target.key, key))
-        };
-        self.targets.retain(|target| !is_fixed(target));
+        let count = self.targets.len();
+        self.targets.retain(|target| !fixed.iter().any(|key| overlaps(key, &target.key)));
+        self.is_part = self.targets.len() < count;
         (!self.targets.is_empty()).then_some(self)
     }
 

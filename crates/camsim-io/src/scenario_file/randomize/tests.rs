@@ -294,3 +294,37 @@ fn values_out_of_range_name_variation_key_and_value() {
         "{error}"
     );
 }
+
+#[test]
+fn the_table_draws_the_same_elsewhere() {
+    let text = "[randomize]\n\"scene.pattern.image\" = { choice = [\"a.png\", \"/b.png\"] }\n\
+                \"camera\" = { choice = [{ photometric = { vignette = \"v.png\" } }] }\nvariations = 4\n\
+                \"camera.fps\" = { uniform = [10, 20] }\nown_seed = false";
+    let scenario = with(text, &[("randomize.seed", "5")]).unwrap();
+    let table = scenario.randomize_table().unwrap().unwrap();
+    let here = std::path::absolute("dir/a.png").unwrap();
+    assert_eq!(table["scene.pattern.image"]["choice"][0], here.to_str().unwrap());
+    let vignette = &table["camera"]["choice"][0]["photometric"]["vignette"];
+    assert_eq!(*vignette, std::path::absolute("dir/v.png").unwrap().to_str().unwrap());
+    let mut tree: Table = toml::from_str(SCENE).unwrap();
+    tree.insert(RANDOMIZE.into(), Value::try_from(&table).unwrap());
+    let text = toml::to_string(&tree).unwrap();
+    let elsewhere = parse_random_scenario(&text, Path::new("other/s.toml"), &[]).unwrap();
+    for index in 0..4 {
+        let [a, b] = [&scenario, &elsewhere].map(|scenario| scenario.variation(index).unwrap());
+        assert_eq!(a.rig.first().camera.fps, b.rig.first().camera.fps);
+        let image = |v: &Variation| {
+            v.rig.first().scene.pattern.clone().unwrap().image.file_name().unwrap().to_owned()
+        };
+        assert_eq!((image(&a), a.seed), (image(&b), b.seed));
+    }
+    // The later word counts.
+    let set = [("camera.fps", "3"), ("randomize.camera.fps", "{ uniform = [10, 20] }")];
+    assert!(with("", &set).unwrap().variation(1).unwrap().rig.first().camera.fps >= 10.0);
+    let part =
+        with(&format!("{RIG}\"cameras.*.fps\" = {{ uniform = [1, 2] }}"), &[("cameras.left.fps", "3")])
+            .unwrap();
+    assert!(part.randomize_table().unwrap_err().to_string().contains("name each element"));
+    let error = read("[randomise]\nx = 1").unwrap_err().to_string();
+    assert!(error.contains("did you mean `randomize`"), "{error}");
+}

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use serde_json::Value as Json;
 use toml::{Table, Value};
 
 use super::{
     super::{
-        ScenarioError,
-        schema::{CAMERAS, SCENARIO, ValueKind},
+        ScenarioError, for_each_path,
+        schema::{CAMERAS, SCENARIO, ValueKind, like_camera},
         similar::nearest_word,
         tree::{KeyLocation, Tree, join, value},
     },
@@ -72,7 +73,7 @@ impl Written {
 
     /// Checks all of it. Keys that `--set` has fixed are not drawn.
     pub(super) fn spec(
-        self,
+        &self,
         tree: &Tree,
         defaults: &Table,
         scenario_seed: u64,
@@ -101,6 +102,51 @@ impl Written {
             found.extend(read.err().map(|message| (key.clone(), message)));
         }
         if found.is_empty() { Ok(spec) } else { Err(problems(tree, &found)) }
+    }
+}
+
+impl Written {
+    /// The distribution of a key as it is written, with absolute paths.
+    pub(super) fn portable(&self, draw: &Draw, tree: &Tree) -> Result<Json, ScenarioError> {
+        let key = draw.name();
+        let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
+        let mut law = self.values.get(key).map(json).unwrap_or_default();
+        if draw.is_part() {
+            let message =
+                "some of its elements are fixed by --set, which no table can say; name each element";
+            return Err(problems(tree, &[(key.to_owned(), message.into())]));
+        }
+        for choice in law.get_mut("choice").and_then(Json::as_array_mut).into_iter().flatten() {
+            make_paths_absolute(key, choice, tree);
+        }
+        Ok(law)
+    }
+}
+
+/// Makes the paths of a value at a key absolute.
+fn make_paths_absolute(key: &str, value: &mut Json, tree: &Tree) {
+    let location = join(RANDOMIZE, key);
+    let absolute = |path: &mut String| {
+        let resolved = tree.resolve(&location, path);
+        *path = std::path::absolute(&resolved).unwrap_or(resolved).to_string_lossy().into_owned();
+    };
+    let plain = like_camera(&schema_key(key)).into_owned();
+    let is_camera = plain == "camera" || plain == CAMERAS;
+    match value {
+        // A camera file.
+        Json::String(path) if is_camera => absolute(path),
+        value => {
+            // In its place within a scenario, where paths are known.
+            let mut nested = std::mem::take(value);
+            for step in plain.rsplit('.') {
+                nested = Json::Object([(step.to_owned(), nested)].into_iter().collect());
+            }
+            for_each_path(&mut nested, &mut |_, path| absolute(path));
+            for step in plain.split('.') {
+                nested = nested.get_mut(step).map(std::mem::take).unwrap_or_default();
+            }
+            *value = nested;
+        }
     }
 }
 
