@@ -60,7 +60,10 @@ def dataset(
     :param num_cpus: Processors of each actor.
     :param batch_size: Samples that an actor renders at once.
     """
-    samples = Samples(source, channels, frames)
+    return _rendered(Samples(source, channels, frames), concurrency, num_cpus, batch_size)
+
+
+def _rendered(samples: Samples, concurrency: int | tuple[int, int], num_cpus: float, batch_size: int) -> Any:
     blocks = max(1, -(-len(samples) // batch_size))
     numbers = ray.data.range(len(samples), override_num_blocks=blocks)
     return numbers.map_batches(
@@ -70,4 +73,6 @@ def dataset(
         batch_format="numpy",
         concurrency=concurrency,
         num_cpus=num_cpus,
+        # A renderer takes a machine's processors: actors go to different machines first.
+        scheduling_strategy="SPREAD",
     )

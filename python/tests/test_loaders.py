@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import pathlib
+import threading
+import time
 from typing import Any
 
 import camsim
@@ -74,24 +76,54 @@ def test_two_workers_give_the_bytes_of_one_process(
     assert sorted(seen) == list(range(COUNT))
 
 
-def test_a_killed_node_changes_no_byte(pattern: pathlib.Path, rendered: list[dict[str, Any]]) -> None:
+def slow_samples(pattern: pathlib.Path, marks: pathlib.Path) -> Any:
+    """Samples that take a second, and leave a file with the node's name for each."""
+    from camsim._samples import Samples
+
+    class Slow(Samples):
+        def __getitem__(self, index: Any) -> dict[str, Any]:
+            import ray
+
+            node = ray.get_runtime_context().get_node_id()
+            (marks / f"{node}-{int(index)}").touch()
+            time.sleep(1)
+            return super().__getitem__(index)
+
+    return Slow(variations(pattern), CHANNELS, None)
+
+
+def test_a_killed_node_changes_no_byte(
+    pattern: pathlib.Path, rendered: list[dict[str, Any]], tmp_path: pathlib.Path
+) -> None:
     pytest.importorskip("ray.data")
     import camsim.ray
     import ray
     from ray.cluster_utils import Cluster
 
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 2})
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 2, "include_dashboard": False})
     try:
         node = cluster.add_node(num_cpus=2)
         ray.init(address=cluster.address, log_to_driver=False)
         cluster.wait_for_nodes()
-        frames = camsim.ray.dataset(variations(pattern), channels=CHANNELS, concurrency=(1, 2), batch_size=1)
-        rows = []
+        both = threading.Event()
+
+        def kill_when_both_render() -> None:
+            while len({mark.name.split("-")[0] for mark in tmp_path.iterdir()}) < 2:
+                time.sleep(0.05)
+            cluster.remove_node(node, allow_graceful=False)
+            both.set()
+
+        killer = threading.Thread(target=kill_when_both_render, daemon=True)
+        killer.start()
+        frames = camsim.ray._rendered(slow_samples(pattern, tmp_path), 2, 1, 1)
+        rows, late = [], 0
         for row in frames.iter_rows():
             rows.append(row)
-            if len(rows) == 2:
-                cluster.remove_node(node, allow_graceful=False)
+            late += both.is_set()
+        assert late > 0, "the node was killed on the way"
         assert sorted(int(row["sample"]) for row in rows) == list(range(COUNT))
+        # What the lost node had begun was rendered again.
+        assert len(list(tmp_path.iterdir())) > COUNT
         for row in rows:
             wanted = rendered[int(row["sample"])]
             for channel in CHANNELS:
