@@ -13,7 +13,7 @@ from .randomize import Variations
 from .scenario import Scenario
 
 
-class Samples(Sequence[dict[str, Any]]):
+class Samples:
     """Frames by number. Of variations, sample i is frame `frames[i % n]` of variation `i // n`.
 
     Nothing is rendered, and no renderer is opened, before a sample is asked for; the object may be taken into a fork or
