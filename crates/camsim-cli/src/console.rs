@@ -1,6 +1,7 @@
 //! Output streams: results go to standard output, messages to standard error.
 
 use std::{
+    collections::HashSet,
     ffi::{OsStr, OsString},
     fmt,
     io::{self, Write},
@@ -23,6 +24,10 @@ pub struct Console<'a> {
     scenario: Option<(PathBuf, Vec<String>)>,
     /// The camera of several that messages are about.
     camera: Option<String>,
+    /// The variation of a random scenario that messages are about.
+    variation: Option<u64>,
+    /// Of a series of variations: what has been said, and is not said again.
+    said: Option<HashSet<String>>,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -45,6 +50,8 @@ impl<'a> Console<'a> {
             typed: Vec::new(),
             scenario: None,
             camera: None,
+            variation: None,
+            said: None,
         }
     }
 
@@ -61,6 +68,16 @@ impl<'a> Console<'a> {
     /// Sets the camera of several that messages are about.
     pub fn set_camera(&mut self, name: Option<&str>) {
         self.camera = name.map(str::to_owned);
+    }
+
+    /// Sets the variation of a random scenario that messages are about.
+    pub fn set_variation(&mut self, index: Option<u64>) {
+        self.variation = index;
+    }
+
+    /// From now on a note that several variations have is printed once, with the number of the first.
+    pub fn begin_series(&mut self) {
+        self.said = Some(HashSet::new());
     }
 
     /// The command line as typed.
@@ -83,7 +100,8 @@ impl<'a> Console<'a> {
         let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
         let camera = self.camera.as_ref().map(|name| format!(" --camera {name}")).unwrap_or_default();
         let path = quoted(scenario.as_os_str()) + &camera;
-        let words = changes.iter().map(|word| quoted(word.as_ref()));
+        let variation = self.variation.map(|index| ["--variation".to_owned(), index.to_string()]);
+        let words = changes.iter().chain(variation.iter().flatten()).map(|word| quoted(word.as_ref()));
         let with_changes = std::iter::once(path.clone()).chain(words).collect::<Vec<_>>().join(" ");
         text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}"))
             .replace("SCENARIO.toml", &with_changes)
@@ -141,8 +159,18 @@ impl<'a> Console<'a> {
 
     /// Prints a note to standard error, unless `-q`.
     pub fn note(&mut self, text: impl fmt::Display) {
-        if !self.quiet {
-            self.complain(&format!("{text}\n"));
+        if self.quiet {
+            return;
+        }
+        let text = text.to_string();
+        match (&mut self.said, self.variation) {
+            (Some(said), Some(index)) => {
+                let is_new = said.insert(text.clone());
+                if is_new {
+                    self.complain(&format!("variation {index}: {text}\n"));
+                }
+            }
+            _ => self.complain(&format!("{text}\n")),
         }
     }
 

@@ -39,6 +39,16 @@ impl Failure {
         Self { code: INTERRUPTED, error: error.into() }
     }
 
+    /// Says of which variation it is; an interruption says so itself.
+    #[must_use]
+    pub fn of_variation(self, index: u64) -> Self {
+        if self.code == INTERRUPTED {
+            return self;
+        }
+        let text = format!("variation {index}: {}", self.error);
+        Self { code: self.code, error: self.error.context(text) }
+    }
+
     /// The exit code.
     #[must_use]
     pub fn code(&self) -> u8 {

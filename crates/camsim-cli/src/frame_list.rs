@@ -116,6 +116,36 @@ impl FrameList {
     }
 }
 
+impl FrameList {
+    /// The same for `--variations`, of a scenario with `count` of them, or as many as one likes.
+    ///
+    /// # Errors
+    /// A message for the user.
+    pub fn variations(&self, count: Option<u64>) -> Result<Vec<u64>, String> {
+        let is_open = self.0.iter().any(|part| part.end.is_none());
+        let first = self.0.iter().map(|part| part.first).max().unwrap_or(0);
+        let end = self.0.iter().filter_map(|part| part.end).max().unwrap_or(0).max(first.saturating_add(1));
+        match count {
+            Some(count) if end > count => Err(format!(
+                "--variations: variation {} does not exist, the last one is {}; raise randomize.variations",
+                first.max(count),
+                count.saturating_sub(1)
+            )),
+            Some(count) => self.resolve(count).map_err(|error| error.to_string()),
+            None if is_open => {
+                Err("--variations has no end: write 0..100, or state randomize.variations".into())
+            }
+            None if end - self.0.iter().map(|part| part.first).min().unwrap_or(0) > MOST_VARIATIONS => {
+                Err(format!("--variations: more than {MOST_VARIATIONS} in one run; render them in parts"))
+            }
+            None => self.resolve(end).map_err(|error| error.to_string()),
+        }
+    }
+}
+
+/// Most variations of one run, which lists them.
+pub const MOST_VARIATIONS: u64 = 10_000_000;
+
 /// `--shard I/N`: every N-th frame, starting with the I-th (counted from 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard(
@@ -191,6 +221,22 @@ mod tests {
         assert_eq!(frames("12..", 10), outside(12));
         // A huge range is refused before it is listed.
         assert_eq!(frames("0..18446744073709551615", 10), outside(10));
+    }
+
+    #[test]
+    fn variations_have_a_stated_number_or_no_end() {
+        let variations = |text: &str, count| text.parse::<FrameList>().unwrap().variations(count);
+        assert_eq!(variations("17", None), Ok(vec![17]));
+        assert_eq!(variations("99998..100000", None), Ok(vec![99_998, 99_999]));
+        assert_eq!(variations("3..", Some(5)), Ok(vec![3, 4]));
+        for (text, count, wanted) in [
+            ("3..", None, "has no end"),
+            ("3..7", Some(5), "variation 5 does not exist, the last one is 4"),
+            ("0..18446744073709551615", None, "render them in parts"),
+        ] {
+            let error = variations(text, count).unwrap_err();
+            assert!(error.contains(wanted), "{text}: {error}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
+    imaging::ImageSensor,
     reference::{Oracle, RenderOptions},
     scenario::Auto,
     scene::LodSelection,
@@ -100,6 +101,8 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 pub struct ReferenceSource {
     /// One, or one a face.
     oracles: Vec<Oracle>,
+    /// For what faces are joined to; a single oracle has its own.
+    sensor: Option<ImageSensor>,
     planner: Planner,
     options: RenderOptions,
 }
@@ -126,7 +129,8 @@ impl ReferenceSource {
             _ => Oracle::new(planner.lane(lane).sequence().clone()),
         };
         let oracles = (0..planner.lanes()).map(oracle).collect::<Result<_, _>>().or_bad_input()?;
-        Ok(Self { oracles, planner, options })
+        let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
+        Ok(Self { oracles, sensor, planner, options })
     }
 
     fn finished(&self, oracle: &Oracle, plan: FramePlan) -> Finished {
@@ -179,6 +183,9 @@ impl FrameSource for ReferenceSource {
             let faces = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
             if let Some(mut whole) = join_faces(faces) {
                 whole.frame.rows = rows;
+                if let Some(sensor) = &self.sensor {
+                    sensor.expose(&mut whole.frame, whole.plan.stamp_s);
+                }
                 sink(whole).or_failed()?;
             }
         }

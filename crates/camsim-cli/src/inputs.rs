@@ -9,8 +9,8 @@ use camsim_core::{
     tracker::TrackResult,
 };
 use camsim_io::{
-    load::{Loaded, flight_warnings, load_flight, load_rig, load_sequence},
-    scenario_file::read_rig,
+    load::{Loaded, flight_warnings, load_flight, load_sequence, reload_rig, reload_sequence},
+    scenario_file::{RandomScenario, read_random_scenario},
 };
 
 use crate::{
@@ -28,6 +28,9 @@ pub struct ScenarioArgs {
     /// Camera of a scenario with [[cameras]], by its name [default: the first]
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Variation of a scenario with [randomize] [default: without what is drawn]
+    #[arg(long, value_name = "K")]
+    pub variation: Option<u64>,
 }
 
 /// Changes of a scenario by the command line.
@@ -72,19 +75,53 @@ fn parse_set(text: &str) -> Result<(String, String), String> {
 impl ScenarioArgs {
     /// Reads the scenario, of one of its cameras, and applies the changes; hints name both from then on.
     pub fn read(&self, console: &mut Console<'_>) -> Result<Scenario, Failure> {
-        let rig = read_changed_rig(&self.scenario, &self.changes, console)?;
+        let rig = read_changed_rig(&self.scenario, &self.changes, self.variation, console)?;
         choose_camera(&rig, self.camera.as_deref(), console).cloned()
     }
 }
 
-/// Reads a scenario of one camera or several, and applies the changes; hints name it from then on.
-pub fn read_changed_rig(path: &Path, changes: &Changes, console: &mut Console<'_>) -> Result<Rig, Failure> {
+/// Reads a scenario, or one variation of it, and applies the changes; hints name it from then on.
+pub fn read_changed_rig(
+    path: &Path,
+    changes: &Changes,
+    variation: Option<u64>,
+    console: &mut Console<'_>,
+) -> Result<Rig, Failure> {
+    let scenario = read_changed(path, changes, console)?;
+    let Some(index) = variation else {
+        if scenario.is_random() {
+            console.note("[randomize] is left out: --variation K chooses values");
+        }
+        return Ok(scenario.into_base());
+    };
+    refuse_fixed(&scenario)?;
+    console.set_variation(Some(index));
+    Ok(scenario.variation(index).or_bad_input()?.rig)
+}
+
+/// Refuses a scenario without `[randomize]` where a variation is asked for.
+pub fn refuse_fixed(scenario: &RandomScenario) -> Result<(), Failure> {
+    if scenario.is_random() {
+        return Ok(());
+    }
+    Err(Failure::bad_input(anyhow!(
+        "the scenario has no [randomize], so it has no variations: leave out --variation, or add [randomize]"
+    )))
+}
+
+/// Reads a scenario of one camera or several, which may have `[randomize]`, and applies the changes; hints name it
+/// from then on.
+pub fn read_changed(
+    path: &Path,
+    changes: &Changes,
+    console: &mut Console<'_>,
+) -> Result<RandomScenario, Failure> {
     console.set_scenario(path, changes.words());
     let preset = changes.preset.map(|preset| match preset {
         PresetArg::Default => Preset::Default,
         PresetArg::Paper => Preset::Paper,
     });
-    read_rig(path, &changes.sets, preset).or_bad_input()
+    read_random_scenario(path, &changes.sets, preset).or_bad_input()
 }
 
 /// The scenario of the camera with a name. Without a name it is that of the first one; of several, a note says
@@ -128,21 +165,30 @@ pub fn camera_position(rig: &Rig, name: &str) -> Result<usize, Failure> {
 
 /// Loads the files of a scenario, and prints warnings.
 pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Failure> {
-    let mut loaded = load_sequence(scenario).or_bad_input()?;
+    with_warnings(load_sequence(scenario).or_bad_input()?, console)
+}
+
+/// Prints the warnings of a loaded scenario.
+fn with_warnings(mut loaded: Loaded, console: &mut Console<'_>) -> Result<Loaded, Failure> {
     loaded.warnings.iter_mut().for_each(|warning| *warning = console.whole(warning));
     for warning in &loaded.warnings {
         console.warn(warning);
     }
-    print_details(scenario, &loaded.log, console);
+    print_details(&loaded.sequence.scenario, &loaded.log, console);
     Ok(loaded)
 }
 
-/// As [`load`], for all cameras of a rig. Warnings that all of them have are printed once.
-pub fn load_cameras(rig: &Rig, console: &mut Console<'_>) -> Result<Vec<Loaded>, Failure> {
+/// As [`load`], for all cameras of a rig. Warnings that all of them have are printed once. What is the same in
+/// `before` is not read again.
+pub fn load_cameras(rig: &Rig, before: &[Loaded], console: &mut Console<'_>) -> Result<Vec<Loaded>, Failure> {
     if !rig.is_list() {
-        return Ok(vec![load(rig.first(), console)?]);
+        let loaded = match before.first() {
+            Some(before) => reload_sequence(rig.first(), before),
+            None => load_sequence(rig.first()),
+        };
+        return Ok(vec![with_warnings(loaded.or_bad_input()?, console)?]);
     }
-    let mut all = load_rig(rig).or_bad_input()?;
+    let mut all = reload_rig(rig, before).or_bad_input()?;
     let is_shared = |warning: &String| all.iter().all(|loaded| loaded.warnings.contains(warning));
     let shared: Vec<String> = all[0].warnings.iter().filter(|warning| is_shared(warning)).cloned().collect();
     for warning in &shared {

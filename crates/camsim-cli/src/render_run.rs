@@ -15,6 +15,7 @@ use camsim_io::{
     load::TrackInputs,
     manifest::{RunManifest, in_shard},
     portable::write_camera,
+    scenario_file::VariationRecord,
     write::{FrameWriter, SourceFrame, WriteError},
 };
 
@@ -55,6 +56,8 @@ pub struct Job<'a> {
     pub camera: Option<&'a str>,
     /// The loaded sequence.
     pub sequence: &'a Arc<Sequence>,
+    /// Which variation of a random scenario it is.
+    pub variation: Option<&'a VariationRecord>,
     /// Output folder.
     pub folder: &'a Path,
     /// Frames of all shards, in ascending order.
@@ -346,6 +349,7 @@ fn manifest(job: &Job<'_>, pictures: &Pictures, adapter: String) -> RunManifest 
         adapter,
         seed: scenario.seed,
         paths: String::new(),
+        variation: job.variation.cloned(),
         twin: pictures.twin.clone(),
         scenario: scenario.clone(),
         inputs: pictures.inputs.clone(),

@@ -20,9 +20,12 @@ pub struct TimesTable {
 type Parts = Vec<(String, Vec<f64>)>;
 
 impl TimesTable {
-    /// Adds a stage before the first frame.
+    /// Adds a stage before the first frame, or time to it.
     pub fn add_start(&mut self, name: &'static str, time: Duration) {
-        self.start.push((name, time));
+        match self.start.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += time,
+            None => self.start.push((name, time)),
+        }
     }
 
     /// Runs and times a stage before the first frame, with a progress message if it takes long.

@@ -31,6 +31,7 @@
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
 //! | [`imaging`] | the image sensor: electrons, digital numbers, mosaics |
+//! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
 //! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
@@ -55,6 +56,7 @@
 
 pub mod apply;
 pub mod camera;
+pub mod distribution;
 pub mod flight_log;
 pub mod frame;
 pub mod geodesy;

@@ -128,7 +128,7 @@ pub(crate) fn upper_quantile(p: f64) -> f64 {
 }
 
 /// `1 - Phi(z)` for `z >= 0`.
-fn upper_tail(z: f64) -> f64 {
+pub(crate) fn upper_tail(z: f64) -> f64 {
     let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
     if z < 3.0 {
         // Phi(z) = 1/2 + density * (z + z^3/3 + z^5/(3*5) + ...)

@@ -247,13 +247,21 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
 /// # Errors
 /// As [`load_sequence`]; those of a camera of several name it.
 pub fn load_rig(rig: &Rig) -> Result<Vec<Loaded>, LoadError> {
+    reload_rig(rig, &[])
+}
+
+/// As [`load_rig`], but reuses parts of the cameras of `before` as [`reload_sequence`] does.
+///
+/// # Errors
+/// As [`load_rig`].
+pub fn reload_rig(rig: &Rig, before: &[Loaded]) -> Result<Vec<Loaded>, LoadError> {
     let mut all: Vec<Loaded> = Vec::new();
     for scenario in rig.scenarios() {
         let of_camera = |source| match rig.is_list() {
             true => LoadError::Camera { name: scenario.camera.name.clone(), source: Box::new(source) },
             false => source,
         };
-        all.push(load_or_reuse(scenario, all.first()).map_err(of_camera)?);
+        all.push(load_or_reuse(scenario, all.first().or(before.first())).map_err(of_camera)?);
     }
     Ok(all)
 }

@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::{
     inputs::Inputs,
     portable::{portable_scenario, relative_to},
-    scenario_file::for_each_path,
+    scenario_file::{VariationRecord, for_each_path},
     write::{WriteError, write_atomic},
 };
 
@@ -40,6 +40,9 @@ pub struct RunManifest {
     pub seed: u64,
     /// Base of the paths: [`PATHS`].
     pub paths: String,
+    /// Which variation of a scenario with `[randomize]` it is. `scenario` has its values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variation: Option<VariationRecord>,
     /// In the folder of a twin: which one it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin: Option<TwinRecord>,

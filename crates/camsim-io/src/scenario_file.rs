@@ -12,6 +12,7 @@ use thiserror::Error;
 
 pub(crate) mod check;
 mod paths;
+mod randomize;
 mod rig;
 pub(crate) mod schema;
 mod similar;
@@ -19,6 +20,10 @@ pub(crate) mod tree;
 mod wrong_file_kind;
 
 pub(crate) use paths::for_each_path;
+pub use randomize::{
+    Drawn, RANDOMIZE, RandomScenario, Variation, VariationRecord, drawn_json, parse_random_scenario,
+    randomize, read_random_scenario,
+};
 pub use rig::{rig_json, rig_of_table, rig_table};
 pub use schema::{CAMERAS, ValueKind};
 use tree::Tree;
@@ -82,13 +87,24 @@ pub enum ScenarioError {
         /// Names of the cameras.
         names: Vec<String>,
     },
+    /// A variation of `[randomize]` has drawn values that cannot be used.
+    #[error("variation {variation} ({drawn}): {source}")]
+    Variation {
+        /// Its number.
+        variation: u64,
+        /// Drawn values, `key = value`.
+        drawn: String,
+        /// What is wrong.
+        source: Box<ScenarioError>,
+    },
     /// Wrong keys, types or ranges: one line each, with file and line.
     #[error("{}", .0.join("\n"))]
     Problems(Vec<String>),
 }
 
 /// Reads a scenario of one camera or of several, or that of a `run.json`, with `sets` (`--set key=value`, in
-/// order) and `preset` on top, and checks all of it.
+/// order) and `preset` on top, and checks all of it. What `[randomize]` draws is left out
+/// ([`read_random_scenario`]).
 ///
 /// # Errors
 /// The file or its camera file cannot be read or is not TOML; a key is unknown, of the wrong type or out of
@@ -98,7 +114,7 @@ pub fn read_rig(
     sets: &[(String, String)],
     preset: Option<Preset>,
 ) -> Result<Rig, ScenarioError> {
-    finish(Tree::read_scenario(path)?, sets, preset)
+    Ok(read_random_scenario(path, sets, preset)?.into_base())
 }
 
 /// As [`read_rig`], from the text of the file `path`, which is not read.
@@ -106,7 +122,7 @@ pub fn read_rig(
 /// # Errors
 /// As [`read_rig`].
 pub fn parse_rig(text: &str, path: &Path, sets: &[(String, String)]) -> Result<Rig, ScenarioError> {
-    finish(Tree::parse(text, path, "")?, sets, None)
+    Ok(parse_random_scenario(text, path, sets)?.into_base())
 }
 
 /// As [`read_rig`], for a scenario with `[camera]`.
@@ -199,12 +215,7 @@ pub fn keys() -> &'static [(&'static str, ValueKind)] {
 }
 
 /// Turns a tree into checked scenarios.
-fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> Result<Rig, ScenarioError> {
-    tree.resolve_cameras()?;
-    for (key, text) in sets {
-        tree.set(key, text)?;
-    }
-    tree.check_cameras()?;
+fn rig_of_tree(mut tree: Tree, preset: Option<Preset>) -> Result<Rig, ScenarioError> {
     let problems = check::check(&mut tree, &schema::SCENARIO, "");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));

@@ -31,6 +31,13 @@
 //! OUT/left/...                    all of the above, of the camera `left`
 //! ```
 //!
+//! Variations of a scenario with `[randomize]` have such a folder each, of one camera or of a rig:
+//!
+//! ```text
+//! OUT/variations.csv              what each variation has drawn
+//! OUT/variation_000017/...        all of the above
+//! ```
+//!
 //! Paths in these files are relative to the file that holds them ([`crate::portable`]).
 //!
 //! `output.format` selects the formats of colour; the other channels have one format each. If it is empty, no
@@ -53,6 +60,7 @@ mod rig;
 mod sensors;
 mod tables;
 mod tracks;
+mod variations;
 mod video;
 
 pub use atomic::{is_special, open_special, write_atomic};
@@ -74,6 +82,7 @@ pub use tables::{
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
 pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
+pub use variations::{VARIATIONS_CSV, VariationsError, variation_folder, write_variations};
 pub use video::Y4mStream;
 
 /// Why a file was not written.

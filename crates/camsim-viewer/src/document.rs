@@ -11,7 +11,7 @@ use std::{
 
 use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, validate_rig};
 use camsim_io::{
-    scenario_file::{CAMERAS, ValueKind, keys, read_rig, rig_of_table, rig_table},
+    scenario_file::{CAMERAS, ValueKind, keys, read_random_scenario, rig_of_table, rig_table},
     write::write_atomic,
 };
 use toml::{Table, Value};
@@ -34,6 +34,8 @@ pub struct Document {
     pub problems: Vec<Problem>,
     /// Incremented when files are to be read again.
     pub reload_count: u64,
+    /// Whether the file has `[randomize]`, which is not edited here.
+    is_random: bool,
     /// The last legal scenario with all cameras.
     rig: Rig,
     /// Number of the shown camera. Keys of `camera` are its own.
@@ -58,7 +60,8 @@ impl Document {
     /// # Errors
     /// Message with file, line and remedy.
     pub fn open(path: &Path) -> Result<Self, String> {
-        let rig = read_rig(path, &[], None).map_err(|error| error.to_string())?;
+        let scenario = read_random_scenario(path, &[], None).map_err(|error| error.to_string())?;
+        let (is_random, rig) = (scenario.is_random(), scenario.into_base());
         let tree = tree_of(&rig).map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(Self {
             path: path.into(),
@@ -67,6 +70,7 @@ impl Document {
             camera: 0,
             problems: Vec::new(),
             reload_count: 0,
+            is_random,
             opened: tree.clone(),
             saved: tree.clone(),
             tree,
@@ -234,9 +238,16 @@ impl Document {
         if let Some(problem) = self.problems.first() {
             return Err(format!("not saved: {problem}"));
         }
+        if self.is_random && path == self.path {
+            return Err(format!(
+                "not saved: {} has [randomize], which would be lost; save under another name, or edit it as text",
+                path.display()
+            ));
+        }
         let text = self.to_toml(path.parent())?;
         write_atomic(path, text.as_bytes()).map_err(|error| error.to_string())?;
         self.path = path.into();
+        self.is_random = false;
         self.saved = self.tree.clone();
         Ok(())
     }

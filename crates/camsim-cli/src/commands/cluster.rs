@@ -84,7 +84,15 @@ pub fn run(args: &ClusterArgs, console: &mut Console<'_>) -> Result<(), Failure>
         Kind::Local(args) => args,
     };
     let folder = &shards.output;
-    let rig = inputs::read_changed_rig(&shards.scenario, &shards.changes, console)?;
+    let scenario = inputs::read_changed(&shards.scenario, &shards.changes, console)?;
+    if scenario.is_random() {
+        return Err(Failure::bad_input(anyhow!(
+            "camsim cluster makes shards of the frames of one scenario, and this one has [randomize]: in an array job, \
+             `camsim render {} -o OUT --shard I/N --resume` renders every N-th variation, all into one folder",
+            shards.scenario.display()
+        )));
+    }
+    let rig = scenario.into_base();
     if folder.join("shards").exists() {
         return Err(Failure::bad_input(anyhow!(
             "{} has shards already: choose another folder, or remove that one",

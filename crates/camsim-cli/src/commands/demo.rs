@@ -68,14 +68,19 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = args.backend.open()?;
     console.note(format_args!("rendering on {engine}"));
     let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
-    let scenario =
-        ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default(), camera: None }
-            .read(console)?;
+    let scenario = ScenarioArgs {
+        scenario: scene.clone(),
+        changes: inputs::Changes::default(),
+        camera: None,
+        variation: None,
+    }
+    .read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
     let resume_command = console.command();
     let warnings = &loaded.warnings;
     let job = Job {
+        variation: None,
         camera: None,
         sequence: &loaded.sequence,
         tracks: &loaded.tracks,

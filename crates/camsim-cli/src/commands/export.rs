@@ -12,7 +12,7 @@ use crate::{
     console::{Console, quoted},
     failure::{Failure, OrFail},
     frame_list::FrameList,
-    inputs::Changes,
+    inputs::{self, Changes},
     interrupt,
     progress::frames_bar,
     render_run::Lock,
@@ -46,6 +46,9 @@ pub struct ExportArgs {
     frames: Option<FrameList>,
     #[command(flatten)]
     changes: Changes,
+    /// Variation of a scenario with [randomize] [default: without what is drawn]
+    #[arg(long, value_name = "K")]
+    variation: Option<u64>,
     /// Renderer of a scenario
     #[arg(long, value_enum)]
     backend: Option<RenderBackend>,
@@ -80,9 +83,10 @@ pub fn run(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Failure> 
 /// Options that change a scenario have no use with frames that are rendered.
 fn refuse_scenario_options(args: &ExportArgs) -> Result<(), Failure> {
     let has_changes = !args.changes.sets.is_empty() || args.changes.preset.is_some();
-    if has_changes || args.frames.is_some() || args.backend.is_some() {
+    if has_changes || args.frames.is_some() || args.backend.is_some() || args.variation.is_some() {
         return Err(Failure::bad_input(anyhow!(
-            "{} is a folder of frames that are rendered: --set, --preset, --frames and --backend go with a scenario",
+            "{} is a folder of frames that are rendered: --set, --preset, --variation, --frames and --backend go with a \
+             scenario",
             args.source.display()
         )));
     }
@@ -92,9 +96,9 @@ fn refuse_scenario_options(args: &ExportArgs) -> Result<(), Failure> {
 /// Renders what the layout needs; returns the folder.
 fn render_source(args: &ExportArgs, console: &mut Console<'_>) -> Result<PathBuf, Failure> {
     let folder = args.output.join("camsim");
-    let (frames, changes) = (args.frames.clone(), args.changes.clone());
-    let rendered = RenderArgs::for_export(frames, changes, args.backend);
-    render(&rendered, &args.source, &folder, Some(args.format), console)?;
+    let rendered = RenderArgs::for_export(args.frames.clone(), args.changes.clone(), args.backend);
+    let rig = inputs::read_changed_rig(&args.source, &args.changes, args.variation, console)?;
+    render(&rendered, rig, &folder, Some(args.format), console)?;
     Ok(folder)
 }
 

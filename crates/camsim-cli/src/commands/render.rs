@@ -1,7 +1,7 @@
 //! `camsim render`.
 
 use std::{
-    ops::ControlFlow,
+    cell::OnceCell,
     path::{Path, PathBuf},
 };
 
@@ -9,30 +9,24 @@ use anyhow::anyhow;
 use camsim_core::scenario::{
     Auto, Channel, DatasetFormat, ImageFormat, Preset, Rig, Scenario, Solver, validate,
 };
-use camsim_engine::Finished;
-use camsim_io::{
-    merge::write_checksums,
-    scenario_file::print_default,
-    write::{Y4mStream, channel_pictures},
-};
+use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::export::{export_datasets, with_needs};
+use super::export::export_datasets;
 use crate::{
     backend,
-    channel_sheet::write_channel_sheet,
     console::Console,
-    failure::{FAILED, Failure, OrFail},
+    failure::Failure,
     frame_list::{FrameList, Shard},
-    frame_source::{EngineSource, FrameSource, ReferenceSource},
     inputs::{self, Changes},
-    render_run::Selected,
-    times_table::TimesTable,
+    render_run::Outcome,
 };
 
 mod cameras;
+mod stage;
+mod variations;
 
-use cameras::{chosen_cameras, frames_of_cameras, piped_camera};
+use stage::{Part, Stage};
 
 /// Render the frames of a scenario
 ///
@@ -53,6 +47,8 @@ Examples:
   camsim render flight.toml -o out --shard 2/4        the second of four machines
   camsim render flight.toml -o out --resume           only what is missing
   camsim render rig.toml -o out --camera left         one camera of several
+  camsim render random.toml -o out --variations 0..100
+                                                      scenarios that [randomize] draws
   camsim render flight.toml --backend cpu             without a graphics adapter
   camsim render flight.toml --backend reference --frames 7
                                                       exactly and slowly
@@ -97,7 +93,7 @@ pub struct RenderArgs {
     /// Also write channels.png: the channels of the first frame as pictures in colour, four in a row
     #[arg(long, conflicts_with = "pipe")]
     sheet: bool,
-    /// Render only the I-th of N parts, with I from 1
+    /// Render only the I-th of N parts, with I from 1: every N-th frame, or every N-th variation
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Write checksums.csv at the end: size and CRC-32 of each file, which `camsim merge` checks
@@ -106,6 +102,10 @@ pub struct RenderArgs {
     /// Pass the frames to standard output as an uncompressed video (y4m), too, for ffmpeg, mpv or GStreamer
     #[arg(long)]
     pipe: bool,
+    /// Variations of a scenario with [randomize], each into a folder DIR/variation_000017: 17, 0..100 (without 100)
+    /// ... [default: all, if randomize.variations says how many]
+    #[arg(long, visible_alias = "variation", value_name = "LIST")]
+    variations: Option<FrameList>,
     /// Print a scenario with every key, its default and its meaning, and exit
     #[arg(long, exclusive = true)]
     print_default: bool,
@@ -170,7 +170,11 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         return Ok(console.print(&print_default())?);
     };
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
-    let datasets = render(args, &path, &folder, None, console)?;
+    let scenario = inputs::read_changed(&path, &args.changes, console)?;
+    if scenario.is_random() || args.variations.is_some() {
+        return variations::run(args, &scenario, &folder, console);
+    }
+    let datasets = render(args, scenario.into_base(), &folder, None, console)?;
     if args.shard.is_some() && !datasets.is_empty() {
         console.note("a shard writes no datasets: when all are there, `camsim export DIR --as ...` does");
         return Ok(());
@@ -178,95 +182,32 @@ pub fn run(args: &RenderArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     export_datasets(&folder, &datasets, args.pipe, console)
 }
 
-/// Renders the scenario at `path` with all that its datasets need, which are returned, or that `export` needs.
+/// Renders a scenario with all that its datasets need, which are returned, or that `export` needs.
 pub fn render(
     args: &RenderArgs,
-    path: &Path,
+    rig: Rig,
     folder: &Path,
     export: Option<DatasetFormat>,
     console: &mut Console<'_>,
 ) -> Result<Vec<DatasetFormat>, Failure> {
-    let rig = inputs::read_changed_rig(path, &args.changes, console)?.try_map(|scenario| {
-        with_needs(with_backend(with_outputs(scenario, args)?, args.backend)?, export, console)
-    })?;
-    let cameras = chosen_cameras(&rig, &args.camera)?;
-    refuse_parts_of_videos(&rig, args.shard)?;
-    let piped = piped_camera(args.pipe, &rig, &cameras)?;
-    let mut times = TimesTable::default();
-    let is_quiet = console.is_quiet();
-    let loaded = times.timed("scenario files", is_quiet, || inputs::load_cameras(&rig, console))?;
-    let selected = Selected {
-        rig: &rig,
-        loaded: &loaded,
-        folder,
-        frames: frames_of_cameras(args.frames.as_ref(), &cameras, &loaded, console)?,
-        cameras,
-        shard: args.shard,
-        resume: args.resume,
-        resume_command: match export {
-            Some(_) => console.command(),
-            None => console.command_with("--resume"),
-        },
-    };
-    let sequence = selected.first();
-    let renderer = args.backend.and_then(RenderBackend::renderer);
-    let engine;
-    let is_exact = rig.first().quality.solver == Auto::Value(Solver::Oracle);
-    let mut source: Box<dyn FrameSource + '_> = if is_exact {
-        Box::new(times.timed("ray-casting structures", is_quiet, || ReferenceSource::new(sequence))?)
-    } else {
-        engine = times.timed("adapter", is_quiet, || backend::open(renderer))?;
-        let mut engine_source =
-            times.timed("scene upload", is_quiet, || EngineSource::new(&engine, sequence))?;
-        if args.times {
-            engine_source.time_passes();
-        }
-        Box::new(engine_source)
-    };
-    console.detail(format_args!("adapter: {}", source.adapter()));
-    let (fps, bits) = (sequence.scenario.camera.fps, sequence.scenario.output.video.bits);
-    let mut pipe = args.pipe.then(|| Y4mStream::new(std::io::stdout(), fps, bits));
-    let (mut broken_pipe, mut sheet) = (None, None);
-    let mut on_frame = |name: Option<&str>, finished: &Finished| {
-        times.add(name, &finished.times);
-        if args.sheet && sheet.is_none() {
-            sheet = Some(channel_pictures(&finished.frame));
-        }
-        let pipe = pipe.as_mut().filter(|_| name == piped);
-        broken_pipe = pipe.and_then(|pipe| pipe.write(&finished.frame).err());
-        if broken_pipe.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let outcome = selected.run(&mut *source, console, &mut on_frame);
-    if let Some(error) = broken_pipe {
-        return Err(anyhow!("--pipe: standard output takes no more frames: {error}")).or_failed();
-    }
-    let outcome = outcome.inspect_err(|failure| {
-        if failure.code() == FAILED && folder.join("run.json").is_file() {
-            let command = &selected.resume_command;
-            console.note(format_args!("written frames are kept; to resume: {command}"));
-        }
-    })?;
-    if let Some(pictures) = sheet {
-        write_channel_sheet(folder, pictures)?;
-    }
-    if args.checksums {
-        write_checksums(folder).or_failed()?;
-    }
-    if !console.is_quiet() {
-        let (seconds, size_mb) = (outcome.time.as_secs_f64(), outcome.bytes as f64 * 1e-6);
-        let summary = format!(
-            "{} in {seconds:.2} s, {}, {size_mb:.1} MB in {}",
-            outcome.pictures(),
-            outcome.rate(),
-            folder.display()
-        );
-        if args.pipe { console.note(summary) } else { console.line(summary)? }
-    }
-    if args.times {
-        times.add_start("plan of the first frame", outcome.first_plan);
-        console.print(&times.text())?;
-    }
-    Ok(rig.first().output.datasets.clone())
+    let datasets = rig.first().output.datasets.clone();
+    let engine = OnceCell::new();
+    let mut stage = Stage::new(&engine);
+    let part = Part { rig, folder, variation: None, export, shard: args.shard };
+    let outcome = stage.render(args, part, console)?;
+    stage.report(args, &outcome, &summary(&outcome, folder), console)?;
+    Ok(datasets)
+}
+
+/// What was rendered, for users.
+fn summary(outcome: &Outcome, folder: &Path) -> String {
+    let (seconds, size_mb) = (outcome.time.as_secs_f64(), outcome.bytes as f64 * 1e-6);
+    format!(
+        "{} in {seconds:.2} s, {}, {size_mb:.1} MB in {}",
+        outcome.pictures(),
+        outcome.rate(),
+        folder.display()
+    )
 }
 
 /// A shard has a part of the frames, and its video would have the name of all others.

@@ -40,6 +40,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let [first, end] = job.frames;
     let frames: Vec<u64> = (first..end.min(loaded[job.camera].sequence.frames)).collect();
     let selected = Selected {
+        variation: None,
         rig: &rig,
         loaded: &loaded,
         folder: &job.folder,

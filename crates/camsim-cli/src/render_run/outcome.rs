@@ -22,6 +22,17 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Adds another run.
+    pub fn add(&mut self, other: &Self) {
+        self.cameras = self.cameras.max(other.cameras);
+        self.frames += other.frames;
+        self.twins += other.twins;
+        self.skipped += other.skipped;
+        self.bytes += other.bytes;
+        self.time += other.time;
+        self.first_plan += other.first_plan;
+    }
+
     /// Frames and pictures of twins per second; 0 if there was nothing to do.
     #[must_use]
     pub fn pictures_per_s(&self) -> f64 {

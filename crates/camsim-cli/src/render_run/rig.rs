@@ -11,6 +11,7 @@ use camsim_io::{
     inputs::Inputs,
     load::Loaded,
     manifest::{RigManifest, is_finished},
+    scenario_file::VariationRecord,
     write::{RIG_TOML, rig_names, unlisted_frame_files, write_rig, write_sensors},
 };
 
@@ -40,6 +41,8 @@ pub struct Selected<'a> {
     pub resume: bool,
     /// Command that resumes the run.
     pub resume_command: String,
+    /// Which variation of a random scenario it is.
+    pub variation: Option<VariationRecord>,
 }
 
 impl Selected<'_> {
@@ -57,7 +60,8 @@ impl Selected<'_> {
         on_frame: &mut OnFrame<'_>,
     ) -> Result<Outcome, Failure> {
         let Self { rig, loaded, folder, shard, .. } = *self;
-        let rig_folder = RigFolder { rig, loaded, folder, shard };
+        let variation = self.variation.as_ref();
+        let rig_folder = RigFolder { rig, loaded, folder, shard, variation };
         let name = |camera: usize| rig.is_list().then(|| &*loaded[camera].sequence.scenario.camera.name);
         let folders: Vec<PathBuf> = self
             .cameras
@@ -74,6 +78,7 @@ impl Selected<'_> {
                     tracks,
                     // Those of a rig are in its own folder.
                     sensors: (!rig.is_list()).then_some(sensors),
+                    variation,
                     folder,
                     frames,
                     shard,
@@ -98,6 +103,8 @@ pub struct RigFolder<'a> {
     pub folder: &'a Path,
     /// Frames of this run's shard.
     pub shard: Option<Shard>,
+    /// Which variation of a random scenario it is.
+    pub variation: Option<&'a VariationRecord>,
 }
 
 impl RigFolder<'_> {
@@ -156,6 +163,7 @@ impl RigFolder<'_> {
         let manifest = RigManifest {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             adapter: adapter.to_owned(),
+            variation: self.variation.cloned(),
             rig: self.rig,
             inputs: inputs.clone(),
             frames: frames.collect(),

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use camsim_core::scenario::Rig;
 
 use super::{PATHS, portable_inputs, write_runs};
-use crate::{inputs::Inputs, portable::portable_rig, write::WriteError};
+use crate::{inputs::Inputs, portable::portable_rig, scenario_file::VariationRecord, write::WriteError};
 
 /// Contents of `run.json` in the folder of a rig, which has a folder with a `run.json` for each camera.
 #[derive(Clone, Debug)]
@@ -14,6 +14,8 @@ pub struct RigManifest<'a> {
     pub version: String,
     /// Names of adapter and driver.
     pub adapter: String,
+    /// Which variation of a scenario with `[randomize]` it is.
+    pub variation: Option<VariationRecord>,
     /// The scenario with all cameras, with defaults and `--set` applied.
     pub rig: &'a Rig,
     /// Fingerprints of the files that it names.
@@ -37,7 +39,7 @@ impl RigManifest<'_> {
             |error: serde_json::Error| WriteError::Encode { path: path.clone(), message: error.to_string() };
         let runs: BTreeMap<&str, String> =
             self.rig.names().map(|name| (name, format!("{name}/run.json"))).collect();
-        let manifest = serde_json::json!({
+        let mut manifest = serde_json::json!({
             "version": self.version,
             "adapter": self.adapter,
             "seed": self.rig.first().seed,
@@ -49,6 +51,9 @@ impl RigManifest<'_> {
             "shard": self.shard,
             "finished": self.finished,
         });
+        if let (Some(variation), Some(root)) = (&self.variation, manifest.as_object_mut()) {
+            root.insert("variation".into(), serde_json::to_value(variation).map_err(fail)?);
+        }
         let text = serde_json::to_string_pretty(&manifest).map_err(fail)? + "\n";
         write_runs(folder, self.shard, &text)
     }

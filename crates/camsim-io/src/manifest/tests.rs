@@ -16,6 +16,7 @@ fn manifest(scenario: Scenario) -> RunManifest {
         adapter: "llvmpipe".into(),
         seed: scenario.seed,
         paths: PATHS.to_owned(),
+        variation: None,
         twin: None,
         scenario,
         inputs: [("a.csv".to_owned(), "3 bytes".to_owned())].into(),

@@ -13,7 +13,7 @@ use crate::{
     inputs::Inputs,
     manifest::{RigManifest, RunManifest},
     portable::resolved,
-    scenario_file::{ScenarioError, for_each_path, read_rig},
+    scenario_file::{ScenarioError, VariationRecord, for_each_path, read_rig},
 };
 
 /// A shard.
@@ -28,6 +28,8 @@ pub(super) struct ShardRun {
 pub(super) struct ShardManifest {
     version: String,
     pub(super) adapter: String,
+    #[serde(default)]
+    variation: Option<VariationRecord>,
     scenario: Value,
     inputs: Inputs,
     /// First and last frame, or those of each camera.
@@ -125,13 +127,14 @@ pub(super) fn write_joined(folders: &[&Path], file: &Path, out: &Path) -> Result
 fn write_joined_rig(first: &Path, out: &Path) -> Result<u64, MergeError> {
     let damaged = |error: ScenarioError| MergeError::File { path: first.into(), message: error.to_string() };
     let rig = read_rig(first, &[], None).map_err(damaged)?;
-    let ShardManifest { version, adapter, inputs, .. } = read_manifest(first)?;
+    let ShardManifest { version, adapter, inputs, variation, .. } = read_manifest(first)?;
     let runs: Vec<(String, RunManifest)> = rig
         .names()
         .map(|name| Ok((name.to_owned(), read_manifest(&out.join(name).join("run.json"))?)))
         .collect::<Result<_, MergeError>>()?;
     let frames = runs.iter().map(|(name, run)| (name.clone(), run.frames)).collect();
-    let manifest = RigManifest { version, adapter, rig: &rig, inputs, frames, shard: None, finished: true };
+    let manifest =
+        RigManifest { version, adapter, variation, rig: &rig, inputs, frames, shard: None, finished: true };
     manifest.write(out)?;
     Ok(runs.iter().map(|(_, run)| run.written).sum())
 }

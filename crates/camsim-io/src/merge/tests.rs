@@ -45,6 +45,7 @@ impl Shards {
                     adapter: "cpu".into(),
                     seed: 1,
                     paths: String::new(),
+                    variation: None,
                     twin: None,
                     scenario: scenario.clone(),
                     inputs: [(dir.path().join("flight.csv").display().to_string(), "7".into())].into(),

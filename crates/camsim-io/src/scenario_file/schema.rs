@@ -12,6 +12,7 @@ use camsim_core::{
 };
 use camsim_plan::MAX_KEYS;
 
+use super::randomize::RANDOMIZE;
 use super::similar::{MIN_KEY_SIMILARITY, similarity};
 
 /// Keys of a file format, with what error messages say about them.
@@ -515,6 +516,9 @@ impl Schema {
     fn nearest_like(&self, key: &str) -> Option<String> {
         let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
         let mut names: Vec<&str> = Vec::new();
+        if self.keys == KEYS {
+            names.push(RANDOMIZE);
+        }
         for (name, _) in self.keys {
             names.extend(name.match_indices('.').map(|(end, _)| &name[..end]));
             names.push(name);

@@ -42,6 +42,7 @@ impl fmt::Display for KeyLocation {
 }
 
 /// A parsed file: nested values, and the location of each key.
+#[derive(Clone, Debug)]
 pub(crate) struct Tree {
     /// The file that was read.
     pub(crate) file: PathBuf,
@@ -173,53 +174,41 @@ impl Tree {
         if key.is_empty() || key.split('.').any(str::is_empty) {
             return Err(fail("the key is empty; write --set camera.fps=25".into()));
         }
-        let key = &*self.numbered(key).map_err(fail)?;
+        let key = self.numbered(key).map_err(fail)?;
+        self.put(&key, value(text), &KeyLocation::Set(shown.clone()), fail)
+    }
+
+    /// Puts a value, which stands at `location`, at a key with the numbers of cameras.
+    pub(super) fn put(
+        &mut self,
+        key: &str,
+        value: Value,
+        location: &KeyLocation,
+        fail: impl Fn(String) -> ScenarioError,
+    ) -> Result<(), ScenarioError> {
         if let Some(camera) = key.strip_prefix("cameras.").and_then(|index| index.parse().ok()) {
-            return self.set_camera(camera, value(text), shown);
+            return self.put_camera(camera, value, location);
         }
         let parents = key.match_indices('.').map(|(end, _)| &key[..end]);
         let new_tables: Vec<&str> = parents.filter(|parent| !self.has(parent)).collect();
-        let mut steps: Vec<&str> = key.split('.').collect();
-        let leaf = steps.pop().unwrap_or_default();
-        let mut table = &mut self.root;
-        let mut steps = steps.into_iter().peekable();
-        while let Some(step) = steps.next() {
-            let mut next = table.entry(step).or_insert_with(|| Value::Table(Table::new()));
-            if let Value::Array(array) = next {
-                let (length, index) =
-                    (array.len(), steps.next().and_then(|index| index.parse::<usize>().ok()));
-                next = index.and_then(|index| array.get_mut(index)).ok_or_else(|| {
-                    fail(format!(
-                        "`{step}` is a list of {length}; name one by its number from 0, as in {step}.0.{leaf}"
-                    ))
-                })?;
-            }
-            table = next
-                .as_table_mut()
-                .ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
-        }
-        table.insert(leaf.into(), value(text));
+        *slot(&mut self.root, key, fail)? = value;
         self.forget_below(key);
         // Tables that were there keep the location of what contains them.
         for table in new_tables {
-            self.locations.entry(table.into()).or_insert_with(|| KeyLocation::Set(shown.clone()));
+            self.locations.entry(table.into()).or_insert_with(|| location.clone());
         }
-        self.locations.insert(key.into(), KeyLocation::Set(shown));
+        self.locations.insert(key.into(), location.clone());
         if ["camera", CAMERAS].contains(&key) { self.resolve_cameras() } else { Ok(()) }
+    }
+
+    /// The value at a dotted key.
+    pub(super) fn get(&self, key: &str) -> Option<&Value> {
+        get(&self.root, key)
     }
 
     /// Whether there is a value at a dotted key.
     fn has(&self, key: &str) -> bool {
-        let mut steps = key.split('.');
-        let first = steps.next().and_then(|step| self.root.get(step));
-        first.is_some_and(|first| {
-            steps
-                .try_fold(first, |value, step| match value {
-                    Value::Array(list) => list.get(step.parse::<usize>().ok()?),
-                    value => value.get(step),
-                })
-                .is_some()
-        })
+        self.get(key).is_some()
     }
 
     /// Removes the locations below a key whose value is replaced.
@@ -227,6 +216,49 @@ impl Tree {
         let below = format!("{key}.");
         self.locations.retain(|key, _| !key.starts_with(&below));
     }
+}
+
+/// The place of the value at a dotted key. Tables on the way to it are added, and elements of lists are named by
+/// their numbers.
+fn slot<'t>(
+    root: &'t mut Table,
+    key: &str,
+    fail: impl Fn(String) -> ScenarioError,
+) -> Result<&'t mut Value, ScenarioError> {
+    let mut steps: Vec<&str> = key.split('.').collect();
+    let leaf = steps.pop().unwrap_or_default();
+    let mut place = root;
+    let mut steps = steps.into_iter();
+    while let Some(step) = steps.next() {
+        let mut next = place.entry(step).or_insert_with(|| Value::Table(Table::new()));
+        if let Value::Array(array) = next {
+            let (length, index) = (array.len(), steps.next());
+            let number = index.unwrap_or(leaf).parse::<usize>().ok();
+            next = number.and_then(|number| array.get_mut(number)).ok_or_else(|| {
+                let rest = index.map_or_else(String::new, |_| format!(".{leaf}"));
+                fail(format!(
+                    "`{step}` is a list of {length}; name one by its number from 0, as in {step}.0{rest}"
+                ))
+            })?;
+            if index.is_none() {
+                return Ok(next);
+            }
+        }
+        place = next
+            .as_table_mut()
+            .ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
+    }
+    Ok(place.entry(leaf).or_insert_with(|| Value::Boolean(false)))
+}
+
+/// The value at a dotted key, with elements of lists by their numbers.
+pub(super) fn get<'t>(root: &'t Table, key: &str) -> Option<&'t Value> {
+    let mut steps = key.split('.');
+    let first = root.get(steps.next()?)?;
+    steps.try_fold(first, |value, step| match value {
+        Value::Array(list) => list.get(step.parse::<usize>().ok()?),
+        value => value.get(step),
+    })
 }
 
 /// Converts JSON to TOML; `None` for null, which TOML lacks.
@@ -247,7 +279,7 @@ fn from_json(json: &serde_json::Value) -> Option<Value> {
 }
 
 /// Parses a TOML value; any other text becomes a string, so that words need no quotes.
-fn value(text: &str) -> Value {
+pub(super) fn value(text: &str) -> Value {
     let parsed = toml::from_str::<Table>(&format!("v = {text}")).ok().filter(|table| table.len() == 1);
     parsed.and_then(|mut table| table.remove("v")).unwrap_or_else(|| Value::String(text.into()))
 }

@@ -177,3 +177,18 @@ fn keys_of_the_camera_are_those_of_the_shown_one() {
     assert!(text.contains("vignette = \"v.png\"") && !text.contains("[camera]"), "{text}");
     assert_eq!(Document::open(&saved).expect("what was saved").rig(), document.rig());
 }
+
+#[test]
+fn a_file_with_random_values_is_not_overwritten() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("random.toml");
+    let text = "[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n[randomize]\n\
+                \"camera.fps\" = { uniform = [10, 20] }\n";
+    std::fs::write(&path, text).expect("written");
+    let mut document = Document::open(&path).expect("legal");
+    assert!(document.save(&path).expect_err("refused").contains("[randomize]"));
+    assert_eq!(std::fs::read_to_string(&path).expect("read"), text);
+    let copy = folder.path().join("copy.toml");
+    document.save(&copy).expect("saved");
+    document.save(&copy).expect("saved again");
+}

@@ -143,6 +143,7 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
         adapter: "none".into(),
         seed: scenario.seed,
         paths: PATHS.to_owned(),
+        variation: None,
         twin: None,
         scenario: scenario.clone(),
         inputs: [("a.csv".to_owned(), "3 bytes".to_owned())].into(),

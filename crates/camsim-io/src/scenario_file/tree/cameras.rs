@@ -70,7 +70,7 @@ impl Tree {
     }
 
     /// The entries of `[[cameras]]`.
-    fn entries(&self) -> &[Value] {
+    pub(in super::super) fn entries(&self) -> &[Value] {
         self.root.get(CAMERAS).and_then(Value::as_array).map_or(&[], Vec::as_slice)
     }
 
@@ -103,7 +103,7 @@ impl Tree {
     }
 
     /// A key of `--set` with the number of a camera in place of its name.
-    pub(super) fn numbered(&self, key: &str) -> Result<String, String> {
+    pub(in super::super) fn numbered(&self, key: &str) -> Result<String, String> {
         let mut steps = key.splitn(3, '.');
         let (first, camera, rest) = (steps.next(), steps.next(), steps.next());
         let has_list = self.root.contains_key(CAMERAS);
@@ -134,7 +134,7 @@ impl Tree {
     }
 
     /// Names of the cameras, empty for entries without one.
-    fn names(&self) -> Vec<&str> {
+    pub(in super::super) fn names(&self) -> Vec<&str> {
         self.entries()
             .iter()
             .map(|entry| entry.get("name").and_then(Value::as_str).unwrap_or_default())
@@ -145,17 +145,16 @@ impl Tree {
         self.names().join(", ")
     }
 
-    /// `--set cameras.NAME=VALUE`: another camera, or camera file, with the name of the one before unless it
-    /// has its own.
-    pub(super) fn set_camera(
+    /// Another camera, or camera file, in place of one, with its name unless it has its own.
+    pub(super) fn put_camera(
         &mut self,
         index: usize,
         new: Value,
-        shown: String,
+        location: &KeyLocation,
     ) -> Result<(), ScenarioError> {
         let key = format!("{CAMERAS}.{index}");
         self.forget_below(&key);
-        self.locations.insert(key, KeyLocation::Set(shown));
+        self.locations.insert(key, location.clone());
         let Some(Value::Array(entries)) = self.root.get_mut(CAMERAS) else { return Ok(()) };
         let Some(entry) = entries.get_mut(index) else { return Ok(()) };
         let name = entry.get("name").cloned();

@@ -1,0 +1,213 @@
+"""A finished frame."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _camsim
+from ._errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Time, pose and velocity of each row of the readout, as arrays of one length.
+
+    There is a record for each sensor row, or for each column if the sensor is read sideways.
+
+    >>> rows = frame.rows
+    >>> readout_ms = (rows.t_mid_ns[-1] - rows.t_mid_ns[0]) * 1e-6
+    """
+
+    row: NDArray[np.uint32]
+    """Number of the row, from 0; shape (N,)."""
+    t_mid_ns: NDArray[np.int64]
+    """Mid-exposure, nanoseconds on the clock of stamps; shape (N,)."""
+    position_ned_m: NDArray[np.float64]
+    """Optical centre: north, east, down, metres; shape (N, 3)."""
+    ned_from_camera_wxyz: NDArray[np.float64]
+    """Unit quaternion that takes optical camera axes to NED, scalar first; shape (N, 4)."""
+    velocity_ned_m_s: NDArray[np.float64]
+    """Velocity of the optical centre: north, east, down, m/s; shape (N, 3)."""
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The pinhole camera whose pixels `x` and `y` of `coords` are (`ideal_*` in `frames.csv`)."""
+
+    size_px: tuple[int, int]
+    """Width, height."""
+    focal_px: tuple[float, float]
+    """fx, fy."""
+    principal_px: tuple[float, float]
+    """cx, cy."""
+    t_ns: int
+    """Instant, nanoseconds on the clock of stamps."""
+    position_ned_m: NDArray[np.float64]
+    """Optical centre at that instant: north, east, down, metres; shape (3,)."""
+    ned_from_camera_wxyz: NDArray[np.float64]
+    """Its attitude, scalar first; shape (4,)."""
+
+
+class Frame(Mapping[str, NDArray[Any]]):
+    """A finished frame: numpy arrays of its channels, by name and as attributes.
+
+    Arrays are what the renderer has allocated: nothing is copied, each owns its memory, and numpy's
+    ``__dlpack__`` hands it on to other libraries. Images are height x width (x components), row by row from
+    the top-left pixel; `docs/CHANNELS.md` says what each channel holds.
+
+    >>> frame = scenario[7]
+    >>> frame.depth.shape, frame.depth.dtype
+    ((480, 640), dtype('float32'))
+    >>> sorted(frame)
+    ['color', 'depth']
+    """
+
+    __slots__ = ("_arrays", "_encoding", "camera", "index", "rows", "size_px", "source", "stamp_ns")
+
+    index: int
+    """Number of the frame, from 0."""
+    camera: str
+    """Name of the camera; empty where it has none."""
+    stamp_ns: int
+    """Stamp, nanoseconds on the clock of `output.stamps`."""
+    size_px: tuple[int, int]
+    """Width, height."""
+    rows: Rows
+    """Time, pose and velocity of each row."""
+    source: Source
+    """The pinhole camera that `coords` refers to."""
+
+    def __init__(self, parts: Mapping[str, Any], camera: str, encoding: str) -> None:
+        self.index = parts["index"]
+        self.camera = camera
+        self.stamp_ns = parts["stamp_ns"]
+        self.size_px = parts["size_px"]
+        self.rows = Rows(**parts["rows"])
+        self.source = Source(**parts["source"])
+        self._arrays: dict[str, NDArray[Any]] = parts["channels"]
+        self._encoding = encoding
+
+    def __getitem__(self, channel: str) -> NDArray[Any]:
+        try:
+            return self._arrays[channel]
+        except KeyError:
+            held = ", ".join(self._arrays) or "none"
+            message = f"the frame has no channel {channel!r}: ask for it by channels=[...]; it has {held}"
+            raise KeyError(message) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    def __repr__(self) -> str:
+        width, height = self.size_px
+        camera = f" of {self.camera}" if self.camera else ""
+        return f"<camsim.Frame {self.index}{camera}: {width}x{height}, {', '.join(self._arrays)}>"
+
+    # A frame is equal to itself alone: comparing pictures is `camsim.compare`.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def _attribute(self, channel: str) -> NDArray[Any]:
+        if channel in self._arrays:
+            return self._arrays[channel]
+        held = ", ".join(self._arrays) or "none"
+        raise AttributeError(f"the frame has no channel {channel!r}: ask for it by channels=[...]; it has {held}")
+
+    @property
+    def color(self) -> NDArray[np.float32]:
+        """Linear R, G, B and A; A is 1 where a ray exists, else 0. Float32, height x width x 4."""
+        return self._attribute("color")
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Planar depth along the optical axis, metres; 0 where nothing is. Float32, height x width."""
+        return self._attribute("depth")
+
+    @property
+    def range(self) -> NDArray[np.float32]:
+        """Distance along the ray, metres; 0 where nothing is. Float32, height x width."""
+        return self._attribute("range")
+
+    @property
+    def valid(self) -> NDArray[np.uint8]:
+        """255 where a ray exists, else 0. Uint8, height x width."""
+        return self._attribute("valid")
+
+    @property
+    def coords(self) -> NDArray[np.float32]:
+        """Ideal ray u, v; source pixel x, y; time after the stamp, s; point or, for the sky, direction (north,
+        east, down). Float32, height x width x 8."""
+        return self._attribute("coords")
+
+    @property
+    def normal(self) -> NDArray[np.float32]:
+        """Unit normal towards the camera in optical axes (right, down, forwards). Float32, height x width x 3."""
+        return self._attribute("normal")
+
+    @property
+    def normal_world(self) -> NDArray[np.float32]:
+        """Unit normal towards the camera: north, east, down. Float32, height x width x 3."""
+        return self._attribute("normal_world")
+
+    @property
+    def object(self) -> NDArray[np.uint16]:
+        """Number of the object, as in `Scenario.objects`; 0 for the sky. Uint16, height x width."""
+        return self._attribute("object")
+
+    @property
+    def class_(self) -> NDArray[np.uint16]:
+        """Class of the object; 0 for none. Uint16, height x width. Also ``frame["class"]``."""
+        return self._attribute("class")
+
+    @property
+    def coverage(self) -> NDArray[np.float32]:
+        """Share of the pixel's area and exposure that the object at its centre has. Float32, height x width."""
+        return self._attribute("coverage")
+
+    @property
+    def flow(self) -> NDArray[np.float32]:
+        """Displacement dx, dy to frame i + k, pixels, and state (1: shown there). Float32, height x width x 3."""
+        return self._attribute("flow")
+
+    @property
+    def flow_back(self) -> NDArray[np.float32]:
+        """Displacement dx, dy to frame i - k, pixels, and state. Float32, height x width x 3."""
+        return self._attribute("flow_back")
+
+    @property
+    def flow_global(self) -> NDArray[np.float32]:
+        """Displacement dx, dy to the picture of a global shutter, pixels, and state. Float32, height x width x 3."""
+        return self._attribute("flow_global")
+
+    @property
+    def motion(self) -> NDArray[np.float32]:
+        """Velocity of the point's image at the pixel's instant, px/s: vx, vy. Float32, height x width x 2."""
+        return self._attribute("motion")
+
+    @property
+    def blur_path(self) -> NDArray[np.float32]:
+        """Displacement of the point's image at the begin (x0, y0) and at the end (x1, y1) of the exposure,
+        pixels. Float32, height x width x 4."""
+        return self._attribute("blur_path")
+
+    def save(self, path: str | os.PathLike[str], encoding: str | None = None) -> None:
+        """Writes the picture: `.png` in an encoding of `camera.photometric.output` (the scenario's by default),
+        `.exr` with linear 32-bit floats.
+
+        >>> scenario[0].save("first.png")
+        """
+        if "color" not in self._arrays:
+            raise InputError('the frame has no picture to write: ask for it by channels=["color", ...]')
+        _camsim.write_picture(path, self.color, encoding or self._encoding)

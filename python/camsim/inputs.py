@@ -1,0 +1,211 @@
+"""Logs, terrains and pictures from arrays, in place of files."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import pathlib
+import struct
+import tempfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _toml
+from ._arrays import rows_of
+from ._errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTable:
+    """A flight from arrays, in place of the file of `flight.log`.
+
+    >>> t_s = np.linspace(0, 10, 101)
+    >>> log = camsim.PoseTable(t_s, position_ned_m=np.c_[20 * t_s, 0 * t_s, 0 * t_s - 100])
+    >>> scenario = camsim.Scenario.from_dict({"flight": {"log": log, "attitude": "track"}, ...})
+    """
+
+    t_s: ArrayLike
+    """Times, ascending, seconds; shape (N,)."""
+    position_ned_m: ArrayLike | None = None
+    """Positions of the platform: north, east, down, metres; shape (N, 3)."""
+    geodetic: ArrayLike | None = None
+    """In place of them: latitude and longitude, degrees, and height, m (as `flight.height` says); shape (N, 3)."""
+    ned_from_body_wxyz: ArrayLike | None = None
+    """Attitudes, scalar first, from body axes (forward, right, down); shape (N, 4)."""
+    angles_deg: ArrayLike | None = None
+    """In place of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes set
+    `flight.attitude = "track"`: the nose looks along the way."""
+
+    def csv(self) -> str:
+        """The table as text of a log file, with all digits."""
+        if (self.position_ned_m is None) == (self.geodetic is None):
+            raise InputError("PoseTable: give position_ned_m or geodetic")
+        if self.ned_from_body_wxyz is not None and self.angles_deg is not None:
+            raise InputError("PoseTable: give ned_from_body_wxyz or angles_deg, not both")
+        t_s: NDArray[np.float64] = np.asarray(self.t_s, dtype=np.float64).reshape(-1, 1)
+        parts = [("t_s", t_s)]
+        for names, values in (
+            ("n_m,e_m,d_m", self.position_ned_m),
+            ("lat_deg,lon_deg,height_m", self.geodetic),
+            ("qw,qx,qy,qz", self.ned_from_body_wxyz),
+            ("roll_deg,pitch_deg,yaw_deg", self.angles_deg),
+        ):
+            if values is not None:
+                rows = rows_of(values, names.count(",") + 1, names)
+                if len(rows) != len(t_s):
+                    raise InputError(f"PoseTable: {len(t_s)} times, and {len(rows)} rows of {names}")
+                parts.append((names, rows))
+        lines = [",".join(names for names, _ in parts)]
+        lines += [",".join(map(repr, row)) for row in np.hstack([rows for _, rows in parts]).tolist()]
+        return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap:
+    """Heights from an array, in place of the file of `scene.terrain.dem`.
+
+    Its rows lead from north to south, its columns from west to east.
+
+    >>> heights_m = 5 * np.random.default_rng(1).standard_normal((64, 64))
+    >>> dem = camsim.HeightMap.around(heights_m, lat_deg=46.5, lon_deg=8.2, step_m=10)
+    >>> {"scene": {"terrain": {"dem": dem, "ortho": picture}}}      # picture: bytes, height x width x 3, sRGB
+    """
+
+    heights_m: ArrayLike
+    """Shape (rows, columns); NaN where there is no ground."""
+    north_west: tuple[float, float]
+    """x and y of the first height in the coordinate system: easting and northing, or longitude and latitude, degrees."""
+    step: tuple[float, float]
+    """Distance of columns and of rows in the same unit, above 0."""
+    epsg: int = 4326
+    """The coordinate system: 4326 is longitude and latitude; else one of `docs/inputs/TERRAIN.md`."""
+
+    @classmethod
+    def around(cls, heights_m: ArrayLike, *, lat_deg: float, lon_deg: float, step_m: float) -> HeightMap:
+        """Heights with their middle at a place. Steps in degrees are constant, so that the length of those to the
+        east changes with latitude, as it does on the Earth."""
+        rows, columns = np.shape(heights_m)
+        sin = math.sin(math.radians(lat_deg))
+        semi_axis_m, eccentricity2 = 6_378_137.0, 6.694_379_990_141_317e-3
+        to_normal = 1.0 - eccentricity2 * sin * sin
+        north_m = semi_axis_m * (1.0 - eccentricity2) / to_normal**1.5
+        east_m = semi_axis_m / math.sqrt(to_normal) * math.cos(math.radians(lat_deg))
+        step = (math.degrees(step_m / east_m), math.degrees(step_m / north_m))
+        corner = (lon_deg - step[0] * (columns - 1) / 2, lat_deg + step[1] * (rows - 1) / 2)
+        return cls(heights_m, corner, step)
+
+    def tiff(self) -> bytes:
+        """The heights as a GeoTIFF of the same numbers."""
+        heights = np.asarray(self.heights_m)
+        kind = np.float32 if heights.dtype == np.float32 else np.float64
+        heights = np.ascontiguousarray(heights, dtype=np.dtype(kind).newbyteorder("<"))
+        if heights.ndim != 2 or min(heights.shape) < 2:
+            raise InputError(f"HeightMap: heights of shape (rows, columns), two of each at least, not {heights.shape}")
+        rows, columns = heights.shape
+        is_geographic = 4000 <= self.epsg < 5000
+        # 1024: projected or geographic; 1025: pixels are points; 2048 or 3072: the coordinate system.
+        keys = [1, 1, 0, 3, 1024, 0, 1, 2 if is_geographic else 1, 1025, 0, 1, 2]
+        keys += [2048 if is_geographic else 3072, 0, 1, self.epsg]
+        tie = [0.0, 0.0, 0.0, *map(float, self.north_west), 0.0]
+        tags: list[tuple[int, str, list[Any]]] = [
+            (256, "I", [columns]),
+            (257, "I", [rows]),
+            (258, "H", [8 * heights.itemsize]),
+            (259, "H", [1]),
+            (262, "H", [1]),
+            (273, "I", [8]),
+            (277, "H", [1]),
+            (278, "I", [rows]),
+            (279, "I", [heights.nbytes]),
+            (339, "H", [3]),
+            (33550, "d", [*map(float, self.step), 0.0]),
+            (33922, "d", tie),
+            (34735, "H", keys),
+        ]
+        return _tiff(heights.tobytes(), tags)
+
+
+def _tiff(pixels: bytes, tags: list[tuple[int, str, list[Any]]]) -> bytes:
+    """A little-endian TIFF: header, pixels, directory, values that do not fit into it."""
+    codes = {"H": 3, "I": 4, "d": 12}
+    pixels += b"\0" * (-len(pixels) % 8)
+    directory = 8 + len(pixels)
+    place = directory + 2 + 12 * len(tags) + 4
+    entries, values = b"", b""
+    for tag, code, numbers in tags:
+        packed = struct.pack(f"<{len(numbers)}{code}", *numbers)
+        if len(packed) > 4:
+            field = struct.pack("<I", place + len(values))
+            values += packed + b"\0" * (-len(packed) % 8)
+        else:
+            field = packed.ljust(4, b"\0")
+        entries += struct.pack("<HHI", tag, codes[code], len(numbers)) + field
+    head = struct.pack("<2sHI", b"II", 42, directory)
+    return head + pixels + struct.pack("<H", len(tags)) + entries + b"\0\0\0\0" + values
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    """Bytes of a grey or RGB picture as PNG."""
+    height, width = picture.shape[:2]
+    channels = picture.shape[2] if picture.ndim == 3 else 1
+    if picture.ndim > 3 or channels not in (1, 3):
+        raise InputError(f"a picture of shape (height, width) or (height, width, 3) is needed, not {picture.shape}")
+    lines = np.zeros((height, 1 + width * channels), dtype=np.uint8)
+    lines[:, 1:] = picture.reshape(height, -1)
+    header = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 0, 0, 0, 0)
+    out = io.BytesIO(b"\x89PNG\r\n\x1a\n")
+    out.seek(0, io.SEEK_END)
+    for name, data in ((b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes(), 1)), (b"IEND", b"")):
+        out.write(struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)))
+    return out.getvalue()
+
+
+class InputFiles:
+    """Files that stand for arrays of a scenario, in a folder of their own that lives as long as it is used."""
+
+    def __init__(self, files: Mapping[str, bytes] | None = None) -> None:
+        self._held: tempfile.TemporaryDirectory[str] | None = None
+        self._count = 0
+        for name, content in (files or {}).items():
+            self._write(name, content)
+
+    @property
+    def folder(self) -> pathlib.Path:
+        """The folder, as the system knows it."""
+        if self._held is None:
+            self._held = tempfile.TemporaryDirectory(prefix="camsim-inputs-")
+        return pathlib.Path(os.path.realpath(self._held.name))
+
+    def _write(self, name: str, content: bytes) -> str:
+        path = self.folder / name
+        path.write_bytes(content)
+        self._count += 1
+        return str(path)
+
+    def contents(self) -> dict[str, bytes]:
+        """All files by name."""
+        return {} if self._held is None else {path.name: path.read_bytes() for path in sorted(self.folder.iterdir())}
+
+    def placed(self, value: Any) -> Any:
+        """A tree with paths of files in place of arrays."""
+        if isinstance(value, Mapping):
+            return {key: self.placed(item) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [self.placed(item) for item in value]
+        if isinstance(value, PoseTable):
+            return self._write(f"log-{self._count}.csv", value.csv().encode())
+        if isinstance(value, HeightMap):
+            return self._write(f"dem-{self._count}.tif", value.tiff())
+        if isinstance(value, np.ndarray) and value.ndim >= 2 and value.dtype == np.uint8:
+            return self._write(f"picture-{self._count}.png", _png(value))
+        return value
+
+    def text(self, value: Any, key: str) -> str:
+        """A value as text of TOML, with paths of files in place of arrays."""
+        return _toml.value_text(self.placed(value), key)

@@ -1,0 +1,126 @@
+"""Lenses over arrays of points."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _camsim
+from ._arrays import rows_of
+
+
+class Lens:
+    """A camera's lens: points to pixels and back, on all processors, in double precision.
+
+    Points are in camera axes (right, down, forwards), in any unit of length; pixel (0, 0) is the centre of the
+    top-left pixel. Models and coefficients are those of `[camera.lens]`, as OpenCV writes them.
+
+    >>> lens = camsim.Lens((640, 480), (420, 421), model="brown-conrady", coefficients=[-0.22, 0.06])
+    >>> pixels = lens.project([[0.1, 0.0, 1.0], [0.0, 0.2, 1.0]])
+    >>> lens.unproject(pixels)                     # unit rays
+    >>> lens.undistort(pixels)                     # x/z and y/z
+    """
+
+    def __init__(
+        self,
+        size_px: Sequence[int],
+        focal_px: Sequence[float],
+        principal_point_px: Sequence[float] | None = None,
+        *,
+        model: str = "pinhole",
+        coefficients: Sequence[float] = (),
+    ) -> None:
+        """
+        :param size_px: Width, height.
+        :param focal_px: fx, fy.
+        :param principal_point_px: cx, cy; the centre of the picture if left out.
+        :param model: As `camera.lens.model`: ``"pinhole"``, ``"brown-conrady"``, ``"kannala-brandt"`` ...
+        :param coefficients: In the model's order; trailing zeros may be left out.
+        """
+        pair = None if principal_point_px is None else list(map(float, principal_point_px))
+        self._native = _camsim.Lens(
+            list(size_px), list(map(float, focal_px)), pair, model, list(map(float, coefficients))
+        )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], camera: str | None = None) -> Lens:
+        """The lens of a CAMERA.toml, or of a calibration by another program (`camsim camera import` lists them).
+
+        :param camera: Name of the camera in a calibration of several.
+        """
+        return cls._of(_camsim.Camera.load(path, camera).lens())
+
+    @classmethod
+    def _of(cls, native: _camsim.Lens) -> Lens:
+        lens = cls.__new__(cls)
+        lens._native = native
+        return lens
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width, height."""
+        return self._native.size_px
+
+    @property
+    def focal_px(self) -> tuple[float, float]:
+        """fx, fy."""
+        return self._native.focal_px
+
+    @property
+    def principal_point_px(self) -> tuple[float, float]:
+        """cx, cy."""
+        return self._native.principal_point_px
+
+    @property
+    def model(self) -> str:
+        """Name of the model."""
+        return self._native.model
+
+    @property
+    def coefficients(self) -> list[float]:
+        """All coefficients in the model's order."""
+        return self._native.coefficients
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The 3 x 3 matrix K that OpenCV takes."""
+        (fx, fy), (cx, cy) = self.focal_px, self.principal_point_px
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Pixels (N, 2) of points (N, 3) in camera axes; NaN beside and behind the camera.
+
+        Beyond the fold of the lens the formula is evaluated too: `valid` says which points the lens images.
+        """
+        return self._native.project(rows_of(points, 3, "points"))
+
+    def distort(self, ideal: ArrayLike) -> NDArray[np.float64]:
+        """Pixels (N, 2) of ideal points (N, 2): x/z and y/z."""
+        return self._native.distort(rows_of(ideal, 2, "ideal"))
+
+    def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Unit rays (N, 3) in camera axes of pixels (N, 2); NaN where the lens has no ray."""
+        return self._native.unproject(rows_of(pixels, 2, "pixels"))
+
+    def undistort(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Ideal points (N, 2), x/z and y/z, of pixels (N, 2); NaN where the lens has no ray.
+
+        What `cv2.undistortPoints` and `cv2.fisheye.undistortPoints` approximate, to the last bits.
+        """
+        return self._native.undistort(rows_of(pixels, 2, "pixels"))
+
+    def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Derivatives (N, 2, 3) of the pixels of points (N, 3) by these points, analytic."""
+        return self._native.jacobian(rows_of(points, 3, "points")).reshape(-1, 2, 3)
+
+    def valid(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether the lens images points (N, 3), inside of the picture or not: before the camera, and within the
+        fold, beyond which the formula gives mirror images that no real lens shows. Shape (N,)."""
+        return self._native.valid(rows_of(points, 3, "points"))
+
+    def __repr__(self) -> str:
+        width, height = self.size_px
+        return f"<camsim.Lens {self.model} {self.coefficients}: {width}x{height}, f = {self.focal_px} px>"

@@ -1,0 +1,352 @@
+"""Scenarios and their frames."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import pathlib
+import tempfile
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, overload
+
+from . import _camsim, _command, _toml
+from ._errors import InputError, ScenarioWarning
+from .frame import Frame
+from .inputs import InputFiles
+from .lens import Lens
+from .randomize import Variations
+from .trajectory import BarometerSamples, GnssSamples, ImuSamples, MagnetometerSamples, Trajectory
+
+Path = str | os.PathLike[str]
+
+
+class Scenario(Sequence[Frame]):
+    """A flight through a scene as one camera sees it: a sequence of frames that are rendered when asked for.
+
+    >>> import camsim
+    >>> scenario = camsim.Scenario.load("assets/demo.toml")
+    >>> len(scenario)
+    60
+    >>> scenario[7].save("frame-7.png")
+    >>> for frame in scenario.frames(0, 10, channels=["color", "depth"]):
+    ...     print(frame.index, frame.stamp_ns, float(frame.depth.max()))
+    """
+
+    def __init__(self, native: _camsim.Scenario, files: InputFiles, known: Iterable[str] = ()) -> None:
+        """Not for users: `Scenario.load` and `Scenario.from_dict` make scenarios."""
+        self._native = native
+        self._files = files
+        for warning in native.warnings():
+            if warning not in known:
+                warnings.warn(warning, ScenarioWarning, stacklevel=3)
+
+    @classmethod
+    def load(
+        cls,
+        path: Path,
+        *,
+        sets: Mapping[str, Any] | None = None,
+        camera: str | None = None,
+        preset: str | None = None,
+        backend: str = "auto",
+    ) -> Scenario:
+        """Reads a scenario (TOML) or the `run.json` of an earlier run, and every file that it names.
+
+        :param path: The file.
+        :param sets: Keys with values on top of the file's, as `--set` of the command line.
+        :param camera: Name of one of `[[cameras]]`; the first if left out.
+        :param preset: ``"default"`` or ``"paper"``.
+        :param backend: ``"cpu"``, ``"gpu"``, or ``"auto"``: the gpu on a graphics card, else the cpu.
+        :raises camsim.InputError: The message names the file, line or key and what to do.
+
+        >>> scenario = Scenario.load("flight.toml", sets={"camera.shutter.readout_ms": 0})
+        """
+        files = InputFiles()
+        return cls(_camsim.Scenario.load(path, _set_pairs(sets or {}, files), preset, camera, backend), files)
+
+    @classmethod
+    def from_dict(
+        cls,
+        tree: Mapping[str, Any],
+        *,
+        folder: Path = ".",
+        camera: str | None = None,
+        backend: str = "auto",
+    ) -> Scenario:
+        """A scenario from a tree of keys, as `to_dict` gives it.
+
+        :param tree: Tables, lists, numbers and text; what is left out has its default. In place of paths there may be
+            a `PoseTable` (log), a `HeightMap` (DEM), and pictures as arrays of bytes.
+        :param folder: The folder that relative paths are in.
+
+        >>> scenario = Scenario.from_dict({
+        ...     "flight": {"log": "flight.csv"},
+        ...     "camera": {"size_px": [640, 480], "focal_px": [420.0, 420.0], "fps": 30.0},
+        ...     "scene": {"pattern": {"cell_m": 10.0}},
+        ... })
+        """
+        files = InputFiles()
+        text = _toml.document_text(files.placed(tree))
+        return cls(_camsim.Scenario.parse(text, pathlib.Path(folder) / "<dict>", camera, backend), files)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every key with its value, those of defaults too. Times are as in the file (s, ms), angles in degrees."""
+        tree: dict[str, Any] = json.loads(self._native.json(False))
+        return tree
+
+    def to_toml(self) -> str:
+        """Every key with its value as the text of a scenario file."""
+        return self._native.toml()
+
+    def set(self, key: str, value: Any) -> None:
+        """Changes a key of this scenario. Frames under way are not changed.
+
+        :param key: With dots, as in the file; elements of lists by number, cameras of `[[cameras]]` by name.
+        :raises camsim.InputError: There is no such key, or the value cannot be used; nothing is changed then.
+
+        >>> scenario.set("camera.shutter.readout_ms", 20)
+        """
+        self._native.set(key, self._files.text(value, key))
+
+    def replace(self, sets: Mapping[str, Any]) -> Scenario:
+        """A copy with changed keys. What they do not touch (log, scene) is shared, and loaded once.
+
+        >>> sharp = scenario.replace({"camera.shutter.exposure_ms": 0, "camera.shutter.readout_ms": 0})
+        """
+        return Scenario(self._native.changed(_set_pairs(sets, self._files)), self._files, self.warnings)
+
+    @property
+    def variations(self) -> Variations:
+        """The scenarios that `[randomize]` of the file describes; `camsim.randomize` adds one."""
+        return Variations(self)
+
+    @property
+    def variation(self) -> int | None:
+        """Number of the variation that it is; None if nothing was drawn."""
+        return self._native.variation_index
+
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """What was drawn for this variation, by key."""
+        index = self.variation
+        return {} if index is None else dict(json.loads(self._native.drawn(index)))
+
+    def _variation(self, index: int) -> Scenario:
+        return Scenario(self._native.variation(index), self._files, self.warnings)
+
+    @property
+    def camera(self) -> str:
+        """Name of the camera; empty where it has none."""
+        return self._native.camera
+
+    @property
+    def cameras(self) -> dict[str, Scenario]:
+        """The scenarios of all cameras of `[[cameras]]` by their names, of one flight and scene.
+
+        >>> left, right = scenario.cameras["left"], scenario.cameras["right"]
+        """
+        known = self.warnings
+        return {name: Scenario(self._native.of_camera(name), self._files, known) for name in self._native.cameras}
+
+    @property
+    def channels(self) -> list[str]:
+        """The channels of `output.channels`, which frames have if nothing else is asked for."""
+        return self._native.channels
+
+    @property
+    def warnings(self) -> list[str]:
+        """What camsim has noticed while loading."""
+        return self._native.warnings()
+
+    @property
+    def objects(self) -> list[tuple[str, int]]:
+        """Name and class of every object; number n of the channel `object` is `objects[n - 1]`."""
+        return self._native.objects()
+
+    @property
+    def lens(self) -> Lens:
+        """The camera's lens."""
+        return Lens._of(self._native.camera_keys().lens())
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Motion of platform and camera at any instant."""
+        return Trajectory(self._native.trajectory())
+
+    def imu(self, name: str | None = None) -> ImuSamples:
+        """Samples of an `[[imu]]`; of several it is named.
+
+        >>> imu = scenario.imu()
+        >>> imu.t_ns, imu.gyro_rad_s, imu.accel_m_s2
+        """
+        return ImuSamples(**self._native.samples("imu", name))
+
+    def gnss(self, name: str | None = None) -> GnssSamples:
+        """Samples of a `[[gnss]]`."""
+        return GnssSamples(**self._native.samples("gnss", name))
+
+    def barometer(self, name: str | None = None) -> BarometerSamples:
+        """Samples of a `[[barometer]]`."""
+        return BarometerSamples(**self._native.samples("barometer", name))
+
+    def magnetometer(self, name: str | None = None) -> MagnetometerSamples:
+        """Samples of a `[[magnetometer]]`."""
+        return MagnetometerSamples(**self._native.samples("magnetometer", name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Scenarios travel to other processes with their keys and arrays; what they load is loaded there."""
+        camera = self.camera if len(self._native.cameras) > 1 else None
+        folder = str(self._files.folder) if self._files.contents() else ""
+        return _restored, (self._native.json(True), camera, self._native.backend, folder, self._files.contents())
+
+    def __len__(self) -> int:
+        """Number of frames in the window."""
+        return len(self._native)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Renders one frame, or those of a slice, with the channels of `output.channels`."""
+        if isinstance(index, slice):
+            return list(self._frames(range(len(self))[index], None))
+        return self.render(index)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.frames()
+
+    def render(self, index: int, channels: Iterable[str] | None = None) -> Frame:
+        """Renders one frame. Several in order are faster by `frames`.
+
+        :param index: Number of the frame; negative from the end.
+        :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :raises IndexError: There is no such frame.
+        """
+        number = range(len(self))[index]
+        native = self._native
+        return Frame(native.render_one(number, _names(channels)), native.camera, native.encoding)
+
+    def frames(
+        self,
+        start: int | None = None,
+        stop: int | None = None,
+        step: int | None = None,
+        *,
+        channels: Iterable[str] | None = None,
+        progress: bool = False,
+    ) -> Iterator[Frame]:
+        """Renders frames in order; while Python works on one, the next ones are under way.
+
+        :param start, stop, step: As those of a slice of this scenario.
+        :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :param progress: Show a bar by tqdm, if that is installed.
+
+        >>> for frame in scenario.frames(0, 100, channels=["color", "flow"]):
+        ...     train(frame.color, frame.flow)
+        """
+        frames = self._frames(range(len(self))[start:stop:step], _names(channels))
+        return _with_bar(frames) if progress else frames
+
+    def _frames(self, numbers: range, channels: list[str] | None) -> Frames:
+        return Frames(self._native, numbers, channels)
+
+    def explain(self, frame: int = 0, *, as_dict: bool = False) -> Any:
+        """The plan of a frame: passes, sizes, samples, predicted errors, what is left out and why.
+
+        :param as_dict: Give what `camsim explain --json` prints; else the text for people.
+
+        >>> print(scenario.explain(7))
+        >>> scenario.explain(7, as_dict=True)["plan"]
+        """
+        number = range(len(self))[frame]
+        words = ["explain", "{scenario}", "--frame", str(number), *(["--json"] if as_dict else [])]
+        text = self._command(words)
+        return json.loads(text) if as_dict else text
+
+    def _command(self, words: Sequence[str], *, fails_with_output: bool = False) -> str:
+        """What a command prints of this scenario; `{scenario}` among the words is its file."""
+        with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
+            path = os.path.join(folder, "scenario.json")
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"scenario": self.to_dict()}, file)
+            camera = ["--camera", self.camera] if len(self._native.cameras) > 1 else []
+            backend = [] if self._native.backend == "auto" else ["--backend", self._native.backend]
+            command = [path if word == "{scenario}" else word for word in words]
+            return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
+
+    def __repr__(self) -> str:
+        camera = f" of {self.camera}" if self.camera else ""
+        return f"<camsim.Scenario{camera}: {len(self)} frames, {', '.join(self.channels)}>"
+
+    # Two scenarios are not compared frame by frame.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+
+class Frames(Iterator[Frame]):
+    """Frames on their way: an iterator with a length, and `close`."""
+
+    def __init__(self, native: _camsim.Scenario, numbers: range, channels: list[str] | None) -> None:
+        self._camera, self._encoding = native.camera, native.encoding
+        self._left = len(numbers)
+        first = numbers[0] if numbers else 0
+        self._stream = native.stream(first, numbers.step, len(numbers), channels)
+
+    def __next__(self) -> Frame:
+        parts = next(self._stream)
+        self._left -= 1
+        return Frame(parts, self._camera, self._encoding)
+
+    def __len__(self) -> int:
+        """Number of frames that are still to come."""
+        return self._left
+
+    def close(self) -> None:
+        """Renders no more than the frames under way."""
+        self._stream.close()
+        self._left = 0
+
+
+def load_rig(path: Path, *, sets: Mapping[str, Any] | None = None, backend: str = "auto") -> dict[str, Scenario]:
+    """The scenarios of all cameras of a file with `[[cameras]]`, by name; log and scene are read once.
+
+    >>> rig = camsim.load_rig("stereo.toml")
+    >>> for left, right in zip(rig["left"].frames(), rig["right"].frames()):
+    ...     ...
+    """
+    return Scenario.load(path, sets=sets, backend=backend).cameras
+
+
+def default_scenario() -> str:
+    """Every key of a scenario file with its default, unit and meaning, as TOML."""
+    return _camsim.default_scenario()
+
+
+def _set_pairs(sets: Mapping[str, Any], files: InputFiles) -> list[tuple[str, str]]:
+    return [(key, files.text(value, key)) for key, value in sets.items()]
+
+
+def _restored(text: str, camera: str | None, backend: str, folder: str, contents: Mapping[str, bytes]) -> Scenario:
+    files = InputFiles(contents)
+    if contents:
+        text = text.replace(json.dumps(folder)[1:-1], json.dumps(str(files.folder))[1:-1])
+    document = _toml.document_text(json.loads(text))
+    native = _camsim.Scenario.parse(document, pathlib.Path("scenario"), camera, backend)
+    return Scenario(native, files, known=native.warnings())
+
+
+def _names(channels: Iterable[str] | None) -> list[str] | None:
+    if isinstance(channels, str):
+        raise InputError(f'channels: write channels=["{channels}"], a list of names')
+    return None if channels is None else list(channels)
+
+
+def _with_bar(frames: Frames) -> Iterator[Frame]:
+    try:
+        tqdm = importlib.import_module("tqdm.auto").tqdm
+    except ImportError:
+        return frames
+    return iter(tqdm(frames, total=len(frames), unit="frame"))

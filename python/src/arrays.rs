@@ -1,0 +1,63 @@
+//! Tables of numbers from numpy and to it.
+
+use glam::{DQuat, DVec3};
+use numpy::{
+    Element, IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+use crate::error::input_error;
+
+/// Rows of `width` values each, which the array owns.
+pub fn table<'py, T: Element>(py: Python<'py>, values: Vec<T>, width: usize) -> PyResult<Bound<'py, PyAny>> {
+    let rows = values.len() / width;
+    Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
+}
+
+/// A table of a vector for each item.
+pub fn vectors<'py, T>(
+    py: Python<'py>,
+    items: &[T],
+    part: impl Fn(&T) -> DVec3,
+) -> PyResult<Bound<'py, PyAny>> {
+    table(py, items.iter().flat_map(|item| part(item).to_array()).collect(), 3)
+}
+
+/// A table of a quaternion, scalar first, for each item.
+pub fn quaternions<'py, T>(
+    py: Python<'py>,
+    items: &[T],
+    part: impl Fn(&T) -> DQuat,
+) -> PyResult<Bound<'py, PyAny>> {
+    table(py, items.iter().flat_map(|item| wxyz(part(item))).collect(), 4)
+}
+
+/// An array of a number for each item.
+pub fn column<'py, T, V: Element>(py: Python<'py>, items: &[T], part: impl Fn(&T) -> V) -> Bound<'py, PyAny> {
+    items.iter().map(part).collect::<Vec<V>>().into_pyarray(py).into_any()
+}
+
+/// Components of a quaternion, scalar first.
+pub fn wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}
+
+/// A table from Python as rows of N numbers.
+pub fn rows<'a, const N: usize>(
+    array: &'a PyReadonlyArray2<'_, f64>,
+    what: &str,
+) -> PyResult<&'a [[f64; N]]> {
+    let (rows, width) = (array.shape()[0], array.shape()[1]);
+    if width != N {
+        return Err(input_error(format!(
+            "{what}: an array of shape (N, {N}) is needed, not ({rows}, {width})"
+        )));
+    }
+    let (rows, _) = array.as_slice()?.as_chunks();
+    Ok(rows)
+}
+
+/// A list of numbers from Python.
+pub fn numbers<'a>(array: &'a PyReadonlyArray1<'_, f64>) -> PyResult<&'a [f64]> {
+    Ok(array.as_slice()?)
+}

@@ -1,0 +1,153 @@
+//! A frame as numpy arrays, and pictures from arrays.
+
+use std::path::PathBuf;
+
+use camsim::{
+    core::{
+        frame::{COORDS_CHANNELS, PlaneValues, RenderedFrame, RowRecord},
+        scenario::{Channel, OutputEncoding},
+    },
+    engine::Finished,
+    io::write::{self, SourceFrame},
+};
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{column, quaternions, vectors, wxyz},
+    error::{OrRaise, input_error},
+};
+
+/// A finished frame on its way to Python.
+#[derive(Debug)]
+pub struct Delivery {
+    pub frame: RenderedFrame,
+    pub source: SourceFrame,
+}
+
+impl Delivery {
+    /// A frame of a sequence whose stamps begin at `epoch_ns`.
+    pub fn new(finished: Finished, epoch_ns: i64) -> Self {
+        let source = SourceFrame::new(&finished.plan, epoch_ns);
+        Self { frame: finished.frame, source }
+    }
+
+    /// The frame as a dictionary: `index`, `stamp_ns`, `rows`, `source`, and `channels` with an array each.
+    pub fn into_dict<'py>(self, py: Python<'py>, channels: &[Channel]) -> PyResult<Bound<'py, PyDict>> {
+        let Self { frame, source } = self;
+        let parts = PyDict::new(py);
+        parts.set_item("index", frame.index)?;
+        parts.set_item("stamp_ns", frame.stamp_ns)?;
+        parts.set_item("size_px", (frame.size_px[0], frame.size_px[1]))?;
+        parts.set_item("rows", rows(py, &frame.rows)?)?;
+        parts.set_item("source", source_dict(py, &source)?)?;
+        parts.set_item("channels", arrays(py, frame, channels)?)?;
+        Ok(parts)
+    }
+}
+
+fn rows<'py>(py: Python<'py>, rows: &[RowRecord]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("row", column(py, rows, |row| row.row))?;
+    dict.set_item("t_mid_ns", column(py, rows, |row| row.t_mid_ns))?;
+    dict.set_item("position_ned_m", vectors(py, rows, |row| row.position_ned_m)?)?;
+    dict.set_item("ned_from_camera_wxyz", quaternions(py, rows, |row| row.ned_from_camera)?)?;
+    dict.set_item("velocity_ned_m_s", vectors(py, rows, |row| row.velocity_ned_m_s)?)?;
+    Ok(dict)
+}
+
+fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("size_px", (source.size_px[0], source.size_px[1]))?;
+    dict.set_item("focal_px", (source.focal_px[0], source.focal_px[1]))?;
+    dict.set_item("principal_px", (source.principal_px[0], source.principal_px[1]))?;
+    dict.set_item("t_ns", source.t_ns)?;
+    dict.set_item("position_ned_m", PyArray1::from_slice(py, &source.pose.position_ned_m.to_array()))?;
+    dict.set_item("ned_from_camera_wxyz", PyArray1::from_slice(py, &wxyz(source.pose.ned_from_camera)))?;
+    Ok(dict)
+}
+
+/// The channels that were asked for, of the types that files have. All but the small ones are what the
+/// renderer has allocated, which the arrays own.
+fn arrays<'py>(py: Python<'py>, frame: RenderedFrame, channels: &[Channel]) -> PyResult<Bound<'py, PyDict>> {
+    let [width, height] = frame.size_px.map(|side| side as usize);
+    let dict = PyDict::new(py);
+    let has = |channel| channels.contains(&channel);
+    if has(Channel::Valid) {
+        let valid = frame.color_rgba.chunks_exact(4).map(|rgba| if rgba[3] > 0.0 { u8::MAX } else { 0 });
+        dict.set_item("valid", image(py, valid.collect(), [height, width])?)?;
+    }
+    if has(Channel::Color) {
+        dict.set_item("color", image(py, frame.color_rgba, [height, width])?)?;
+    }
+    if let Some(depth_m) = frame.depth_m.filter(|_| has(Channel::Depth)) {
+        dict.set_item("depth", image(py, depth_m, [height, width])?)?;
+    }
+    if let Some(coords) = frame.coords.filter(|_| has(Channel::Coords)) {
+        dict.set_item("coords", table_image::<_, COORDS_CHANNELS>(py, coords, [height, width])?)?;
+    }
+    for plane in frame.planes.into_iter().filter(|plane| has(plane.channel)) {
+        let array = match plane.values {
+            PlaneValues::Float(values) => image(py, values, [height, width])?,
+            // `object` and `class` of 65535 objects at most, as their files.
+            PlaneValues::Index(numbers) => {
+                image(py, numbers.iter().map(|&number| number as u16).collect(), [height, width])?
+            }
+        };
+        dict.set_item(plane.channel.name(), array)?;
+    }
+    Ok(dict)
+}
+
+/// An array of height x width, and x components where a pixel has several.
+pub fn image<'py, T: Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    [height, width]: [usize; 2],
+) -> PyResult<Bound<'py, PyAny>> {
+    let components = values.len() / (height * width).max(1);
+    let flat = values.into_pyarray(py);
+    Ok(match components {
+        1 => flat.reshape([height, width])?.into_any(),
+        _ => flat.reshape([height, width, components])?.into_any(),
+    })
+}
+
+fn table_image<'py, T: Element, const N: usize>(
+    py: Python<'py>,
+    values: Vec<[T; N]>,
+    size: [usize; 2],
+) -> PyResult<Bound<'py, PyAny>> {
+    image(py, values.into_flattened(), size)
+}
+
+/// A frame of a colour picture alone.
+pub fn frame_of(color: &PyReadonlyArray3<'_, f32>) -> PyResult<RenderedFrame> {
+    let [height, width, components] = [color.shape()[0], color.shape()[1], color.shape()[2]];
+    let color_rgba = match components {
+        4 => color.as_array().iter().copied().collect(),
+        3 => color.as_array().rows().into_iter().flat_map(|p| [p[0], p[1], p[2], 1.0]).collect(),
+        _ => return Err(input_error(format!("a picture has 3 or 4 components a pixel, not {components}"))),
+    };
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| crate::error::too_large("the picture"));
+    Ok(RenderedFrame { size_px: [side(width)?, side(height)?], color_rgba, ..RenderedFrame::default() })
+}
+
+/// Writes a linear colour picture, height x width x 3 or 4, as `.png` (encoded) or `.exr`.
+#[pyfunction]
+pub fn write_picture(
+    py: Python<'_>,
+    path: PathBuf,
+    color: PyReadonlyArray3<'_, f32>,
+    encoding: &str,
+) -> PyResult<()> {
+    let frame = frame_of(&color)?;
+    let encoding = self::encoding(encoding)?;
+    py.detach(|| write::write_picture(&path, &frame, encoding)).or_run_error()
+}
+
+fn encoding(name: &str) -> PyResult<OutputEncoding> {
+    toml::Value::String(name.to_owned())
+        .try_into()
+        .map_err(|error: toml::de::Error| input_error(format!("encoding {name:?}: {}", error.message())))
+}
