@@ -176,7 +176,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<CameraSpec>, ScenarioError> {
     let tree = Tree::read_scenario(path)?;
     let is_scenario = ["camera", "flight", "scene"].iter().any(|key| tree.root.contains_key(*key));
     if is_scenario {
-        let rig = finish(tree, &[], None)?;
+        let rig = read_rig(path, &[], None)?;
         return Ok(rig.scenarios().iter().map(|scenario| scenario.camera.clone()).collect());
     }
     if !tree.root.contains_key(CAMERAS) {
