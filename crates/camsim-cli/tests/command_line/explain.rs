@@ -33,20 +33,20 @@ fn what_moves_and_what_senses_is_listed() {
     let args = ["explain", text(&scenario), "--set", imu, "--set", "output.twin=[]"];
     let (code, out, err) = camsim(args);
     assert_eq!(code, 0, "{err}");
-    let moves = "moves: rotor; pixels that show it, or its shadow, are means of 64 rays of their own, which the predicted \
+    let moves = "moves: propeller/rotor; pixels that show it, or its shadow, are means of 64 rays of their own, which the predicted \
                  errors do not cover";
     assert!(out.contains(moves), "{out}");
-    // The window of two seconds, and one before and after.
+    // The window of two seconds with the exposures of its first and last row, and one second before and after.
     assert!(
-        out.contains("sensors\n  imu imu0: 100 Hz, 401 samples, on the camera at 0.1, 0, 0 m\n"),
+        out.contains("sensors\n  imu imu0: 100 Hz, 403 samples, on the camera at 0.1, 0, 0 m\n"),
         "{out}"
     );
     let (_, out, _) = camsim([&args[..], &["--json"]].concat());
     let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!(explained["moving"], serde_json::json!(["rotor"]));
+    assert_eq!(explained["moving"], serde_json::json!(["propeller/rotor"]));
     assert_eq!(
         (&explained["sensors"][0]["name"], &explained["sensors"][0]["samples"]),
-        (&"imu0".into(), &401.into())
+        (&"imu0".into(), &403.into())
     );
     let (_, out, _) = camsim(["explain", text(&assets().join("pattern.toml"))]);
     assert!(!out.contains("moves:") && !out.contains("sensors"), "{out}");

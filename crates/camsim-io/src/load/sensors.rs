@@ -122,8 +122,8 @@ mod tests {
     use crate::scenario_file::parse_scenario;
 
     /// Warnings of the force on a flight in a circle of 40 m, 10 rows a second, each `turn_rad` after the last and off
-    /// by `noise_m` to and fro.
-    fn warned(keys: &str, turn_rad: f64, noise_m: f64) -> Vec<String> {
+    /// by `wave_m` to and fro once a second.
+    fn warned(keys: &str, turn_rad: f64, wave_m: f64) -> Vec<String> {
         let text = format!(
             "[flight]\nlog = \"a.csv\"\n{keys}\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n[[imu]]\nname = \"imu0\""
         );
@@ -132,7 +132,7 @@ mod tests {
         let rows: Vec<LogRow> = (0..200)
             .map(|i| {
                 let angle = turn_rad * f64::from(i);
-                let off_m = noise_m * if i % 2 == 0 { 1.0 } else { -1.0 };
+                let off_m = wave_m * (std::f64::consts::TAU * 0.1 * f64::from(i)).sin();
                 LogRow {
                     t_s: 0.1 * f64::from(i) / speed,
                     position_ned_m: DVec3::new(40.0 * angle.sin() + off_m, 40.0 * angle.cos(), -50.0),
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(warned("", 0.045, 0.0), [""; 0], "8.1 m/s^2");
         let fast = warned("speed = 3.0", 0.045, 0.0);
         assert!(fast.len() == 1 && fast[0].contains("multiplies accelerations by 9"), "{fast:?}");
-        let noisy = warned("", 0.045, 0.5);
+        let noisy = warned("", 0.045, 1.0);
         assert!(
             noisy.len() == 1
                 && noisy[0].contains("10.0 rows a second")

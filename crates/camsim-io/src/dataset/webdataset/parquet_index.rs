@@ -15,7 +15,7 @@ use parquet::{
 use super::super::DatasetError;
 
 /// Samples of a group of rows: what is held in memory.
-const GROUP: usize = 10_000;
+const GROUP: usize = 2000;
 
 const SCHEMA: &str = "message samples {
     required binary key (STRING);
