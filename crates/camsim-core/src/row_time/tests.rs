@@ -150,7 +150,10 @@ fn a_wide_lens_shows_what_is_beside_and_behind() {
         assert_eq!(found.map_or(0, |found| found.solutions as usize), expected.len(), "{point:?}");
         inside += expected.len();
         if let Some(shown) = frame.projector().by_steps(point, DVec2::new(30.0, 20.0)) {
-            assert!(expected.iter().any(|px| px.distance(shown.px) < 1e-3), "{point:?}: {shown:?} {expected:?}");
+            assert!(
+                expected.iter().any(|px| px.distance(shown.px) < 1e-3),
+                "{point:?}: {shown:?} {expected:?}"
+            );
         }
     }
     assert!(inside > 200, "{inside}");
