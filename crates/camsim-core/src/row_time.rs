@@ -145,7 +145,8 @@ impl CameraModel {
             return Some((self.project(uv), depth_m(ray.z)));
         }
         // What an ideal plane does not hold.
-        let is_beyond = self.lens.angle_max_rad() > MAX_FIELD_RAD && self.lens.contains_ray(ray);
+        let reaches = self.lens.angle_max_rad() > MAX_FIELD_RAD && ray.length_squared() > 0.0;
+        let is_beyond = reaches && self.lens.contains_ray(ray);
         let is_seen = is_beyond && (ray.z <= 0.0 || uv.length() >= MAX_FIELD_RAD.tan());
         is_seen.then(|| (self.project_ray(ray), depth_m(if ray.z > 0.0 { ray.z } else { ray.length() })))
     }

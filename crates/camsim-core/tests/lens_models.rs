@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{PI, TAU};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use camsim_core::camera::CameraModel;
 use camsim_core::lens::{Lens, LensModel};
@@ -219,9 +220,15 @@ fn validity_and_inverse_of_every_set() {
         .chain(hostile_sets())
         .filter(|set| set.camera.lens.model() != LensModel::Equirectangular)
         .collect();
-    let [rays, pixels] = sets.par_iter().map(judge).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    // Every set is judged, so that one failure does not hide others.
+    let judged: Vec<Option<[usize; 2]>> =
+        sets.par_iter().map(|set| catch_unwind(AssertUnwindSafe(|| judge(set))).ok()).collect();
+    let failed: Vec<&String> =
+        sets.iter().zip(&judged).filter(|(_, judged)| judged.is_none()).map(|(set, _)| &set.name).collect();
+    assert!(failed.is_empty(), "{} sets failed: {failed:#?}", failed.len());
+    let [rays, pixels] = judged.into_iter().flatten().fold([0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     eprintln!("{} sets, {rays} rays found again, {pixels} pixels judged", sets.len());
-    assert!(sets.len() > 250 && rays > 200_000 && pixels > 50_000);
+    assert!(sets.len() > 250 && rays > 50_000 && pixels > 50_000);
 }
 
 /// Counts of the rays and pixels that were judged.
@@ -233,7 +240,7 @@ fn judge(set: &Set) -> [usize; 2] {
     let limit = camera.lens.angle_max_rad();
     let mut found = 0;
     let size = DVec2::from(camera.size_px.map(f64::from));
-    let is_one_to_one = camera.check().bijective;
+    let border = border_px(set, &borders, limit);
     for (i, Border { last_good, first_bad, .. }) in borders.iter().enumerate() {
         let phi = i as f64 * TAU / RAYS as f64;
         let end = last_good.min(limit);
@@ -247,39 +254,45 @@ fn judge(set: &Set) -> [usize; 2] {
             let inside = ray(phi, end * (f64::from(k) + 0.7) / 12.2);
             let px = camera.project_ray(inside);
             assert!(camera.lens.contains_ray(inside), "{name}: direction {i}, share {k} of {end}");
-            if !(px.cmpge(-size).all() && px.cmple(2.0 * size).all()) {
+            if !(px.cmpge(DVec2::splat(-0.5)).all() && px.cmple(size - 0.5).all()) {
                 continue;
             }
             let again = camera.ray(px);
             let again = again.unwrap_or_else(|| panic!("{name}: missed {inside} at {px}"));
-            assert!(!is_one_to_one || again.distance(inside) < 1e-5, "{name}: {inside} became {again}");
+            let off_px = (camera.project_ray(again) - px).length();
+            assert!(
+                off_px < 1e-4 * (1.0 + px.length() / 1000.0),
+                "{name}: {again} is imaged {off_px} px away"
+            );
+            // Where the border's image winds about a pixel twice, it has two rays.
+            let has_one = border.as_ref().is_some_and(|border| winding(border, px).0 <= 1);
+            assert!(!has_one || again.distance(inside) < 1e-5, "{name}: {inside} became {again}");
             found += 1;
         }
     }
-    [found, judge_pixels(set, &borders, limit, is_one_to_one)]
+    [found, judge_pixels(set, border.as_deref())]
+}
+
+/// The image of the border; `None` for one that is not near everywhere.
+fn border_px(set: &Set, borders: &[Border], limit: f64) -> Option<Vec<DVec2>> {
+    let image = |(i, border): (usize, &Border)| {
+        let phi = i as f64 * TAU / RAYS as f64;
+        // The scan ends within a step of the border: here by bisection.
+        let (mut low, mut high) = (border.last_good, border.first_bad.min(set.limit()));
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            *(if set.is_regular(phi, middle) { &mut low } else { &mut high }) = middle;
+        }
+        let px = set.camera.project_ray(ray(phi, low.min(limit) * (1.0 - 1e-6)));
+        (!border.is_pole && px.is_finite() && px.length() < 1e5).then_some(px)
+    };
+    borders.iter().enumerate().map(image).collect()
 }
 
 /// No pixel has a ray that is not inside and does not show there; none that the image of the border winds about is
 /// without one.
-fn judge_pixels(set: &Set, borders: &[Border], limit: f64, is_one_to_one: bool) -> usize {
+fn judge_pixels(set: &Set, border: Option<&[DVec2]>) -> usize {
     let (name, camera) = (&set.name, &set.camera);
-    let border: Vec<DVec2> = borders
-        .iter()
-        .enumerate()
-        .map(|(i, Border { last_good, first_bad, .. })| {
-            let phi = i as f64 * TAU / RAYS as f64;
-            // The scan ends within a step of the border: here by bisection.
-            let (mut low, mut high) = (*last_good, first_bad.min(set.limit()));
-            for _ in 0..40 {
-                let middle = 0.5 * (low + high);
-                *(if set.is_regular(phi, middle) { &mut low } else { &mut high }) = middle;
-            }
-            camera.project_ray(ray(phi, low.min(limit) * (1.0 - 1e-6)))
-        })
-        .collect();
-    let has_pole = borders.iter().any(|border| border.is_pole);
-    let is_near = |px: &DVec2| px.is_finite() && px.length() < 1e5;
-    let has_border = is_one_to_one && !has_pole && border.iter().all(is_near);
     let mut judged = 0;
     for k in 0..20 * 20 {
         let share = DVec2::new(f64::from(k % 20), f64::from(k / 20)) / 19.0;
@@ -292,13 +305,16 @@ fn judge_pixels(set: &Set, borders: &[Border], limit: f64, is_one_to_one: bool) 
             let first_bad = set.border(phi, theta).first_bad;
             assert!(theta <= first_bad, "{name} {px}: {found} lies beyond the fold at {first_bad}");
         }
-        // The map of a picture holds f32.
+        // The map of a picture holds f32. Where a lens magnifies without limit (beside the end of the division
+        // model) its rounding is more.
         if let Some(ideal) = camera.unproject(px) {
             let off_px = (camera.project(ideal.as_vec2().as_dvec2()) - px).length();
-            assert!(off_px < 1e-3, "{name} {px}: {off_px} px in f32");
+            let rounded =
+                (camera.lens.jacobian(ideal).abs() * ideal.abs() * camera.focal_px).length() / 2_f64.powi(24);
+            assert!(off_px < rounded.max(1e-3), "{name} {px}: {off_px} px in f32");
         }
-        let (turns, distance) = winding(&border, px);
-        if has_border && distance > UNJUDGED_PX {
+        let Some((turns, distance)) = border.map(|border| winding(border, px)) else { continue };
+        if distance > UNJUDGED_PX {
             assert_eq!(
                 answer.is_some(),
                 turns > 0,
@@ -321,4 +337,29 @@ fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
         distance = distance.min((to_a + along * share).length());
     }
     ((turned / TAU).round() as i32, distance)
+}
+
+/// Times of a lens map in f64, of each model's first camera over that of a brown-conrady lens of the same picture.
+#[test]
+#[ignore = "a measurement: cargo test -p camsim-core --test lens_models -- --ignored --nocapture"]
+fn lens_map_times() {
+    let seconds = |camera: &CameraModel| {
+        let start = std::time::Instant::now();
+        let rays = camera.lens_inverse();
+        assert!(rays.len() > 100_000);
+        start.elapsed().as_secs_f64()
+    };
+    let k = [-0.283, 0.074, 2e-4, 2e-5];
+    let sets = golden_sets();
+    for model in LensModel::ALL {
+        let Some(set) = sets.iter().find(|set| set.camera.lens.model() == model) else { continue };
+        let mut plain = set.camera.clone();
+        plain.lens = Lens::new(LensModel::BrownConrady, &k).unwrap();
+        // By turns, the least of five: other programs run beside.
+        let mut least = [f64::INFINITY; 2];
+        for _ in 0..5 {
+            least = [least[0].min(seconds(&set.camera)), least[1].min(seconds(&plain))];
+        }
+        eprintln!("{}: {:.2} times brown-conrady", set.name, least[0] / least[1]);
+    }
 }

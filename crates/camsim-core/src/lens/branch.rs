@@ -27,7 +27,13 @@ const SAMPLES: [usize; 2] = [240, 160];
 /// Sectors in which the reach of the branch's image is tabulated.
 const SECTORS: usize = 360;
 /// Radii of starts elsewhere, as shares of the border's, and their directions.
-const ELSEWHERE: ([f64; 2], usize) = ([0.5, 0.97], 8);
+const ELSEWHERE: (&[f64], usize) = (&[0.5, 0.97], 8);
+/// The same for a long search.
+const EVERYWHERE: (&[f64], usize) = (&[0.97, 0.5, 0.25, 0.75, 0.9, 0.99, 0.998], 48);
+/// Distance from the rim's polygon, relative beyond 1, within which the rim itself may pass on the other side.
+const BESIDE_RIM: f64 = 5e-3;
+/// Largest deviation of the rim from its polygon, as a share of a side.
+const SAG: f64 = 0.25;
 
 /// A smooth map of the plane.
 pub(super) trait ChartMap {
@@ -52,6 +58,8 @@ pub(super) struct Branch {
     starts: Vec<DVec2>,
     /// Largest distance of an image from that of the origin, by direction.
     reach: Vec<f64>,
+    /// Image of the border, a polygon; empty if it is not finite.
+    rim: Vec<DVec2>,
 }
 
 impl Branch {
@@ -69,8 +77,12 @@ impl Branch {
         }
         let centre = map.value(DVec2::ZERO);
         let starts = starts(map, &border);
-        let reach = reach(map, &border, centre);
-        Self { limit, border, centre, starts, reach }
+        let mut rim = border_images(map, &border, f64::INFINITY);
+        let reach = reach(&rim, centre);
+        if !rim.iter().all(|image| image.is_finite()) {
+            rim.clear();
+        }
+        Self { limit, border, centre, starts, reach, rim }
     }
 
     /// Largest radius of the branch.
@@ -83,9 +95,9 @@ impl Branch {
         self.border.radius(phi_rad)
     }
 
-    /// The image of the border, a polygon.
-    pub(super) fn border_images(&self, map: &impl ChartMap) -> Vec<DVec2> {
-        border_images(map, &self.border, f64::INFINITY)
+    /// The image of the border, a polygon; empty if it is not finite.
+    pub(super) fn rim(&self) -> &[DVec2] {
+        &self.rim
     }
 
     /// Whether a point of the chart is inside.
@@ -115,6 +127,10 @@ impl Branch {
         if let Some(found) = self.newton(map, image, self.starts[index(cell)]) {
             return Some(found);
         }
+        let pre_images = self.pre_images(image);
+        if pre_images == Some(0) {
+            return None;
+        }
         let newton = |start: DVec2| {
             self.newton(map, image, start)
                 .or_else(|| self.newton(map, image, self.approach(map, image, start)))
@@ -123,12 +139,33 @@ impl Branch {
             let [x, y] = [0, 1].map(|i| (cell[i] + step[i]).saturating_sub(1).min(CELLS - 1));
             self.starts[index([x, y])]
         });
-        let (shares, directions) = ELSEWHERE;
+        // Where there is one for sure, it is worth a long search.
+        let (shares, directions) = if pre_images.is_some() { EVERYWHERE } else { ELSEWHERE };
         let elsewhere = (0..directions).flat_map(|k| {
             let phi = k as f64 * TAU / directions as f64;
-            shares.map(|share| DVec2::from_angle(phi) * (share * self.border.radius(phi)))
+            shares.iter().map(move |share| DVec2::from_angle(phi) * (share * self.border.radius(phi)))
         });
         [self.starts[index(cell)]].into_iter().chain(near).chain(elsewhere).find_map(newton)
+    }
+
+    /// Number of points of the branch with an image, by how often the rim winds about it; `None` beside the rim.
+    fn pre_images(&self, image: DVec2) -> Option<i32> {
+        let mut turns = 0;
+        let mut clear = f64::INFINITY;
+        for (a, b) in self.rim.iter().zip(self.rim.iter().cycle().skip(1)) {
+            let (along, to_image) = (*b - *a, image - *a);
+            let share = (to_image.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+            // The rim between two corners may pass beside the straight line by a share of its length.
+            clear = clear.min((to_image - along * share).length() - SAG * along.length());
+            let left = along.perp_dot(to_image);
+            if a.y <= image.y && b.y > image.y && left > 0.0 {
+                turns += 1;
+            } else if a.y > image.y && b.y <= image.y && left < 0.0 {
+                turns -= 1;
+            }
+        }
+        let is_sure = clear > BESIDE_RIM * (1.0 + image.length()) && !self.rim.is_empty();
+        is_sure.then_some(turns)
     }
 
     /// Guarded Newton iteration: each step is pulled back where it would leave the branch, and halved where the
@@ -323,8 +360,7 @@ fn index([x, y]: [usize; 2]) -> usize {
 }
 
 /// The image of the border encloses that of the branch.
-fn reach(map: &impl ChartMap, border: &FoldCurve, centre: DVec2) -> Vec<f64> {
-    let images = border_images(map, border, f64::INFINITY);
+fn reach(images: &[DVec2], centre: DVec2) -> Vec<f64> {
     let image = |ray: usize| images[ray % FOLD_RAYS] - centre;
     let mut reach = vec![0.0_f64; SECTORS];
     for ray in 0..FOLD_RAYS {

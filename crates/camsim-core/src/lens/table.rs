@@ -159,8 +159,7 @@ pub(super) fn formula(grid: &Arc<LensGrid>) -> Arc<dyn DirectionFormula> {
         GridOf::Points => {
             let reach = grid.spline.reach();
             let branch = Branch::new(&Points(grid), reach, reach);
-            let rim = branch.border_images(&Points(grid));
-            Arc::new(OfPoints { grid: grid.clone(), branch, rim })
+            Arc::new(OfPoints { grid: grid.clone(), branch })
         }
     }
 }
@@ -201,8 +200,6 @@ impl DirectionFormula for OfRays {
 struct OfPoints {
     grid: Arc<LensGrid>,
     branch: Branch,
-    /// The border's image among rays, a polygon.
-    rim: Vec<DVec2>,
 }
 
 /// The spline as a map of the distorted plane.
@@ -254,7 +251,8 @@ impl ClosedInverse for OfPoints {
     /// Where the line from the axis first crosses the rim.
     fn ideal_radius(&self, phi_rad: f64) -> Option<f64> {
         let axis = DVec2::from_angle(phi_rad);
-        let sides = self.rim.iter().zip(self.rim.iter().cycle().skip(1));
+        let rim = self.branch.rim();
+        let sides = rim.iter().zip(rim.iter().cycle().skip(1));
         let crossing = sides.filter_map(|(a, b)| {
             let (from, to) = (axis.perp_dot(*a), axis.perp_dot(*b));
             let place = a.lerp(*b, from / (from - to)).dot(axis);

@@ -19,6 +19,7 @@ mod twin;
 use std::{collections::HashSet, fmt::Debug, hash::Hash};
 
 use camsim_core::{
+    lens::LensModel,
     scene::PrefilterTaps,
     temporal::{NodeDepths, PathStage},
 };
@@ -53,6 +54,14 @@ fn frames_of_planned_cases_agree_with_their_twins() {
         &keys.iter().map(|key| (key.blur, key.tap)).collect(),
         TapKind::ALL.into_iter().flat_map(|tap| [(false, tap), (true, tap)]),
     );
+}
+
+#[test]
+fn lens_models_agree_with_their_twins() {
+    let plans = plans(run(Group::Planned, &planned_cases::lenses()));
+    let models: HashSet<LensModel> = plans.iter().map(|plan| plan.camera.lens.model()).collect();
+    let others = [LensModel::Pinhole, LensModel::BrownConrady, LensModel::KannalaBrandt, LensModel::Table];
+    assert_all(&models, LensModel::ALL.into_iter().filter(|model| !others.contains(model)));
 }
 
 #[test]

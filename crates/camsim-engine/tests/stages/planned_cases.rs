@@ -67,14 +67,6 @@ pub fn planned() -> Vec<Case> {
             all.push(case(format!("{name}, {scene_name}"), sequence, 2));
         }
     }
-    // Every model of a lens whose map no shader makes, over ground.
-    for (model, coefficients, focal_px) in lens_models() {
-        let mut scenario = camera(0.0);
-        scenario.camera.focal_px = [focal_px, 0.95 * focal_px];
-        scenario.camera.lens = LensSpec { model, coefficients: coefficients.to_vec() };
-        let sequence = sequence(scenario, turning(), pattern(6000.0));
-        all.push(case(format!("lens of model {}", model.facts().name), sequence, 2));
-    }
     let benches = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../benches");
     let read = |name: &str| read_scenario(&benches.join(name), &[], None).expect("scenario");
     let all_effects = load_sequence(&read("all_effects.toml")).expect("sequence").sequence;
@@ -93,6 +85,20 @@ pub fn planned() -> Vec<Case> {
         all.push(case(format!("houses, {exposure_ms} ms, k1 = {radial}"), houses, 40));
     }
     all
+}
+
+/// Every model of a lens whose map no shader makes, over ground.
+pub fn lenses() -> Vec<Case> {
+    let case = |(model, coefficients, focal_px): (LensModel, &[f64], f64)| {
+        let mut scenario = camera(0.0);
+        scenario.camera.focal_px = [focal_px, 0.95 * focal_px];
+        scenario.camera.lens = LensSpec { model, coefficients: coefficients.to_vec() };
+        let sequence = sequence(scenario, turning(), pattern(6000.0));
+        let name = format!("lens of model {}", model.facts().name);
+        let case = Case::new(name, sequence, Input::Frame(2), Output::FrameAndColorAlone);
+        Case { coords_phase: COORDS_PHASE, ..case }
+    };
+    lens_models().map(case).into()
 }
 
 fn lens_models() -> [(LensModel, &'static [f64], f64); 11] {
