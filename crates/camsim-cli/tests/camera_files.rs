@@ -79,7 +79,8 @@ fn chains_become_rigs_that_scenarios_name() {
     let text = fs::read_to_string(path("pattern.toml")).unwrap();
     let (head, tail) = (&text[..text.find("[camera]").unwrap()], &text[text.find("[scene]").unwrap()..]);
     let scenario = file(base, "flight.toml", &format!("cameras = \"rig.toml\"\n{head}{tail}"));
-    let (code, _, err) = camsim(&["camera", "export", &scenario, "--as", "kalibr", "-o", &path("again.yaml")]);
+    let (code, _, err) =
+        camsim(&["camera", "export", &scenario, "--as", "kalibr", "-o", &path("again.yaml")]);
     assert_eq!(code, 0, "{err}");
     let (code, again, err) = camsim(&["camera", "import", &path("again.yaml"), "--rig"]);
     assert_eq!(code, 0, "{err}");
@@ -101,7 +102,11 @@ fn sizes_complete_files_without_one() {
     let (code, _, err) = camsim(&["camera", "import", &path]);
     assert!(code != 0 && err.contains("--size"), "{err}");
     let (code, out, err) = camsim(&["camera", "import", &path, "--size", "640x480"]);
-    assert!(code == 0 && out.contains("size_px = [\n    640,\n    480,\n]") || out.contains("size_px = [640, 480]"), "{out} {err}");
+    assert!(
+        code == 0 && out.contains("size_px = [\n    640,\n    480,\n]")
+            || out.contains("size_px = [640, 480]"),
+        "{out} {err}"
+    );
     let stated = file(folder.path(), "own.yaml", &format!("{text}Camera.width: 320\nCamera.height: 240\n"));
     let (code, _, err) = camsim(&["camera", "import", &stated, "--size", "640x480"]);
     assert!(code != 0 && err.contains("the file states 320 x 240"), "{err}");
@@ -117,7 +122,8 @@ fn stmaps_are_lens_tables() {
          lens = { model = \"brown-conrady\", coefficients = [-0.2, 0.03, 0.001, -0.002] }\n",
     );
     let maps = folder.path().join("maps");
-    let (code, _, err) = camsim(&["camera", "export", &camera, "--as", "stmap", "-o", maps.to_str().unwrap()]);
+    let (code, _, err) =
+        camsim(&["camera", "export", &camera, "--as", "stmap", "-o", maps.to_str().unwrap()]);
     assert_eq!(code, 0, "{err}");
     let table = file(
         folder.path(),

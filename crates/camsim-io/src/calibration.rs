@@ -113,4 +113,3 @@ pub struct ImuReference {
     /// How much its clock is ahead of the platform's, seconds.
     pub clock_offset_s: f64,
 }
-

@@ -20,8 +20,8 @@ mod format;
 mod gyroflow;
 mod kalibr;
 mod key_table;
-mod lensfun;
 mod lens_models;
+mod lensfun;
 mod ncamera;
 mod nerfstudio;
 mod okvis;
@@ -199,10 +199,7 @@ fn import_document(
 }
 
 /// Parses a file and detects its format if none is given.
-fn open(
-    path: &Path,
-    options: &ImportOptions<'_>,
-) -> Result<(Document, CameraFormat), CameraFileError> {
+fn open(path: &Path, options: &ImportOptions<'_>) -> Result<(Document, CameraFormat), CameraFileError> {
     refuse_other_files(path)?;
     let text = read(path)?;
     let document = Document::parse(&text).map_err(|problem| CameraFileError::Syntax {

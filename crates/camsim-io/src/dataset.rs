@@ -58,9 +58,9 @@ mod tum;
 mod twins;
 mod webdataset;
 
+pub use crate::calibration::Intrinsics;
 pub use axes::{Rigid, enu, enu_from_camera, enu_from_ned, flu_from_frd};
 pub use requirements::require;
-pub use crate::calibration::Intrinsics;
 pub use run_folder::{PlatformState, RunCamera, RunFolder, RunFrame};
 use target::Target;
 

@@ -63,7 +63,10 @@ fn lenses(numbers: &mut Numbers) -> Vec<LensSpec> {
         of(LensModel::Fisheye624, 12),
         of(LensModel::Mei, 5),
         of(LensModel::Division, 1),
-        LensSpec { model: LensModel::DoubleSphere, coefficients: vec![-0.24 + numbers.between(0.0, 0.1), 0.6] },
+        LensSpec {
+            model: LensModel::DoubleSphere,
+            coefficients: vec![-0.24 + numbers.between(0.0, 0.1), 0.6],
+        },
         LensSpec { model: LensModel::Eucm, coefficients: vec![0.6 + numbers.between(0.0, 0.1), 1.1] },
         LensSpec { model: LensModel::Ucm, coefficients: vec![0.6 + numbers.between(0.0, 0.1)] },
         LensSpec { model: LensModel::Fov, coefficients: vec![0.9 + numbers.between(0.0, 0.1)] },
@@ -178,8 +181,15 @@ fn what_a_format_has_no_place_for_is_named() {
     spec.clock_offset_ms = 1.5;
     spec.photometric.noise_sigma = 0.01;
     let set = [
-        "fps", "phase", "shutter.exposure_ms", "shutter.delay_ms", "shutter.readout_ms", "clock_offset_ms",
-        "photometric.noise_sigma", "mount.angles_deg", "mount.offset_m",
+        "fps",
+        "phase",
+        "shutter.exposure_ms",
+        "shutter.delay_ms",
+        "shutter.readout_ms",
+        "clock_offset_ms",
+        "photometric.noise_sigma",
+        "mount.angles_deg",
+        "mount.offset_m",
     ];
     for format in CalibrationFormat::ALL {
         let exported = export(std::slice::from_ref(&spec), format).unwrap();
@@ -199,7 +209,12 @@ fn what_a_format_has_no_place_for_is_named() {
             let is_shift = ["shutter.delay_ms", "clock_offset_ms"].contains(&key)
                 && exported.notes.iter().any(|note| note.contains("clock_offset_ms of 8.5"))
                 && (back.clock_offset_ms - 8.5).abs() < 1e-12;
-            assert!(is_kept || named(key) || is_shift, "{}: {key} is lost: {:?}", format.name(), exported.notes);
+            assert!(
+                is_kept || named(key) || is_shift,
+                "{}: {key} is lost: {:?}",
+                format.name(),
+                exported.notes
+            );
             assert!(!(is_kept && named(key)), "{}: {key} is kept, and named as lost", format.name());
         }
     }
@@ -211,7 +226,10 @@ fn lenses_that_a_format_does_not_have_are_errors() {
     let eight = camera(lens(LensModel::BrownConrady, &mut numbers, 8), &mut numbers);
     for format in [CalibrationFormat::Kalibr, CalibrationFormat::OrbSlam3, CalibrationFormat::Nerfstudio] {
         let error = export(std::slice::from_ref(&eight), format).unwrap_err().to_string();
-        assert!(error.contains("has no lens with this many coefficients") && error.contains("cam0"), "{error}");
+        assert!(
+            error.contains("has no lens with this many coefficients") && error.contains("cam0"),
+            "{error}"
+        );
     }
     let pair = [eight.clone(), CameraSpec { name: "other".into(), ..eight }];
     let error = export(&pair, CalibrationFormat::OpenCv).unwrap_err().to_string();
@@ -237,12 +255,23 @@ fn published_chains_come_back() {
         let back = read_back(&rig.cameras, CalibrationFormat::Kalibr).unwrap();
         for (camera, back) in rig.cameras.iter().zip(&back.cameras) {
             cameras += 1;
-            assert_eq!((&camera.lens, camera.focal_px, camera.principal_point_px), (&back.lens, back.focal_px, back.principal_point_px));
-            assert!((camera.clock_offset_ms - back.clock_offset_ms).abs() <= 1e-15 * camera.clock_offset_ms.abs());
+            assert_eq!(
+                (&camera.lens, camera.focal_px, camera.principal_point_px),
+                (&back.lens, back.focal_px, back.principal_point_px)
+            );
+            assert!(
+                (camera.clock_offset_ms - back.clock_offset_ms).abs() <= 1e-15 * camera.clock_offset_ms.abs()
+            );
             let turn = |spec: &CameraSpec| {
                 glam::DMat3::from_quat(camsim_core::mount::body_from_camera(spec.mount.angles_deg))
             };
-            assert!(turn(camera).abs_diff_eq(turn(back), 5e-15), "{}: {:?} {:?}", path.display(), camera.mount, back.mount);
+            assert!(
+                turn(camera).abs_diff_eq(turn(back), 5e-15),
+                "{}: {:?} {:?}",
+                path.display(),
+                camera.mount,
+                back.mount
+            );
             let offsets = camera.mount.offset_m.iter().zip(back.mount.offset_m);
             offsets.for_each(|(a, b)| assert!((a - b).abs() < 4e-15, "{}: {a} {b}", path.display()));
         }
@@ -253,8 +282,13 @@ fn published_chains_come_back() {
 #[test]
 fn half_pixels_are_those_of_each_program() {
     let spec = CameraSpec { principal_point_px: Some([320.0, 240.0]), ..CameraSpec::default() };
-    let text = |format| String::from_utf8(export(std::slice::from_ref(&spec), format).unwrap().files[0].bytes.clone()).unwrap();
+    let text = |format| {
+        String::from_utf8(export(std::slice::from_ref(&spec), format).unwrap().files[0].bytes.clone())
+            .unwrap()
+    };
     assert!(text(CalibrationFormat::Colmap).ends_with("1 SIMPLE_PINHOLE 640 480 500 320.5 240.5\n"));
     assert!(text(CalibrationFormat::Nerfstudio).contains("\"cx\": 320.5, \"cy\": 240.5"));
-    assert!(text(CalibrationFormat::OpenCv).contains("[500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]"));
+    assert!(
+        text(CalibrationFormat::OpenCv).contains("[500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]")
+    );
 }

@@ -114,9 +114,9 @@ struct ExportArgs {
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let sides = text.split_once(['x', 'X', '*']).and_then(|(width, height)| {
-        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
-    });
+    let sides = text
+        .split_once(['x', 'X', '*'])
+        .and_then(|(width, height)| Some([width.trim().parse().ok()?, height.trim().parse().ok()?]));
     sides.filter(|sides| !sides.contains(&0)).ok_or_else(|| "write WIDTHxHEIGHT, such as 640x480".to_owned())
 }
 
@@ -173,7 +173,10 @@ fn import_file(args: &ImportArgs) -> Result<(&'static str, Vec<String>, String),
         (imported.format, imported.notes, toml::to_string(&imported.spec).or_failed()?)
     };
     if args.rig && body.is_none() {
-        notes.push("the file's body or IMU is read as x forward, y left, z up: --body frd is the other choice".into());
+        notes.push(
+            "the file's body or IMU is read as x forward, y left, z up: --body frd is the other choice"
+                .into(),
+        );
     }
     Ok((format.name(), notes, text))
 }
@@ -201,9 +204,8 @@ fn export_cameras(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Fa
     let mut cameras = read_cameras(&args.file).or_bad_input()?;
     if let Some(name) = &args.camera {
         let names = cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
-        let unknown = || {
-            Failure::bad_input(anyhow!("--camera {name}: there is no such camera; the names are {names}"))
-        };
+        let unknown =
+            || Failure::bad_input(anyhow!("--camera {name}: there is no such camera; the names are {names}"));
         let index = cameras.iter().position(|camera| camera.name == *name).ok_or_else(unknown)?;
         cameras = vec![cameras.swap_remove(index)];
     }
@@ -217,10 +219,9 @@ fn export_cameras(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Fa
         (files, Some(folder)) => {
             files.iter().try_for_each(|file| write_atomic(&folder.join(file.name), &file.bytes)).or_failed()
         }
-        (_, None) => Err(Failure::bad_input(anyhow!(
-            "{} has two files: name a folder with -o",
-            format.name()
-        ))),
+        (_, None) => {
+            Err(Failure::bad_input(anyhow!("{} has two files: name a folder with -o", format.name())))
+        }
     }
 }
 

@@ -33,7 +33,16 @@ pub(crate) fn file(name: &str, camera: &Calibration) -> Result<String, Calibrati
         (Some([k1, k2, k3, k4]), ..) => (
             "KANNALA_BRANDT",
             Vec::new(),
-            vec![("k2", k1), ("k3", k2), ("k4", k3), ("k5", k4), ("mu", fx), ("mv", fy), ("u0", cx), ("v0", cy)],
+            vec![
+                ("k2", k1),
+                ("k3", k2),
+                ("k4", k3),
+                ("k5", k4),
+                ("mu", fx),
+                ("mv", fy),
+                ("u0", cx),
+                ("v0", cy),
+            ],
         ),
         (None, Some([k1, k2, p1, p2]), _) => {
             ("PINHOLE", vec![("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2)], pinhole)
@@ -53,12 +62,7 @@ pub(crate) fn file(name: &str, camera: &Calibration) -> Result<String, Calibrati
 }
 
 /// A model with its tables of numbers; empty ones are left out.
-fn yaml(
-    model: &str,
-    name: &str,
-    [w, h]: [u32; 2],
-    tables: [(&str, Vec<(&str, f64)>); 3],
-) -> String {
+fn yaml(model: &str, name: &str, [w, h]: [u32; 2], tables: [(&str, Vec<(&str, f64)>); 3]) -> String {
     let mut text = format!(
         "%YAML:1.0\n---\nmodel_type: {model}\ncamera_name: {name}\nimage_width: {w}\nimage_height: {h}\n"
     );
@@ -80,7 +84,8 @@ pub(crate) fn settings(camera: &Calibration, imu: &ImuReference) -> Result<Strin
     let imu_from_camera = imu.body_from_imu.inverse().of(&camera.body_from_camera());
     let rows = imu_from_camera.matrix();
     let rotation: Vec<f64> = rows[..3].iter().flat_map(|row| row[..3].to_vec()).collect();
-    let readout_s = camera.line_delay_s().filter(|line_s| *line_s > 0.0).map_or(0.0, |_| camera.shutter.readout_s());
+    let readout_s =
+        camera.line_delay_s().filter(|line_s| *line_s > 0.0).map_or(0.0, |_| camera.shutter.readout_s());
     Ok(format!(
         "{}estimate_extrinsic: 0\n{}{}# stamp + td is the time of the image's centre on the IMU's clock\ntd: {}\n\
          # seconds from the first row to the last\nrolling_shutter: {}\nrolling_shutter_tr: {}\n",

@@ -11,10 +11,8 @@ use super::{Calibration, CalibrationError, lens_names::no_such_lens};
 /// # Errors
 /// COLMAP does not have the lens.
 pub(crate) fn cameras_txt(cameras: &[Calibration]) -> Result<String, CalibrationError> {
-    let mut text = format!(
-        "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n# Number of cameras: {}\n",
-        cameras.len()
-    );
+    let mut text =
+        format!("# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n# Number of cameras: {}\n", cameras.len());
     for (i, camera) in cameras.iter().enumerate() {
         let (name, _, parameters) = camera_model(camera)?;
         let _ = writeln!(text, "{}", camera_line(i as u32 + 1, name, camera.intrinsics.size_px, &parameters));
@@ -32,9 +30,7 @@ pub(crate) fn camera_line(id: u32, model: &str, [width, height]: [u32; 2], param
 ///
 /// # Errors
 /// COLMAP does not have the lens.
-pub(crate) fn camera_model(
-    camera: &Calibration,
-) -> Result<(&'static str, i32, Vec<f64>), CalibrationError> {
+pub(crate) fn camera_model(camera: &Calibration) -> Result<(&'static str, i32, Vec<f64>), CalibrationError> {
     let lens = &camera.intrinsics;
     let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px.map(|px| px + 0.5));
     if let Some([k1, k2, k3, k4]) = lens.equidistant() {

@@ -162,8 +162,7 @@ impl CalibrationFormat {
 /// The format holds one camera, or does not have the lens of one of them.
 pub fn export(cameras: &[CameraSpec], format: CalibrationFormat) -> Result<Exported, CalibrationError> {
     let all = cameras.iter().map(Calibration::new).collect::<Result<Vec<_>, _>>()?;
-    let platform =
-        ImuReference { body_from_imu: Rigid::turn(flu_from_frd()), clock_offset_s: 0.0 };
+    let platform = ImuReference { body_from_imu: Rigid::turn(flu_from_frd()), clock_offset_s: 0.0 };
     let one = match &all[..] {
         [one] => Ok(one),
         _ => Err(CalibrationError::Refused(format!(

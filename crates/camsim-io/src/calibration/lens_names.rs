@@ -57,9 +57,7 @@ pub(crate) fn lens(
     let found = match family {
         // OpenCV's four could be those of a fisheye, so five are written.
         Family::OpenCv => five.or(eight).map(named("radtan")),
-        Family::Ros => {
-            five.map(named("plumb_bob")).or_else(|| eight.map(named("rational_polynomial")))
-        }
+        Family::Ros => five.map(named("plumb_bob")).or_else(|| eight.map(named("rational_polynomial"))),
         Family::Kalibr => four.map(named("radtan")),
         Family::Euroc => {
             four.map(named("radial-tangential")).or_else(|| eight.map(named("radialtangential8")))

@@ -64,7 +64,10 @@ fn check_pair(cameras: &[Calibration]) -> Result<(), CalibrationError> {
                 )),
             }
         }
-        more => refuse(format!("ORB-SLAM3 has one or two cameras, not {}: choose one with `--camera`", more.len())),
+        more => refuse(format!(
+            "ORB-SLAM3 has one or two cameras, not {}: choose one with `--camera`",
+            more.len()
+        )),
     }
 }
 

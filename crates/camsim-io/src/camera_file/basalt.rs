@@ -66,10 +66,26 @@ pub(super) const KEYS: &[KeyRow] = &[
         Treatment::Reported(Neutral::Zero),
         "radius limit of the model; camsim computes the limit itself",
     ),
-    KeyRow::new("value0.intrinsics.intrinsics.xi", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
-    KeyRow::new("value0.intrinsics.intrinsics.alpha", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
-    KeyRow::new("value0.intrinsics.intrinsics.beta", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
-    KeyRow::new("value0.intrinsics.intrinsics.w", Treatment::Applied, "coefficient; refused unless zero if camera_type does not have it"),
+    KeyRow::new(
+        "value0.intrinsics.intrinsics.xi",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
+    ),
+    KeyRow::new(
+        "value0.intrinsics.intrinsics.alpha",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
+    ),
+    KeyRow::new(
+        "value0.intrinsics.intrinsics.beta",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
+    ),
+    KeyRow::new(
+        "value0.intrinsics.intrinsics.w",
+        Treatment::Applied,
+        "coefficient; refused unless zero if camera_type does not have it",
+    ),
     KeyRow::new("value0.resolution", Treatment::Applied, "width and height of each camera"),
     KeyRow::new(
         "value0.vignette.**",

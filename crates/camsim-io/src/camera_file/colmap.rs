@@ -96,9 +96,7 @@ fn parameter_names(model: &str) -> Option<(LensModel, &'static [&'static str])> 
         "EUCM" => (Eucm, &["fx", "fy", "cx", "cy", "alpha", "beta"]),
         "RAD_TAN_THIN_PRISM_FISHEYE" => (
             Fisheye624,
-            &[
-                "fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3",
-            ],
+            &["fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"],
         ),
         _ => return None,
     })

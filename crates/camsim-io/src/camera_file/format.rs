@@ -7,8 +7,8 @@ use super::key_table::{KeyRow, TableLeaves, leaves};
 use super::selection::CameraEntry;
 use super::syntax::LENS_DATABASE;
 use super::{
-    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, nerfstudio, okvis, opencv, opensfm,
-    orb_slam, reference, ros, vikit,
+    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, nerfstudio, okvis, opencv,
+    opensfm, orb_slam, reference, ros, vikit,
 };
 
 /// Formats that can be imported.

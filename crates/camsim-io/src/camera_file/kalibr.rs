@@ -7,13 +7,16 @@ use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
-const POSE: &str =
-    "pose relative to an IMU or another camera, whose axes are not the body's: `--body` or `--rig` applies it";
+const POSE: &str = "pose relative to an IMU or another camera, whose axes are not the body's: `--body` or `--rig` applies it";
 const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all stamps: `--body` or `--rig` \
                       applies it";
 
 pub(super) const KEYS: &[KeyRow] = &[
-    KeyRow::new("cam*.camera_model", Treatment::Applied, "pinhole, omni (with radtan or none), ds, eucm, ucm"),
+    KeyRow::new(
+        "cam*.camera_model",
+        Treatment::Applied,
+        "pinhole, omni (with radtan or none), ds, eucm, ucm",
+    ),
     KeyRow::new(
         "cam*.intrinsics",
         Treatment::Applied,
@@ -116,11 +119,7 @@ pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCame
 }
 
 /// A projection with parameters of its own before the focal lengths.
-fn import_wide(
-    value: &Value,
-    format: CameraFormat,
-    projection: &str,
-) -> Result<ImportedCamera, KeyProblem> {
+fn import_wide(value: &Value, format: CameraFormat, projection: &str) -> Result<ImportedCamera, KeyProblem> {
     let intrinsics = numbers(value, "intrinsics")?;
     let Some((parameters, [fx, fy, cx, cy])) = intrinsics.split_last_chunk::<4>() else {
         return Err(KeyProblem::new("intrinsics", format!("has {} numbers", intrinsics.len())));

@@ -83,13 +83,12 @@ pub fn import_lensfun(path: &Path, query: &LensfunQuery<'_>) -> Result<LensfunCa
     }
     let text = read(path)?;
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
-    let tree = roxmltree::Document::parse_with_options(&text, options).map_err(|error| {
-        CameraFileError::Syntax {
+    let tree =
+        roxmltree::Document::parse_with_options(&text, options).map_err(|error| CameraFileError::Syntax {
             path: path.to_owned(),
             line: Some(error.pos().row as usize),
             message: format!("XML: {error}"),
-        }
-    })?;
+        })?;
     if tree.root_element().tag_name().name() != "lensdatabase" {
         return Err(fail("lensdatabase", "is missing: this is not lensfun's database".to_owned()));
     }
@@ -130,10 +129,20 @@ fn find_lens(tree: &roxmltree::Document<'_>, wanted: &str) -> Result<Vec<Calibra
     titles.dedup();
     match titles.len() {
         0 => Err(format!("`{wanted}` is no lens of this file")),
-        1 => Ok(found.iter().map(|lens| calibrations(*lens)).collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect()),
+        1 => Ok(found
+            .iter()
+            .map(|lens| calibrations(*lens))
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter()
+            .flatten()
+            .collect()),
         count => {
             titles.truncate(8);
-            Err(format!("{count} lenses match `{wanted}`: {}{}", titles.join(", "), if count > 8 { ", ..." } else { "" }))
+            Err(format!(
+                "{count} lenses match `{wanted}`: {}{}",
+                titles.join(", "),
+                if count > 8 { ", ..." } else { "" }
+            ))
         }
     }
 }
@@ -184,7 +193,11 @@ fn entry(node: Node<'_, '_>, model: &str) -> Result<Entry, String> {
         "poly3" => &["k1"],
         "poly5" => &["k1", "k2"],
         "ptlens" => &["a", "b", "c"],
-        other => return Err(format!("has distortion of the model `{other}`: poly3, poly5 and ptlens can be imported")),
+        other => {
+            return Err(format!(
+                "has distortion of the model `{other}`: poly3, poly5 and ptlens can be imported"
+            ));
+        }
     };
     let get = |name: &str| node.attribute(name).map_or(Ok(0.0), |text| number(text, name));
     let focal = node.attribute("focal").ok_or("has a distortion without focal")?;
@@ -213,7 +226,9 @@ fn centre_scale(model: &str, [a, b, c]: [f64; 3]) -> f64 {
 fn choose(all: &[Calibration], crop: Option<f64>) -> Result<&Calibration, String> {
     let mut usable: Vec<&Calibration> = all.iter().filter(|one| !one.entries.is_empty()).collect();
     if usable.is_empty() {
-        return Err("the lens has no distortion in this file: its pictures may be used as a pinhole's".to_owned());
+        return Err(
+            "the lens has no distortion in this file: its pictures may be used as a pinhole's".to_owned()
+        );
     }
     usable.sort_by(|a, b| b.crop.total_cmp(&a.crop));
     let Some(crop) = crop else { return Ok(usable[0]) };
@@ -293,7 +308,9 @@ fn camera(calibration: &Calibration, query: &LensfunQuery<'_>) -> Result<Lensfun
             LensSpec { model: LensModel::FTheta, coefficients: vec![1.0, k2, k3, k4, k5] }
         }
         (other, _) => {
-            return Err(format!("is of the type `{other}`: rectilinear and fisheye (equidistant) can be imported"));
+            return Err(format!(
+                "is of the type `{other}`: rectilinear and fisheye (equidistant) can be imported"
+            ));
         }
     };
     notes.extend(left_out(calibration, &entry, crop));
@@ -325,7 +342,10 @@ fn left_out(calibration: &Calibration, entry: &Entry, crop: f64) -> Vec<String> 
     if !parts.is_empty() {
         notes.push(format!("not applied: {} of this lens", parts.join(", ")));
     }
-    notes.push("the file has no principal point, frame rate or shutter: the centre, 30 fps, a global shutter".to_owned());
+    notes.push(
+        "the file has no principal point, frame rate or shutter: the centre, 30 fps, a global shutter"
+            .to_owned(),
+    );
     notes
 }
 

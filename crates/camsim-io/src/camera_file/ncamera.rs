@@ -17,7 +17,11 @@ pub(super) const KEYS: &[KeyRow] = &[
     ),
     KeyRow::new("cameras.camera.image_width", Treatment::Applied, "width"),
     KeyRow::new("cameras.camera.image_height", Treatment::Applied, "height"),
-    KeyRow::new("cameras.camera.intrinsics", Treatment::Applied, "fx fy cx cy; xi before them in unified-projection"),
+    KeyRow::new(
+        "cameras.camera.intrinsics",
+        Treatment::Applied,
+        "fx fy cx cy; xi before them in unified-projection",
+    ),
     KeyRow::new(
         "cameras.camera.distortion.type",
         Treatment::Applied,
@@ -134,8 +138,10 @@ fn import_unified(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let distortion = match lens_models::lens_by_name(model_key, kind, key, distortion)? {
         (LensModel::BrownConrady, list) if list.len() <= 4 => list,
         _ => {
-            let text = format!("is `{kind}`: unified-projection can be imported with four radial-tangential \
-                                coefficients or none");
+            let text = format!(
+                "is `{kind}`: unified-projection can be imported with four radial-tangential \
+                                coefficients or none"
+            );
             return Err(KeyProblem::new(model_key, text));
         }
     };

@@ -20,7 +20,11 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("h", Treatment::Applied, "height"),
     KeyRow::new("fl_x", Treatment::Applied, "px"),
     KeyRow::new("fl_y", Treatment::Applied, "px; fl_x if missing"),
-    KeyRow::new("cx", Treatment::Applied, "px; half a pixel is subtracted, as its code counts from the corner"),
+    KeyRow::new(
+        "cx",
+        Treatment::Applied,
+        "px; half a pixel is subtracted, as its code counts from the corner",
+    ),
     KeyRow::new("cy", Treatment::Applied, "px; half a pixel is subtracted"),
     KeyRow::new("k1", Treatment::Applied, COEFFICIENT),
     KeyRow::new("k2", Treatment::Applied, COEFFICIENT),

@@ -71,7 +71,9 @@ pub(super) fn read(
             found.shift(root, "", "timeshift_cam_imu")?;
         }
         CameraFormat::Okvis => found.in_body(entry.value, &format!("{}.", entry.roots[0]), "T_SC", false)?,
-        CameraFormat::NCamera => found.in_body(entry.value, &format!("{}.", entry.roots[0]), "T_B_C", false)?,
+        CameraFormat::NCamera => {
+            found.in_body(entry.value, &format!("{}.", entry.roots[0]), "T_B_C", false)?
+        }
         CameraFormat::Camodocal => found.camodocal(root)?,
         CameraFormat::Basalt => found.basalt(root, index)?,
         CameraFormat::OrbSlam => found.orb_slam(root, &entry.name)?,
@@ -101,7 +103,9 @@ impl Extrinsics {
         self.applied.push(format!("{prefix}{key}"));
         let (rigid, error) = rigid(&list).map_err(|message| KeyProblem::new(key, message))?;
         if error > 1e-5 {
-            self.notes.push(format!("{prefix}{key}: its axes are off by {error:.1e}; the nearest rotation is taken"));
+            self.notes.push(format!(
+                "{prefix}{key}: its axes are off by {error:.1e}; the nearest rotation is taken"
+            ));
         }
         Ok(rigid)
     }
@@ -157,7 +161,8 @@ impl Extrinsics {
         let (entry, prefix) = (&entries[index], format!("{}.", entries[index].name));
         let stated = self.matrix(entry.value, &prefix, "T_cn_cnm1")?;
         let before = read(CameraFormat::Kalibr, document, entries, index - 1)?;
-        let (Some(Placement::InBody(own)), Some(Placement::InBody(before))) = (self.placement, before.placement)
+        let (Some(Placement::InBody(own)), Some(Placement::InBody(before))) =
+            (self.placement, before.placement)
         else {
             return Ok(());
         };
@@ -182,7 +187,10 @@ impl Extrinsics {
         if self.placement.is_none() && find(root, turn).is_some() && find(root, shift).is_some() {
             let (r, t) = (numbers(root, turn)?, numbers(root, shift)?);
             if r.len() != 9 || t.len() != 3 {
-                return Err(KeyProblem::new(turn, format!("has {} numbers, and {shift} {}", r.len(), t.len())));
+                return Err(KeyProblem::new(
+                    turn,
+                    format!("has {} numbers, and {shift} {}", r.len(), t.len()),
+                ));
             }
             let rows: Vec<f64> = (0..3).flat_map(|k| [r[3 * k], r[3 * k + 1], r[3 * k + 2], t[k]]).collect();
             let (pose, _) = rigid(&rows).map_err(|message| KeyProblem::new(turn, message))?;
@@ -200,8 +208,9 @@ impl Extrinsics {
         let poses = find(root, "value0.T_imu_cam").and_then(Value::as_array);
         let Some(pose) = poses.and_then(|poses| poses.get(index)) else { return Ok(()) };
         let get = |key: &str| {
-            number(pose, key)
-                .map_err(|problem| KeyProblem::new(format!("value0.T_imu_cam[{index}].{key}"), problem.message))
+            number(pose, key).map_err(|problem| {
+                KeyProblem::new(format!("value0.T_imu_cam[{index}].{key}"), problem.message)
+            })
         };
         let rotation = DQuat::from_xyzw(get("qx")?, get("qy")?, get("qz")?, get("qw")?);
         if (rotation.length() - 1.0).abs() > 1e-3 {
@@ -209,8 +218,7 @@ impl Extrinsics {
             return Err(KeyProblem::new(format!("value0.T_imu_cam[{index}]"), text));
         }
         let translation_m = DVec3::new(get("px")?, get("py")?, get("pz")?);
-        self.placement =
-            Some(Placement::InBody(Rigid { rotation: rotation.normalize(), translation_m }));
+        self.placement = Some(Placement::InBody(Rigid { rotation: rotation.normalize(), translation_m }));
         let keys = ["px", "py", "pz", "qx", "qy", "qz", "qw"];
         self.applied.extend(keys.map(|key| format!("value0.T_imu_cam[{index}].{key}")));
         Ok(())
@@ -248,7 +256,8 @@ impl Extrinsics {
             Some(Placement::InFirst(pose)) => {
                 set_mount(spec, &Rigid::of_mount(&MountSpec::default()).of(&pose));
                 notes.push(
-                    "the file has poses between cameras only: the first camera looks along the nose".to_owned(),
+                    "the file has poses between cameras only: the first camera looks along the nose"
+                        .to_owned(),
                 );
             }
             None => notes.push("the file has no pose of the camera: the mount is the default".to_owned()),

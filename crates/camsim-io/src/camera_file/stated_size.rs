@@ -17,7 +17,9 @@ pub(super) fn complete(document: &mut Document, format: CameraFormat, [width, he
         CameraFormat::OrbSlam if find(&document.value, "Camera.width").is_none() => {
             add(&mut document.value, ["Camera.width", "Camera.height"]);
         }
-        CameraFormat::OpenCv | CameraFormat::OpenCvFisheye if opencv::image_size(&document.value).is_err() => {
+        CameraFormat::OpenCv | CameraFormat::OpenCvFisheye
+            if opencv::image_size(&document.value).is_err() =>
+        {
             add(&mut document.value, ["image_width", "image_height"]);
         }
         CameraFormat::OpenSfm => {

@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use super::ImportedCamera;
 use super::document::{KeyProblem, as_flag, as_number};
-use crate::calibration::text::shortest;
 use super::key_table::{KeyRow, Leaf, TableLeaves, Treatment, row_of};
+use crate::calibration::text::shortest;
 
 /// Longest plausible readout (sensors need 1 to 190 ms), milliseconds.
 const MAX_READOUT_MS: f64 = 250.0;

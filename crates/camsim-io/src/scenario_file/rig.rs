@@ -61,10 +61,12 @@ fn json(value: &impl Serialize) -> Result<Json, serde_json::Error> {
 pub(super) fn read_cameras_alone(mut tree: Tree) -> Result<Vec<CameraSpec>, ScenarioError> {
     tree.resolve_cameras()?;
     tree.check_cameras()?;
-    let missing = |problem: &String| schema::SCENARIO.required.iter().any(|(key, parent)| {
-        // A scenario needs a flight; a file of cameras does not.
-        parent.is_empty() && problem.contains(&format!(": {key}: is missing"))
-    });
+    let missing = |problem: &String| {
+        schema::SCENARIO.required.iter().any(|(key, parent)| {
+            // A scenario needs a flight; a file of cameras does not.
+            parent.is_empty() && problem.contains(&format!(": {key}: is missing"))
+        })
+    };
     let mut problems = check::check(&mut tree, &schema::SCENARIO, "");
     problems.retain(|problem| !missing(problem));
     if !problems.is_empty() {

@@ -125,7 +125,10 @@ fn ros_models_are_imported_or_refused() {
     for (text, words) in [
         (eight, ["distortion_coefficients", "five"]),
         (other("plumb_bob", "\"\""), ["distortion_coefficients", "is empty"]),
-        (other("plumb_bob", "thin_prism"), ["distortion_coefficients", "has 5 parameters where `thinprism` has 12 or 14"]),
+        (
+            other("plumb_bob", "thin_prism"),
+            ["distortion_coefficients", "has 5 parameters where `thinprism` has 12 or 14"],
+        ),
         (other(list, "[0.1, 0.2, 0.3]"), ["distortion_coefficients", "has 3 numbers"]),
         (other("plumb_bob", "equidistant"), ["distortion_coefficients", "fisheye has four"]),
         (

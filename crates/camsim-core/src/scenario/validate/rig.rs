@@ -47,9 +47,9 @@ pub fn validate_cameras(cameras: &[CameraSpec]) -> Vec<Problem> {
     let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
     check_names(&mut check, &names);
     for (i, camera) in cameras.iter().enumerate() {
-        check.problems.extend(
-            validate_camera(camera).iter().filter_map(|problem| of_camera(problem, i, &camera.name)),
-        );
+        check
+            .problems
+            .extend(validate_camera(camera).iter().filter_map(|problem| of_camera(problem, i, &camera.name)));
     }
     check.problems
 }

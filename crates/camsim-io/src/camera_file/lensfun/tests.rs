@@ -85,7 +85,8 @@ fn difference_px(
         if image_mm > corner_mm {
             break;
         }
-        let found = model.lens.image(glam::DVec3::new(angle.sin(), 0.0, angle.cos())) * camera.spec.focal_px[0];
+        let found =
+            model.lens.image(glam::DVec3::new(angle.sin(), 0.0, angle.cos())) * camera.spec.focal_px[0];
         worst = worst.max((found.x - image_mm / pitch_mm).abs()).max(found.y.abs());
     }
     assert!(centre == DVec2::new(2999.5, 1999.5));
@@ -114,7 +115,8 @@ fn polynomials_are_lensfuns() {
     let error = difference_px(&camera, half_short_mm(1.6, 1.5), pitch_mm(1.6), 24.0, poly5, f64::tan);
     assert!(error < 1e-8, "{error}");
 
-    let ptlens = |[a, b, c]: [f64; 3]| move |r: f64| r * (a * r.powi(3) + b * r * r + c * r + 1.0 - a - b - c);
+    let ptlens =
+        |[a, b, c]: [f64; 3]| move |r: f64| r * (a * r.powi(3) + b * r * r + c * r + 1.0 - a - b - c);
     // The angle of an equidistant fisheye: exact as f-theta.
     let camera = import("Fisheye", 8.0, None).unwrap();
     assert_eq!(camera.spec.lens.model, LensModel::FTheta);
