@@ -173,7 +173,9 @@ pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
 /// # Errors
 /// As [`read_rig`] or [`read_checked_camera`].
 pub fn read_cameras(path: &Path) -> Result<Vec<CameraSpec>, ScenarioError> {
-    let tree = Tree::read_scenario(path)?;
+    // A camera file is no scenario, which the reader of scenarios would say.
+    let is_run = std::fs::read(path).is_ok_and(|bytes| bytes.trim_ascii_start().first() == Some(&b'{'));
+    let tree = if is_run { Tree::read_scenario(path)? } else { Tree::read(path, "")? };
     let is_scenario = ["camera", "flight", "scene"].iter().any(|key| tree.root.contains_key(*key));
     if is_scenario {
         let rig = read_rig(path, &[], None)?;
