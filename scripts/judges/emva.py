@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
 """EMVA 1288 release 4.0 on stacks of raw pictures, by the reference implementation `emva1288`: does it find the keys again?
 
-    pip install emva1288 pillow numpy
-    python3 scripts/judges/emva1288.py camsim          # the program; renders flat and dark stacks, prints a table
+    pip install emva1288 numpy
+    cargo build --release -p camsim-core --example flat_fields
+    python3 scripts/judges/emva.py target/release/examples/flat_fields
 
-A camera that stands still looks at a white sky (flat) or a black one (dark). The irradiance is constant and the exposure rises, two pictures a step;
-photons per pixel are worked out here from irradiance, area, wavelength and time. The spatial stacks have 64 pictures each. Every picture has a frame number of
-its own, so that no noise is used twice.
+The program takes even light and darkness. The irradiance is constant and the exposure rises, two pictures a step; photons per pixel are worked out here, from
+irradiance, area, wavelength and time. The spatial stacks have 64 pictures each. Every picture has a frame number of its own, so that no noise is used twice.
 """
 
-import csv
 import pathlib
 import subprocess
 import sys
@@ -20,15 +19,13 @@ import numpy as np
 from emva1288.process.data import Data1288
 from emva1288.process.loader import LoadImageData
 from emva1288.process.results import Results1288
-from PIL import Image
 
 SIZE = (640, 480)
 E_PER_DN, QE, READ_E, FULL_E, DARK_E_S, DSNU_E, PRNU = 2.6, 0.6, 2.45, 40_000.0, 200.0, 3.0, 0.01
 # The dark current is stated at 25 degrees and doubles twice.
 SENSOR = dict(
-    mosaic="mono", pixel_um=3.45, wavelength_nm=530.0, quantum_efficiency=QE, read_noise_e=READ_E, full_well_e=FULL_E,
-    gain_e_per_dn=E_PER_DN, black_dn=64.0, bits=14, dark_current_e_s=DARK_E_S / 4, dark_doubling_c=8.0, temperature_c=41.0,
-    dsnu_e=DSNU_E, prnu=PRNU,
+    pixel_um=3.45, wavelength_nm=530, quantum_efficiency=QE, read_noise_e=READ_E, full_well_e=FULL_E, gain_e_per_dn=E_PER_DN,
+    black_dn=64, bits=14, dark_current_e_s=DARK_E_S / 4, dark_doubling_c=8, temperature_c=41, dsnu_e=DSNU_E, prnu=PRNU,
 )
 FULL_MS = 20.0
 # Full well at FULL_MS.
@@ -38,48 +35,28 @@ STEPS = np.concatenate([np.linspace(0.01, 0.9, 28), np.linspace(0.92, 1.06, 29)]
 SPATIAL, L = 0.5, 64
 
 
-def table(values):
-    return "{ " + ", ".join(f"{k} = {v!r}".replace("'", '"') for k, v in values.items()) + " }"
-
-
 class Camera:
+    """Collects what is to be taken, and takes it."""
+
     def __init__(self, program, folder):
-        self.program, self.folder, self.frame = program, folder, 0
-        with open(folder / "log.csv", "w", newline="") as out:
-            rows = csv.writer(out)
-            rows.writerow(["t_s", "lat_deg", "lon_deg", "alt_m", "roll_deg", "pitch_deg", "yaw_deg"])
-            rows.writerows([t, 46.7, 9.85, 2100.0, 0.0, 0.0, 0.0] for t in (0.0, 5.0, 10.0))
-        Image.new("L", (4, 4)).save(folder / "none.png")
-        (folder / "flat.toml").write_text(f"""seed = 20261127
-[flight]
-log = "log.csv"
-format = "csv-lla"
-[tracker]
-kind = "linear"
-[camera]
-size_px = {list(SIZE)}
-fps = 100
-mount = {{ angles_deg = [0, 90, 0] }}
-sensor = {table(SENSOR)}
-[scene]
-pattern = {{ image = "none.png", width_m = 10 }}
-[output]
-channels = ["raw"]
-format = ["png"]
-""")
+        self.program, self.folder, self.frame, self.lines = program, folder, 0, []
 
     def take(self, level, exposure_ms, count):
-        """Raw pictures of a sky of this linear level."""
-        out = self.folder / f"out{self.frame}"
-        frames = range(self.frame, self.frame + count)
+        """Places of raw pictures of light of this level: file and number within."""
+        path = self.folder / f"{self.frame}.u16"
+        self.lines.append(f"{level} {exposure_ms} {self.frame} {count} {path}\n")
         self.frame += count
-        command = [
-            self.program, "render", self.folder / "flat.toml", "-o", out, "--frames", f"{frames.start}..{frames.stop}", "--backend", "cpu",
-            "--set", f"scene.sky=[{level}, {level}, {level}]", "--set", f"camera.sensor.white_w_m2={W_M2!r}",
-            "--set", f"camera.sensor.exposure_ms={exposure_ms}",
-        ]
-        subprocess.run([str(word) for word in command], check=True, capture_output=True)
-        return [out / "raw" / f"frame_{frame:06}.png" for frame in frames]
+        return [(path, i) for i in range(count)]
+
+    def run(self):
+        keys = [f"{key}={value!r}" for key, value in {**SENSOR, "white_w_m2": W_M2}.items()]
+        command = [self.program, f"{SIZE[0]}x{SIZE[1]}", "20261127", *keys]
+        subprocess.run(command, input="".join(self.lines), text=True, check=True)
+
+
+def picture(place):
+    path, number = place
+    return np.memmap(path, "<u2", "r").reshape(-1, SIZE[1], SIZE[0])[number]
 
 
 def stacks(camera):
@@ -98,7 +75,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         camera = Camera(sys.argv[1], pathlib.Path(folder))
         images = stacks(camera)
-        loaded = LoadImageData(images, fload=lambda path: np.asarray(Image.open(path)))
+        camera.run()
+        loaded = LoadImageData(images, fload=picture)
         found = Results1288(Data1288(loaded.data).data, pixel_area=3.45**2)
     rows = [
         ("system gain K", "DN/e-", 1 / E_PER_DN, found.K),
@@ -118,7 +96,7 @@ def main():
         print(f"| {name} | {unit} | {given:.5g} | {value:.5g} | {off:+.2f} % |")
     linearity = max(abs(found.LE_min), abs(found.LE_max))
     print(f"| linearity error | % | 0 | {linearity:.3f} | {linearity:.3f} % |")
-    packages = ", ".join(f"{package} {version(package)}" for package in ("emva1288", "numpy", "pillow"))
+    packages = ", ".join(f"{package} {version(package)}" for package in ("emva1288", "numpy"))
     print(f"\nworst: {worst:.2f} %; linearity {linearity:.3f} %; {camera.frame} pictures of {SIZE[0]}x{SIZE[1]}; {packages}")
     return 0 if worst < 2 and linearity < 0.5 else 1
 
