@@ -1,5 +1,7 @@
 //! A fisheye of 220 degrees, whose field is divided among the faces of a cube.
 
+#![allow(clippy::print_stdout, reason = "the figures are documented")]
+
 mod common;
 
 use std::sync::Arc;

@@ -85,7 +85,7 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         LensCommand::Undistort(points) => undistort(&camera, points, console),
         LensCommand::Table { nodes, output } => {
             let text = lens_table_csv(&camera, *nodes);
-            write_output(output.as_deref(), console, |out| Ok(out.write_all(text.as_bytes())?))
+            write_output(output.as_deref(), console, |out| out.write_all(text.as_bytes()))
         }
         LensCommand::Check { json } => check(&camera, *json, console),
     }

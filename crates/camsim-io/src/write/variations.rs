@@ -82,8 +82,11 @@ pub fn write_variations(
     }
 }
 
+/// Rows of a table by the number of their variation.
+type Rows = BTreeMap<u64, Vec<String>>;
+
 /// The columns and rows of a table; none if the file does not exist or is no such table.
-fn read(path: &Path) -> Result<(Vec<String>, BTreeMap<u64, Vec<String>>), WriteError> {
+fn read(path: &Path) -> Result<(Vec<String>, Rows), WriteError> {
     let mut rows = BTreeMap::new();
     let text = match std::fs::read(path) {
         Ok(text) => text,
@@ -101,10 +104,10 @@ fn read(path: &Path) -> Result<(Vec<String>, BTreeMap<u64, Vec<String>>), WriteE
     Ok((columns, rows))
 }
 
-fn csv_of(columns: &[String], rows: &BTreeMap<u64, Vec<String>>) -> Result<Vec<u8>, String> {
+fn csv_of(columns: &[String], rows: &Rows) -> Result<Vec<u8>, String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let all = std::iter::once(columns).chain(rows.values().map(Vec::as_slice));
-    all.map(|row| writer.write_record(row)).collect::<Result<(), _>>().map_err(|error| error.to_string())?;
+    let mut all = std::iter::once(columns).chain(rows.values().map(Vec::as_slice));
+    all.try_for_each(|row| writer.write_record(row)).map_err(|error| error.to_string())?;
     writer.into_inner().map_err(|error| error.to_string())
 }
 
