@@ -118,7 +118,7 @@ fn stmaps_are_lens_tables() {
     let camera = file(
         folder.path(),
         "camera.toml",
-        "size_px = [160, 120]\nfocal_px = [120.0, 121.0]\nprincipal_point_px = [78.5, 61.25]\n\
+        "size_px = [80, 60]\nfocal_px = [60.0, 60.5]\nprincipal_point_px = [39.25, 30.5]\n\
          lens = { model = \"brown-conrady\", coefficients = [-0.2, 0.03, 0.001, -0.002] }\n",
     );
     let maps = folder.path().join("maps");
@@ -128,7 +128,7 @@ fn stmaps_are_lens_tables() {
     let table = file(
         folder.path(),
         "table.toml",
-        "size_px = [160, 120]\nfocal_px = [120.0, 121.0]\nprincipal_point_px = [78.5, 61.25]\n\
+        "size_px = [80, 60]\nfocal_px = [60.0, 60.5]\nprincipal_point_px = [39.25, 30.5]\n\
          lens_table = \"maps/distort.exr\"\nlens = { model = \"table\" }\n",
     );
     let points = file(folder.path(), "points.csv", "u,v\n0,0\n0.3,0.2\n-0.45,0.31\n0.1,-0.35\n");
