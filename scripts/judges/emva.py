@@ -20,6 +20,9 @@ from emva1288.process.data import Data1288
 from emva1288.process.loader import LoadImageData
 from emva1288.process.results import Results1288
 
+# emva1288 1.0.2 calls it; NumPy 2 has it no more.
+np.asfarray = lambda values: np.asarray(values, dtype=float)
+
 SIZE = (640, 480)
 E_PER_DN, QE, READ_E, FULL_E, DARK_E_S, DSNU_E, PRNU = 2.6, 0.6, 2.45, 40_000.0, 200.0, 3.0, 0.01
 # The dark current is stated at 25 degrees and doubles twice.
@@ -39,24 +42,31 @@ class Camera:
     """Collects what is to be taken, and takes it."""
 
     def __init__(self, program, folder):
-        self.program, self.folder, self.frame, self.lines = program, folder, 0, []
+        self.program, self.folder, self.frame = program, folder, 0
+        self.lines, self.stacks = [], []
 
     def take(self, level, exposure_ms, count):
-        """Places of raw pictures of light of this level: file and number within."""
-        path = self.folder / f"{self.frame}.u16"
-        self.lines.append(f"{level} {exposure_ms} {self.frame} {count} {path}\n")
+        """Files of raw pictures of light of this level."""
+        stack = self.folder / f"{self.frame}.stack"
+        files = [str(self.folder / f"{self.frame + i}.u16") for i in range(count)]
+        self.lines.append(f"{level} {exposure_ms} {self.frame} {count} {stack}\n")
+        self.stacks.append((stack, files))
         self.frame += count
-        return [(path, i) for i in range(count)]
+        return files
 
     def run(self):
         keys = [f"{key}={value!r}" for key, value in {**SENSOR, "white_w_m2": W_M2}.items()]
         command = [self.program, f"{SIZE[0]}x{SIZE[1]}", "20261127", *keys]
         subprocess.run(command, input="".join(self.lines), text=True, check=True)
+        # The loader wants a file for each picture.
+        for stack, files in self.stacks:
+            for file, picture in zip(files, np.fromfile(stack, "<u2").reshape(len(files), -1), strict=True):
+                picture.tofile(file)
+            stack.unlink()
 
 
-def picture(place):
-    path, number = place
-    return np.memmap(path, "<u2", "r").reshape(-1, SIZE[1], SIZE[0])[number]
+def picture(path):
+    return np.fromfile(path, "<u2").reshape(SIZE[1], SIZE[0])
 
 
 def stacks(camera):

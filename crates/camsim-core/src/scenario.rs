@@ -31,7 +31,6 @@ pub use camera::{
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
 pub use face::Face;
-pub(crate) use image_sensor::UNIT_MATRIX;
 pub use image_sensor::{
     Companding, Demosaic, FlickerSpec, FlickerWave, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve,
     SensorModel,

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     frame::RawPicture,
-    scenario::{Demosaic, ImageSensorSpec, Mosaic, ResponseCurve, UNIT_MATRIX},
+    scenario::{Demosaic, ImageSensorSpec, Mosaic, ResponseCurve},
 };
 
 /// How raw pictures become colours.
@@ -145,8 +145,5 @@ impl Response {
 
 /// A matrix of rows.
 fn matrix(rows: &[f64; 9]) -> Mat3 {
-    if *rows == UNIT_MATRIX {
-        return Mat3::IDENTITY;
-    }
     Mat3::from_cols_array(&rows.map(|value| value as f32)).transpose()
 }

@@ -207,7 +207,7 @@ mod tests {
             let last = (mean + 12.0 * mean.sqrt() + 12.0) as usize;
             let mut counts = vec![0_u32; last + 1];
             for i in 0..SAMPLES / 2 {
-                let words = two_words(i % 2000 | (i / 2000) << 16, 3, 20_261_127, stream);
+                let words = two_words((i % 2000) | ((i / 2000) << 16), 3, 20_261_127, stream);
                 words.iter().for_each(|&bits| counts[draws.poisson(mean, bits) as usize] += 1);
             }
             let n = f64::from(SAMPLES);

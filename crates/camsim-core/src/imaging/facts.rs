@@ -151,8 +151,8 @@ mod tests {
             let spec = with_facts(&ImageSensorSpec { model: Some(model), ..ImageSensorSpec::default() });
             let full_e = 10.0_f64.powf(snr_db / 10.0);
             let noise_e = full_e / 10.0_f64.powf(range_db / 20.0) - 0.5;
-            assert!((spec.full_well_e.unwrap() / full_e - 1.0).abs() < 2e-3, "{model:?}: {full_e}");
-            assert!((spec.read_noise_e.unwrap() - noise_e).abs() < 6e-3, "{model:?}: {noise_e}");
+            assert!((spec.full_well_e.expect("valid") / full_e - 1.0).abs() < 2e-3, "{model:?}: {full_e}");
+            assert!((spec.read_noise_e.expect("valid") - noise_e).abs() < 6e-3, "{model:?}: {noise_e}");
         }
     }
 }

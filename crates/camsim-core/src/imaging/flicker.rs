@@ -60,7 +60,7 @@ mod tests {
     fn flicker(wave: FlickerWave, exposure_ms: f64) -> Flicker {
         let spec = FlickerSpec { hz: 100.0, depth: 0.7, wave, duty: 0.3, phase_deg: 40.0 };
         let shutter = ShutterSpec { readout_ms: 20.0, exposure_ms, ..ShutterSpec::default() };
-        let shutter = Shutter::from_spec(&shutter, 25.0, [8, 400]).unwrap();
+        let shutter = Shutter::from_spec(&shutter, 25.0, [8, 400]).expect("valid");
         Flicker::new(&spec, shutter, exposure_ms * 1e-3)
     }
 

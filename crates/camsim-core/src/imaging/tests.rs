@@ -36,7 +36,7 @@ fn photon_transfer_has_the_gain_as_its_slope() {
         full_well_e: Some(1e5),
         ..mono(9000.0)
     };
-    let sensor = ImageSensor::new(&camera(size_px, spec), 5).unwrap();
+    let sensor = ImageSensor::new(&camera(size_px, spec), 5).expect("valid");
     for level in [0.0, 0.02, 0.1, 0.4, 0.9] {
         let raw = sensor.raw(3, 0.0, &flat(size_px, level as f32));
         let [mean, variance] = mean_and_variance(raw.values.iter().map(|&v| f64::from(v)));
@@ -71,7 +71,7 @@ fn patterns_are_fixed_and_noise_is_not() {
     };
     let sensor = |spec: &ImageSensorSpec, name: &str| {
         let camera = CameraSpec { name: name.into(), ..camera(size_px, spec.clone()) };
-        ImageSensor::new(&camera, 5).unwrap()
+        ImageSensor::new(&camera, 5).expect("valid")
     };
     let fixed = sensor(&spec, "");
     let dark = fixed.raw(0, 0.0, &flat(size_px, 0.0));
@@ -117,7 +117,7 @@ fn hot_and_dead_pixels_have_their_shares() {
         full_well_e: Some(1e5),
         ..mono(4000.0)
     };
-    let sensor = ImageSensor::new(&camera(size_px, spec), 5).unwrap();
+    let sensor = ImageSensor::new(&camera(size_px, spec), 5).expect("valid");
     let raw = sensor.raw(0, 0.0, &flat(size_px, 1.0));
     let share = |test: &dyn Fn(u16) -> bool| {
         raw.values.iter().filter(|&&v| test(v)).count() as f64 / raw.values.len() as f64
@@ -134,7 +134,7 @@ fn hot_and_dead_pixels_have_their_shares() {
 #[test]
 fn light_saturates_at_the_full_well() {
     let spec = ImageSensorSpec { full_well_e: Some(1000.0), bits: Some(8), ..mono(5000.0) };
-    let sensor = ImageSensor::new(&camera([20, 10], spec), 5).unwrap();
+    let sensor = ImageSensor::new(&camera([20, 10], spec), 5).expect("valid");
     assert!(sensor.raw(0, 0.0, &flat([20, 10], 1.0)).values.iter().all(|&v| v == 255));
     let mut frame =
         RenderedFrame { color_rgba: flat([20, 10], 1.0), size_px: [20, 10], ..RenderedFrame::default() };
@@ -154,9 +154,9 @@ fn threads_and_repetition_change_no_bit() {
     let light: Vec<f32> =
         (0..64 * 48 * 4).map(|i| if i % 4 == 3 { 1.0 } else { (i % 97) as f32 / 97.0 }).collect();
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("valid");
         pool.install(|| {
-            let sensor = ImageSensor::new(&camera(size_px, spec.clone()), 5).unwrap();
+            let sensor = ImageSensor::new(&camera(size_px, spec.clone()), 5).expect("valid");
             let mut frame =
                 RenderedFrame { index: 4, color_rgba: light.clone(), size_px, ..RenderedFrame::default() };
             sensor.expose(&mut frame, 0.0);
@@ -167,7 +167,7 @@ fn threads_and_repetition_change_no_bit() {
     assert_eq!(one.raw, many.raw);
     assert_eq!(one.color_rgba, many.color_rgba);
     // FNV-1a of the numbers: the same on every machine.
-    let hash = one.raw.unwrap().values.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, value| {
+    let hash = one.raw.expect("valid").values.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, value| {
         (hash ^ u64::from(*value)).wrapping_mul(0x0000_0100_0000_01b3)
     });
     assert_eq!(hash, 0x03a3_f0e4_22fb_601c, "{hash:#x}");
@@ -178,7 +178,7 @@ fn little_more_light_changes_few_numbers_by_one() {
     let size_px = [300, 200];
     let spec =
         ImageSensorSpec { gain_e_per_dn: Some(1.0), full_well_e: Some(1e5), bits: Some(16), ..mono(1000.0) };
-    let sensor = ImageSensor::new(&camera(size_px, spec), 5).unwrap();
+    let sensor = ImageSensor::new(&camera(size_px, spec), 5).expect("valid");
     let [a, b] = [0.5, 0.5001].map(|light| sensor.raw(0, 0.0, &flat(size_px, light)));
     let differences: Vec<i32> =
         a.values.iter().zip(&b.values).map(|(a, b)| i32::from(*b) - i32::from(*a)).collect();

@@ -117,7 +117,7 @@ pub struct ImageSensorSpec {
 }
 
 /// No colours mixed.
-pub(crate) const UNIT_MATRIX: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+const UNIT_MATRIX: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 impl Default for ImageSensorSpec {
     fn default() -> Self {

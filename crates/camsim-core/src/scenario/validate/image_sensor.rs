@@ -253,7 +253,7 @@ mod tests {
     fn a_scale_is_all_that_is_needed() {
         assert_eq!(validate(&good()), []);
         let mut by_lux = good();
-        let sensor = by_lux.camera.sensor.as_mut().unwrap();
+        let sensor = by_lux.camera.sensor.as_mut().expect("valid");
         (sensor.white_e, sensor.white_lux, sensor.f_number) = (None, Some(1e4), Some(4.0));
         (sensor.model, sensor.quantum_efficiency) = (Some(SensorModel::Imx250), Some(PerChannel::One(0.6)));
         sensor.exposure_ms = Some(2.0);
@@ -314,7 +314,7 @@ mod tests {
         ];
         for (key, change) in cases {
             let mut scenario = good();
-            let mut sensor = scenario.camera.sensor.take().unwrap();
+            let mut sensor = scenario.camera.sensor.take().expect("valid");
             change(&mut scenario, &mut sensor);
             scenario.camera.sensor = Some(sensor);
             let problems = validate(&scenario);
