@@ -48,11 +48,7 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
         Ok(imported) => {
             let spec = &imported.spec;
             let [cx, cy] = spec.principal_point_px.unwrap();
-            let model = match spec.lens.model {
-                LensModel::Pinhole => "pinhole",
-                LensModel::BrownConrady => "brown-conrady",
-                LensModel::KannalaBrandt => "kannala-brandt",
-            };
+            let model = spec.lens.model.facts().name;
             let readout = if spec.shutter.readout_ms == 0.0 {
                 "0".to_owned()
             } else {
