@@ -98,7 +98,7 @@ fn end_of_growth(k: [f64; 5]) -> f64 {
     let mut radius = 0.0;
     for _ in 0..20_000 {
         let [angle, slope] = value_and_slope(k, radius + step);
-        if !(slope > 0.0) {
+        if slope.is_nan() || slope <= 0.0 {
             let (mut low, mut high) = (radius, radius + step);
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
@@ -116,7 +116,7 @@ fn end_of_growth(k: [f64; 5]) -> f64 {
 
 impl RadialFormula for FThetaInverse {
     fn radius(&self, angle: f64) -> f64 {
-        if !(angle <= value_and_slope(self.k, self.radius_max)[0]) {
+        if angle.is_nan() || angle > value_and_slope(self.k, self.radius_max)[0] {
             return f64::NAN;
         }
         let (mut low, mut high) = (0.0, self.radius_max);
