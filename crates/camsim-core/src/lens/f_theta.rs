@@ -116,8 +116,7 @@ fn end_of_growth(k: [f64; 5]) -> f64 {
 
 impl RadialFormula for FThetaInverse {
     fn radius(&self, angle: f64) -> f64 {
-        let most = value_and_slope(self.k, self.radius_max)[0];
-        if angle.is_nan() || most.is_nan() || angle > most {
+        if angle.is_nan() || angle > value_and_slope(self.k, self.radius_max)[0] {
             return f64::NAN;
         }
         let (mut low, mut high) = (0.0, self.radius_max);
