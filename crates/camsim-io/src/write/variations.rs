@@ -16,6 +16,9 @@ pub const VARIATIONS_CSV: &str = "variations.csv";
 /// Columns before those of the drawn values.
 const COLUMNS: [&str; 2] = ["variation", "folder"];
 
+/// Cells of each row, by the number of its variation.
+type Rows = BTreeMap<u64, Vec<String>>;
+
 /// Why the table was not written.
 #[derive(Debug, Error)]
 pub enum VariationsError {
@@ -72,7 +75,7 @@ pub fn write_variations(
         let begin = [index.to_string(), variation_folder(*index)];
         (*index, begin.into_iter().chain(drawn.iter().flat_map(cells)).collect())
     });
-    let rows: BTreeMap<u64, Vec<String>> = rows.collect();
+    let rows: Rows = rows.collect();
     match old.iter().find(|(index, row)| rows.get(index) != Some(row)) {
         Some((index, _)) => Err(others(format!("the row of variation {index} has other values"))),
         None => Ok(write_atomic(
@@ -83,7 +86,7 @@ pub fn write_variations(
 }
 
 /// The columns and rows of a table; none if the file does not exist or is no such table.
-fn read(path: &Path) -> Result<(Vec<String>, BTreeMap<u64, Vec<String>>), WriteError> {
+fn read(path: &Path) -> Result<(Vec<String>, Rows), WriteError> {
     let mut rows = BTreeMap::new();
     let text = match std::fs::read(path) {
         Ok(text) => text,
@@ -101,10 +104,10 @@ fn read(path: &Path) -> Result<(Vec<String>, BTreeMap<u64, Vec<String>>), WriteE
     Ok((columns, rows))
 }
 
-fn csv_of(columns: &[String], rows: &BTreeMap<u64, Vec<String>>) -> Result<Vec<u8>, String> {
+fn csv_of(columns: &[String], rows: &Rows) -> Result<Vec<u8>, String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let all = std::iter::once(columns).chain(rows.values().map(Vec::as_slice));
-    all.map(|row| writer.write_record(row)).collect::<Result<(), _>>().map_err(|error| error.to_string())?;
+    let mut all = std::iter::once(columns).chain(rows.values().map(Vec::as_slice));
+    all.try_for_each(|row| writer.write_record(row)).map_err(|error| error.to_string())?;
     writer.into_inner().map_err(|error| error.to_string())
 }
 
