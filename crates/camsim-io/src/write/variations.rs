@@ -16,6 +16,9 @@ pub const VARIATIONS_CSV: &str = "variations.csv";
 /// Columns before those of the drawn values.
 const COLUMNS: [&str; 2] = ["variation", "folder"];
 
+/// Cells of each row, by the number of its variation.
+type Rows = BTreeMap<u64, Vec<String>>;
+
 /// Why the table was not written.
 #[derive(Debug, Error)]
 pub enum VariationsError {
@@ -72,7 +75,7 @@ pub fn write_variations(
         let begin = [index.to_string(), variation_folder(*index)];
         (*index, begin.into_iter().chain(drawn.iter().flat_map(cells)).collect())
     });
-    let rows: BTreeMap<u64, Vec<String>> = rows.collect();
+    let rows: Rows = rows.collect();
     match old.iter().find(|(index, row)| rows.get(index) != Some(row)) {
         Some((index, _)) => Err(others(format!("the row of variation {index} has other values"))),
         None => Ok(write_atomic(
