@@ -25,7 +25,7 @@ imu = scenario.imu()
 table = np.c_[imu.t_ns, imu.gyro_rad_s, imu.accel_m_s2]
 np.savetxt(folder / "imu0/data.csv", table, "%d" + ",%.17g" * 6, header="timestamp [ns],w xyz [rad/s],a xyz [m/s^2]")
 # North-east-down to north-west-up: the world that EuRoC's readers expect, with gravity along -z.
-world_from_ned, turn = np.array([1, -1, -1]), np.array([1, 1, -1, -1])
+world_from_ned = np.array([1, -1, -1])
 w, x, y, z = imu.ned_from_sensor_wxyz.T
 poses = np.c_[imu.t_ns, imu.position_ned_m * world_from_ned, np.c_[-x, w, -z, y], imu.velocity_ned_m_s * world_from_ned]
 np.savetxt(folder / "state_groundtruth_estimate0/data.csv", poses, "%d" + ",%.17g" * 10, header="timestamp [ns],p xyz [m],q wxyz,v xyz [m/s]")

@@ -42,7 +42,7 @@ CASES: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "fisheye": (
         "assets/demo.toml",
         ["color", "valid", "range"],
-        {"camera.lens": '{ model = "kannala-brandt", coefficients = [-0.01, 0.002] }', "camera.focal_px": [60.0, 60.0]},
+        {"camera.lens": '{ model = "kannala-brandt", coefficients = [-0.01, 0.002] }', "camera.focal_px": [90.0, 90.0]},
     ),
     "paper": ("assets/demo.toml", ["color"], {"quality.preset": "paper"}),
     "noisy": ("assets/pattern.toml", ["color"], {"camera.photometric.noise_sigma": 0.05, "seed": 99}),
