@@ -85,9 +85,6 @@ pub fn write_variations(
     }
 }
 
-/// Rows of a table by the number of their variation.
-type Rows = BTreeMap<u64, Vec<String>>;
-
 /// The columns and rows of a table; none if the file does not exist or is no such table.
 fn read(path: &Path) -> Result<(Vec<String>, Rows), WriteError> {
     let mut rows = BTreeMap::new();
