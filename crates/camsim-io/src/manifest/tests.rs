@@ -193,6 +193,8 @@ fn all_paths_of_a_scenario_are_made_relative() {
             flight = { log = "x/1" }
             [camera]
             zoom_track = "x/2"
+            lens_table = "x/13.csv"
+            lens = { model = "table" }
             photometric = { vignette = "x/3" }
             [[camera.zoom]]
             at = 1.0
@@ -213,7 +215,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
         assert!(visited.iter().any(|visited| visited == key), "{key}");
     }
     assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");
-    assert_eq!(visited.len(), 12);
+    assert_eq!(visited.len(), 13);
 }
 
 #[test]

@@ -528,7 +528,12 @@ impl Schema {
             let similarity = similarity(leaf, its_leaf);
             if its_parent == parent { similarity + 0.15 } else { similarity }
         };
-        let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+        // Tables may share a name, such as exposure_ms: the more similar table decides.
+        let of_table = |name: &str| similarity(parent, name.rsplit_once('.').map_or("", |(table, _)| table));
+        let order = |a: &&str, b: &&str| {
+            score(a).total_cmp(&score(b)).then_with(|| of_table(a).total_cmp(&of_table(b)))
+        };
+        let best = names.into_iter().max_by(order)?;
         (score(&best) > MIN_KEY_SIMILARITY).then(|| best.to_owned())
     }
 }

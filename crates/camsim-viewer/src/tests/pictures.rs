@@ -253,12 +253,21 @@ fn a_camera_that_cannot_be_rendered_leaves_the_last_picture() {
     window.settle();
     let shown_px = window.state().document.as_ref().expect("open").scenario.camera.size_px;
     let middle = window.harness.get_by_label("picture").rect().center();
-    // A field of view that no perspective ideal frame covers.
-    let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![0.0] };
-    let camera = CameraSpec { size_px: [512, 512], focal_px: [150.0, 150.0], lens, ..CameraSpec::default() };
+    // The picture lies beyond the fold of the lens.
+    let lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-1.0] };
+    let camera = CameraSpec {
+        size_px: [512, 512],
+        principal_point_px: Some([9000.0, 9000.0]),
+        lens,
+        ..CameraSpec::default()
+    };
     send(&mut window, Message::Camera(Box::new(camera)));
     window.wait("the fault", |state| {
-        state.engine.fault.as_ref().is_some_and(|fault| fault.contains("too wide"))
+        state
+            .engine
+            .fault
+            .as_ref()
+            .is_some_and(|fault| fault.contains("no pixel of the camera has an ideal ray"))
     });
     // The text of the fault has moved the pane.
     let pane = window.harness.get_by_label("picture").rect();
