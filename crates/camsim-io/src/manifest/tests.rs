@@ -189,12 +189,11 @@ fn moved_folders_and_inputs_can_be_resumed() {
 #[test]
 fn all_paths_of_a_scenario_are_made_relative() {
     use crate::scenario_file::{ValueKind, keys};
+    use camsim_core::lens::LensTable;
     let text = r#"
             flight = { log = "x/1" }
             [camera]
             zoom_track = "x/2"
-            lens_table = "x/13.csv"
-            lens = { model = "table" }
             photometric = { vignette = "x/3" }
             [[camera.zoom]]
             at = 1.0
@@ -207,7 +206,9 @@ fn all_paths_of_a_scenario_are_made_relative() {
             [output.tracks]
             points = ["terrain", "x/12.csv"]
         "#;
-    let scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
+    let mut scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
+    // No lens has a table and a zoom.
+    scenario.camera.lens_table = Some(LensTable { path: "x/13.csv".into(), grid: None });
     let mut tree = serde_json::to_value(&scenario).unwrap();
     let mut visited = Vec::new();
     for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));

@@ -250,7 +250,6 @@ fn problems_name_file_line_and_key() {
         ),
         ("\"quality.key_frames\" = { uniform = [1, 4] }", "takes whole numbers: write { integer"),
         ("\"camera.lens\" = { uniform = [1, 4] }", "takes no numbers: write { choice"),
-        ("\"camera.sensor\" = { uniform = [1, 4] }", "is not supported by this version"),
         ("\"camera.mount.angles_deg.7\" = { uniform = [1, 4] }", "`angles_deg` is a list of 3"),
         ("\"cameras.left.fps\" = { uniform = [1, 4] }", "the scenario has one camera, [camera]"),
         ("\"scene.gltf.*.scale\" = { uniform = [1, 4] }", "the scenario has no list `scene.gltf`"),
