@@ -43,5 +43,6 @@ if [ "${CAMSIM_SKIP_JUDGES:-}" = 1 ]; then
 else
     sh scripts/judges.sh
 fi
+sh scripts/python-test.sh
 cargo test --workspace --lib --bins --tests
 say "all passed"
