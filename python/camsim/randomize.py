@@ -122,7 +122,7 @@ class Variations(Sequence["Scenario"]):
     >>> variations = camsim.randomize(scenario, {"camera.shutter.exposure_ms": camsim.Uniform(2, 10)}, seed=7)
     >>> variations[17][0].color
     >>> variations.drawn(17)
-    {'camera.shutter.exposure_ms': 6.27340119263, 'seed': 98230112407731}
+    {'camera.shutter.exposure_ms': 6.95500452456, 'seed': 74442395611743}
     """
 
     def __init__(self, scenario: Scenario) -> None:

@@ -14,8 +14,8 @@ use common::{city, rolling, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
 const SIZE_PX: [u32; 2] = [160, 120];
-/// Houses have silhouettes, which both renderers sample.
-const LEAST_PSNR_DB: f64 = 30.0;
+/// `quality.max_error_dn` = 1 is an RMS of 48.1 dB, which plans predict and do not bound: 48.4 to 50.5 are measured.
+const LEAST_PSNR_DB: f64 = 47.0;
 
 /// Model, coefficients and focal length of cameras that see some 80 degrees.
 fn lenses() -> [(LensModel, &'static [f64], f64); 13] {
