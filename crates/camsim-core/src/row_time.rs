@@ -123,8 +123,8 @@ struct Projection {
 
 impl CameraModel {
     /// Pixel coordinates at which a camera shows a point at path time `t_s`, and its planar depth (infinite for
-    /// a direction); `None` if it is beyond the reach of the lens. What lies beside or behind the camera has its distance for a depth. Only a point on something
-    /// that moves depends on the time.
+    /// a direction); `None` if it is beyond the reach of the lens. What lies beside or behind the camera has its
+    /// distance for a depth. Only a point on something that moves depends on the time.
     #[must_use]
     pub fn show(&self, pose: &CameraPose, t_s: f64, point: WorldPoint<'_>) -> Option<(DVec2, f64)> {
         let camera_from_ned = pose.ned_from_camera.conjugate();
