@@ -24,7 +24,7 @@ use camsim::{
         load::Loaded,
         write::{FrameFiles, FrameWriter},
     },
-    plan::{Planner, row_poses},
+    plan::{Capabilities, Planner, row_poses},
 };
 use criterion::{BenchmarkId, Criterion, Throughput};
 use glam::{DQuat, DVec3};
@@ -64,6 +64,14 @@ fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
         };
         group.bench_function(BenchmarkId::new("plan of a group of eight", name), |bencher| {
             bencher.iter(plan_anew)
+        });
+        let for_card = Planner::new(sequence.clone(), &sequence.scenario.output.channels, MAX_SIDE_PX)?
+            .with_capabilities(Capabilities::default());
+        group.bench_function(BenchmarkId::new("the same for a graphics card", name), |bencher| {
+            bencher.iter(|| {
+                for_card.forget();
+                for_card.plan(black_box(60)).map(drop)
+            })
         });
         let plan = planner.plan(60)?;
         group.bench_function(BenchmarkId::new("row_poses", name), |bencher| {

@@ -16,6 +16,8 @@ const CPU_MAX_SIDE_PX: u32 = 16_384;
 pub struct Engine {
     gpu: Option<GpuContext>,
     backend: Backend,
+    /// The class that plans are made for, if it is not the adapter's own.
+    planned_class: Option<AdapterClass>,
 }
 
 impl Engine {
@@ -24,13 +26,13 @@ impl Engine {
     /// # Errors
     /// There is no usable adapter.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
-        Ok(Self { gpu: Some(GpuContext::new(choice)?), backend: automatic() })
+        Ok(Self { gpu: Some(GpuContext::new(choice)?), backend: automatic(), planned_class: None })
     }
 
     /// The cpu renderer alone, without opening an adapter or loading a driver.
     #[must_use]
     pub fn cpu() -> Self {
-        Self { gpu: None, backend: Backend::Cpu }
+        Self { gpu: None, backend: Backend::Cpu, planned_class: None }
     }
 
     /// Opens the renderers of a backend: with [`Backend::Auto`] the best adapter, or the cpu alone without
@@ -47,7 +49,7 @@ impl Engine {
                 opened => opened,
             },
             Backend::Gpu | Backend::GpuThenCpu => {
-                Ok(Self { gpu: Some(GpuContext::new(AdapterChoice::Best)?), backend })
+                Ok(Self { gpu: Some(GpuContext::new(AdapterChoice::Best)?), backend, planned_class: None })
             }
         }
     }
@@ -75,13 +77,20 @@ impl Engine {
         self.backend = backend;
     }
 
+    /// Plans new sessions for an adapter of another class than this machine's: to try plans for graphics cards
+    /// on a software adapter. Without an adapter it has no effect.
+    pub fn plan_for(&mut self, class: AdapterClass) {
+        self.planned_class = Some(class);
+    }
+
     /// Capabilities of this machine, which plans depend on.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
-        let adapter = self.gpu.as_ref().map(|gpu| match gpu.is_software() {
+        let class = |gpu: &GpuContext| match gpu.is_software() {
             true => AdapterClass::Software,
             false => AdapterClass::Card,
-        });
+        };
+        let adapter = self.gpu.as_ref().map(|gpu| self.planned_class.unwrap_or(class(gpu)));
         Capabilities {
             backend: self.backend,
             adapter,

@@ -136,9 +136,12 @@ impl Planner {
         Self { inputs, faces, ..self }
     }
 
-    /// Plans for a machine with these capabilities; without, for a graphics card.
+    /// Plans for a machine with these capabilities. Without, passes are placed as on a graphics card, and
+    /// sampling is as sparing as on a processor.
     #[must_use]
-    pub fn with_capabilities(self, capabilities: Capabilities) -> Self {
+    pub fn with_capabilities(mut self, capabilities: Capabilities) -> Self {
+        let has_shadows = self.inputs.sequence.scene.light.is_some_and(|light| light.shadows);
+        self.inputs.is_drawing_cheap = capabilities.draws_on_card() && !has_shadows;
         let rasterises = cpu_rasterises(&self.inputs.sequence.scene, capabilities.max_picture_px);
         let faces = self.faces.into_iter().map(|face| face.with_capabilities(capabilities)).collect();
         Self { capabilities, rasterises, faces, ..self }

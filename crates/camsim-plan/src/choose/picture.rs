@@ -103,6 +103,7 @@ pub(crate) fn choose(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Pict
         most_scale: scale_of(context, scene, context.inputs.max_ideal_px, context.inputs.max_side_px),
         ideal_share: ideal_share(context, scene),
         may_have_samples: false,
+        is_drawing_cheap: context.inputs.is_drawing_cheap,
         exposure: context.exposed(scene.motion, &scene.ideal).path(quality, &mut Vec::new()),
     };
     let Some(model) = &scene.silhouettes else {

@@ -62,6 +62,8 @@ pub(crate) struct PlanInputs {
     pub truth: bool,
     pub max_side_px: u32,
     pub max_ideal_px: u64,
+    /// Whether fine sampling costs less time than the search for the cheapest.
+    pub is_drawing_cheap: bool,
     /// Neighbourhoods of the probes of recent frames, of all probes and of half of them.
     pub neighbourhoods: RecentCache<Neighbourhoods>,
     pub neighbourhoods_of_halves: RecentCache<Neighbourhoods>,
@@ -103,6 +105,7 @@ impl PlanInputs {
             truth,
             max_side_px,
             max_ideal_px: MAX_IDEAL_PX,
+            is_drawing_cheap: false,
             neighbourhoods: RecentCache::new(cached),
             neighbourhoods_of_halves: RecentCache::new(cached),
         })

@@ -42,6 +42,10 @@ const CAPS: [u32; 4] = [2, 3, 4, MOST_TAPS];
 /// left, the more the wider they are (RMS, four samples an ideal pixel), which the safety of silhouettes has
 /// room for.
 const MOST_LEAN: f64 = 0.2;
+/// Where drawing is cheap: scales of the ideal frame, in order, and samples a pixel of path, of the plans that
+/// are taken without a search if they keep the tolerance.
+const FINE_SCALES: [f64; 4] = [1.41, MOST_SCALE, 2.83, 4.0];
+const FINE_SAMPLES_PER_PX: f64 = 4.0;
 /// By how much a plan may cost more because it leaves no error: costs are not known better, and of two that
 /// are alike the more exact one wins.
 const WORTH: f64 = 0.2;
@@ -64,6 +68,8 @@ pub(crate) struct SamplingTask<'a> {
     pub ideal_share: f64,
     /// Whether ideal pixels may have several samples.
     pub may_have_samples: bool,
+    /// Whether fine sampling costs less time than the search for the cheapest.
+    pub is_drawing_cheap: bool,
     pub exposure: Option<ExposurePath>,
 }
 
@@ -127,10 +133,36 @@ pub(crate) struct SamplingSearch<'a> {
 impl SamplingSearch<'_> {
     /// The cheapest plan within the tolerance, or one that is nearly the best there is.
     pub fn choose(&self) -> SamplingChoice {
+        if let Some((total_dn, plan)) = self.fine() {
+            return self.choice(plan, total_dn, true, total_dn);
+        }
         match self.cheapest() {
             Ok((total_dn, plan)) => self.choice(plan, total_dn, true, total_dn),
             Err(failed) => self.nearest(failed),
         }
+    }
+
+    /// Where drawing is cheap, the first fine plan that keeps the tolerance, and its error.
+    fn fine(&self) -> Option<(f64, SamplingPlan)> {
+        let task = self.task;
+        if !task.is_drawing_cheap {
+            return None;
+        }
+        let samples_a_pixel = *task.samples().last()?;
+        let scales: Vec<f64> = match task.quality.ideal_scale.value() {
+            Some(scale) => vec![scale],
+            None => FINE_SCALES.iter().map(|scale| scale.max(task.wished_scale) * task.least_scale).collect(),
+        };
+        scales.into_iter().filter(|&scale| scale < task.most_scale).find_map(|scale| {
+            let taps = self.tap_stages(scale).into_iter().rfind(|stage| *stage != TapStage::Area)?;
+            let ideal = SamplingPlan::of_ideal(scale, PrefilterTaps::Grid, samples_a_pixel);
+            let samples_per_px = match (task.exposure, task.quality.blur_samples.value()) {
+                (None, _) => 0.0,
+                (Some(_), Some(samples)) => f64::from(samples),
+                (Some(_), None) => FINE_SAMPLES_PER_PX / scale,
+            };
+            self.within(&task.sampled(&SamplingPlan { taps, ..ideal }, samples_per_px))
+        })
     }
 
     /// A plan that another frame has chosen.

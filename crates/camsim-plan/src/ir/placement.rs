@@ -77,6 +77,14 @@ pub struct Capabilities {
     pub max_picture_px: u32,
 }
 
+impl Capabilities {
+    /// Whether a graphics card makes the ideal frames.
+    #[must_use]
+    pub fn draws_on_card(&self) -> bool {
+        self.adapter == Some(AdapterClass::Card) && self.backend != Backend::Cpu
+    }
+}
+
 impl Default for Capabilities {
     /// A graphics card with usual limits.
     fn default() -> Self {
