@@ -135,7 +135,7 @@ fn verify_compares_the_channels_that_a_scenario_asks_for() {
     assert!(planes[1]["p99"].as_f64() < Some(1e-3), "{}", planes[1]);
     let (code, out, err) = verify(&["--set", channels]);
     assert!(
-        code == 0 && out.contains("object wrong: ") && out.contains("near the pixel's ray: kept"),
+        code == 0 && out.contains("object wrong: ") && out.contains("near the pixel's ray has: passed"),
         "{out}{err}"
     );
     let flows = "output.channels=[\"flow\", \"flow_global\", \"motion\", \"blur_path\", \"coverage\"]";
@@ -155,7 +155,7 @@ fn verify_compares_the_channels_that_a_scenario_asks_for() {
     );
     let (code, out, err) = verify(&["--set", flows]);
     assert!(
-        code == 0 && out.contains("flow states wrong: 0 of ") && out.contains("coverage against"),
+        code == 0 && out.contains("flow, wrong states: 0 of ") && out.contains("coverage against"),
         "{out}{err}"
     );
     let (_, out, _) = verify(&["--json"]);

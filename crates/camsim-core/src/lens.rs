@@ -50,7 +50,7 @@ pub use direction::DirectionLens;
 pub use face::FaceLens;
 pub use facts::ModelFacts;
 pub use fold::{FOLD_RAYS, FoldCurve};
-pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens};
+pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens, foreign_model};
 pub use pinhole::Pinhole;
 pub use radial::RadialLens;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};

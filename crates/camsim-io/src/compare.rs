@@ -4,7 +4,7 @@
 //! never one with the other.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
@@ -99,12 +99,26 @@ pub struct FileFigures {
     pub figures: Figures,
 }
 
-/// Result of `camsim compare`: the figures of all files together, then file by file.
+/// The figures of all files of one format.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FormatFigures {
+    /// Extension of the files.
+    pub format: String,
+    /// Number of files.
+    pub files: usize,
+    /// Their figures together.
+    #[serde(flatten)]
+    pub figures: Figures,
+}
+
+/// Result of `camsim compare`: the figures of all files together, then of each format, then file by file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Figures of all files together: pooled RMSE, largest maximum, mean SSIM.
     #[serde(flatten)]
     pub total: Figures,
+    /// Figures of each format: EXR has linear values and PNG encoded ones. Empty for two single files.
+    pub formats: Vec<FormatFigures>,
     /// Figures file by file; empty for two single files.
     pub files: Vec<FileFigures>,
     /// Pictures that only the first folder has.
@@ -121,7 +135,7 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
     match (a.is_dir(), b.is_dir()) {
         (false, false) => {
             let total = Figures::from(&compare_files(a, b)?);
-            Ok(Report { total, files: vec![], only_in_a: vec![], only_in_b: vec![] })
+            Ok(Report { total, formats: vec![], files: vec![], only_in_a: vec![], only_in_b: vec![] })
         }
         (true, true) => compare_folders(a, b),
         // A missing path is reported as missing, not as a file compared with a folder.
@@ -147,15 +161,28 @@ fn compare_folders(a: &Path, b: &Path) -> Result<Report, CompareError> {
     pictures_below(a, "", &mut in_a)?;
     pictures_below(b, "", &mut in_b)?;
     let (mut files, mut all) = (Vec::new(), Vec::new());
+    let mut by_format: BTreeMap<String, Vec<Comparison>> = BTreeMap::new();
     for name in in_a.intersection(&in_b) {
         let comparison = compare_files(&a.join(name), &b.join(name))?;
         files.push(FileFigures { file: name.clone(), figures: (&comparison).into() });
+        let format = Path::new(name).extension().map(|extension| extension.to_string_lossy().into_owned());
+        by_format.entry(format.unwrap_or_default()).or_default().push(comparison);
         all.push(comparison);
     }
     let total =
         Comparison::pooled(&all).ok_or_else(|| CompareError::NothingInCommon { a: a.into(), b: b.into() })?;
     let only = |one: &BTreeSet<String>, other: &BTreeSet<String>| one.difference(other).cloned().collect();
-    Ok(Report { total: (&total).into(), files, only_in_a: only(&in_a, &in_b), only_in_b: only(&in_b, &in_a) })
+    let of_format = |(format, all): (String, Vec<Comparison>)| {
+        let figures = (&Comparison::pooled(&all)?).into();
+        Some(FormatFigures { format, files: all.len(), figures })
+    };
+    Ok(Report {
+        total: (&total).into(),
+        formats: by_format.into_iter().filter_map(of_format).collect(),
+        files,
+        only_in_a: only(&in_a, &in_b),
+        only_in_b: only(&in_b, &in_a),
+    })
 }
 
 /// Collects the paths of all pictures below `root`, recursively.
@@ -316,6 +343,12 @@ mod tests {
             ("color/frame_000000.exr", 0.25)
         );
         assert_eq!(report.total.differing, 1.0);
+        let formats: Vec<(&str, usize, f64)> =
+            report.formats.iter().map(|of| (of.format.as_str(), of.files, of.figures.max)).collect();
+        assert!(
+            formats[0] == ("exr", 2, 0.25) && formats[1].0 == "png" && formats[1].2 != 0.25,
+            "{formats:?}"
+        );
 
         let (exr, png) = ("color/frame_000000.exr", "color/frame_000000.png");
         assert_eq!(compare_paths(&a.join(exr), &b.join(exr)).unwrap().total.max, 0.25);

@@ -58,3 +58,4 @@ pub mod write;
 
 #[cfg(test)]
 mod inputs_page;
+mod similar_file;

@@ -172,6 +172,19 @@ pub enum LoadError {
             camera.fps higher"
     )]
     NoFrame(f64, f64, f64),
+    /// No frame lies within the log's first and last row.
+    #[error(
+        "flight.window_s: none of the {frames} frames, from {first_s:.3} s on, lies in the log, which has rows from \
+            0 to {log_s:.3} s"
+    )]
+    OutsideLog {
+        /// Number of frames.
+        frames: u64,
+        /// First frame, seconds after the log's first row.
+        first_s: f64,
+        /// Length of the log, seconds.
+        log_s: f64,
+    },
     /// The window holds more frames than [`MAX_FRAMES`]; frames and frame rate.
     #[error(
         "the window holds {0:.0} frames at {1} frames a second, more than {MAX_FRAMES:.0}: make \
@@ -335,6 +348,11 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         vignette,
         zoom_track,
     };
+    let (first_s, last_s) = sequence.path.span_s();
+    if last_s > first_s && frames_outside(&sequence) as u64 == sequence.frames {
+        let (frames, log_s) = (sequence.frames, last_s - first_s);
+        return Err(LoadError::OutsideLog { frames, first_s: sequence.start_s, log_s });
+    }
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(sensor_warnings(scenario, &log, &sequence.path.trajectory));
     warnings.extend(scene_notes.iter().cloned());

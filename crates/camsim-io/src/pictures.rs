@@ -9,13 +9,16 @@ use camsim_core::{
 };
 use image::{DynamicImage, ImageDecoder, ImageReader, metadata::Orientation};
 
-use crate::terrain::raster::{Raster, is_tiff, max_decoded_bytes};
+use crate::{
+    similar_file::suggestion,
+    terrain::raster::{Raster, is_tiff, max_decoded_bytes},
+};
 
 /// Why a picture cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The file cannot be opened.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("{path}: cannot be read: {source}{}", suggestion(path))]
     Open {
         /// The file.
         path: PathBuf,

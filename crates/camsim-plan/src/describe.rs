@@ -182,7 +182,7 @@ impl fmt::Display for FramePlan {
         )?;
         writeln!(
             f,
-            "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px"
+            "  longest blur path {blur_px:.3} px; a straight line differs from it by at most {blur_sagitta_px:.2e} px"
         )?;
         write_prediction(&self.predicted, f)?;
         for cause in self.not_in_the_picture() {

@@ -20,7 +20,7 @@ pub struct CompareArgs {
     a: PathBuf,
     /// Second image or folder
     b: PathBuf,
-    /// Print JSON: rmse, max, psnr_db (null for equal images), ssim, differing, and each file of a folder
+    /// Print JSON: rmse, max, psnr_db (null for equal images), ssim, differing, and of folders each format and file
     #[arg(long)]
     json: bool,
 }
@@ -43,9 +43,12 @@ pub fn run(args: &CompareArgs, console: &mut Console<'_>) -> Result<(), Failure>
     for file in &report.files {
         console.line(format_args!("{} {}", row(&file.figures), file.file))?;
     }
-    let all =
-        if report.files.is_empty() { String::new() } else { format!(" all {} images", report.files.len()) };
-    console.line(row(&report.total) + &all)?;
+    for of in &report.formats {
+        console.line(format_args!("{} all {} {} images", row(&of.figures), of.files, of.format))?;
+    }
+    if report.formats.is_empty() {
+        console.line(row(&report.total))?;
+    }
     if report.total.non_finite > 0 {
         console.warn(format_args!(
             "{} pixels contain NaN or infinity and count only as differing",

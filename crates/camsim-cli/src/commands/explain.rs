@@ -272,7 +272,8 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
     }
     print_light(&loaded, console)?;
     sensors::print(&sensors, console)?;
-    console.line(format_args!("sequence of {frames} frames"))?;
+    let s = if frames == 1 { "" } else { "s" };
+    console.line(format_args!("sequence of {frames} frame{s}"))?;
     if let Some(face) = plan.camera.lens.face() {
         print_faces(face, &faces, console)?;
     }

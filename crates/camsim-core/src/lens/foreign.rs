@@ -62,12 +62,7 @@ const NAMES: [(&[&str], LensModel, &[usize]); 11] = [
 /// point, in the order of the model's authority: `xi alpha` (double sphere), `alpha beta` (EUCM), `xi k1 k2 p1 p2`
 /// (omni, MEI), OpenCV's order (radial-tangential).
 pub fn foreign_lens(name: &str, parameters: &[f64]) -> Result<ForeignLens, ForeignLensError> {
-    let plain: String =
-        name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
-    let (_, model, counts) = NAMES
-        .iter()
-        .find(|(names, ..)| names.contains(&plain.as_str()))
-        .ok_or_else(|| ForeignLensError::Unknown(name.to_owned()))?;
+    let (_, model, counts) = named(name).ok_or_else(|| ForeignLensError::Unknown(name.to_owned()))?;
     // OpenCV names all its models alike: the thin prism shows in the count.
     let is_prism = *model == LensModel::BrownConrady && [12, 14].contains(&parameters.len());
     if is_prism {
@@ -85,6 +80,18 @@ pub fn foreign_lens(name: &str, parameters: &[f64]) -> Result<ForeignLens, Forei
         });
     }
     Ok(ForeignLens { model: *model, coefficients: parameters.to_vec() })
+}
+
+/// The model that other programs give this name, in any spelling.
+#[must_use]
+pub fn foreign_model(name: &str) -> Option<LensModel> {
+    named(name).map(|(_, model, _)| *model)
+}
+
+fn named(name: &str) -> Option<&'static (&'static [&'static str], LensModel, &'static [usize])> {
+    let plain: String =
+        name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    NAMES.iter().find(|(names, ..)| names.contains(&plain.as_str()))
 }
 
 /// Focal length in pixels, and the lens, of an f-theta polynomial in pixels (`p[0]` is the constant term, which

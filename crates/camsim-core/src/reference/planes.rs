@@ -62,7 +62,13 @@ impl Oracle {
             Channel::Flow | Channel::FlowBack | Channel::FlowGlobal | Channel::Motion | Channel::BlurPath => {
                 self.flow_plane(frame, channel, &view, &samples)
             }
-            _ => PlaneValues::Float(
+            Channel::Color
+            | Channel::Depth
+            | Channel::Valid
+            | Channel::Rows
+            | Channel::Raw
+            | Channel::Coords => PlaneValues::Float(Vec::new()),
+            Channel::Coverage => PlaneValues::Float(
                 samples
                     .par_iter()
                     .enumerate()

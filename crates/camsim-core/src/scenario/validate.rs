@@ -61,8 +61,8 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     tracks::check_tracks(&mut check, scenario);
     video::check_video(&mut check, scenario);
     sensors::check_sensors(&mut check, scenario);
-    twins::check_twins(&mut check, scenario);
     image_sensor::check_with_output(&mut check, scenario);
+    twins::check_twins(&mut check, scenario);
     check.problems
 }
 

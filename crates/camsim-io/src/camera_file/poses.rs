@@ -136,19 +136,50 @@ impl Extrinsics {
             }
             return Ok(());
         }
-        // Kalibr's first camera is the origin of a chain without an inertial sensor.
-        let mut first_from_camera = Rigid::IDENTITY;
-        for entry in &entries[1..=index] {
+        let (start, origin) = self.start_of_chain(entries, index)?;
+        let mut origin_from_camera = Rigid::IDENTITY;
+        for entry in &entries[start + 1..=index] {
             if find(entry.value, "T_cn_cnm1").is_none() {
                 return Ok(());
             }
             let pose = self.matrix(entry.value, &format!("{}.", entry.name), "T_cn_cnm1")?;
-            first_from_camera = first_from_camera.of(&pose.inverse());
+            origin_from_camera = origin_from_camera.of(&pose.inverse());
         }
-        if entries.len() > 1 {
-            self.placement = Some(Placement::InFirst(first_from_camera));
-        }
+        self.placement = match origin {
+            Some(Placement::InBody(pose)) => Some(Placement::InBody(pose.of(&origin_from_camera))),
+            Some(Placement::InFirst(_)) | None if entries.len() > 1 => {
+                Some(Placement::InFirst(origin_from_camera))
+            }
+            _ => None,
+        };
         Ok(())
+    }
+
+    /// Where the chain of poses to a camera begins: at the nearest camera before it whose pose to the inertial
+    /// sensor is known, or at the first camera. The number and pose of that camera.
+    fn start_of_chain(
+        &mut self,
+        entries: &[CameraEntry<'_>],
+        index: usize,
+    ) -> Result<(usize, Option<Placement>), KeyProblem> {
+        for (number, entry) in entries[..index].iter().enumerate().rev() {
+            let prefix = format!("{}.", entry.name);
+            let mut before = Self::default();
+            before.in_body(entry.value, &prefix, "T_cam_imu", true)?;
+            before.in_body(entry.value, &prefix, "T_imu_cam", false)?;
+            if before.placement.is_some() {
+                self.applied.extend(before.applied);
+                if self.shift_s.is_none() && find(entry.value, "timeshift_cam_imu").is_some() {
+                    self.notes.push(format!(
+                        "{}.timeshift_cam_imu is missing, {prefix}timeshift_cam_imu is given: the clock of {} is taken \
+                         to be the IMU's",
+                        entries[index].name, entries[index].name
+                    ));
+                }
+                return Ok((number, before.placement));
+            }
+        }
+        Ok((0, None))
     }
 
     /// A note if `T_cn_cnm1` contradicts the poses of both cameras.

@@ -60,9 +60,35 @@ fn camera_toml_has_the_keys_of_camera_at_its_root() {
     assert!(matches!(missing, CameraFileError::Read { .. }));
 }
 
+/// Two cameras of a chain, of which only the first has a pose to the IMU: the second's is that times the step.
+#[test]
+fn a_kalibr_chain_goes_on_from_the_camera_with_a_pose() {
+    let camera = "  camera_model: pinhole\n  distortion_model: equidistant\n  resolution: [512, 512]\n  \
+                  intrinsics: [190.9, 190.9, 254.9, 256.8]\n  distortion_coeffs: [0, 0, 0, 0]\n";
+    let pose = |key: &str, [x, y, z]: [f64; 3]| {
+        format!("  {key}: [[1, 0, 0, {x}], [0, 1, 0, {y}], [0, 0, 1, {z}], [0, 0, 0, 1]]\n")
+    };
+    let first = format!("cam0:\n{camera}{}", pose("T_cam_imu", [0.03, 0.01, 0.02]));
+    let step = pose("T_cn_cnm1", [-0.11, 0.0, 0.0]);
+    let own = pose("T_cam_imu", [-0.08, 0.01, 0.02]);
+    let imported = |second: &str| {
+        let text = format!("{first}cam1:\n{camera}{second}");
+        let (_folder, path) = write_file("camchain.yaml", &text);
+        let body = Some(BodyAxes::Flu);
+        let options = ImportOptions { camera: Some("cam1"), body, ..ImportOptions::default() };
+        import_camera_with(&path, &options).unwrap().spec.mount
+    };
+    let (by_step, by_own) = (imported(&step), imported(&own));
+    for i in 0..3 {
+        assert!((by_step.offset_m[i] - by_own.offset_m[i]).abs() < 1e-12, "{by_step:?} {by_own:?}");
+    }
+    assert_eq!(by_step.angles_deg, by_own.angles_deg);
+    assert!((by_own.offset_m[0] - 0.08).abs() < 1e-12, "{by_own:?}");
+}
+
 #[test]
 fn kalibr_and_euroc_are_imported() {
-    // Several cameras: which one is is_explicit for, not guessed.
+    // Of several cameras none is guessed.
     let which = import("chain.yaml", EUROC_CHAIN).unwrap_err().to_string();
     assert!(which.contains("there are 2 (`cam0`, `cam1`)") && which.contains("`--camera cam0`"), "{which}");
     let imported = import_named("chain.yaml", EUROC_CHAIN, "cam0").unwrap();

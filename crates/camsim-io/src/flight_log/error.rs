@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use camsim_core::flight_log::LogError;
 
+use crate::similar_file::suggestion;
+
 /// Why a flight log cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightLogError {
     /// The file cannot be read.
-    #[error("{}: {source}; check flight.log", path.display())]
+    #[error("{}: {source}; check flight.log{}", path.display(), suggestion(path))]
     Read {
         /// The file.
         path: PathBuf,

@@ -37,7 +37,6 @@ pub(super) const FRAME: Schema = Schema {
         ("fog.end_m", Number),
         ("fog.color", Numbers(3)),
     ],
-    unsupported_words: &[],
     required: &[("focal_px", ""), ("fog.end_m", "fog"), ("fog.color", "fog")],
     listing: "`camsim apply --help` lists all keys",
 };

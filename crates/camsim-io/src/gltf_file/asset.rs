@@ -6,6 +6,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde_json::Value;
 
 use super::{GltfError, accessor, preprocess::preprocess, treatments, validation};
+use crate::similar_file::suggestion;
 
 /// A parsed file with its buffers.
 #[derive(Debug)]
@@ -229,7 +230,11 @@ fn resolve_uri(path: &Path, uri: &str, key: &str) -> Result<Vec<u8>, GltfError> 
     }
     let file = file_of_uri(path, uri).ok_or_else(|| broken("its uri is not a file name"))?;
     std::fs::read(&file).map_err(|error| {
-        broken(&format!("its file {} cannot be read: {error}; put it there", file.display()))
+        broken(&format!(
+            "its file {} cannot be read: {error}; put it there{}",
+            file.display(),
+            suggestion(&file)
+        ))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     flight_log::FlightLog,
-    scenario::{CameraSpec, Scenario},
+    scenario::{CameraSpec, LensSpec, Scenario},
     sequence::{GrayImage, Sequence},
 };
 
@@ -75,7 +75,20 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
 pub(super) fn optics_warnings(sequence: &Sequence) -> Vec<String> {
     let camera = &sequence.scenario.camera;
     let vignette = sequence.vignette.as_deref().map(|map| vignette_warnings(camera, map)).unwrap_or_default();
-    zoom_warnings(sequence).into_iter().chain(vignette).collect()
+    zoom_warnings(sequence).into_iter().chain(vignette).chain(coefficients_warning(camera)).collect()
+}
+
+/// Warns of a lens model that is named without coefficients.
+fn coefficients_warning(camera: &CameraSpec) -> Option<String> {
+    let LensSpec { model, coefficients } = &camera.lens;
+    let facts = model.facts();
+    (coefficients.is_empty() && camera.zoom.is_empty() && !facts.coefficients.is_empty()).then(|| {
+        format!(
+            "camera.lens.coefficients is empty: {} has its default values of {}, which are no lens that was measured",
+            facts.name,
+            facts.coefficients.join(" ")
+        )
+    })
 }
 
 /// Warns if the zoom track covers less than the frames, or exceeds the calibrated zoom values. The nearest

@@ -1,5 +1,6 @@
 //! Checks keys and types against the schema, and resolves paths.
 
+use camsim_core::lens::foreign_model;
 use toml::{Table, Value};
 
 use super::{
@@ -55,13 +56,13 @@ fn check_table(
                 None
             }
             (Some(kind @ ValueKind::WordsOrTables(words)), value) => {
-                let problem = type_problem(schema, &key, kind, value);
+                let problem = type_problem(&key, kind, value);
                 if problem.is_none() {
                     resolve_tables(tree, words, value, &indexed_key);
                 }
                 problem
             }
-            (Some(kind), value) => type_problem(schema, &key, kind, value),
+            (Some(kind), value) => type_problem(&key, kind, value),
             (None, Value::Table(table)) if schema.is_table(&key) => {
                 check_table(tree, schema, table, &indexed_key, &key, problems);
                 None
@@ -69,6 +70,10 @@ fn check_table(
             (None, value) if schema.is_table(&key) => {
                 Some(format!("expected a table, found {}", show(value)))
             }
+            (None, _) if schema.is_outside_tables(&key) => Some(format!(
+                "unknown key; `{}` stands outside of all tables: move the line above the first [table]",
+                key.rsplit('.').next().unwrap_or(&key)
+            )),
             (None, _) => Some(match schema.nearest(&key) {
                 Some(near) => format!("unknown key; did you mean `{near}`?"),
                 None => format!("unknown key; {}", schema.listing),
@@ -109,7 +114,7 @@ fn has(table: &Table, path: &str) -> bool {
 
 /// The message for a value of the wrong type; `None` if it is right.
 // Long because it is one table of kinds.
-fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> Option<String> {
+fn type_problem(key: &str, kind: ValueKind, value: &Value) -> Option<String> {
     let number = |value: &Value| value.is_float() || value.is_integer();
     let whole = |value: &Value| value.as_integer().is_some_and(|value| value >= 0);
     let count = |value: &Value| value.as_integer().is_some_and(|value| u32::try_from(value).is_ok());
@@ -179,7 +184,6 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
                 format!("one of {} or a table \"NAME.csv\", or a list of these", list(words)),
             )
         }
-        ValueKind::Unsupported => return Some("is not supported by this version; leave it out".into()),
     };
     if ok {
         return None;
@@ -189,24 +193,25 @@ fn type_problem(schema: &Schema, key: &str, kind: ValueKind, value: &Value) -> O
         .into_iter()
         .chain(value.as_array().into_iter().flatten().filter_map(Value::as_str))
         .collect();
-    if let Some((_, word)) =
-        schema.unsupported_words.iter().find(|(its_key, word)| *its_key == key && written.contains(word))
-    {
-        return Some(format!("\"{word}\" is not supported by this version; expected {text}"));
-    }
     let hint = match kind {
         ValueKind::Word(words)
         | ValueKind::Words(words)
         | ValueKind::WordsOrTables(words)
         | ValueKind::NumberOr(words)
-        | ValueKind::CountOr(_, words) => written
-            .iter()
-            .find(|word| !words.contains(word))
-            .and_then(|word| similar::nearest_word(word, words)),
+        | ValueKind::CountOr(_, words) => {
+            written.iter().find(|word| !words.contains(word)).and_then(|word| meant_word(key, word, words))
+        }
         _ => None,
     };
     let hint = hint.map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
     Some(format!("expected {text}, found {}{hint}", show(value)))
+}
+
+/// The word that was probably meant: of a lens model the one that other programs call so, else the most similar.
+fn meant_word<'a>(key: &str, word: &str, words: &[&'a str]) -> Option<&'a str> {
+    let foreign = foreign_model(word).filter(|_| key.ends_with("lens.model"));
+    let known = foreign.and_then(|model| words.iter().copied().find(|known| *known == model.facts().name));
+    known.or_else(|| similar::nearest_word(word, words))
 }
 
 /// Quoted words, separated by commas.

@@ -20,8 +20,6 @@ use super::similar::{MIN_KEY_SIMILARITY, similarity};
 pub(crate) struct Schema {
     /// Dotted keys, without indices of array elements.
     pub(crate) keys: &'static [(&'static str, ValueKind)],
-    /// Words of the format that this version does not support, with their keys.
-    pub(crate) unsupported_words: &'static [(&'static str, &'static str)],
     /// Required keys, each with the table within which it is required (`""` for the root).
     pub(crate) required: &'static [(&'static str, &'static str)],
     /// Hint in messages: where a user finds all keys.
@@ -29,12 +27,8 @@ pub(crate) struct Schema {
 }
 
 /// Schema of scenarios, and of camera files below `camera`.
-pub(crate) const SCENARIO: Schema = Schema {
-    keys: KEYS,
-    unsupported_words: UNSUPPORTED_WORDS,
-    required: REQUIRED,
-    listing: "`camsim render --print-default` lists all keys",
-};
+pub(crate) const SCENARIO: Schema =
+    Schema { keys: KEYS, required: REQUIRED, listing: "`camsim render --print-default` lists all keys" };
 
 /// The values that a key takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,8 +77,6 @@ pub enum ValueKind {
     WordsOrTables(&'static [&'static str]),
     /// An array of tables, whose keys are listed below the same dotted name.
     Tables,
-    /// Reserved; not supported by this version.
-    Unsupported,
 }
 
 use ValueKind::*;
@@ -429,9 +421,6 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("magnetometer.jitter_ms", Number),
 ];
 
-/// Words that this version does not support.
-pub(super) const UNSUPPORTED_WORDS: &[(&str, &str)] = &[];
-
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("flight.log", ""),
@@ -500,6 +489,13 @@ impl Schema {
                 .keys
                 .iter()
                 .any(|(name, _)| name.strip_prefix(&*key).is_some_and(|rest| rest.starts_with('.')))
+    }
+
+    /// Whether the last part of an unknown key is the name of a value that stands outside of all tables.
+    pub(crate) fn is_outside_tables(&self, key: &str) -> bool {
+        let Some((_, leaf)) = key.rsplit_once('.') else { return false };
+        let is_value = |&(name, kind): &(&str, ValueKind)| name == leaf && kind != Tables;
+        self.keys == KEYS && (["camera", "cameras"].contains(&leaf) || self.keys.iter().any(is_value))
     }
 
     /// The known key most similar to `key`, for "did you mean". Siblings are preferred, but a key of another

@@ -9,7 +9,8 @@ const MIN_WORD_SIMILARITY: f64 = 0.65;
 
 /// The word of `words` most similar to `word`, if it is similar enough to suggest.
 pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
-    let score = |candidate: &&str| similarity(word, candidate);
+    let word = word.to_lowercase();
+    let score = |candidate: &&str| similarity(&word, candidate);
     words
         .iter()
         .copied()

@@ -190,13 +190,8 @@ fn every_key_of_the_structs_is_in_the_schema() {
     let saved = toml::to_string(&scenario).unwrap();
     let mut visited = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut visited);
-    for (key, kind) in KEYS {
-        let is_unsupported = matches!(kind, schema::ValueKind::Unsupported);
-        assert_eq!(
-            visited.iter().any(|s| s == key),
-            !is_unsupported,
-            "{key} stands in the schema but not in the struct, or the other way round"
-        );
+    for (key, _) in KEYS {
+        assert!(visited.iter().any(|s| s == key), "{key} stands in the schema but not in the struct");
     }
 }
 
@@ -376,6 +371,11 @@ fn errors_name_file_line_and_key() {
         ),
         ("[[camera.zoom]]\nat = 1\nfocal_px = [1, 0]", "dir/s.toml:8: camera.zoom.0.focal_px: must be"),
         ("[camera", "dir/s.toml:6: not valid TOML"),
+        ("[camera.shutter]\nexposure_ms = 8,0", "; decimals have a point"),
+        ("[camera]\ncamera = \"c.toml\"", "`camera` stands outside of all tables: move the line above"),
+        ("[camera.lens]\nmodel = \"equidistant\"", "did you mean \"kannala-brandt\"?"),
+        ("[camera.lens]\nmodel = \"radtan\"", "did you mean \"brown-conrady\"?"),
+        ("[camera.sensor]\nmosaic = \"RGGB\"", "did you mean \"rggb\"?"),
         ("camera = \"no.toml\"", "unknown key"),
     ];
     for (extra, expected) in cases {

@@ -127,10 +127,10 @@ impl Tree {
         let line_of = |offset: usize| {
             text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1
         };
-        let syntax = |error: toml::de::Error| ScenarioError::Syntax {
-            path: path.into(),
-            line: error.span().map_or(1, |span| line_of(span.start)),
-            message: error.message().to_owned(),
+        let syntax = |error: toml::de::Error| {
+            let line = error.span().map_or(1, |span| line_of(span.start));
+            let hint = syntax_hint(path, text.lines().nth(line - 1).unwrap_or_default());
+            ScenarioError::Syntax { path: path.into(), line, message: format!("{}{hint}", error.message()) }
         };
         let spanned = DeTable::parse(text).map_err(syntax)?;
         let root: Table = toml::from_str(text).map_err(syntax)?;
@@ -311,4 +311,25 @@ fn locate_value(value: &Spanned<DeValue<'_>>, name: &str, record: &mut dyn FnMut
         }
         _ => {}
     }
+}
+
+/// What a file or a line that is not TOML probably is.
+fn syntax_hint(path: &Path, line: &str) -> String {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    if matches!(extension.as_deref(), Some("yaml" | "yml" | "json" | "xml")) {
+        let path = path.display();
+        return format!(
+            "; if it is another program's calibration, convert it: `camsim camera import {path} -o CAMERA.toml`, of \
+             several cameras with --rig"
+        );
+    }
+    let parts: Vec<&str> = line.split('#').next().unwrap_or_default().split(',').collect();
+    let is_decimal = |pair: &[&str]| {
+        pair[0].ends_with(|c: char| c.is_ascii_digit()) && pair[1].starts_with(|c: char| c.is_ascii_digit())
+    };
+    let in_list = line.contains('[') || line.contains('{');
+    if !in_list && parts.windows(2).any(is_decimal) {
+        return "; decimals have a point".into();
+    }
+    String::new()
 }

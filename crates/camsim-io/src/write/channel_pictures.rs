@@ -96,7 +96,15 @@ fn of_plane(plane: &Plane) -> Vec<[u8; 3]> {
             };
             displacements(values.chunks_exact(3).map(of_pixel).collect())
         }
-        _ => values.iter().map(|&value| [byte(value); 3]).collect(),
+        Channel::Coverage
+        | Channel::Color
+        | Channel::Depth
+        | Channel::Valid
+        | Channel::Rows
+        | Channel::Raw
+        | Channel::Coords
+        | Channel::Object
+        | Channel::Class => values.iter().map(|&value| [byte(value); 3]).collect(),
     }
 }
 

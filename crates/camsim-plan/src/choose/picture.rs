@@ -317,7 +317,7 @@ pub(crate) fn why_one_sample(
         _ if !picture.is_plain => "silhouettes have rays of their own",
         (_, Auto::Value(1)) => "quality.ideal_samples is 1",
         (_, Auto::Value(_)) => "an ideal frame of that scale has too many pixels for them",
-        (_, Auto::Auto) => "one keeps quality.max_error_dn, or comes as near, for less time",
+        (_, Auto::Auto) => "one sample a pixel keeps quality.max_error_dn, or comes as close, in less time",
     }
 }
 

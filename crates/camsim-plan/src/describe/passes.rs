@@ -34,6 +34,7 @@ pub(crate) fn passes(plan: &FramePlan) -> Vec<String> {
         passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
     }
     passes.push("readback".to_owned());
+    passes.extend(plan.finishing.iter().map(ToString::to_string));
     if plan.has_exact_truth() {
         passes.push("cpu: rays in f64 for depth and coordinates at edges and creases".to_owned());
     }
@@ -114,7 +115,8 @@ fn temporal(temporal: TemporalStage) -> String {
         TemporalStage::Identity => "no motion".to_owned(),
         TemporalStage::Rotation => "rotation per row".to_owned(),
         TemporalStage::Reproject { iterations } => {
-            format!("reproject per row, {iterations} depth look-ups")
+            let s = if iterations == 1 { "" } else { "s" };
+            format!("reproject per row, {iterations} depth look-up{s}")
         }
         TemporalStage::Linear => "linear displacement (eq. 16) at the key instant's twist".to_owned(),
         TemporalStage::Rk2 => {
@@ -146,9 +148,10 @@ fn exact_gather(temporal: TemporalStage, blur: &BlurStage) -> String {
         PathStage::Quartic => "quartics",
     };
     format!(
-        "blur along {curve} through {} nodes{depth}, {:.2} samples a px",
+        "blur along {curve} through {} nodes{depth}, {:.2} samples a px of path, at most {} a pixel",
         blur.solved(),
-        blur.samples_per_px
+        blur.samples_per_px,
+        blur.stretches() * blur.max_samples
     )
 }
 

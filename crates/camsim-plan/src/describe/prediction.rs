@@ -6,7 +6,7 @@ use crate::ir::predicted::{BlendedDepthError, Disocclusion, Predicted};
 
 /// Source error and picture error by cause.
 pub(crate) fn write_prediction(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    writeln!(f, "predicted source error, ideal px (99th percentile, pixels at silhouettes apart)")?;
+    writeln!(f, "predicted source error, ideal px (99th percentile; pixels at silhouettes are not counted)")?;
     if predicted.probes == 0 {
         return writeln!(
             f,
@@ -25,7 +25,7 @@ fn verdict(kept: bool) -> &'static str {
 fn write_source_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let Predicted { total_px, probes, silhouette_share, level_of_detail_px, .. } = *predicted;
     let verdict = verdict(predicted.source_error_kept);
-    writeln!(f, "  at most {total_px:.2e} in all, from dry runs of {probes} pixels: {verdict}")?;
+    writeln!(f, "  99 % of the pixels: at most {total_px:.2e}, from dry runs of {probes} pixels: {verdict}")?;
     if let Some(cause) = &predicted.source_error_obstacle {
         writeln!(f, "  obstacle: {cause}")?;
     }
@@ -48,7 +48,7 @@ fn write_source_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt:
     if silhouette_share > 0.0 {
         writeln!(
             f,
-            "  apart: at least {:.0} % of the pixels, at a step or fold of depth",
+            "  not counted: at least {:.0} % of the pixels, at silhouettes or creases",
             100.0 * silhouette_share
         )?;
     }

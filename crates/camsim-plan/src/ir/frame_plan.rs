@@ -101,6 +101,8 @@ pub struct FramePlan {
     pub predicted: Predicted,
     /// Who makes its passes.
     pub placement: Placement,
+    /// What the processor does with the finished light of the frame, in order.
+    pub finishing: Vec<&'static str>,
     /// What is not done.
     pub skipped: Vec<Skip>,
     /// Time that its passes are expected to take, roughly: milliseconds for pictures of 640x480 on two

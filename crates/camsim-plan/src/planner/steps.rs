@@ -1,7 +1,7 @@
 //! The steps of a plan.
 
 use camsim_core::{
-    scenario::Auto,
+    scenario::{Auto, CameraSpec},
     scene::Light,
     temporal::{IdealGeometry, SKY_REACH_PX},
 };
@@ -37,6 +37,12 @@ const MOST_REFINEMENTS: u32 = 3;
 /// Rays over a pixel at a shadow's border. On a lattice of a Fibonacci number of points the share of them on
 /// one side of a straight line is within 0.05 of the area's.
 const SHADOW_BORDER_RAYS: u32 = 21;
+
+/// What follows the last pass of a renderer.
+fn finishing(camera: &CameraSpec) -> Vec<&'static str> {
+    let sensor = camera.sensor.as_ref().map(|_| "image sensor: light -> electrons -> numbers -> colours");
+    sensor.into_iter().collect()
+}
 
 fn shadow_stage(light: Option<Light>) -> Option<ShadowStage> {
     light.filter(|light| light.shadows).map(|_| ShadowStage { border_rays: SHADOW_BORDER_RAYS })
@@ -278,8 +284,8 @@ impl<'a> Draft<'a> {
     /// What the scenario as a whole makes unnecessary.
     pub fn note_static_skips(&mut self, temporal: TemporalStage) {
         let inputs = self.context.inputs;
-        let photometric = &inputs.sequence.scenario.camera.photometric;
-        if photometric.noise_sigma <= 0.0 {
+        let camera = &inputs.sequence.scenario.camera;
+        if camera.sensor.is_none() && camera.photometric.noise_sigma <= 0.0 {
             self.skip("noise", "camera.photometric.noise_sigma is 0");
         }
         if inputs.sequence.vignette.is_none() {
@@ -347,6 +353,7 @@ impl<'a> Draft<'a> {
             terrain_error_px: terrain_tolerance_px,
             predicted,
             placement: Placement::default(),
+            finishing: finishing(&inputs.sequence.scenario.camera),
             skipped: self.skipped,
             price_ms: picture.price.ms + temporal_ms(method),
             ideal_price_ms: picture.price.ideal_ms,

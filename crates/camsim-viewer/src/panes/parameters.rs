@@ -39,9 +39,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn groups() -> &'static [Group] {
     static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
         let mut groups: Vec<Group> = Vec::new();
-        for (key, kind) in
-            keys().iter().filter(|(key, kind)| *kind != ValueKind::Unsupported && !is_element(key))
-        {
+        for (key, kind) in keys().iter().filter(|(key, _)| !is_element(key)) {
             let name = key.rsplit_once('.').map_or("", |(group, _)| group);
             match groups.iter_mut().find(|group| group.name == name) {
                 Some(group) => group.keys.push((*key, *kind)),

@@ -142,8 +142,7 @@ pub fn describe(planes: &Planes) -> Vec<String> {
     let mut lines: Vec<String> = planes.flows.iter().flat_map(describe_flow).collect();
     lines.extend(planes.coverage.as_ref().map(|CoverageTruth { kept, pixels, rms, max, faults }| {
         format!(
-            "coverage against 256 rays in {pixels} pixels: {rms:.4} RMS, {} at most, {faults} not explained: \
-             {}",
+            "coverage against 256 rays in {pixels} pixels: {rms:.4} RMS, {} at most, {faults} faults: {}",
             figure(*max),
             verdict(*kept)
         )
@@ -163,7 +162,7 @@ fn describe_flow(flow: &FlowTruth) -> Vec<String> {
     };
     let mut lines = vec![format!(
         "{channel}: away from borders {}, within 1 px of them {}; in {} of {of_pixels} pixels; {beyond} off by \
-         more than {allowed} or in state, {faults} as no surface near the pixel's ray: {}",
+         more than {allowed} or in state, {faults} of them faults, which no surface near the pixel's ray has: {}",
         figures(away),
         figures(near),
         away.looked_at + near.looked_at,
@@ -175,11 +174,11 @@ fn describe_flow(flow: &FlowTruth) -> Vec<String> {
             .iter()
             .enumerate()
             .filter(|(_, row)| row.iter().any(|&count| count > 0))
-            .map(|(state, row)| format!("{state}: {}", row.map(|count| count.to_string()).join(" ")))
+            .map(|(state, row)| format!("{state} -> {}", row.map(|count| count.to_string()).join(" ")))
             .collect();
         lines.push(format!(
-            "{channel} states wrong: {} away from borders, {} within 1 px of them; reference state: frames of \
-             states 0 to 4 = {}",
+            "{channel}, wrong states: {} away from borders, {} within 1 px of them; true state -> pixels found in \
+             states 0 1 2 3 4: {}",
             wrong(away),
             wrong(near),
             rows.join(", ")

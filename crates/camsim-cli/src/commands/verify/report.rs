@@ -170,11 +170,11 @@ pub fn describe_truth(truth: &Truth) -> String {
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
         "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error \
-         {}), {points_beyond} points (largest {}); on no surface near the pixel's ray: {depth_faults} and \
-         {point_faults}: {}",
+         {}), {points_beyond} points (largest {}); faults, which lie on no surface near the pixel's ray: \
+         {depth_faults} depths, {point_faults} points: {}",
         largest(depth_max),
         largest(point_max),
-        if *kept { "kept" } else { "FAULTS" }
+        if *kept { "passed" } else { "FAILED" }
     )
 }
 
@@ -198,12 +198,12 @@ pub fn describe_plane(plane: &PlaneTruth) -> String {
     };
     format!(
         "{channel} {allowed}: {beyond} of {pixels} pixels{largest}; {beyond_away} of {pixels_away} away from \
-         borders of objects ({:.4} %), {} of {} within 1 px of them ({:.2} %); {faults} on no surface near the \
-         pixel's ray: {}",
+         borders of objects ({:.4} %), {} of {} within 1 px of them ({:.2} %); {faults} faults, \
+         which no surface near the pixel's ray has: {}",
         share(*beyond_away, *pixels_away),
         beyond - beyond_away,
         pixels - pixels_away,
         share(beyond - beyond_away, pixels - pixels_away),
-        if *kept { "kept" } else { "FAULTS" }
+        if *kept { "passed" } else { "FAILED" }
     )
 }

@@ -176,7 +176,6 @@ pub(super) fn schema_key(key: &str) -> String {
 fn known(key: &str) -> Result<Option<ValueKind>, String> {
     let plain = schema_key(key);
     match SCENARIO.kind(&plain) {
-        Some(ValueKind::Unsupported) => Err("is not supported by this version; leave it out".into()),
         Some(kind) => Ok(Some(kind)),
         None if SCENARIO.is_table(&plain) => Ok(None),
         None => {

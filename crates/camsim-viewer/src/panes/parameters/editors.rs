@@ -58,7 +58,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => as_written(ui, key, value, param),
         ValueKind::Points(_) if is_of_sensor(key) => as_written(ui, key, value, param),
         // Lists of texts occur in FRAME.toml only.
-        ValueKind::Tables | ValueKind::Unsupported | ValueKind::Texts | ValueKind::Points(_) => None,
+        ValueKind::Tables | ValueKind::Texts | ValueKind::Points(_) => None,
     };
     if let Some(Edit { value, is_dragged }) = edit {
         out.push(Message::Set(key.to_owned(), value, is_dragged));
