@@ -32,7 +32,7 @@ pub(super) fn photometric(
     }
     for (value, noise) in values.iter_mut().zip(&noise) {
         *value =
-            per_lane(|i| clamp_to(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
+            per_lane(|i| clamp_to(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], frame.most));
     }
     values
 }
