@@ -122,6 +122,9 @@ impl<'a> Pipeline<'a> {
         motion: &'a Motion,
         settings: &Settings,
     ) -> Result<Self, ApplyError> {
+        if spec.auto_exposure.is_some() {
+            return Err(ApplyError::AutoExposure);
+        }
         let camera = CameraModel::from_spec(spec)?;
         let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)?;
         frame.check()?;

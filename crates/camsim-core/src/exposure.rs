@@ -7,6 +7,8 @@
 
 mod controller;
 mod meter;
+#[cfg(test)]
+mod tests;
 mod track;
 
 pub use controller::Controller;

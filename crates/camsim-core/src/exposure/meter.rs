@@ -1,12 +1,13 @@
 //! The light meter: what a coarse grid of points of a picture sees, by rays.
 //!
-//! Each point is in the middle of a cell of the metered window and looks through the camera's lens at the
-//! mid-exposure of its own row. The texture is averaged over the parallelogram that the cell covers on a surface,
-//! which the neighbouring points tell; without this, a coarse grid on a rough texture would flicker.
+//! Each point is in a cell of the metered window and looks through the camera's lens at the mid-exposure of its own
+//! row. The points of a row or column of cells are not in line, so that a border which is parallel to the picture's
+//! sides, as a horizon is, crosses them one by one. Texture is read all over the parallelogram that the cell covers
+//! on a surface, which the neighbouring points tell: else a coarse grid on a rough texture would flicker.
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat2, DVec2, DVec3};
 
 use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
@@ -21,7 +22,7 @@ use crate::{
 /// Points of the grid.
 const COLUMNS: usize = 24;
 const ROWS: usize = 18;
-/// Texture is read at so many places along each side of a cell.
+/// Texture is read at so many places along each side of a cell's parallelogram.
 const READS: u32 = 4;
 /// Least cosine between the normals of neighbouring points on one face of a mesh.
 const SAME_FACE: f64 = 0.99;
@@ -35,6 +36,8 @@ pub(super) struct Meter {
     lens: MeterLens,
     shutter: Shutter,
     points: Vec<MeterPoint>,
+    /// Size of a cell.
+    cell_px: DVec2,
 }
 
 /// The camera, or its table of zoom values.
@@ -66,18 +69,28 @@ struct MeterPoint {
     vignette: f64,
 }
 
-/// Light at the points of a picture that have a ray: luminance and weight.
-#[derive(Clone, Debug, PartialEq)]
+/// Light of a picture: luminances at places that have a ray, and their weights.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MeteredLight {
-    points: Vec<[f64; 2]>,
-    weight: f64,
+    places: Vec<[f32; 2]>,
 }
 
 impl MeteredLight {
-    /// Mean of `min(gain * light, most)`; 0 where no point has a ray.
+    /// Mean of `min(gain * light, most)`; 0 where no place has a ray.
     pub fn level(&self, gain: f64, most: f64) -> f64 {
-        let sum: f64 = self.points.iter().map(|[light, weight]| weight * (gain * light).min(most)).sum();
-        if self.weight > 0.0 { sum / self.weight } else { 0.0 }
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for [light, weight] in self.places.iter().map(|place| place.map(f64::from)) {
+            sum += weight * (gain * light).min(most);
+            weights += weight;
+        }
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    }
+
+    fn add(&mut self, color: DVec3, point: &MeterPoint, share: f64) {
+        let light = point.vignette * LUMINANCE.dot(color);
+        // What is no number is dark.
+        let light = if light.is_finite() { light.max(0.0) } else { 0.0 };
+        self.places.push([light, point.weight * share].map(|value| value as f32));
     }
 }
 
@@ -92,20 +105,21 @@ struct Seen {
 impl Meter {
     pub fn new(sequence: Arc<Sequence>, spec: &AutoExposureSpec, lens: MeterLens, shutter: Shutter) -> Self {
         let points = points(&sequence, spec);
-        Self { oracle: Oracle::of_scene(sequence), lens, shutter, points }
+        let [left, top, right, bottom] = spec.window;
+        let cells = DVec2::new(COLUMNS as f64, ROWS as f64);
+        let size_px = DVec2::from_array(sequence.scenario.camera.size_px.map(f64::from));
+        let cell_px = DVec2::new(right - left, bottom - top) * size_px / cells;
+        Self { oracle: Oracle::of_scene(sequence), lens, shutter, points, cell_px }
     }
 
     /// Light of the picture of a frame.
     pub fn light(&self, frame: u64) -> MeteredLight {
         let seen = self.seen(frame);
-        let mut light = MeteredLight { points: Vec::with_capacity(seen.len()), weight: 0.0 };
-        for (i, (point, here)) in self.points.iter().zip(&seen).enumerate() {
-            let Some(here) = here else { continue };
-            let luminance = LUMINANCE.dot(self.color(here, &seen, i)).max(0.0);
-            // A scene without numbers is dark.
-            let luminance = if luminance.is_finite() { luminance } else { 0.0 };
-            light.points.push([point.vignette * luminance, point.weight]);
-            light.weight += point.weight;
+        let mut light = MeteredLight::default();
+        for (i, here) in seen.iter().enumerate() {
+            if let Some(here) = here {
+                self.read(&mut light, here, &seen, i);
+            }
         }
         light
     }
@@ -138,40 +152,54 @@ impl Meter {
         self.points.iter().map(see).collect()
     }
 
-    /// Mean colour of the cell of point `i`.
-    fn color(&self, here: &Seen, all: &[Option<Seen>], i: usize) -> DVec3 {
+    /// Adds the light of the cell of point `i`.
+    fn read(&self, light: &mut MeteredLight, here: &Seen, all: &[Option<Seen>], i: usize) {
+        let point = &self.points[i];
         if self.oracle.has_blended() {
-            return self.oracle.radiance_along(here.t_s, here.pose.position_ned_m, here.ray_ned, 1.0);
+            let color = self.oracle.radiance_along(here.t_s, here.pose.position_ned_m, here.ray_ned, 1.0);
+            return light.add(color, point, 1.0);
         }
-        let Some(hit) = here.hit else { return self.oracle.light_of(None) };
-        let (column, row) = (i % COLUMNS, i / COLUMNS);
-        let along = side(&hit, all, [i + 1, i.wrapping_sub(1)], [column + 1 < COLUMNS, column > 0]);
-        let down = side(&hit, all, [i + COLUMNS, i.wrapping_sub(COLUMNS)], [row + 1 < ROWS, row > 0]);
-        let (Some(along), Some(down)) = (along, down) else { return self.oracle.light_of(Some(&hit)) };
+        let sides = here.hit.and_then(|hit| Some((hit, self.sides(&hit, all, i)?)));
+        let Some((hit, sides)) = sides else {
+            return light.add(self.oracle.light_of(here.hit.as_ref()), point, 1.0);
+        };
         let place = |k: u32| (f64::from(k) + 0.5) / f64::from(READS) - 0.5;
-        let mut sum = DVec3::ZERO;
         for j in 0..READS {
             for k in 0..READS {
-                let uv = DVec2::from_array(hit.texture_uv) + place(k) * along + place(j) * down;
-                sum += self.oracle.light_of(Some(&Hit { texture_uv: uv.to_array(), ..hit }));
+                let uv = DVec2::from_array(hit.texture_uv) + sides * DVec2::new(place(k), place(j));
+                let hit = Hit { texture_uv: uv.to_array(), ..hit };
+                light.add(self.oracle.light_of(Some(&hit)), point, 1.0 / f64::from(READS * READS));
             }
         }
-        sum / f64::from(READS * READS)
+    }
+
+    /// Texture coordinates along both sides of the cell of point `i`, by its neighbours on the same face; `None`
+    /// where it has none.
+    fn sides(&self, hit: &Hit, all: &[Option<Seen>], i: usize) -> Option<DMat2> {
+        let (column, row) = (i % COLUMNS, i / COLUMNS);
+        let way = |k: usize| {
+            let other = all[k].as_ref()?.hit.as_ref()?;
+            let is_near = other.surface == hit.surface
+                && (hit.surface == 0 || other.normal_ned.dot(hit.normal_ned) > SAME_FACE);
+            let uv = DVec2::from_array(other.texture_uv) - DVec2::from_array(hit.texture_uv);
+            is_near.then(|| (uv, self.points[k].position_px - self.points[i].position_px))
+        };
+        let after = |step: usize, place: usize, count: usize| {
+            let next = (place + 1 < count).then(|| way(i + step)).flatten();
+            next.or_else(|| (place > 0).then(|| way(i - step)).flatten())
+        };
+        let ((uv_along, px_along), (uv_down, px_down)) =
+            after(1, column, COLUMNS).zip(after(COLUMNS, row, ROWS))?;
+        let uv_from_px =
+            DMat2::from_cols(uv_along, uv_down) * DMat2::from_cols(px_along, px_down).inverse();
+        let sides = uv_from_px * DMat2::from_diagonal(self.cell_px);
+        sides.is_finite().then_some(sides)
     }
 }
 
-/// Texture coordinates along a side of a cell, from the point after it or before it, whichever sees the same
-/// face.
-fn side(hit: &Hit, all: &[Option<Seen>], others: [usize; 2], exist: [bool; 2]) -> Option<DVec2> {
-    let uv = |hit: &Hit| DVec2::from_array(hit.texture_uv);
-    let is_near = |other: &Hit| {
-        other.surface == hit.surface && (hit.surface == 0 || other.normal_ned.dot(hit.normal_ned) > SAME_FACE)
-    };
-    let of = |k: usize| {
-        let seen = all.get(others[k]).filter(|_| exist[k])?.as_ref()?;
-        seen.hit.as_ref().filter(|other| is_near(other))
-    };
-    of(0).map(|after| uv(after) - uv(hit)).or_else(|| of(1).map(|before| uv(hit) - uv(before)))
+/// Places of the points of neighbouring cells within them, -0.5 to 0.5: multiples of the golden ratio's fraction.
+fn spread(k: usize) -> f64 {
+    (k as f64 * 0.618_033_988_749_894_9 + 0.5).fract() - 0.5
 }
 
 /// The grid over the metered window.
@@ -186,8 +214,9 @@ fn points(sequence: &Sequence, spec: &AutoExposureSpec) -> Vec<MeterPoint> {
     let cells = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| [column, row]));
     cells
         .map(|[column, row]| {
-            let share =
-                DVec2::new((column as f64 + 0.5) / COLUMNS as f64, (row as f64 + 0.5) / ROWS as f64);
+            let in_cell = DVec2::new(spread(row), spread(column)) + 0.5;
+            let share = (DVec2::new(column as f64, row as f64) + in_cell)
+                / DVec2::new(COLUMNS as f64, ROWS as f64);
             let from_middle = (share - 0.5) / 0.25;
             let in_picture = DVec2::new(left, top) + share * DVec2::new(right - left, bottom - top);
             let position_px = in_picture * DVec2::new(f64::from(width), f64::from(height)) - 0.5;

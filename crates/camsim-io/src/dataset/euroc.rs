@@ -69,7 +69,7 @@ fn write_camera(
     job.target.stream(&name("exposure.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],exposure time[ns]")?;
         camera.frames.iter().try_for_each(|frame| {
-            Ok(writeln!(out, "{},{}", frame.stamp_ns, (frame.exposure_s * 1e9).round())?)
+            Ok(writeln!(out, "{},{}", frame.stamp_ns, (frame.exposure_ms * 1e6).round())?)
         })
     })?;
     job.target.stream(&format!("settings/times_cam{i}.txt"), &mut |out| {

@@ -58,8 +58,8 @@ pub struct RunFrame {
     pub stamp_ns: i64,
     /// Pose at the stamp.
     pub pose: CameraPose,
-    /// Exposure time, seconds.
-    pub exposure_s: f64,
+    /// Exposure time.
+    pub exposure_ms: f64,
     /// Paths by the columns of files, relative to the folder; empty where there is none.
     files: Vec<String>,
 }
@@ -143,7 +143,7 @@ impl RunCamera {
         let spec = manifest.scenario.camera.clone();
         let shutter =
             Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|e| fail(e.to_string()))?;
-        let (columns, frames) = read_frames(&folder.join("frames.csv"), shutter.exposure_s())?;
+        let (columns, frames) = read_frames(&folder.join("frames.csv"), spec.shutter.exposure_ms)?;
         Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns })
     }
 
@@ -290,7 +290,7 @@ impl RunCamera {
 const FRAME_COLUMNS: [&str; 9] = ["frame", "stamp_ns", "n", "e", "d", "qw", "qx", "qy", "qz"];
 
 /// Names of the columns of files, and the frames.
-fn read_frames(path: &Path, exposure_s: f64) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
+fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
     let mut rows = CsvRows::open(path, &FRAME_COLUMNS)?;
     let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
     let place = |of: &str| header.iter().position(|name| name == of);
@@ -299,14 +299,14 @@ fn read_frames(path: &Path, exposure_s: f64) -> Result<(Vec<String>, Vec<RunFram
     let columns = header.get(last + 1..).unwrap_or_default().to_vec();
     let mut frames = Vec::new();
     while rows.advance()? {
-        let own_s = |place: usize| rows.cell(place).parse::<f64>().ok().map(|ms| 1e-3 * ms);
+        let own_ms = |place: usize| rows.cell(place).parse().ok();
         frames.push(RunFrame {
             number: rows.whole(0)?,
             instant: instant.and_then(|place| rows.cell(place).parse().ok()),
             stamp_ns: rows.whole(1)?,
             pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(5)? },
             // Pictures of one instant have no exposure time, however long they collect light.
-            exposure_s: exposure.filter(|_| exposure_s > 0.0).and_then(own_s).unwrap_or(exposure_s),
+            exposure_ms: exposure.filter(|_| nominal_ms > 0.0).and_then(own_ms).unwrap_or(nominal_ms),
             files: (0..columns.len()).map(|k| rows.cell(last + 1 + k).to_owned()).collect(),
         });
     }

@@ -106,16 +106,13 @@ impl TableKind {
 
     /// The kind of a header, and the columns of files with a comma before each.
     fn of_header(header: &str) -> Option<(Self, &str)> {
-        let [exposures, instants] = [EXPOSURE_COLUMNS, INSTANT_COLUMN].map(|columns| {
-            move |rest: &str| -> bool {
-                rest.strip_prefix(columns).is_some_and(|rest| rest.is_empty() || rest.starts_with(','))
-            }
-        });
         let mut rest = header.strip_prefix(FRAMES_COLUMNS)?;
-        let has_exposures = exposures(rest);
-        rest = if has_exposures { &rest[EXPOSURE_COLUMNS.len()..] } else { rest };
-        let has_instants = instants(rest);
-        rest = if has_instants { &rest[INSTANT_COLUMN.len()..] } else { rest };
+        let [has_exposures, has_instants] = [EXPOSURE_COLUMNS, INSTANT_COLUMN].map(|columns| {
+            let after = rest.strip_prefix(columns);
+            let after = after.filter(|after| after.is_empty() || after.starts_with(','));
+            rest = after.unwrap_or(rest);
+            after.is_some()
+        });
         Some((Self { has_exposures, has_instants }, rest))
     }
 }
