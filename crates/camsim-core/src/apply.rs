@@ -326,15 +326,7 @@ impl<'a> Pipeline<'a> {
         let frame = self.settings.frame as u32;
         let stage = Photometry::new(self.spec, None);
         let finish = |color: DVec3| {
-            photometric(
-                &stage,
-                color.as_vec3().to_array(),
-                weight,
-                pixel,
-                frame,
-                self.noise_seed,
-                table,
-            )
+            photometric(&stage, color.as_vec3().to_array(), weight, pixel, frame, self.noise_seed, table)
         };
         if weight <= 0.0 {
             return Ok((finish(DVec3::ZERO), depth_m));

@@ -135,8 +135,7 @@ impl ImageSensor {
         let channels = settings.channels();
         let mut values = vec![0_u16; self.key.size_px[1] as usize * width * channels];
         let seed = camera_seed(self.key.seed, &self.key.name);
-        let columns =
-            self.shared_noise(settings.column_noise_e, width as u32, frame, seed, stream::COLUMN);
+        let columns = self.shared_noise(settings.column_noise_e, width as u32, frame, seed, stream::COLUMN);
         values
             .par_chunks_mut(width * channels)
             .zip(color_rgba.par_chunks(width * 4))

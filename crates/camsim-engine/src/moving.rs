@@ -15,7 +15,11 @@ pub const MOVING_RAYS: u32 = RAYS;
 use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
-    noise::tail_table, photometric::{Photometry, photometric}, scene::Scene, sequence::Sequence, shutter::RowAxis,
+    noise::tail_table,
+    photometric::{Photometry, photometric},
+    scene::Scene,
+    sequence::Sequence,
+    shutter::RowAxis,
 };
 use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;

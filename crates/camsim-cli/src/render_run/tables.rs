@@ -117,10 +117,7 @@ fn seen_s(sequence: &Sequence) -> Result<[f64; 2], Failure> {
 }
 
 fn table_kind(pictures: &Pictures) -> TableKind {
-    TableKind {
-        has_exposures: pictures.sequence.exposures.is_some(),
-        has_instants: pictures.has_instants(),
-    }
+    TableKind { has_exposures: pictures.sequence.exposures.is_some(), has_instants: pictures.has_instants() }
 }
 
 /// Rows of this scenario in the folder's `frames.csv`.

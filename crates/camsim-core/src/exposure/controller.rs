@@ -132,7 +132,8 @@ mod tests {
     #[test]
     fn limits_hold_and_nothing_winds_up_beyond_them() {
         let spec = AutoExposureSpec { delay: 3, ..spec() };
-        let scene: Vec<f64> = (0..120).map(|frame| if (20..70).contains(&frame) { 1e-6 } else { 0.4 }).collect();
+        let scene: Vec<f64> =
+            (0..120).map(|frame| if (20..70).contains(&frame) { 1e-6 } else { 0.4 }).collect();
         let found = run(&spec, &scene);
         let most = (16.0 * 8.0 / 8.0_f64).ln();
         assert!(found.iter().all(|&x| x <= most) && (found[69] - most).abs() < 1e-6, "{}", found[69]);
@@ -160,7 +161,10 @@ mod tests {
         ];
         for (first, product_ms, expected) in cases {
             let found = split(first, product_ms);
-            assert!((found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9, "{found:?}");
+            assert!(
+                (found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9,
+                "{found:?}"
+            );
         }
     }
 

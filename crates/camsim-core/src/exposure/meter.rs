@@ -190,8 +190,7 @@ impl Meter {
         };
         let ((uv_along, px_along), (uv_down, px_down)) =
             after(1, column, COLUMNS).zip(after(COLUMNS, row, ROWS))?;
-        let uv_from_px =
-            DMat2::from_cols(uv_along, uv_down) * DMat2::from_cols(px_along, px_down).inverse();
+        let uv_from_px = DMat2::from_cols(uv_along, uv_down) * DMat2::from_cols(px_along, px_down).inverse();
         let sides = uv_from_px * DMat2::from_diagonal(self.cell_px);
         sides.is_finite().then_some(sides)
     }
@@ -215,8 +214,8 @@ fn points(sequence: &Sequence, spec: &AutoExposureSpec) -> Vec<MeterPoint> {
     cells
         .map(|[column, row]| {
             let in_cell = DVec2::new(spread(row), spread(column)) + 0.5;
-            let share = (DVec2::new(column as f64, row as f64) + in_cell)
-                / DVec2::new(COLUMNS as f64, ROWS as f64);
+            let share =
+                (DVec2::new(column as f64, row as f64) + in_cell) / DVec2::new(COLUMNS as f64, ROWS as f64);
             let from_middle = (share - 0.5) / 0.25;
             let in_picture = DVec2::new(left, top) + share * DVec2::new(right - left, bottom - top);
             let position_px = in_picture * DVec2::new(f64::from(width), f64::from(height)) - 0.5;

@@ -35,8 +35,7 @@ fn snow_and_forest() -> Scene {
         let [r, g, b] = texel(i);
         [r, g, b, 255]
     });
-    let texture =
-        Texture { size_px: [SIDE_PX; 2], rgba8: rgba8.collect(), encoding: Encoding::Linear };
+    let texture = Texture { size_px: [SIDE_PX; 2], rgba8: rgba8.collect(), encoding: Encoding::Linear };
     Scene {
         meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, WIDTH_M)],
         sky_linear: [0.2, 0.4, 0.8],
@@ -92,9 +91,8 @@ fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
 
 /// Mean luminance of a picture over the pixels that have a ray.
 fn mean(frame: &RenderedFrame) -> f64 {
-    let luminance = |rgba: &[f32]| {
-        f64::from(0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]) * f64::from(rgba[3])
-    };
+    let luminance =
+        |rgba: &[f32]| f64::from(0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]) * f64::from(rgba[3]);
     let pixels = frame.color_rgba.chunks_exact(4);
     let count: f64 = pixels.clone().map(|rgba| f64::from(rgba[3])).sum();
     pixels.map(luminance).sum::<f64>() / count
@@ -173,7 +171,8 @@ fn an_exposure_is_a_function_of_the_frame_alone() {
     let shuffled: Vec<_> = (0..290_u64).into_par_iter().map(|i| track(&at_once).of(i * 97 % 290)).collect();
     assert!((0..290).all(|i| shuffled[i] == in_order[i * 97 % 290]));
     // Twins and faces are exposed as the frames are.
-    let twin = crate::scenario::TwinSpec { name: "sharp".into(), exposure: Some(false), ..Default::default() };
+    let twin =
+        crate::scenario::TwinSpec { name: "sharp".into(), exposure: Some(false), ..Default::default() };
     let twin = sequence.twin(&twin, None).expect("a twin");
     assert!(twin.exposure(200) == Some(in_order[200]) && twin.blurred_s(200) == 0.0);
     assert_eq!(sequence.blurred_s(200), in_order[200].time_s);
@@ -182,7 +181,8 @@ fn an_exposure_is_a_function_of_the_frame_alone() {
 #[test]
 fn the_window_and_its_weights_choose_what_counts() {
     let level = |spec: AutoExposureSpec| {
-        let sequence = sequence_of(scenario(AutoExposureSpec { start: ExposureStart::Nominal, ..spec }), None);
+        let sequence =
+            sequence_of(scenario(AutoExposureSpec { start: ExposureStart::Nominal, ..spec }), None);
         // The border between snow and forest is in the middle of this picture; the aircraft flies upwards in it.
         track(&sequence).level(80)
     };

@@ -107,7 +107,8 @@ impl ExposureTrack {
             let end = (frame + 1).min(first + AT_ONCE);
             // The lock is not held meanwhile: metering is parallel, and a thread that waits for its parts may take
             // up another frame.
-            let seen = (first..end).into_par_iter().map(|of| self.picture_for(&meter, of)).collect::<Vec<_>>();
+            let seen =
+                (first..end).into_par_iter().map(|of| self.picture_for(&meter, of)).collect::<Vec<_>>();
             let mut known = self.known();
             // Another thread may have found them in the meantime.
             if known.len() as u64 == first {

@@ -199,7 +199,12 @@ fn a_frame_of_its_own_exposure_is_that_of_a_sensor_with_it() {
         hot_pixels: 0.05,
         hot_e_s: 1e5,
         prnu: Some(0.02),
-        flicker: Some(FlickerSpec { hz: 100.0, depth: 0.9, wave: FlickerWave::Sine, ..FlickerSpec::default() }),
+        flicker: Some(FlickerSpec {
+            hz: 100.0,
+            depth: 0.9,
+            wave: FlickerWave::Sine,
+            ..FlickerSpec::default()
+        }),
         ..mono(8000.0)
     };
     let exposure = FrameExposure { time_s: 2.5e-3, gain: 3.0, light: 0.75 };
@@ -212,8 +217,7 @@ fn a_frame_of_its_own_exposure_is_that_of_a_sensor_with_it() {
     };
     let picture = |spec: ImageSensorSpec, exposure: Option<&FrameExposure>| {
         let light: Vec<f32> = (0..96 * 64).flat_map(|i| [(i % 96) as f32 / 20.0; 4]).collect();
-        let mut frame =
-            RenderedFrame { index: 5, size_px, color_rgba: light, ..RenderedFrame::default() };
+        let mut frame = RenderedFrame { index: 5, size_px, color_rgba: light, ..RenderedFrame::default() };
         let sensor = ImageSensor::new(&camera(size_px, spec), 3).expect("valid");
         sensor.expose(&mut frame, 0.123, exposure);
         (frame.raw.expect("a raw picture").values, frame.color_rgba)

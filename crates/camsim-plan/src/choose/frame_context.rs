@@ -184,8 +184,7 @@ impl<'a> FrameContext<'a> {
         let Self { inputs, reach, shutter, stamp_s, key_s, .. } = self;
         let twist = solver.map(|stage| (stage, self.key_twist));
         let surfaces = &inputs.scene.surfaces;
-        let own =
-            || ideal_extent(reach, self.path(), shutter, *stamp_s, *key_s, keys, surfaces, twist);
+        let own = || ideal_extent(reach, self.path(), shutter, *stamp_s, *key_s, keys, surfaces, twist);
         self.shared.map_or_else(own, |shared| shared.extent).pixels(&reach.camera, scale)
     }
 

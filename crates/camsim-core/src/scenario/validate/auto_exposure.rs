@@ -11,16 +11,22 @@ fn key(leaf: &str) -> String {
 pub(super) fn check_auto_exposure(check: &mut Check, camera: &CameraSpec) {
     let Some(spec) = &camera.auto_exposure else { return };
     let AutoExposureSpec { window: [left, top, right, bottom], target, speed, delay, .. } = *spec;
-    let is_window = 0.0 <= left && left < right && right <= 1.0 && 0.0 <= top && top < bottom && bottom <= 1.0;
+    let is_window =
+        0.0 <= left && left < right && right <= 1.0 && 0.0 <= top && top < bottom && bottom <= 1.0;
     check.require(is_window, key("window"), || {
-        format!("must be [left, top, right, bottom] within 0 to 1, each side after the other, not {:?}", spec.window)
+        format!(
+            "must be [left, top, right, bottom] within 0 to 1, each side after the other, not {:?}",
+            spec.window
+        )
     });
     check.require(target > 0.0 && target < 1.0, key("target"), || {
         format!("must be above 0 (black) and below 1 (white), not {target}; 0.18 is a middle grey")
     });
     for (leaf, [least, most]) in [("exposure_ms", spec.exposure_ms), ("gain", spec.gain)] {
         check.require(least > 0.0 && least <= most && most.is_finite(), key(leaf), || {
-            format!("must be [smallest, largest], both above 0, not [{least}, {most}]; the same twice fixes it")
+            format!(
+                "must be [smallest, largest], both above 0, not [{least}, {most}]; the same twice fixes it"
+            )
         });
     }
     check.require(speed > 0.0 && speed <= 1.0, key("speed"), || {
@@ -39,7 +45,8 @@ fn check_nominal(check: &mut Check, camera: &CameraSpec, spec: &AutoExposureSpec
     }
     let nominal_ms = camera.nominal_exposure_ms();
     check.require(nominal_ms > 0.0, "camera.shutter.exposure_ms", || {
-        "is 0; with [camera.auto_exposure] it is the exposure that makes the scene's white white: give it".into()
+        "is 0; with [camera.auto_exposure] it is the exposure that makes the scene's white white: give it"
+            .into()
     });
     let of_sensor = camera.sensor.as_ref().and_then(|sensor| sensor.exposure_ms);
     check.require(of_sensor.is_none_or(|ms| ms == nominal_ms), "camera.sensor.exposure_ms", || {
@@ -53,7 +60,8 @@ pub(super) fn check_with_scenario(check: &mut Check, scenario: &Scenario) {
         return;
     }
     check.require(scenario.quality.preset != Preset::Paper, "quality.preset", || {
-        "\"paper\" has its own photometric model; leave [camera.auto_exposure] out, or write \"default\"".into()
+        "\"paper\" has its own photometric model; leave [camera.auto_exposure] out, or write \"default\""
+            .into()
     });
     for (i, twin) in scenario.output.twin.iter().enumerate() {
         let over_exposure = twin.instants.is_some() && twin.over.unwrap_or_default() == BurstOver::Exposure;
@@ -108,7 +116,8 @@ mod tests {
             validate(&scenario).into_iter().map(|problem| problem.key).collect::<Vec<_>>()
         };
         assert!(
-            problem(|s| s.camera.shutter.exposure_ms = 0.0).contains(&"camera.shutter.exposure_ms".to_owned())
+            problem(|s| s.camera.shutter.exposure_ms = 0.0)
+                .contains(&"camera.shutter.exposure_ms".to_owned())
         );
         let sensor = |exposure_ms| {
             Some(ImageSensorSpec { white_e: Some(1e4), exposure_ms, ..ImageSensorSpec::default() })

@@ -69,7 +69,9 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
     });
     if let Some(brightness) = scene.sky_brightness {
         check.require((0.0..=MOST_BRIGHTNESS).contains(&brightness), "scene.sky_brightness", || {
-            format!("must be a factor of 0 to {MOST_BRIGHTNESS}, not {brightness}; 1 leaves scene.sky as it is")
+            format!(
+                "must be a factor of 0 to {MOST_BRIGHTNESS}, not {brightness}; 1 leaves scene.sky as it is"
+            )
         });
     }
     if let Some(visibility_m) = scene.fog_visibility_m {
