@@ -23,7 +23,7 @@ import matplotlib.pyplot as plt
 SIDE, WIDTH_M, SPEED_M_S, HEIGHT_M, SECONDS, FPS = 3000, 3000.0, 60.0, 150.0, 12, 25
 TARGET = 0.18
 CASES = [("speed 0.2, delay 1", 0.2, 1, True), ("speed 0.2, delay 1, no sensor", 0.2, 1, False), ("speed 0.6, delay 4", 0.6, 4, True)]
-SHOWN = [100, 150, 154, 160, 170, 190, 290]
+SHOWN = [120, 145, 150, 155, 162, 175, 250]
 
 
 def noise(rng, cells):
@@ -38,11 +38,11 @@ def ground(path):
     snow = np.stack([0.78 + 0.04 * drifts + 0.02 * fine] * 3, -1) * [1.04, 1.0, 0.98]
     trees = 0.03 * np.exp(0.5 * crowns + 0.3 * fine)
     forest = np.stack([trees * 0.6, trees * 1.1, trees * 0.9], -1)
-    edge = SIDE // 2 + 25 * noise(rng, 40)[:, :1]
+    edge = SIDE // 2 + 8 * noise(rng, 100)[:, :1]
     east = 1 / (1 + np.exp(-(np.arange(SIDE)[None, :] - edge) / 3))[..., None]
     linear = np.clip(snow * (1 - east) + forest * east, 0, 1)
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
-    clearing = (((x - SIDE * 0.59) / 60) ** 2 + ((y - SIDE * 0.5) / 45) ** 2 < 1)[..., None]
+    clearing = (((x - SIDE * 0.59) / 30) ** 2 + ((y - SIDE * 0.5) / 60) ** 2 < 1)[..., None]
     linear = np.where(clearing, 0.25 + 0.02 * fine[..., None], linear).clip(0, 1)
     stored = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     cv2.imwrite(str(path), np.round(255 * stored).astype(np.uint8))
@@ -57,9 +57,9 @@ def scenario(folder, speed, delay, has_sensor):
 log = "log.csv"
 [camera]
 size_px = [320, 240]
-focal_px = [240, 240]
+focal_px = [600, 600]
 fps = {FPS}
-mount = {{ angles_deg = [0, -75, 0] }}
+mount = {{ angles_deg = [0, -90, 0] }}
 [camera.shutter]
 readout_ms = 20
 exposure_ms = 4
@@ -88,7 +88,7 @@ def run(camsim, folder, name, case):
     subprocess.run([camsim, "render", scenario(folder, speed, delay, has_sensor), "-o", out, "-q"], check=True)
     with (out / "frames.csv").open() as file:
         rows = list(csv.DictReader(file))
-    pictures = [cv2.imread(str(out / row["color_png"]), cv2.IMREAD_UNCHANGED)[..., ::-1] / 65535.0 for row in rows]
+    pictures = [cv2.imread(str(out / row["color_png"]), cv2.IMREAD_UNCHANGED)[..., 2::-1] / 65535.0 for row in rows]
     # A sensor's 1 is its full well: 12000 electrons with gain 1 are 1 of its numbers' range as well.
     levels = [(picture @ [0.2126, 0.7152, 0.0722]).mean() for picture in pictures]
     shown = [pictures[k] for k in SHOWN if k < len(pictures)]
@@ -124,10 +124,13 @@ def main():
         results = [run(camsim, folder, f"case{k}", case) for k, case in enumerate(CASES)]
     for (label, *_), (exposures, gains, levels, _) in zip(CASES, results, strict=True):
         light = exposures * gains
-        # Beyond its final value, within the second after the border.
-        over = light[150:185].max() / np.median(light[250:]) - 1
-        print(f"{label}: {exposures[0]:.3f} ms x {gains[0]:.2f} .. {exposures[-1]:.3f} ms x {gains[-1]:.2f},", end=" ")
-        print(f"level {levels[0]:.3f} .. {levels[-1]:.3f}, overshoot {100 * over:.1f} %")
+        # Between the border and the clearing.
+        forest = slice(162, 230)
+        settled = np.median(light[205:230])
+        over = light[forest].max() / settled - 1
+        late = 162 + int(np.argmax(light[forest] > 0.9 * settled))
+        print(f"{label}: {exposures[100]:.3f} ms x {gains[100]:.2f} over snow, {exposures[220]:.3f} ms x {gains[220]:.2f} over forest,", end=" ")
+        print(f"level {levels[100]:.3f} and {levels[220]:.3f}, within 10 % from frame {late} on, overshoot {100 * over:.1f} %")
     plot(results, path)
 
 
