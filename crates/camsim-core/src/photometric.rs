@@ -127,12 +127,12 @@ mod tests {
 
     #[test]
     fn mono_output_has_one_noise_for_all_channels() {
-        let mut camera = CameraSpec::default();
-        camera.photometric = PhotometricSpec {
+        let grey = PhotometricSpec {
             output: OutputEncoding::Luma8,
             noise_sigma: 0.05,
             ..PhotometricSpec::default()
         };
+        let camera = CameraSpec { photometric: grey, ..CameraSpec::default() };
         let stage = Photometry::new(&camera, None);
         let value = photometric(&stage, [0.5, 0.4, 0.3], 1.0, [3, 4], 0, 1, &crate::noise::tail_table());
         assert!(value[0] == value[1] && value[1] == value[2]);

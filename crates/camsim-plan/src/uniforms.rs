@@ -175,7 +175,6 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
             .extend(plan.key_twist.rate_rad_s.length())
             .as_vec4()
             .to_array(),
-        ..FrameUniforms::default()
     }
 }
 

@@ -114,7 +114,6 @@ fn the_meter_finds_the_mean_of_the_picture() {
         let sequence = sequence_of(scenario, vignette);
         for frame in [0, 75, 95, 150] {
             let (metered, rendered) = (track(&sequence).level(frame), mean(&render(&sequence, frame)));
-            println!("frame {frame}: metered {metered:.5}, rendered {rendered:.5}");
             // docs/IMAGING.md has this figure.
             assert!((metered / rendered - 1.0).abs() < 0.02, "{frame}: {metered} {rendered}");
         }
@@ -137,7 +136,6 @@ fn the_meter_sees_what_an_image_sensor_counts() {
         let raw = render(&sequence, frame).raw.expect("a raw picture");
         let found: f64 = raw.values.iter().map(|&dn| (f64::from(dn) - 100.0) / 3995.0).sum();
         let (found, metered) = (found / raw.values.len() as f64, track(&sequence).level(frame));
-        println!("frame {frame}: metered {metered:.5}, counted {found:.5}");
         assert!((metered / found - 1.0).abs() < 0.02, "{frame}: {metered} {found}");
     }
     // In the forest there is more time, and then gain, and the picture is as bright as over the snow.

@@ -88,7 +88,8 @@ mod tests {
     #[test]
     fn numbers_out_of_range_are_named() {
         assert_eq!(validate(&scenario()), []);
-        let cases: [(&str, fn(&mut AutoExposureSpec)); 10] = [
+        type Edit = fn(&mut AutoExposureSpec);
+        let cases: &[(&str, Edit)] = &[
             ("window", |a| a.window = [0.5, 0.0, 0.4, 1.0]),
             ("window", |a| a.window = [0.0, 0.0, 1.1, 1.0]),
             ("window", |a| a.window = [f64::NAN, 0.0, 1.0, 1.0]),
@@ -100,7 +101,7 @@ mod tests {
             ("delay", |a| a.delay = 0),
             ("nominal_ms", |a| a.nominal_ms = Some(-1.0)),
         ];
-        for (leaf, edit) in cases {
+        for &(leaf, edit) in cases {
             let mut scenario = scenario();
             edit(scenario.camera.auto_exposure.as_mut().expect("given"));
             let problems = validate(&scenario);
