@@ -59,7 +59,8 @@ struct Frame {
     key_rate_rad_s: vec4<f32>,
     // Radial coefficients k1 k2 k3 of the lens.
     lens_radial: vec3<f32>,
-    pad0: u32,
+    // Largest value after the photometric stage: 1, or any before an image sensor.
+    most: f32,
     // Linear fog of the paper preset, applied after the gather: sRGB-encoded colour, and 1 / (distance of
     // full fog) in w, 0 = no fog.
     linear_fog: vec4<f32>,

@@ -23,5 +23,5 @@ fn photometric(pixel: vec2<u32>, color: vec3<f32>, weight: f32) -> vec3<f32> {
         let noise = normal4(pixel, NOISE_STREAM);
         value += frame.noise_sigma * select(noise.xyz, noise.xxx, is_mono);
     }
-    return clamp(value, vec3<f32>(0.0), vec3<f32>(1.0));
+    return clamp(value, vec3<f32>(0.0), vec3<f32>(frame.most));
 }

@@ -184,7 +184,7 @@ impl FrameSource for ReferenceSource {
             if let Some(mut whole) = join_faces(faces) {
                 whole.frame.rows = rows;
                 if let Some(sensor) = &self.sensor {
-                    sensor.expose(&mut whole.frame, whole.plan.stamp_s);
+                    sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
                 }
                 sink(whole).or_failed()?;
             }

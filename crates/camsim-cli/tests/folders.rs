@@ -345,3 +345,32 @@ fn a_video_that_cannot_be_made_leaves_nothing() {
     assert!(code == 2 && err.contains("at equal distances"), "{code} {err}");
     assert!(!folder.path().join("out").exists());
 }
+
+#[test]
+fn exposures_follow_the_flight_whatever_is_rendered() {
+    let base = tempfile::tempdir().unwrap();
+    let path = |name: &str| base.path().join(name);
+    let sets = ["shutter.exposure_ms=5", "auto_exposure.start=nominal", "auto_exposure.target=0.1"];
+    let sets = sets.map(|set| format!("camera.{set}"));
+    let auto: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let done = |out: &str, more: &[&str]| {
+        let (code, err) = render(base.path(), out, &[&auto[..], more].concat());
+        assert_eq!(code, 0, "{err}");
+    };
+    done("whole", &["--frames", "0..7"]);
+    done("parts", &["--frames", "5..7"]);
+    let files =
+        |out: &str, frame: u64| fs::read(path(out).join(format!("color/frame_{frame:06}.exr"))).unwrap();
+    assert!(files("parts", 5) == files("whole", 5) && files("parts", 6) == files("whole", 6));
+    done("parts", &["--frames", "0..7", "--resume"]);
+    assert_eq!(fs::read(path("parts/frames.csv")).unwrap(), fs::read(path("whole/frames.csv")).unwrap());
+    // Frame by frame shorter, by a fifth of the logarithm of what is missing.
+    let times: Vec<f64> =
+        frames(&path("whole")).iter().map(|row| row["exposure_ms"].parse().unwrap()).collect();
+    assert_eq!(times[0], 5.0);
+    assert!(times.windows(2).all(|pair| pair[1] < pair[0]), "{times:?}");
+    assert!(frames(&path("whole")).iter().all(|row| row["gain"] == "1"));
+    // Another exposure is another scenario.
+    let (code, _) = render(base.path(), "parts", &["--frames", "0..7", "--resume"]);
+    assert_ne!(code, 0);
+}

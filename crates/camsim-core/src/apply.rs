@@ -20,7 +20,7 @@ use crate::{
     frame::RenderedFrame,
     imaging::ImageSensor,
     noise::{camera_seed, tail_table},
-    photometric::{photometric, vignette_weights},
+    photometric::{Photometry, photometric, vignette_weights},
     scenario::{CameraSpec, Preset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
@@ -122,6 +122,9 @@ impl<'a> Pipeline<'a> {
         motion: &'a Motion,
         settings: &Settings,
     ) -> Result<Self, ApplyError> {
+        if spec.auto_exposure.is_some() {
+            return Err(ApplyError::AutoExposure);
+        }
         let camera = CameraModel::from_spec(spec)?;
         let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)?;
         frame.check()?;
@@ -304,7 +307,7 @@ impl<'a> Pipeline<'a> {
         };
         if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
             // These frames have no place on a clock: the stamp is 0.
-            sensor.expose(&mut frame, 0.0);
+            sensor.expose(&mut frame, 0.0, None);
         }
         (frame, counts)
     }
@@ -321,16 +324,9 @@ impl<'a> Pipeline<'a> {
             if source.inverse_depth > 0.0 { (1.0 / source.inverse_depth) as f32 } else { 0.0 }
         });
         let frame = self.settings.frame as u32;
+        let stage = Photometry::new(self.spec, None);
         let finish = |color: DVec3| {
-            photometric(
-                &self.spec.photometric,
-                color.as_vec3().to_array(),
-                weight,
-                pixel,
-                frame,
-                self.noise_seed,
-                table,
-            )
+            photometric(&stage, color.as_vec3().to_array(), weight, pixel, frame, self.noise_seed, table)
         };
         if weight <= 0.0 {
             return Ok((finish(DVec3::ZERO), depth_m));

@@ -7,6 +7,7 @@
 mod demosaic;
 mod develop;
 mod draw;
+mod exposed;
 mod facts;
 mod fixed_pattern;
 mod flicker;
@@ -17,20 +18,19 @@ use std::sync::LazyLock;
 use rayon::prelude::*;
 
 use crate::{
+    exposure::FrameExposure,
     frame::{RawPicture, RenderedFrame},
     noise::camera_seed,
     scenario::{CameraSpec, ImageSensorSpec, Mosaic, ShutterSpec},
-    shutter::Shutter,
 };
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
 
-use develop::Development;
+use exposed::Exposed;
+pub(crate) use exposed::sensor_range;
 use fixed_pattern::FixedPattern;
-use flicker::Flicker;
 pub(crate) use settings::BITS;
-use settings::Settings;
 
 /// Streams of random bits.
 mod stream {
@@ -53,11 +53,10 @@ static DRAWS: LazyLock<Draws> = LazyLock::new(Draws::new);
 #[derive(Debug)]
 pub struct ImageSensor {
     key: SensorKey,
-    settings: Settings,
+    /// With the scenario's exposure.
+    nominal: Exposed,
     draws: &'static Draws,
     fixed: FixedPattern,
-    develop: Development,
-    flicker: Option<Flicker>,
 }
 
 /// What a sensor is made of.
@@ -79,7 +78,7 @@ impl SensorKey {
         Some(Self {
             spec: sensor.clone(),
             size_px: camera.size_px,
-            exposure_ms: sensor.exposure_ms.unwrap_or(camera.shutter.exposure_ms),
+            exposure_ms: sensor.exposure_ms.unwrap_or(camera.nominal_exposure_ms()),
             shutter: camera.shutter.clone(),
             fps: camera.fps,
             seed,
@@ -106,36 +105,37 @@ impl ImageSensor {
     }
 
     fn of_key(key: SensorKey) -> Self {
-        let settings = Settings::new(&with_facts(&key.spec), key.exposure_ms * 1e-3);
+        let nominal = Exposed::new(&key);
         let draws = &*DRAWS;
         // The pictures of a burst have noise of their own each, but are of one sensor.
         let name = key.name.split('/').next().unwrap_or_default();
-        let fixed = FixedPattern::new(&settings, draws, key.size_px, camera_seed(key.seed, name));
-        let develop = Development::new(&with_facts(&key.spec), &settings);
-        // An invalid shutter has no frames.
-        let shutter = Shutter::from_spec(&key.shutter, key.fps, key.size_px).ok();
-        let lamp = key.spec.flicker.as_ref().zip(shutter);
-        let flicker = lamp.map(|(spec, shutter)| Flicker::new(spec, shutter, key.exposure_ms * 1e-3));
-        Self { key, settings, draws, fixed, develop, flicker }
+        let fixed = FixedPattern::new(&nominal.settings, draws, key.size_px, camera_seed(key.seed, name));
+        Self { key, nominal, draws, fixed }
     }
 
     /// Takes the picture of a frame with this stamp in path time, whose colours are the light: makes its raw
-    /// picture, and of that its colours.
-    pub fn expose(&self, frame: &mut RenderedFrame, stamp_s: f64) {
-        let raw = self.raw(frame.index as u32, stamp_s, &frame.color_rgba);
-        self.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
+    /// picture, and of that its colours. `exposure` is the frame's own; `None` is the scenario's.
+    pub fn expose(&self, frame: &mut RenderedFrame, stamp_s: f64, exposure: Option<&FrameExposure>) {
+        let own = exposure.map(|exposure| Exposed::of_frame(&self.key, exposure));
+        let exposed = own.as_ref().unwrap_or(&self.nominal);
+        let raw = self.raw_of(exposed, frame.index as u32, stamp_s, &frame.color_rgba);
+        exposed.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
         frame.raw = Some(raw);
     }
 
-    /// Digital numbers of the light of a frame: linear R G B A, row-major.
+    /// Digital numbers of the light of a frame, linear R G B A, row-major, with the scenario's exposure.
     #[must_use]
     pub fn raw(&self, frame: u32, stamp_s: f64, color_rgba: &[f32]) -> RawPicture {
+        self.raw_of(&self.nominal, frame, stamp_s, color_rgba)
+    }
+
+    fn raw_of(&self, exposed: &Exposed, frame: u32, stamp_s: f64, color_rgba: &[f32]) -> RawPicture {
+        let settings = &exposed.settings;
         let width = self.key.size_px[0] as usize;
-        let channels = self.settings.channels();
+        let channels = settings.channels();
         let mut values = vec![0_u16; self.key.size_px[1] as usize * width * channels];
         let seed = camera_seed(self.key.seed, &self.key.name);
-        let columns =
-            self.shared_noise(self.settings.column_noise_e, width as u32, frame, seed, stream::COLUMN);
+        let columns = self.shared_noise(settings.column_noise_e, width as u32, frame, seed, stream::COLUMN);
         values
             .par_chunks_mut(width * channels)
             .zip(color_rgba.par_chunks(width * 4))
@@ -143,11 +143,12 @@ impl ImageSensor {
             .for_each_init(
                 || RowScratch::new(width),
                 |scratch, (y, (codes, rgba))| {
-                    let row = RowJob { sensor: self, y: y as u32, frame, stamp_s, seed, columns: &columns };
+                    let (y, columns) = (y as u32, &columns);
+                    let row = RowJob { sensor: self, exposed, y, frame, stamp_s, seed, columns };
                     row.expose(rgba, codes, scratch);
                 },
             );
-        RawPicture { channels: channels as u32, bits: self.settings.bits, values }
+        RawPicture { channels: channels as u32, bits: settings.bits, values }
     }
 
     /// Noise that the pixels of each row or column share, electrons; empty without.
@@ -175,6 +176,7 @@ impl RowScratch {
 /// One row of a frame.
 struct RowJob<'a> {
     sensor: &'a ImageSensor,
+    exposed: &'a Exposed,
     y: u32,
     frame: u32,
     stamp_s: f64,
@@ -184,11 +186,11 @@ struct RowJob<'a> {
 
 impl RowJob<'_> {
     fn expose(&self, rgba: &[f32], codes: &mut [u16], scratch: &mut RowScratch) {
-        let settings = &self.sensor.settings;
+        let settings = &self.exposed.settings;
         let channels = settings.channels();
         for channel in 0..channels {
             self.light(rgba, channel, &mut scratch.electrons);
-            if let Some(flicker) = &self.sensor.flicker {
+            if let Some(flicker) = &self.exposed.flicker {
                 flicker.light(self.y, self.stamp_s, &mut scratch.electrons);
             }
             self.dark(channel, &mut scratch.electrons);
@@ -205,7 +207,7 @@ impl RowJob<'_> {
 
     /// Mean electrons by light: those of a mosaic by the colour of each pixel.
     fn light(&self, rgba: &[f32], channel: usize, electrons: &mut [f32]) {
-        let settings = &self.sensor.settings;
+        let settings = &self.exposed.settings;
         let pixels = rgba.chunks_exact(4);
         match settings.mosaic {
             Mosaic::None => {
@@ -229,7 +231,7 @@ impl RowJob<'_> {
 
     /// Gains of the pixels, and dark current.
     fn dark(&self, channel: usize, electrons: &mut [f32]) {
-        let ImageSensor { settings, fixed, .. } = self.sensor;
+        let (settings, fixed) = (&self.exposed.settings, &self.sensor.fixed);
         let channels = settings.channels();
         let first = self.y as usize * electrons.len() * channels;
         let dark_e = settings.dark_e;
@@ -240,10 +242,10 @@ impl RowJob<'_> {
             }
             None => electrons.iter_mut().for_each(|e| *e += dark_e),
         }
-        for &(i, extra_e) in fixed.hot_in(first..first + electrons.len() * channels) {
+        for &(i, relative) in fixed.hot_in(first..first + electrons.len() * channels) {
             let i = i as usize - first;
             if i % channels == channel {
-                electrons[i / channels] += extra_e;
+                electrons[i / channels] += settings.hot_e * relative;
             }
         }
     }
@@ -257,7 +259,7 @@ impl RowJob<'_> {
 
     /// Electrons in place of their means.
     fn count(&self, scratch: &mut RowScratch) {
-        let ImageSensor { settings, draws, .. } = self.sensor;
+        let (settings, draws) = (&self.exposed.settings, self.sensor.draws);
         let full_e = settings.full_well_e;
         for (e, words) in scratch.electrons.iter_mut().zip(&scratch.words) {
             let counted = if settings.shot_noise { draws.poisson(*e, words[0]) } else { *e };
@@ -267,7 +269,8 @@ impl RowJob<'_> {
 
     /// Digital numbers of electrons, with the noise that is added to them.
     fn digits(&self, channel: usize, scratch: &RowScratch, codes: &mut [u16]) {
-        let ImageSensor { settings, draws, fixed, .. } = self.sensor;
+        let ImageSensor { draws, fixed, .. } = self.sensor;
+        let settings = &self.exposed.settings;
         let channels = settings.channels();
         let first = self.y as usize * codes.len();
         let offsets = fixed.offsets_from(first + channel);
@@ -288,7 +291,7 @@ impl RowJob<'_> {
     }
 
     fn row_noise(&self) -> f32 {
-        let ImageSensor { settings, draws, .. } = self.sensor;
+        let (settings, draws) = (&self.exposed.settings, self.sensor.draws);
         match settings.row_noise_e {
             0.0 => 0.0,
             sigma_e => sigma_e * draws.normal(two_words(self.y, self.frame, self.seed, stream::ROW)[0]),

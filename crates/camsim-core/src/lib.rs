@@ -30,6 +30,7 @@
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`exposure`] | exposure time and gain of each frame |
 //! | [`imaging`] | the image sensor: electrons, digital numbers, mosaics |
 //! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
@@ -57,6 +58,7 @@
 pub mod apply;
 pub mod camera;
 pub mod distribution;
+pub mod exposure;
 pub mod flight_log;
 pub mod frame;
 pub mod geodesy;

@@ -2,10 +2,39 @@
 //! paper). f64 twin of `shaders/reverse/photometric.wgsl`.
 
 use crate::{
+    exposure::FrameExposure,
     noise::{NOISE_STREAM, normal4},
-    scenario::{OutputEncoding, PhotometricSpec},
+    scenario::{CameraSpec, OutputEncoding},
     sequence::GrayImage,
 };
+
+/// Numbers of the photometric stage of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photometry {
+    /// Gain on linear values.
+    pub light: f32,
+    /// Standard deviation of the noise.
+    pub noise_sigma: f32,
+    /// Whether all channels have the luminance.
+    pub is_mono: bool,
+    /// Largest value: white, or any where an image sensor comes after this stage, which has a full well.
+    pub most: f32,
+}
+
+impl Photometry {
+    /// The stage of a camera's frame; `exposure` is the frame's own. An image sensor applies it by itself.
+    #[must_use]
+    pub fn new(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
+        let spec = &camera.photometric;
+        let own = exposure.filter(|_| camera.sensor.is_none()).map_or(1.0, |exposure| exposure.light);
+        Self {
+            light: (spec.light * own) as f32,
+            noise_sigma: spec.noise_sigma as f32,
+            is_mono: is_mono(spec.output),
+            most: if camera.sensor.is_some() { f32::MAX } else { 1.0 },
+        }
+    }
+}
 
 /// Weight of a vignette value: 0 if `v < t1`, else `min(v / t2, 1)`.
 #[must_use]
@@ -50,10 +79,10 @@ pub fn is_mono(output: OutputEncoding) -> bool {
     matches!(output, OutputEncoding::Luma8 | OutputEncoding::Luma16)
 }
 
-/// Final linear value of a pixel: `clamp(color * weight * light + sigma * n, 0, 1)`.
+/// Final linear value of a pixel: `clamp(color * weight * light + sigma * n, 0, most)`.
 #[must_use]
 pub fn photometric(
-    spec: &PhotometricSpec,
+    stage: &Photometry,
     color: [f32; 3],
     weight: f32,
     pixel: [u32; 2],
@@ -61,21 +90,21 @@ pub fn photometric(
     seed: u64,
     table: &[f32],
 ) -> [f32; 3] {
-    let mono = is_mono(spec.output);
+    let Photometry { light, noise_sigma, is_mono, most } = *stage;
     let luma = 0.212_6 * color[0] + 0.715_2 * color[1] + 0.072_2 * color[2];
-    let gain = weight * spec.light as f32;
-    let noise =
-        if spec.noise_sigma > 0.0 { normal4(pixel, frame, seed, NOISE_STREAM, table) } else { [0.0; 4] };
+    let gain = weight * light;
+    let noise = if noise_sigma > 0.0 { normal4(pixel, frame, seed, NOISE_STREAM, table) } else { [0.0; 4] };
     std::array::from_fn(|channel| {
-        let value = if mono { luma } else { color[channel] };
-        let n = if mono { noise[0] } else { noise[channel] };
-        (value * gain + spec.noise_sigma as f32 * n).clamp(0.0, 1.0)
+        let value = if is_mono { luma } else { color[channel] };
+        let n = if is_mono { noise[0] } else { noise[channel] };
+        (value * gain + noise_sigma * n).clamp(0.0, most)
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::{ImageSensorSpec, PhotometricSpec};
 
     #[test]
     fn thresholds_cut_and_saturate() {
@@ -98,12 +127,31 @@ mod tests {
 
     #[test]
     fn mono_output_has_one_noise_for_all_channels() {
-        let spec = PhotometricSpec {
+        let grey = PhotometricSpec {
             output: OutputEncoding::Luma8,
             noise_sigma: 0.05,
             ..PhotometricSpec::default()
         };
-        let value = photometric(&spec, [0.5, 0.4, 0.3], 1.0, [3, 4], 0, 1, &crate::noise::tail_table());
+        let camera = CameraSpec { photometric: grey, ..CameraSpec::default() };
+        let stage = Photometry::new(&camera, None);
+        let value = photometric(&stage, [0.5, 0.4, 0.3], 1.0, [3, 4], 0, 1, &crate::noise::tail_table());
         assert!(value[0] == value[1] && value[1] == value[2]);
+    }
+
+    #[test]
+    fn light_above_white_ends_here_without_a_sensor_and_passes_with_one() {
+        let exposure = FrameExposure { time_s: 4e-3, gain: 2.0, light: 3.0 };
+        let value = |camera: &CameraSpec| {
+            let stage = Photometry::new(camera, Some(&exposure));
+            photometric(&stage, [0.2, 0.9, 20.0], 0.5, [0, 0], 0, 1, &[])
+        };
+        let mut camera = CameraSpec::default();
+        for (found, expected) in value(&camera).iter().zip([0.3, 1.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-6);
+        }
+        camera.sensor = Some(ImageSensorSpec::default());
+        for (found, expected) in value(&camera).iter().zip([0.1, 0.45, 10.0]) {
+            assert!((found - expected).abs() < 1e-6, "the sensor has the exposure, not this stage");
+        }
     }
 }

@@ -33,6 +33,7 @@ mod plane_errors;
 mod planes;
 mod ray;
 mod render;
+mod scene_rays;
 mod shading;
 mod shadow;
 mod terrain_pyramid;
@@ -127,6 +128,7 @@ pub struct Hit {
 pub struct FrameView<'a> {
     oracle: &'a Oracle,
     stamp_s: f64,
+    exposure_s: f64,
     lens: FrameLens<'a>,
 }
 
@@ -158,19 +160,25 @@ impl Oracle {
         } else {
             None
         };
+        let sensor = ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed);
+        Ok(Self { fixed, sensor, ..Self::of_scene(sequence) })
+    }
+
+    /// Rays through the scene of a sequence, without its camera.
+    pub(crate) fn of_scene(sequence: Arc<Sequence>) -> Self {
         let scene = &sequence.scene;
-        Ok(Self {
+        Self {
             timing: FrameTiming::new(&sequence),
-            fixed,
+            fixed: None,
             zoomed: Mutex::default(),
             terrain_pyramid: scene.terrain.as_ref().map(TerrainPyramid::new),
             mesh_bvh: MeshBvh::new(&scene.meshes, scene.light, |mesh| mesh.motion.is_none()),
             moving: moving_meshes(&scene.meshes, scene.light),
             shading: Shading::new(scene),
             blends: scene.has_blended(),
-            sensor: ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed),
+            sensor: None,
             sequence,
-        })
+        }
     }
 
     /// Name of the renderer for display, in place of that of an adapter.
@@ -195,7 +203,8 @@ impl Oracle {
     #[must_use]
     pub fn view(&self, frame: u64) -> FrameView<'_> {
         let stamp_s = self.timing.stamp_s(frame);
-        FrameView { oracle: self, stamp_s, lens: self.lens_of(stamp_s) }
+        let exposure_s = self.sequence.blurred_s(frame);
+        FrameView { oracle: self, stamp_s, exposure_s, lens: self.lens_of(stamp_s) }
     }
 
     /// Samples the position `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase
@@ -254,30 +263,8 @@ impl Oracle {
     /// blended layer in front of it, composited by alpha.
     #[must_use]
     pub fn radiance_at(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> DVec3 {
-        let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
-        let direction = pose.ned_from_camera * way;
-        if !self.blends {
-            let hit = self.cast_at(t_s, pose.position_ned_m, direction).map(|hit| self.in_light(t_s, hit));
-            return self.shading.color(hit.as_ref(), range_per_depth);
-        }
-        let Some(ray) = Ray::new(pose.position_ned_m, direction) else {
-            return self.shading.color(None, range_per_depth);
-        };
-        let terrain_hit = self.cast_terrain(&ray);
-        let solid = self.mesh_bvh.first_solid(&ray, limit_of(terrain_hit)).or(terrain_hit);
-        let solid = self.nearer_moving(&ray, t_s, solid, true);
-        let mut layers = self.mesh_bvh.layers(&ray, limit_of(solid));
-        layers.extend(self.moving.iter().flat_map(|meshes| meshes.layers(&ray, t_s, limit_of(solid))));
-        // Front to back: each layer attenuates the light from behind.
-        layers.sort_by(|a, b| a.hit.depth_m.total_cmp(&b.hit.depth_m));
-        let (mut sum, mut left) = (DVec3::ZERO, 1.0);
-        for layer in &layers {
-            let alpha = layer.alpha.clamp(0.0, 1.0);
-            sum += left * alpha * self.shading.color(Some(&self.in_light(t_s, layer.hit)), range_per_depth);
-            left *= 1.0 - alpha;
-        }
-        let solid = solid.map(|hit| self.in_light(t_s, hit));
-        sum + left * self.shading.color(solid.as_ref(), range_per_depth)
+        let way = uv.extend(1.0);
+        self.radiance_along(t_s, pose.position_ned_m, pose.ned_from_camera * way, way.length())
     }
 
     /// As [`Oracle::is_occluded_at`] at path time 0, for scenes in which nothing moves.
@@ -315,7 +302,7 @@ impl FrameView<'_> {
     #[must_use]
     pub fn sample(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         let uv = self.ray(pixel, offset_px)?;
-        let t_s = self.mid_s(pixel) + phase * self.oracle.timing.exposure_s();
+        let t_s = self.mid_s(pixel) + phase * self.exposure_s;
         let pose = self.oracle.sequence.path.pose(t_s);
         Some(RaySample { t_s, pose, uv, hit: self.hit(t_s, &pose, uv) })
     }
@@ -390,7 +377,7 @@ fn centre_px(camera: &CameraSpec) -> [f64; 2] {
 }
 
 /// Zoom value at a time: linear between the rows of the track, constant beyond its ends; 1 without a track.
-fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
+pub(crate) fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
     let (Some(first), Some(last)) = (track.first(), track.last()) else { return 1.0 };
     if t_s <= first.0 {
         return first.1;

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 mod auto;
+mod auto_exposure;
 mod camera;
 mod channel;
 mod dataset;
@@ -24,6 +25,7 @@ mod validate;
 mod video;
 
 pub use auto::{Auto, FieldOr};
+pub use auto_exposure::{AutoExposureSpec, ExposureOrder, ExposureStart, MeterWeights};
 pub use camera::{
     Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout,
     ShutterSpec, VibrationSpec, ZoomSpec,

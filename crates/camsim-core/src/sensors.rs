@@ -158,8 +158,7 @@ pub fn span_s(scenario: &Scenario, last_row_s: f64) -> [f64; 2] {
     let [from_s, to_s] =
         scenario.flight.window_s.map_or([0.0, last_row_s], |window| window.map(|t_s| t_s / speed));
     let phase_s = camera.phase / camera.fps;
-    let shutter = crate::shutter::Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px);
-    let (first_s, last_s) = shutter.map_or((0.0, 0.0), |shutter| shutter.window_s());
+    let (first_s, last_s) = camera.longest_shutter().map_or((0.0, 0.0), |shutter| shutter.window_s());
     let before_s = (phase_s + first_s).min(0.0);
     let after_s = (phase_s + last_s).max(0.0);
     [from_s + before_s - LEAD_S, to_s + after_s + LEAD_S]

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
+    exposure::{ExposureTrack, FrameExposure},
     mount::CameraPath,
     photometric::vignette_weights,
     scenario::{Face, Scenario, TwinSpec},
@@ -31,6 +32,8 @@ pub struct Sequence {
     pub vignette: Option<Arc<GrayImage>>,
     /// `(t_s, zoom)` rows by path time.
     pub zoom_track: Vec<(f64, f64)>,
+    /// Exposures of the frames, where they follow the pictures. Twins and faces have those of their camera.
+    pub exposures: Option<Arc<ExposureTrack>>,
 }
 
 impl Sequence {
@@ -60,6 +63,21 @@ impl Sequence {
     pub fn stamp_s(&self, frame: f64) -> f64 {
         let camera = &self.scenario.camera;
         self.start_s + (frame + camera.phase) / camera.fps
+    }
+
+    /// Exposure of a frame, if it follows the pictures; else it is the scenario's.
+    #[must_use]
+    pub fn exposure(&self, frame: u64) -> Option<FrameExposure> {
+        self.exposures.as_ref().map(|track| track.of(frame))
+    }
+
+    /// Time for which each row of a frame is exposed to motion, seconds: 0 where pictures are of one instant,
+    /// however long they collect light.
+    #[must_use]
+    pub fn blurred_s(&self, frame: u64) -> f64 {
+        let nominal_s = 1e-3 * self.scenario.camera.shutter.exposure_ms;
+        let own = self.exposures.as_ref().filter(|_| nominal_s > 0.0);
+        own.map_or(nominal_s, |track| track.of(frame).time_s)
     }
 
     /// Time of the platform's clock at path time 0, nanoseconds: that of trajectories.

@@ -178,6 +178,12 @@ impl Shutter {
         self.exposure_s
     }
 
+    /// The same shutter with another exposure time, seconds.
+    #[must_use]
+    pub fn with_exposure_s(self, exposure_s: f64) -> Self {
+        Self { exposure_s, ..self }
+    }
+
     /// Lag between the fields t_i, seconds.
     pub fn interlace_s(&self) -> f64 {
         self.interlace_s

@@ -15,7 +15,11 @@ pub const MOVING_RAYS: u32 = RAYS;
 use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
-    noise::tail_table, photometric::photometric, scene::Scene, sequence::Sequence, shutter::RowAxis,
+    noise::tail_table,
+    photometric::{Photometry, photometric},
+    scene::Scene,
+    sequence::Sequence,
+    shutter::RowAxis,
 };
 use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
@@ -111,13 +115,14 @@ impl MovingScene {
                 (place, caster.at(t_s, self.sequence.path.pose(t_s)))
             })
             .collect();
+        let stage = Photometry::new(&self.sequence.scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
         let color = |pixel: [u32; 2]| {
             let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
             let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
             let scenario = &self.sequence.scenario;
             let value = photometric(
-                &scenario.camera.photometric,
+                &stage,
                 linear.to_array(),
                 weight,
                 pixel,

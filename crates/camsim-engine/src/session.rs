@@ -350,7 +350,7 @@ impl<'a> Session<'a> {
     /// What the image sensor makes of the light of a frame, if the camera has one.
     fn exposed(&self, mut whole: Finished) -> Finished {
         if let Some(sensor) = &self.sensor {
-            sensor.expose(&mut whole.frame, whole.plan.stamp_s);
+            sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
         }
         whole
     }

@@ -90,6 +90,7 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
             scene: Arc::new(scene.clone()),
             vignette: None,
             zoom_track: Vec::new(),
+            exposures: None,
         };
         let done = render(&engine, &Arc::new(sequence), &[Channel::Color], 0);
         let points = line_columns(&done.frame.color_rgba, done.frame.size_px);

@@ -131,7 +131,7 @@ mod tests {
                 key_velocity_m_s,
                 key_rate_rad_s,
                 lens_radial,
-                pad0,
+                most,
                 linear_fog,
                 keys,
                 key_rows,

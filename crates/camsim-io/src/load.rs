@@ -4,6 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
+    exposure::{ExposureError, ExposureTrack},
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
     scenario::{
@@ -63,6 +64,9 @@ pub enum LoadError {
     /// The log cannot be tracked.
     #[error(transparent)]
     Tracker(#[from] TrackerError),
+    /// Pictures cannot be metered.
+    #[error(transparent)]
+    Exposure(#[from] ExposureError),
     /// The mount is not valid.
     #[error(transparent)]
     Mount(#[from] MountError),
@@ -347,12 +351,15 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         scene,
         vignette,
         zoom_track,
+        exposures: None,
     };
     let (first_s, last_s) = sequence.path.span_s();
     if last_s > first_s && frames_outside(&sequence) as u64 == sequence.frames {
         let (frames, log_s) = (sequence.frames, last_s - first_s);
         return Err(LoadError::OutsideLog { frames, first_s: sequence.start_s, log_s });
     }
+    let exposures = ExposureTrack::new(&sequence)?.map(Arc::new);
+    let sequence = Sequence { exposures, ..sequence };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(sensor_warnings(scenario, &log, &sequence.path.trajectory));
     warnings.extend(scene_notes.iter().cloned());
@@ -487,18 +494,24 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
         FieldOr::Ms(ms) => ms,
         FieldOr::Field => 0.0,
     };
+    let auto_ms = camera.auto_exposure.as_ref().map_or(0.0, |auto| auto.exposure_ms[1]);
     let longer = [
-        ("readout_ms", shutter.readout_ms, "the next frame would begin before this one is read"),
-        ("exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
         (
-            "interlace_ms",
+            "camera.shutter.readout_ms",
+            shutter.readout_ms,
+            "the next frame would begin before this one is read",
+        ),
+        ("camera.shutter.exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
+        ("camera.auto_exposure.exposure_ms", auto_ms, "a row could be exposed for two frames at once"),
+        (
+            "camera.shutter.interlace_ms",
             interlace_ms,
             "one field would belong to the frame before; \"field\" is half a period",
         ),
     ];
     let message = |(key, ms, reason): &(&str, f64, &str)| {
         format!(
-            "camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = \
+            "{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = \
                 {}): {reason}",
             camera.fps
         )

@@ -196,6 +196,7 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
         scene: Arc::new(scene),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     })
 }
 

@@ -5,7 +5,7 @@ mod prediction;
 
 use std::fmt;
 
-use camsim_core::{scenario::Preset, temporal::TapStage};
+use camsim_core::{exposure::FrameExposure, scenario::Preset, temporal::TapStage};
 use serde::Serialize;
 
 use crate::ir::{
@@ -169,6 +169,10 @@ impl fmt::Display for FramePlan {
         writeln!(f, "  sees {:.6} .. {:.6} s{outside}", self.window_s[0], self.window_s[1])?;
         if let Some(zoom) = self.zoom {
             writeln!(f, "  zoom {zoom}")?;
+        }
+        if let Some(FrameExposure { time_s, gain, .. }) = self.exposure {
+            let time_ms = 1e3 * time_s;
+            writeln!(f, "  exposed for {time_ms:.4} ms with gain {gain:.4}, by the pictures before it")?;
         }
         writeln!(f, "motion within the frame")?;
         writeln!(

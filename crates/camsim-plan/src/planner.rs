@@ -335,7 +335,7 @@ impl Planner {
         let dry_run = DryRun {
             surfaces: &inputs.scene.surfaces,
             path: inputs.path(),
-            shutter: &inputs.shutter,
+            shutter: &plan.shutter,
             stamp_s: plan.stamp_s,
             key_s,
             key_pose: &key_pose,

@@ -4,7 +4,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use camsim_core::{
-    photometric::is_mono,
+    photometric::Photometry,
     pose::CameraPose,
     scenario::Scenario,
     scene::Scene,
@@ -60,7 +60,7 @@ pub struct FrameUniforms {
     pub key_velocity_m_s: [f32; 4],
     pub key_rate_rad_s: [f32; 4],
     pub lens_radial: [f32; 3],
-    pub pad0: u32,
+    pub most: f32,
     pub linear_fog: [f32; 4],
     pub keys: u32,
     pub key_rows: u32,
@@ -104,6 +104,7 @@ pub struct Truth {
 pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
     // Long because: a line for each field of the shaders' struct.
     let photometric = &scenario.camera.photometric;
+    let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
     let noise_seed = scenario.noise_seed();
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
@@ -144,12 +145,12 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
             TapStage::Bilinear | TapStage::Spline | TapStage::Area => 1,
         },
         coords_phase,
-        light: photometric.light as f32,
-        noise_sigma: photometric.noise_sigma as f32,
+        light: stage.light,
+        noise_sigma: stage.noise_sigma,
         vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
         seed: [noise_seed as u32, (noise_seed >> 32) as u32],
         frame_number: plan.frame as u32,
-        mono: u32::from(is_mono(photometric.output)),
+        mono: u32::from(stage.is_mono),
         key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),
         ned_from_key_x: column(0),
         ned_from_key_y: column(1),
@@ -163,6 +164,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
+        most: stage.most,
         linear_fog,
         sky_reach_px: plan.sky_reach_px as f32,
         planes,
@@ -173,7 +175,6 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
             .extend(plan.key_twist.rate_rad_s.length())
             .as_vec4()
             .to_array(),
-        ..FrameUniforms::default()
     }
 }
 

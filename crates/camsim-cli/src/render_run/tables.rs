@@ -10,13 +10,12 @@ use camsim_core::{
     mount::CameraPath,
     scenario::{Channel, Scenario},
     sequence::Sequence,
-    shutter::Shutter,
     trajectory::Trajectory,
 };
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, WriteError,
+        CameraRecord, FrameRecord, FrameTable, SourceFrame, TableKind, TrajectoryRecord, WriteError,
         camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic, write_sensors,
     },
 };
@@ -112,19 +111,20 @@ pub fn write_platform(folder: &Path, sequences: &[&Sequence]) -> Result<(), Fail
 
 /// Path times that the frames of a sequence see, the first and the last.
 fn seen_s(sequence: &Sequence) -> Result<[f64; 2], Failure> {
-    let camera = &sequence.scenario.camera;
-    let (first_s, last_s) =
-        Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
+    let (first_s, last_s) = sequence.scenario.camera.longest_shutter().or_bad_input()?.window_s();
     let last_frame = sequence.frames.saturating_sub(1) as f64;
     Ok([sequence.stamp_s(0.0) + first_s, sequence.stamp_s(last_frame) + last_s])
+}
+
+fn table_kind(pictures: &Pictures) -> TableKind {
+    TableKind { has_exposures: pictures.sequence.exposures.is_some(), has_instants: pictures.has_instants() }
 }
 
 /// Rows of this scenario in the folder's `frames.csv`.
 pub fn begin_frames(pictures: &Pictures, is_ours: bool) -> Result<(), Failure> {
     let path = frames_path(&pictures.folder);
-    let has_instants = pictures.has_instants();
-    let mut table =
-        if is_ours { FrameTable::read(&path, has_instants) } else { FrameTable::new(has_instants) };
+    let kind = table_kind(pictures);
+    let mut table = if is_ours { FrameTable::read(&path, kind) } else { FrameTable::new(kind) };
     table.retain_existing(&pictures.folder, &|_, _| false);
     table.write(&path).or_failed()
 }
@@ -140,7 +140,7 @@ pub fn end_frames(
     made: &BTreeMap<(u64, Option<u32>), SourceFrame>,
 ) -> Result<BTreeSet<u64>, Failure> {
     let path = frames_path(&pictures.folder);
-    let mut table = FrameTable::read(&path, pictures.has_instants());
+    let mut table = FrameTable::read(&path, table_kind(pictures));
     let Series { sequence, files } = series;
     let instant = files.instant();
     let writes = !sequence.scenario.output.format.is_empty();
@@ -173,6 +173,7 @@ fn record(series: &Series, planner: &Planner, frame: u64, source: SourceFrame) -
         stamp_ns: stamp_ns(sequence.epoch_ns, stamp_s),
         pose: sequence.path.pose(stamp_s),
         source,
+        exposure: sequence.exposure(frame),
         files: files.names(frame),
     }
 }

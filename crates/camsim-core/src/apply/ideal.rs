@@ -40,6 +40,12 @@ pub enum ApplyError {
         "linear fog after the blur belongs to the paper's methods (otherwise fog is part of the ideal frame): use the preset \"paper\", or leave fog out"
     )]
     Fog,
+    /// Automatic exposure.
+    #[error(
+        "camera.auto_exposure meters a flight through a scene, and these frames are pictures by themselves: leave \
+         it out, and give camera.shutter.exposure_ms"
+    )]
+    AutoExposure,
 }
 
 /// A pinhole RGB-D image with its geometry.

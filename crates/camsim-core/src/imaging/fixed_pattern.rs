@@ -18,7 +18,7 @@ const EVERY_FRAME: u32 = 0;
 pub(super) struct FixedPattern {
     gains: Option<Vec<f32>>,
     offsets_e: Option<Vec<f32>>,
-    /// Hot ones with their mean electrons, ascending.
+    /// Hot ones with their dark current, relative to the mean of hot pixels, ascending.
     hot: Vec<(u32, f32)>,
     /// Dead ones, ascending.
     dead: Vec<u32>,
@@ -66,7 +66,7 @@ impl FixedPattern {
         self.offsets_e.as_ref().and_then(|offsets| offsets.get(first..))
     }
 
-    /// Hot pixels of a range.
+    /// Hot pixels of a range, with their dark current relative to the mean.
     pub fn hot_in(&self, range: Range<usize>) -> &[(u32, f32)] {
         let place = |index: usize| self.hot.partition_point(|(i, _)| (*i as usize) < index);
         &self.hot[place(range.start)..place(range.end)]
@@ -100,7 +100,7 @@ fn defects(
             } else if is_below(is_hot, settings.hot_pixels) {
                 // Half the sum of two squared normals is exponentially distributed.
                 let [a, b] = words(x, y, stream::HOT).map(|bits| draws.normal(bits));
-                hot.extend(indices.map(|i| (i, settings.hot_e * 0.5 * (a * a + b * b))));
+                hot.extend(indices.map(|i| (i, 0.5 * (a * a + b * b))));
             }
         }
     }

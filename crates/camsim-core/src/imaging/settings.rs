@@ -47,6 +47,9 @@ pub(super) struct Settings {
     adc_max: f32,
     /// Code of each number of the converter, if they differ.
     code_of_dn: Option<Vec<u16>>,
+    /// Full well and electrons per number of the converter, before rounding.
+    exact_e: [f64; 2],
+    range_dn: f64,
 }
 
 impl Settings {
@@ -61,7 +64,8 @@ impl Settings {
             (None, Some(_)) => f64::INFINITY,
             (None, None) => most_white_e,
         };
-        let e_per_dn = spec.gain_e_per_dn.unwrap_or(full_well_e / (adc_max - spec.black_dn));
+        let range_dn = adc_max - spec.black_dn;
+        let e_per_dn = spec.gain_e_per_dn.unwrap_or(full_well_e / range_dn);
         let dark_s =
             exposure_s * ((spec.temperature_c - spec.dark_reference_c) / spec.dark_doubling_c).exp2();
         let mut settings = Self {
@@ -89,9 +93,29 @@ impl Settings {
             black_dn: spec.black_dn as f32,
             adc_max: adc_max as f32,
             code_of_dn: None,
+            exact_e: [full_well_e, e_per_dn],
+            range_dn,
         };
         settings.set_codes(spec);
         settings
+    }
+
+    /// Full well and electrons per number of the converter.
+    pub fn full_well_and_step_e(&self) -> [f64; 2] {
+        self.exact_e
+    }
+
+    /// Numbers of the converter above black.
+    pub fn range_dn(&self) -> f64 {
+        self.range_dn
+    }
+
+    /// Electrons of the scene's white in the green or only channel, or the white one.
+    pub fn main_white_e(&self) -> f64 {
+        match self.mosaic {
+            Mosaic::Mono | Mosaic::Rgbw => self.white_e[3],
+            _ => self.white_e[1],
+        }
     }
 
     /// Channels of a raw picture.

@@ -1,7 +1,7 @@
 //! Pictures of a sensor against the closed forms of EMVA 1288.
 
 use super::*;
-use crate::scenario::ShutterSpec;
+use crate::scenario::{FlickerSpec, FlickerWave, ShutterSpec};
 
 pub(super) fn camera(size_px: [u32; 2], sensor: ImageSensorSpec) -> CameraSpec {
     CameraSpec {
@@ -138,7 +138,7 @@ fn light_saturates_at_the_full_well() {
     assert!(sensor.raw(0, 0.0, &flat([20, 10], 1.0)).values.iter().all(|&v| v == 255));
     let mut frame =
         RenderedFrame { color_rgba: flat([20, 10], 1.0), size_px: [20, 10], ..RenderedFrame::default() };
-    sensor.expose(&mut frame, 0.0);
+    sensor.expose(&mut frame, 0.0, None);
     assert!(frame.color_rgba.iter().all(|&v| v == 1.0));
 }
 
@@ -159,7 +159,7 @@ fn threads_and_repetition_change_no_bit() {
             let sensor = ImageSensor::new(&camera(size_px, spec.clone()), 5).expect("valid");
             let mut frame =
                 RenderedFrame { index: 4, color_rgba: light.clone(), size_px, ..RenderedFrame::default() };
-            sensor.expose(&mut frame, 0.0);
+            sensor.expose(&mut frame, 0.0, None);
             frame
         })
     };
@@ -186,4 +186,42 @@ fn little_more_light_changes_few_numbers_by_one() {
     // 0.1 electrons more.
     let share = differences.iter().sum::<i32>() as f64 / differences.len() as f64;
     assert!((share - 0.1).abs() < 0.01, "{share}");
+}
+
+#[test]
+fn a_frame_of_its_own_exposure_is_that_of_a_sensor_with_it() {
+    let size_px = [96, 64];
+    let spec = ImageSensorSpec {
+        read_noise_e: Some(3.0),
+        dark_current_e_s: Some(2e4),
+        gain_e_per_dn: Some(6.0),
+        full_well_e: Some(2e4),
+        hot_pixels: 0.05,
+        hot_e_s: 1e5,
+        prnu: Some(0.02),
+        flicker: Some(FlickerSpec {
+            hz: 100.0,
+            depth: 0.9,
+            wave: FlickerWave::Sine,
+            ..FlickerSpec::default()
+        }),
+        ..mono(8000.0)
+    };
+    let exposure = FrameExposure { time_s: 2.5e-3, gain: 3.0, light: 0.75 };
+    // A quarter of the nominal 10 ms, with a third of the electrons a number.
+    let own = ImageSensorSpec {
+        white_e: Some(2000.0),
+        gain_e_per_dn: Some(2.0),
+        exposure_ms: Some(2.5),
+        ..spec.clone()
+    };
+    let picture = |spec: ImageSensorSpec, exposure: Option<&FrameExposure>| {
+        let light: Vec<f32> = (0..96 * 64).flat_map(|i| [(i % 96) as f32 / 20.0; 4]).collect();
+        let mut frame = RenderedFrame { index: 5, size_px, color_rgba: light, ..RenderedFrame::default() };
+        let sensor = ImageSensor::new(&camera(size_px, spec), 3).expect("valid");
+        sensor.expose(&mut frame, 0.123, exposure);
+        (frame.raw.expect("a raw picture").values, frame.color_rgba)
+    };
+    let (found, expected) = (picture(spec.clone(), Some(&exposure)), picture(own, None));
+    assert!(found == expected && found != picture(spec, None));
 }

@@ -280,7 +280,7 @@ impl FrameView<'_> {
     /// Displacement of the image of what a pixel sees at the begin and at the end of its exposure, pixels.
     pub(super) fn blur_path(&self, from_px: DVec2, seen: &RaySample) -> [DVec2; 2] {
         [-0.5, 0.5].map(|phase| {
-            let t_s = seen.t_s + phase * self.oracle.timing.exposure_s();
+            let t_s = seen.t_s + phase * self.exposure_s;
             self.show_at(seen, t_s).map_or(DVec2::ZERO, |px| px - from_px)
         })
     }

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 
 use super::{FrameView, Oracle, RaySample};
 use crate::{
+    exposure::FrameExposure,
     frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
-    photometric::photometric,
+    photometric::{Photometry, photometric},
     pose::CameraPose,
     scenario::Channel,
     sequence::GrayImage,
@@ -119,6 +120,8 @@ struct FrameJob<'a> {
     frame: u64,
     options: &'a RenderOptions,
     noise_table: Vec<f32>,
+    exposure: Option<FrameExposure>,
+    photometry: Photometry,
     truth: bool,
 }
 
@@ -135,8 +138,11 @@ impl Oracle {
         let size_px = self.sequence.scenario.camera.size_px;
         let [depth, coords] =
             [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
+        let exposure = self.sequence.exposure(frame);
         let job = FrameJob {
             oracle: self,
+            exposure,
+            photometry: Photometry::new(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
             frame,
             options,
@@ -166,7 +172,7 @@ impl Oracle {
             raw: None,
         };
         if let Some(sensor) = self.sensor.as_ref().filter(|_| options.photometric) {
-            sensor.expose(&mut rendered, self.stamp_s(frame));
+            sensor.expose(&mut rendered, self.stamp_s(frame), job.exposure.as_ref());
         }
         (rendered, convergence)
     }
@@ -277,10 +283,10 @@ impl FrameJob<'_> {
             return color;
         }
         let sequence = &self.oracle.sequence;
-        let spec = &sequence.scenario.camera.photometric;
+        let thresholds = sequence.scenario.camera.photometric.vignette_thresholds;
         let weight = sequence.vignette.as_ref().map_or(1.0, |map| {
             let value = vignette(map, pixel, sequence.scenario.camera.size_px);
-            let [black, full] = spec.vignette_thresholds;
+            let [black, full] = thresholds;
             match value {
                 value if value < black => 0.0,
                 value if full > 0.0 => (value / full).min(1.0),
@@ -288,7 +294,7 @@ impl FrameJob<'_> {
             }
         });
         photometric(
-            spec,
+            &self.photometry,
             color,
             weight as f32,
             pixel,
@@ -329,7 +335,7 @@ struct SamplePoses<'a> {
 
 impl<'a> SamplePoses<'a> {
     fn new(job: &'a FrameJob<'a>, y: u32) -> Self {
-        let exposure_s = job.oracle.timing.exposure_s();
+        let exposure_s = job.view.exposure_s;
         let shared = job.oracle.timing.reads_rows().then(Vec::new);
         Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
     }

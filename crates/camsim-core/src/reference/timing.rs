@@ -15,7 +15,6 @@ pub(super) struct FrameTiming {
     readout: Readout,
     readout_s: f64,
     delay_s: f64,
-    exposure_s: f64,
     interlace_s: f64,
     first_field: Parity,
 }
@@ -35,7 +34,6 @@ impl FrameTiming {
             readout: shutter.readout,
             readout_s: shutter.readout_ms / 1000.0,
             delay_s: shutter.delay_ms / 1000.0,
-            exposure_s: shutter.exposure_ms / 1000.0,
             interlace_s,
             first_field: shutter.first_field,
         }
@@ -93,9 +91,5 @@ impl FrameTiming {
     /// Distance between rows of the same field: 2 if the fields have different times, else 1.
     pub(super) fn field_rows(&self) -> u32 {
         if self.interlace_s > 0.0 { 2 } else { 1 }
-    }
-
-    pub(super) fn exposure_s(&self) -> f64 {
-        self.exposure_s
     }
 }

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Face, FieldOr, ImageSensorSpec};
-use crate::lens::LensTable;
+use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec};
+use crate::{
+    lens::LensTable,
+    shutter::{Shutter, ShutterError},
+};
 
 /// Camera geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,6 +58,9 @@ pub struct CameraSpec {
     /// The image sensor, in place of `photometric`'s light and noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<ImageSensorSpec>,
+    /// Exposure that follows the pictures, in place of that of `shutter`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auto_exposure: Option<AutoExposureSpec>,
 }
 
 impl Default for CameraSpec {
@@ -76,6 +82,7 @@ impl Default for CameraSpec {
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
             sensor: None,
+            auto_exposure: None,
         }
     }
 }
@@ -85,6 +92,23 @@ impl CameraSpec {
     #[must_use]
     pub fn clock_offset_ns(&self) -> i64 {
         (self.clock_offset_ms * 1e6).round() as i64
+    }
+
+    /// Exposure time that makes the scene's white white: the shutter's, unless automatic exposure has another.
+    #[must_use]
+    pub fn nominal_exposure_ms(&self) -> f64 {
+        let own = self.auto_exposure.as_ref().and_then(|auto| auto.nominal_ms);
+        own.unwrap_or(self.shutter.exposure_ms)
+    }
+
+    /// The shutter with the longest exposure that a frame may have.
+    ///
+    /// # Errors
+    /// A shutter that cannot be used.
+    pub fn longest_shutter(&self) -> Result<Shutter, ShutterError> {
+        let shutter = Shutter::from_spec(&self.shutter, self.fps, self.size_px)?;
+        let auto = self.auto_exposure.as_ref().filter(|_| shutter.exposure_s() > 0.0);
+        Ok(auto.map_or(shutter, |auto| shutter.with_exposure_s(1e-3 * auto.exposure_ms[1])))
     }
 }
 

@@ -25,6 +25,9 @@ pub struct SceneSpec {
     /// Sky colour, sRGB.
     #[serde(default = "sky")]
     pub sky: [f64; 3],
+    /// Factor of the sky's linear light, which may be brighter than white; else 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sky_brightness: Option<f64>,
     /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,

@@ -165,6 +165,9 @@ impl Scenario {
             if let Some(sensor) = &mut camera.sensor {
                 sensor.exposure_ms.get_or_insert(camera.shutter.exposure_ms);
             }
+            if let Some(auto) = &mut camera.auto_exposure {
+                auto.nominal_ms.get_or_insert(camera.shutter.exposure_ms);
+            }
             camera.shutter.exposure_ms = 0.0;
         }
         if twin.is_global() {

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
+mod auto_exposure;
 mod image_sensor;
 mod motion;
 mod names;
@@ -62,6 +63,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     video::check_video(&mut check, scenario);
     sensors::check_sensors(&mut check, scenario);
     image_sensor::check_with_output(&mut check, scenario);
+    auto_exposure::check_with_scenario(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }
@@ -254,6 +256,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
     check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
     image_sensor::check_image_sensor(check, camera);
+    auto_exposure::check_auto_exposure(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {

@@ -7,8 +7,8 @@
 
 use camsim_core::{
     noise::tail_table,
-    photometric::photometric,
-    scenario::{PhotometricSpec, Preset},
+    photometric::{Photometry, photometric},
+    scenario::Preset,
     scene::linear_from_srgb,
     sequence::Sequence,
     temporal::{Footprint, IdealGeometry, paper::linear_fog},
@@ -105,7 +105,7 @@ struct ReversePass<'a> {
     rows: Rows,
     keys: Vec<Key<'a>>,
     gather: Gather,
-    photometric: &'a PhotometricSpec,
+    photometry: Photometry,
     vignette: &'a [f32],
     noise_seed: u64,
     noise_table: Vec<f32>,
@@ -150,7 +150,7 @@ impl<'a> ReversePass<'a> {
                 blur: plan.blur,
                 paper: plan.preset == Preset::Paper,
             },
-            photometric: &sequence.scenario.camera.photometric,
+            photometry: Photometry::new(&sequence.scenario.camera, plan.exposure.as_ref()),
             vignette: inputs.vignette,
             noise_seed: sequence.scenario.noise_seed(),
             noise_table: tail_table(),
@@ -217,7 +217,7 @@ impl<'a> ReversePass<'a> {
             color = linear_fog(color, sky, pixel.ray.uv, depth.image.nearest(own_px), fog.end_m);
         }
         let value = photometric(
-            self.photometric,
+            &self.photometry,
             color.as_vec3().to_array(),
             weight,
             pixel.position,

@@ -31,8 +31,9 @@ pub(super) fn photometric(
         noise = if is_mono { [normals[0]; 3] } else { normals };
     }
     for (value, noise) in values.iter_mut().zip(&noise) {
-        *value =
-            per_lane(|i| clamp_to(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
+        *value = per_lane(|i| {
+            clamp_to(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], frame.most)
+        });
     }
     values
 }

@@ -5,7 +5,7 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
-    photometric::photometric,
+    photometric::{Photometry, photometric},
     scenario::Channel,
     scene::{LodSelection, LodTolerance, PlacedMesh, SceneBatches, TerrainDetail},
     sequence::Sequence,
@@ -143,7 +143,7 @@ impl Engines {
 /// What the photometric twin makes of a frame without photometric effects.
 fn with_effects(case: &Case, plain: &RenderedFrame) -> Vec<[f32; 4]> {
     let scenario = &case.sequence.scenario;
-    let (spec, seed) = (&scenario.camera.photometric, scenario.noise_seed());
+    let (stage, seed) = (Photometry::new(&scenario.camera, None), scenario.noise_seed());
     let weights = case.sequence.vignette_weights().1;
     let table = tail_table();
     let pixels = plain.color_rgba.as_chunks::<4>().0;
@@ -155,7 +155,7 @@ fn with_effects(case: &Case, plain: &RenderedFrame) -> Vec<[f32; 4]> {
             return [0.0; 4];
         }
         let pixel = [i as u32 % width, i as u32 / width];
-        let [r, g, b] = photometric(spec, [r, g, b], weights[i], pixel, plain.index as u32, seed, &table);
+        let [r, g, b] = photometric(&stage, [r, g, b], weights[i], pixel, plain.index as u32, seed, &table);
         [r, g, b, 1.0]
     };
     pixels.iter().enumerate().map(with_effects).collect()

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     noise::tail_table,
-    photometric::photometric,
+    photometric::{Photometry, photometric},
     reference::{FrameView, Oracle},
     shutter::RowAxis,
     temporal::{
@@ -275,8 +275,9 @@ impl<'a> Twin<'a> {
             DVec3::ZERO
         };
         let scenario = &self.case.sequence.scenario;
+        let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
         let color = photometric(
-            &scenario.camera.photometric,
+            &stage,
             color.as_vec3().to_array(),
             weight,
             pixel,

@@ -59,7 +59,6 @@ fn write_camera(
         job.target.link(&camera.file(frame, "color_png"), &name(&format!("data/{}.png", frame.stamp_ns)))
     })?;
     job.target.text(&name("sensor.yaml"), &sensor_yaml(&calibration, &b_from_camera)?)?;
-    let exposure_ns = (camera.shutter.exposure_s() * 1e9).round();
     job.target.stream(&name("data.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],filename")?;
         camera
@@ -69,7 +68,9 @@ fn write_camera(
     })?;
     job.target.stream(&name("exposure.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],exposure time[ns]")?;
-        camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{},{exposure_ns}", frame.stamp_ns)?))
+        camera.frames.iter().try_for_each(|frame| {
+            Ok(writeln!(out, "{},{}", frame.stamp_ns, (frame.exposure_ms * 1e6).round())?)
+        })
     })?;
     job.target.stream(&format!("settings/times_cam{i}.txt"), &mut |out| {
         camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{}", frame.stamp_ns)?))

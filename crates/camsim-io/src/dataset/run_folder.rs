@@ -58,6 +58,8 @@ pub struct RunFrame {
     pub stamp_ns: i64,
     /// Pose at the stamp.
     pub pose: CameraPose,
+    /// Exposure time.
+    pub exposure_ms: f64,
     /// Paths by the columns of files, relative to the folder; empty where there is none.
     files: Vec<String>,
 }
@@ -141,7 +143,7 @@ impl RunCamera {
         let spec = manifest.scenario.camera.clone();
         let shutter =
             Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|e| fail(e.to_string()))?;
-        let (columns, frames) = read_frames(&folder.join("frames.csv"))?;
+        let (columns, frames) = read_frames(&folder.join("frames.csv"), spec.shutter.exposure_ms)?;
         Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns })
     }
 
@@ -288,19 +290,23 @@ impl RunCamera {
 const FRAME_COLUMNS: [&str; 9] = ["frame", "stamp_ns", "n", "e", "d", "qw", "qx", "qy", "qz"];
 
 /// Names of the columns of files, and the frames.
-fn read_frames(path: &Path) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
+fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
     let mut rows = CsvRows::open(path, &FRAME_COLUMNS)?;
     let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
-    let instant = header.iter().position(|name| name == "instant");
-    let last = instant.or_else(|| header.iter().position(|name| name == "ideal_qz")).unwrap_or(0);
+    let place = |of: &str| header.iter().position(|name| name == of);
+    let (instant, exposure) = (place("instant"), place("exposure_ms"));
+    let last = instant.or_else(|| place("gain")).or_else(|| place("ideal_qz")).unwrap_or(0);
     let columns = header.get(last + 1..).unwrap_or_default().to_vec();
     let mut frames = Vec::new();
     while rows.advance()? {
+        let own_ms = |place: usize| rows.cell(place).parse().ok();
         frames.push(RunFrame {
             number: rows.whole(0)?,
             instant: instant.and_then(|place| rows.cell(place).parse().ok()),
             stamp_ns: rows.whole(1)?,
             pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(5)? },
+            // Pictures of one instant have no exposure time, however long they collect light.
+            exposure_ms: exposure.filter(|_| nominal_ms > 0.0).and_then(own_ms).unwrap_or(nominal_ms),
             files: (0..columns.len()).map(|k| rows.cell(last + 1 + k).to_owned()).collect(),
         });
     }

@@ -145,7 +145,7 @@ fn describe(job: &ExportJob<'_>, series: &Series<'_>, frame: &RunFrame) -> Resul
         "principal_point_px": camera.intrinsics().map(|lens| lens.principal_px).ok(),
         "lens": spec.lens,
         "readout_ms": spec.shutter.readout_ms,
-        "exposure_ms": spec.shutter.exposure_ms,
+        "exposure_ms": frame.exposure_ms,
     });
     Ok(value.to_string() + "\n")
 }

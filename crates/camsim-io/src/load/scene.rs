@@ -36,9 +36,10 @@ pub(super) fn load_scene(
         Light::new(sun_azimuth_deg.to_radians(), sun_elevation_deg.to_radians(), sun, sky)
             .with_shadows(shadows)
     });
+    let sky_brightness = spec.sky_brightness.unwrap_or(1.0) as f32;
     let mut scene = Scene {
         light,
-        sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
+        sky_linear: spec.sky.map(|value| sky_brightness * linear_from_srgb(value as f32)),
         fog_visibility_m: spec.fog_visibility_m,
         ..Scene::default()
     };

@@ -2,10 +2,10 @@
 
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
-    Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
-    FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec,
-    ObjectsOf, OutputSpec, PerChannel, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
-    TwinSpec,
+    Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
+    Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind,
+    MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel, QualitySpec, Readout, SensorModel,
+    SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -67,12 +67,15 @@ fn every_word_of_the_schema_deserialises() {
     }
 }
 
-/// Other keys that a word of the image sensor needs.
+/// Other keys that a word of the image sensor or of its exposure needs.
 fn needs_of_sensor(key: &str, value: &str) -> Vec<(&'static str, &'static str)> {
     let points = "[[0, 0], [0.2, 0.5], [1, 1]]";
     let mut needs = Vec::new();
     if key.starts_with("camera.sensor.") || value == "[\"raw\"]" {
         needs.push(("camera.sensor.white_e", "5000"));
+    }
+    if key.starts_with("camera.auto_exposure.") {
+        needs.push(("camera.shutter.exposure_ms", "4"));
     }
     match (key, value) {
         ("camera.sensor.companding", "piecewise") => needs.push(("camera.sensor.companding_points", points)),
@@ -122,6 +125,9 @@ fn every_key_of_the_structs_is_in_the_schema() {
     );
     (scenario.camera.name, scenario.camera.clock_offset_ms) = ("left".into(), 0.5);
     scenario.camera.lens_table = Some(LensTable { path: "lens.csv".into(), grid: None });
+    scenario.camera.auto_exposure =
+        Some(AutoExposureSpec { nominal_ms: Some(4.0), ..AutoExposureSpec::default() });
+    scenario.scene.sky_brightness = Some(2.0);
     scenario.flight.topic = Some("/odom".into());
     scenario.output.twin = vec![TwinSpec {
         name: "sharp".into(),

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::pose::CameraPose;
+use camsim_core::{exposure::FrameExposure, pose::CameraPose};
 use camsim_plan::FramePlan;
 
 use super::{
@@ -22,7 +22,10 @@ pub const FRAMES_COLUMNS: &str = "\
                                   ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,\
                                   ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
-/// Column after [`FRAMES_COLUMNS`] in the table of a burst.
+/// Columns after these in the table of a camera with automatic exposure.
+const EXPOSURE_COLUMNS: &str = ",exposure_ms,gain";
+
+/// Column after those in the table of a burst.
 const INSTANT_COLUMN: &str = ",instant";
 
 /// One row of `frames.csv`.
@@ -38,6 +41,8 @@ pub struct FrameRecord {
     pub pose: CameraPose,
     /// Camera of the source coordinates.
     pub source: SourceFrame,
+    /// Exposure, where it follows the pictures. One table has one kind only.
+    pub exposure: Option<FrameExposure>,
     /// Column name and path, relative to the output folder, of each file.
     pub files: Vec<(String, String)>,
 }
@@ -79,41 +84,67 @@ pub struct FrameTable {
     /// By frame and number within its burst: the text before the paths, and the path of each column, empty
     /// where there is none.
     rows: BTreeMap<(u64, Option<u32>), (String, Vec<String>)>,
+    kind: TableKind,
+}
+
+/// Columns that not every table has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TableKind {
+    /// Whether exposures follow the pictures.
+    pub has_exposures: bool,
     /// Whether it is of a burst.
-    has_instants: bool,
+    pub has_instants: bool,
+}
+
+impl TableKind {
+    /// The columns of values.
+    fn columns(self) -> String {
+        let exposures = if self.has_exposures { EXPOSURE_COLUMNS } else { "" };
+        let instants = if self.has_instants { INSTANT_COLUMN } else { "" };
+        format!("{FRAMES_COLUMNS}{exposures}{instants}")
+    }
+
+    /// The kind of a header, and the columns of files with a comma before each.
+    fn of_header(header: &str) -> Option<(Self, &str)> {
+        let mut rest = header.strip_prefix(FRAMES_COLUMNS)?;
+        let [has_exposures, has_instants] = [EXPOSURE_COLUMNS, INSTANT_COLUMN].map(|columns| {
+            let after = rest.strip_prefix(columns);
+            let after = after.filter(|after| after.is_empty() || after.starts_with(','));
+            rest = after.unwrap_or(rest);
+            after.is_some()
+        });
+        Some((Self { has_exposures, has_instants }, rest))
+    }
 }
 
 impl FrameTable {
-    /// An empty table, of the pictures of a burst or of frames.
+    /// An empty table.
     #[must_use]
-    pub fn new(has_instants: bool) -> Self {
-        Self { has_instants, ..Self::default() }
+    pub fn new(kind: TableKind) -> Self {
+        Self { kind, ..Self::default() }
     }
 
     /// Reads a table; empty if the file does not exist or has other columns.
     #[must_use]
-    pub fn read(path: &Path, has_instants: bool) -> Self {
+    pub fn read(path: &Path, kind: TableKind) -> Self {
         std::fs::read_to_string(path)
             .ok()
             .and_then(|text| Self::parse(&text))
-            .filter(|table| table.has_instants == has_instants)
-            .unwrap_or_else(|| Self::new(has_instants))
+            .filter(|table| table.kind == kind)
+            .unwrap_or_else(|| Self::new(kind))
     }
 
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
-        let files = lines.next()?.strip_prefix(FRAMES_COLUMNS)?;
-        let burst =
-            files.strip_prefix(INSTANT_COLUMN).filter(|rest| rest.is_empty() || rest.starts_with(','));
-        let columns: Vec<String> = burst.unwrap_or(files).split(',').skip(1).map(str::to_owned).collect();
-        let has_instants = burst.is_some();
-        let value_columns = FRAMES_COLUMNS.split(',').count() + usize::from(has_instants);
+        let (kind, files) = TableKind::of_header(lines.next()?)?;
+        let columns: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
+        let value_columns = kind.columns().split(',').count();
         let row = |line: &str| {
             let (end, _) = line.match_indices(',').chain([(line.len(), "")]).nth(value_columns - 1)?;
             let (values, files) = line.split_at(end);
             let mut files: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
             files.resize(columns.len(), String::new());
-            let instant = match has_instants {
+            let instant = match kind.has_instants {
                 true => Some(values.rsplit(',').next()?.parse().ok()?),
                 false => None,
             };
@@ -122,7 +153,7 @@ impl FrameTable {
         };
         // A malformed line is dropped, so that its frame counts as missing.
         let rows = lines.filter_map(row).collect();
-        Some(Self { columns, rows, has_instants })
+        Some(Self { columns, rows, kind })
     }
 
     /// Inserts or replaces the row of a frame. Paths in columns that `record` does not have are kept.
@@ -142,6 +173,9 @@ impl FrameTable {
         values += &format!(",{}", source.t_ns);
         push(&mut values, &source.pose.position_ned_m.to_array());
         push(&mut values, &wxyz(source.pose.ned_from_camera));
+        if let Some(exposure) = record.exposure {
+            push(&mut values, &[1e3 * exposure.time_s, exposure.gain]);
+        }
         if let Some(instant) = record.instant {
             values += &format!(",{instant}");
         }
@@ -197,7 +231,7 @@ impl FrameTable {
     /// The table as CSV.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut text = FRAMES_COLUMNS.to_owned();
+        let mut text = self.kind.columns();
         let line = |text: &mut String, files: &[String]| {
             for i in 0..self.columns.len() {
                 text.push(',');
@@ -205,9 +239,6 @@ impl FrameTable {
             }
             text.push('\n');
         };
-        if self.has_instants {
-            text += INSTANT_COLUMN;
-        }
         line(&mut text, &self.columns);
         for (values, files) in self.rows.values() {
             text.push_str(values);
@@ -251,7 +282,7 @@ mod tests {
         };
         let files =
             columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
-        FrameRecord { frame, instant: None, stamp_ns: 9, pose, source, files }
+        FrameRecord { frame, instant: None, stamp_ns: 9, pose, source, exposure: None, files }
     }
 
     #[test]
@@ -285,7 +316,7 @@ mod tests {
             table
         };
         table_of(&[0, 2, 4]).write(&path).unwrap();
-        let mut table = FrameTable::read(&path, false);
+        let mut table = FrameTable::read(&path, TableKind::default());
         [1, 3, 4].iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
         assert_eq!(table.to_csv(), table_of(&[0, 1, 2, 3, 4]).to_csv());
         // Another channel of the same frames.
@@ -310,7 +341,8 @@ mod tests {
 
     #[test]
     fn pictures_of_a_burst_have_a_row_each() {
-        let mut table = FrameTable::new(true);
+        let kind = TableKind { has_instants: true, ..TableKind::default() };
+        let mut table = FrameTable::new(kind);
         for (frame, instant) in [(4, 1), (2, 0), (4, 0), (2, 10), (2, 9)] {
             table.insert(&FrameRecord { instant: Some(instant), ..record(frame, &["color_png"]) });
         }
@@ -333,7 +365,25 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = frames_path(folder.path());
         table.write(&path).unwrap();
-        assert_eq!(FrameTable::read(&path, true), table);
-        assert_eq!(FrameTable::read(&path, false), FrameTable::default(), "a table of another kind");
+        assert_eq!(FrameTable::read(&path, kind), table);
+        let other = FrameTable::read(&path, TableKind::default());
+        assert_eq!(other, FrameTable::default(), "a table of another kind");
+    }
+
+    #[test]
+    fn exposures_have_columns_before_the_files() {
+        for has_instants in [false, true] {
+            let kind = TableKind { has_exposures: true, has_instants };
+            let mut table = FrameTable::new(kind);
+            let exposure = Some(FrameExposure { time_s: 2.5e-3, gain: 1.5, light: 9.0 });
+            let instant = has_instants.then_some(7);
+            table.insert(&FrameRecord { exposure, instant, ..record(4, &["color_png"]) });
+            let text = table.to_csv();
+            let (header, row) = text.trim_end().split_once('\n').unwrap();
+            assert!(header.contains(",ideal_qz,exposure_ms,gain,"), "{header}");
+            let end = if has_instants { ",2.5,1.5,7,color_png/4" } else { ",2.5,1.5,color_png/4" };
+            assert!(row.ends_with(end), "{row}");
+            assert_eq!(FrameTable::parse(&text).unwrap(), table);
+        }
     }
 }

@@ -112,6 +112,7 @@ fn sequence(
         scene: scene.clone(),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     }))
 }
 

@@ -143,6 +143,7 @@ pub fn sequence(
         scene: scene.clone(),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     }))
 }
 

@@ -6,6 +6,7 @@ use camsim_core::{
     mount::CameraPath,
     pose::CameraPose,
     scenario::{Preset, QualitySpec, Silhouettes},
+    shutter::Shutter,
     temporal::{IdealGeometry, displacement::Twist},
 };
 use glam::DVec3;
@@ -52,6 +53,8 @@ pub(crate) struct FrameContext<'a> {
     pub inputs: &'a PlanInputs,
     pub frame: u64,
     pub stamp_s: f64,
+    /// With the frame's own exposure.
+    pub shutter: Shutter,
     pub window_s: [f64; 2],
     pub zoom: Option<f64>,
     pub reach: Arc<LensReach>,
@@ -124,7 +127,8 @@ impl<'a> FrameContext<'a> {
             _ => return Err(PlanError::NoRay),
         };
         let quarter = if has_half { inputs.quarter_of_the_probes(frame) } else { None };
-        let (first, last) = inputs.shutter.window_s();
+        let shutter = inputs.shutter_of(frame);
+        let (first, last) = shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
         let path = inputs.path();
         let key_s = shared.map_or(0.5 * (window_s[0] + window_s[1]), |shared| shared.key_s);
@@ -137,6 +141,7 @@ impl<'a> FrameContext<'a> {
             inputs,
             frame,
             stamp_s,
+            shutter,
             window_s,
             zoom,
             dry_run_reach: quarter.unwrap_or_else(|| reach.clone()),
@@ -176,25 +181,24 @@ impl<'a> FrameContext<'a> {
     /// Ideal frame that shows what a solver looks for in `keys`, or what all those do that are made from the
     /// shared one.
     pub fn ideal_of(&self, keys: &[KeyFrame], scale: f64, solver: Option<TemporalStage>) -> IdealGeometry {
-        let Self { inputs, reach, stamp_s, key_s, .. } = self;
+        let Self { inputs, reach, shutter, stamp_s, key_s, .. } = self;
         let twist = solver.map(|stage| (stage, self.key_twist));
         let surfaces = &inputs.scene.surfaces;
-        let own =
-            || ideal_extent(reach, self.path(), &inputs.shutter, *stamp_s, *key_s, keys, surfaces, twist);
+        let own = || ideal_extent(reach, self.path(), shutter, *stamp_s, *key_s, keys, surfaces, twist);
         self.shared.map_or_else(own, |shared| shared.extent).pixels(&reach.camera, scale)
     }
 
     /// What moves within the frame, in the pixels of an ideal frame.
     pub fn motion_in(&self, ideal: &IdealGeometry) -> Motion {
-        let PlanInputs { shutter, scene, .. } = self.inputs;
-        motion::measure(&self.reach, self.path(), shutter, self.stamp_s, self.key_s, ideal, &scene.surfaces)
+        let surfaces = &self.inputs.scene.surfaces;
+        motion::measure(&self.reach, self.path(), &self.shutter, self.stamp_s, self.key_s, ideal, surfaces)
     }
 
     pub fn exposed(&self, motion: Motion, ideal: &IdealGeometry) -> ExposedFrame<'_> {
         ExposedFrame {
             reach: &self.reach,
             path: self.path(),
-            shutter: &self.inputs.shutter,
+            shutter: &self.shutter,
             stamp_s: self.stamp_s,
             focal_px: ideal.focal_px,
             motion,
@@ -221,8 +225,8 @@ impl<'a> FrameContext<'a> {
 
     /// What is in view.
     pub fn scene(&self) -> FrameScene<'a> {
-        let PlanInputs { sequence, shutter, scene, fixed, .. } = self.inputs;
-        let Self { reach, stamp_s, key_pose, .. } = self;
+        let PlanInputs { sequence, scene, fixed, .. } = self.inputs;
+        let Self { reach, stamp_s, shutter, key_pose, .. } = self;
         let ideal = match self.is_paper() {
             true => paper::ideal_geometry(&reach.camera),
             false => self.ideal_of(&[self.key()], reach.least_scale(), self.demanded),
@@ -240,6 +244,7 @@ impl<'a> FrameContext<'a> {
                 shutter,
                 *stamp_s,
                 key_pose,
+                self.frame,
             ),
             triangles: TrianglePrices::new(&sequence.scene),
             is_bent: !reach.camera.lens.is_identity(),
@@ -263,7 +268,7 @@ impl<'a> FrameContext<'a> {
         let dry_run = DryRun {
             surfaces: &self.inputs.scene.surfaces,
             path: self.path(),
-            shutter: &self.inputs.shutter,
+            shutter: &self.shutter,
             stamp_s,
             key_s,
             key_pose,
@@ -288,14 +293,13 @@ impl<'a> FrameContext<'a> {
 
     /// Neighbourhoods of the probes of a frame.
     fn neighbourhoods(&self, frame: u64, reach: &LensReach) -> Arc<Neighbourhoods> {
-        let PlanInputs { sequence, shutter, scene, neighbourhoods, neighbourhoods_of_halves, .. } =
-            self.inputs;
-        let gain = &gain(sequence, &reach.camera);
+        let PlanInputs { sequence, scene, neighbourhoods, neighbourhoods_of_halves, .. } = self.inputs;
+        let gain = &gain(sequence, &reach.camera, frame);
         let search = NeighbourhoodSearch {
             reach,
             surfaces: &scene.surfaces,
             path: self.path(),
-            shutter,
+            shutter: &self.inputs.shutter_of(frame),
             stamp_s: self.inputs.stamp_s(frame),
             gain,
         };
@@ -324,10 +328,11 @@ impl<'a> FrameContext<'a> {
 
     /// What the one depth of blended surfaces costs with these ideal frames.
     pub fn blended(&self, keys: &[KeyFrame]) -> Option<BlendedDepthError> {
-        let PlanInputs { sequence, shutter, scene, fixed, .. } = self.inputs;
+        let PlanInputs { sequence, scene, fixed, .. } = self.inputs;
+        let shutter = &self.shutter;
         // All probes: blended surfaces may be little of the picture.
         let (stamp_s, reach) = (self.stamp_s, fixed.as_ref().unwrap_or(&self.reach));
-        let gain = &gain(sequence, &reach.camera);
+        let gain = &gain(sequence, &reach.camera, self.frame);
         let surfaces = &scene.surfaces;
         let search = BlendSearch { reach, surfaces, path: self.path(), shutter, stamp_s, keys, gain };
         // The paper's errors are not judged.

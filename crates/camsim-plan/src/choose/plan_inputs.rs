@@ -51,6 +51,7 @@ impl SceneKnowledge {
 pub(crate) struct PlanInputs {
     pub sequence: Arc<Sequence>,
     pub scene: SceneKnowledge,
+    /// With the scenario's exposure; row times are the same with any.
     pub shutter: Shutter,
     pub zoom: Option<ZoomTable>,
     /// Reach of a lens that does not zoom.
@@ -117,6 +118,14 @@ impl PlanInputs {
 
     pub fn path(&self) -> &CameraPath {
         &self.sequence.path
+    }
+
+    /// The shutter with the exposure of a frame.
+    pub fn shutter_of(&self, frame: u64) -> Shutter {
+        match &self.sequence.exposures {
+            Some(_) => self.shutter.with_exposure_s(self.sequence.blurred_s(frame)),
+            None => self.shutter,
+        }
     }
 
     /// Stamp of a frame, path time, seconds.

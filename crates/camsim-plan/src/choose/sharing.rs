@@ -182,7 +182,8 @@ impl Sharing<'_> {
         let keys = [KeyFrame { t_s: key_s, pose: path.pose(key_s) }];
         let surfaces = &inputs.scene.surfaces;
         let extent = |frame: u64| {
-            ideal_extent(reach, path, &inputs.shutter, inputs.stamp_s(frame), key_s, &keys, surfaces, None)
+            let shutter = inputs.shutter_of(frame);
+            ideal_extent(reach, path, &shutter, inputs.stamp_s(frame), key_s, &keys, surfaces, None)
         };
         let extent = frames.clone().map(extent).reduce(IdealExtent::and)?;
         let scale = own.ideal.scale(&own.camera);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     camera::CameraModel,
+    exposure::FrameExposure,
     pose::CameraPose,
     reference::IdealView,
     scenario::{Preset, QualitySpec},
@@ -46,8 +47,10 @@ pub struct FramePlan {
     pub zoom: Option<f64>,
     /// The output camera at this zoom.
     pub camera: Arc<CameraModel>,
-    /// Row timing.
+    /// Row timing, with the frame's own exposure.
     pub shutter: Shutter,
+    /// Exposure time and gain, where they follow the pictures.
+    pub exposure: Option<FrameExposure>,
     /// Middle of the window, path time, seconds.
     pub key_s: f64,
     /// The pose then: the camera that source coordinates are given in, and that of the ideal frame where

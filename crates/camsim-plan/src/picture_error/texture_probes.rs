@@ -69,9 +69,10 @@ impl<'a> TextureProbes<'a> {
         shutter: &Shutter,
         stamp_s: f64,
         key_pose: &CameraPose,
+        frame: u64,
     ) -> Self {
         let (probes, focal_px) = (&reach.probes, reach.camera.central_focal_px());
-        let gain = &gain(sequence, &reach.camera);
+        let gain = &gain(sequence, &reach.camera, frame);
         let search =
             TextureSearch { sequence, surfaces, spectra, shutter, stamp_s, key_pose, focal_px, gain };
         let views: Vec<ProbeView<'_>> =

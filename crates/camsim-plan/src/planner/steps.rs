@@ -122,7 +122,7 @@ impl<'a> Draft<'a> {
         let quality = context.quality();
         if context.is_paper() {
             self.skip("silhouette rays", "quality.preset \"paper\" takes one sample a pixel");
-            self.blur = paper::blur_stage(&context.inputs.shutter, quality, &mut self.skipped);
+            self.blur = paper::blur_stage(&context.shutter, quality, &mut self.skipped);
             return None;
         }
         let exposure = context
@@ -189,7 +189,7 @@ impl<'a> Draft<'a> {
         TemporalTask {
             reach: &context.dry_run_reach,
             sequence: &inputs.sequence,
-            shutter: &inputs.shutter,
+            shutter: &context.shutter,
             surfaces: &inputs.scene.surfaces,
             stamp_s: context.stamp_s,
             key_s: context.key_s,
@@ -329,7 +329,8 @@ impl<'a> Draft<'a> {
             extrapolated: window_s[0] < span_s.0 || window_s[1] > span_s.1,
             zoom: context.zoom,
             camera: camera.clone(),
-            shutter: inputs.shutter,
+            shutter: context.shutter,
+            exposure: inputs.sequence.exposure(context.frame),
             key_s: middle_s,
             key_pose: context.path().pose(middle_s),
             key_twist: context.key_twist,

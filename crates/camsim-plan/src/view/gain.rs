@@ -2,9 +2,10 @@
 
 use camsim_core::{camera::CameraModel, photometric::vignette_weight, sequence::Sequence};
 
-/// Value of a pixel, of the linear range, for each unit of light that arrives.
-pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2]) -> f64 + Sync {
+/// Value of a pixel of a frame, of the linear range, for each unit of light that arrives.
+pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel, frame: u64) -> impl Fn([u32; 2]) -> f64 + Sync {
     let photometric = &sequence.scenario.camera.photometric;
+    let light = photometric.light * sequence.exposure(frame).map_or(1.0, |exposure| exposure.light);
     let size_px = camera.size_px;
     move |[x, y]: [u32; 2]| {
         let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
@@ -14,6 +15,6 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2
                 photometric.vignette_thresholds,
             ))
         });
-        vignette * photometric.light
+        vignette * light
     }
 }

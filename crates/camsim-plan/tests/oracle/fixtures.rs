@@ -78,6 +78,7 @@ pub fn sequence(scenario: Scenario, motion: Steady, scene: Scene) -> Arc<Sequenc
         scene: Arc::new(scene),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     })
 }
 

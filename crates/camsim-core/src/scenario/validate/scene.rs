@@ -6,6 +6,9 @@ use crate::{
     scene::{Board, BoardError},
 };
 
+/// Largest factor of the sky: half floats hold 65 504.
+const MOST_BRIGHTNESS: f64 = 10_000.0;
+
 pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
     let has_surface =
         scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
@@ -64,6 +67,13 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
     check.require(scene.sky.iter().all(|value| (0.0..=1.0).contains(value)), "scene.sky", || {
         format!("must be sRGB values in 0..1, not {:?}; divide 8-bit values by 255", scene.sky)
     });
+    if let Some(brightness) = scene.sky_brightness {
+        check.require((0.0..=MOST_BRIGHTNESS).contains(&brightness), "scene.sky_brightness", || {
+            format!(
+                "must be a factor of 0 to {MOST_BRIGHTNESS}, not {brightness}; 1 leaves scene.sky as it is"
+            )
+        });
+    }
     if let Some(visibility_m) = scene.fog_visibility_m {
         check.positive("scene.fog_visibility_m", visibility_m, "leave it out for clear air");
     }

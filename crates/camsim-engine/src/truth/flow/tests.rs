@@ -100,6 +100,7 @@ fn sequence() -> Arc<Sequence> {
         scene: Arc::new(scene),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     })
 }
 

@@ -163,7 +163,15 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
         let source =
             SourceFrame { size_px: SIZE, focal_px: [5.0; 2], principal_px: [2.5, 1.5], t_ns: 0, pose };
         let (stamp_ns, files) = (stamp_ns(number), files.names(number));
-        table.insert(&FrameRecord { frame: number, instant: None, stamp_ns, pose, source, files });
+        table.insert(&FrameRecord {
+            frame: number,
+            instant: None,
+            stamp_ns,
+            pose,
+            source,
+            exposure: None,
+            files,
+        });
     }
     let mut writer = FrameWriter::new(files, 1);
     FRAMES.iter().for_each(|number| writer.write(frame(*number)).unwrap());

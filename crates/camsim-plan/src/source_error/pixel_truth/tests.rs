@@ -70,6 +70,7 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
         scene,
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     })
 }
 
