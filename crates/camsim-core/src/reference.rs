@@ -191,6 +191,17 @@ impl Oracle {
         self.timing.stamp_s(frame)
     }
 
+    /// Whether the camera has an image sensor, be it for the faces of its picture together.
+    fn sensor_collects(&self) -> bool {
+        self.sequence.scenario.camera.sensor.is_some()
+    }
+
+    /// Exposure time of a pixel, seconds.
+    #[must_use]
+    pub fn exposure_s(&self, pixel: [u32; 2]) -> f64 {
+        self.timing.exposure_s(pixel)
+    }
+
     /// One frame, for taking many samples of it.
     #[must_use]
     pub fn view(&self, frame: u64) -> FrameView<'_> {
@@ -315,7 +326,7 @@ impl FrameView<'_> {
     #[must_use]
     pub fn sample(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         let uv = self.ray(pixel, offset_px)?;
-        let t_s = self.mid_s(pixel) + phase * self.oracle.timing.exposure_s();
+        let t_s = self.mid_s(pixel) + phase * self.oracle.timing.exposure_s(pixel);
         let pose = self.oracle.sequence.path.pose(t_s);
         Some(RaySample { t_s, pose, uv, hit: self.hit(t_s, &pose, uv) })
     }

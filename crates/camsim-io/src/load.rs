@@ -470,7 +470,6 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
         FieldOr::Field => 0.0,
     };
     let longer = [
-        ("readout_ms", shutter.readout_ms, "the next frame would begin before this one is read"),
         ("exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
         (
             "interlace_ms",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Face, FieldOr, ImageSensorSpec};
+use super::{Face, FieldOr, ImageSensorSpec, TimingSpec};
 use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
@@ -55,6 +55,9 @@ pub struct CameraSpec {
     /// The image sensor, in place of `photometric`'s light and noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<ImageSensorSpec>,
+    /// Faults of trigger, stamps and delivery.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimingSpec>,
 }
 
 impl Default for CameraSpec {
@@ -76,6 +79,7 @@ impl Default for CameraSpec {
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
             sensor: None,
+            timing: None,
         }
     }
 }
@@ -85,6 +89,12 @@ impl CameraSpec {
     #[must_use]
     pub fn clock_offset_ns(&self) -> i64 {
         (self.clock_offset_ms * 1e6).round() as i64
+    }
+
+    /// Readout time, milliseconds: [`ShutterSpec::readout_ms_of`] this camera's picture.
+    #[must_use]
+    pub fn readout_ms(&self) -> f64 {
+        self.shutter.readout_ms_of(self.size_px)
     }
 }
 
@@ -224,6 +234,52 @@ pub struct ShutterSpec {
     pub interlace_ms: FieldOr,
     /// Parity (0-based) of the rows of the earlier field.
     pub first_field: Parity,
+    /// Time from a row to the next, in place of `readout_ms`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_time_us: Option<f64>,
+    /// When the exposures of the rows begin.
+    #[serde(skip_serializing_if = "Reset::is_rolling")]
+    pub reset: Reset,
+    /// Whether the readout may be longer than the period of a frame.
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_overlap: bool,
+}
+
+/// Beginnings of the rows' exposures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reset {
+    /// Each row as long before its readout as all others.
+    #[default]
+    Rolling,
+    /// All rows at once: the exposure of the row that is read first is `exposure_ms`, and that of each next
+    /// one is longer by the time from row to row.
+    Global,
+}
+
+impl Reset {
+    fn is_rolling(&self) -> bool {
+        *self == Self::Rolling
+    }
+}
+
+impl ShutterSpec {
+    /// Time from the first row that is read to the last, milliseconds, of a picture of this size, by
+    /// `readout_ms` or `line_time_us`.
+    #[must_use]
+    pub fn readout_ms_of(&self, [width, height]: [u32; 2]) -> f64 {
+        let lines = match self.readout {
+            Readout::LeftToRight | Readout::RightToLeft => f64::from(width),
+            Readout::TopToBottom | Readout::BottomToTop => f64::from(height),
+            Readout::MiddleOutward | Readout::EdgesInward => 0.5 * f64::from(height),
+        };
+        self.line_time_us.map_or(self.readout_ms, |us| 1e-3 * us * lines)
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 impl Default for ShutterSpec {
@@ -235,6 +291,9 @@ impl Default for ShutterSpec {
             exposure_ms: 0.0,
             interlace_ms: FieldOr::Ms(0.0),
             first_field: Parity::Even,
+            line_time_us: None,
+            reset: Reset::Rolling,
+            allow_overlap: false,
         }
     }
 }
@@ -263,6 +322,10 @@ pub enum Readout {
     LeftToRight,
     /// Last column first.
     RightToLeft,
+    /// Both halves at once, the middle rows first.
+    MiddleOutward,
+    /// Both halves at once, the outer rows first.
+    EdgesInward,
 }
 
 /// `[camera.photometric]`: paper section 7.

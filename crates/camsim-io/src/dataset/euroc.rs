@@ -200,6 +200,12 @@ pub(super) fn timing(camera: &RunCamera) -> String {
         true => centre,
         false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
     };
+    let centre = match camera.spec.timing {
+        None => centre,
+        Some(_) => format!(
+            "{centre}; stamps have the faults of camera.timing, poses and trajectories the true times"
+        ),
+    };
     if readout_ms == 0.0 {
         format!("{centre}; global shutter")
     } else {
@@ -218,5 +224,7 @@ fn direction(camera: &RunCamera) -> &'static str {
         Readout::BottomToTop => "from bottom to top (y from there)",
         Readout::LeftToRight => "from left to right",
         Readout::RightToLeft => "from right to left (y from there)",
+        Readout::MiddleOutward => "in halves at once, from the middle outward",
+        Readout::EdgesInward => "in halves at once, from the edges inward",
     }
 }

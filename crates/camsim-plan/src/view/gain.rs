@@ -6,6 +6,7 @@ use camsim_core::{camera::CameraModel, photometric::vignette_weight, sequence::S
 pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2]) -> f64 + Sync {
     let photometric = &sequence.scenario.camera.photometric;
     let size_px = camera.size_px;
+    let gains = sequence.light_gains();
     move |[x, y]: [u32; 2]| {
         let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
             let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / size_px[k]) as usize);
@@ -14,6 +15,7 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2
                 photometric.vignette_thresholds,
             ))
         });
-        vignette * photometric.light
+        let exposed = gains.as_ref().map_or(1.0, |shutter| shutter.light_gain(x, y));
+        vignette * exposed * photometric.light
     }
 }
