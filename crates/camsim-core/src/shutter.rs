@@ -430,6 +430,82 @@ mod tests {
     }
 
     #[test]
+    fn halves_are_read_at_once() {
+        let with = |readout| Shutter::from_spec(&ShutterSpec { readout, ..spec() }, 30.0, [6, 8]).unwrap();
+        let (outward, inward) = (with(Readout::MiddleOutward), with(Readout::EdgesInward));
+        // Four pairs of rows, as a sensor of four rows would be read.
+        let four = Shutter::from_spec(&spec(), 30.0, [6, 4]).unwrap();
+        for pair in 0..4 {
+            for row in [3 - pair, 4 + pair] {
+                assert!((outward.dt_row_s(row) - four.dt_row_s(pair)).abs() < 1e-15);
+                assert!((inward.dt_row_s(row) - four.dt_row_s(3 - pair)).abs() < 1e-15);
+            }
+            assert_eq!(outward.dt_row_s(pair).to_bits(), outward.dt_row_s(7 - pair).to_bits());
+        }
+        for shutter in [outward, inward] {
+            assert_eq!(shutter.window_s(), window_by_pixels(&shutter, [6, 8]));
+            assert_eq!(shutter.row_axis(), RowAxis::Rows);
+            let instants = [FlowInstant::FirstRow, FlowInstant::Centre, FlowInstant::LastRow];
+            let found = instants.map(|instant| shutter.dt_instant_s(instant));
+            assert!((found[0] - four.dt_row_s(0)).abs() < 1e-15 && found[1] == -0.005, "{found:?}");
+            assert!((found[2] - four.dt_row_s(3)).abs() < 1e-15);
+            let (first, second, share) = shutter.centre_lines();
+            let mixed = shutter.dt_row_s(first) * (1.0 - share) + shutter.dt_row_s(second) * share;
+            assert!((mixed + 0.005).abs() < 1e-15, "{first} {second} {share}");
+        }
+    }
+
+    #[test]
+    fn a_global_reset_begins_all_exposures_at_once() {
+        for readout in [
+            Readout::TopToBottom,
+            Readout::BottomToTop,
+            Readout::LeftToRight,
+            Readout::RightToLeft,
+            Readout::MiddleOutward,
+            Readout::EdgesInward,
+        ] {
+            let spec = ShutterSpec { readout, reset: Reset::Global, ..spec() };
+            let shutter = Shutter::from_spec(&spec, 30.0, [6, 8]).unwrap();
+            let rolling = ShutterSpec { reset: Reset::Rolling, ..spec };
+            let rolling = Shutter::from_spec(&rolling, 30.0, [6, 8]).unwrap();
+            let begins = |line: u32| shutter.dt_row_s(line) - 0.5 * shutter.exposure_row_s(line);
+            let ends = |line: u32| shutter.dt_row_s(line) + 0.5 * shutter.exposure_row_s(line);
+            let lines = 0..shutter.lines();
+            for line in lines.clone() {
+                assert!((begins(line) - begins(0)).abs() < 1e-15, "{readout:?} {line}");
+                // Rows are read as far apart as those of a rolling reset.
+                let apart_s = rolling.dt_row_s(line) - rolling.dt_row_s(0);
+                assert!((ends(line) - ends(0) - apart_s).abs() < 1e-15, "{readout:?} {line}");
+                let [x, y] = if shutter.row_axis() == RowAxis::Rows { [0, line] } else { [line, 0] };
+                assert_eq!(shutter.exposure_pixel_s(x, y), shutter.exposure_row_s(line));
+                assert!((shutter.light_gain(x, y) - shutter.exposure_row_s(line) / 0.008).abs() < 1e-12);
+            }
+            let shortest = lines.clone().map(|line| shutter.exposure_row_s(line)).fold(1.0, f64::min);
+            let longest = lines.map(|line| shutter.exposure_row_s(line)).fold(0.0, f64::max);
+            assert!((shortest - 0.008).abs() < 1e-15 && longest == shutter.longest_exposure_s());
+            let (begin_s, end_s) = shutter.window_s();
+            assert!((begin_s - begins(0)).abs() < 1e-15 && (end_s - begin_s - longest).abs() < 1e-15);
+            assert_eq!(shutter.dt_instant_s(FlowInstant::Centre), -0.005);
+        }
+    }
+
+    #[test]
+    fn a_line_time_states_the_readout() {
+        let lines = |readout| {
+            let spec = ShutterSpec { readout, readout_ms: 0.0, line_time_us: Some(7.3), ..spec() };
+            Shutter::from_spec(&spec, 30.0, [600, 400]).unwrap()
+        };
+        for (readout, step) in
+            [(Readout::TopToBottom, 7.3e-6), (Readout::RightToLeft, -7.3e-6), (Readout::EdgesInward, 7.3e-6)]
+        {
+            let shutter = lines(readout);
+            let found = shutter.dt_row_s(31) - shutter.dt_row_s(30);
+            assert!((found - step).abs() < 1e-15, "{readout:?}: {found}");
+        }
+    }
+
+    #[test]
     fn without_exposure_and_readout_the_window_is_an_instant() {
         let shutter = Shutter::from_spec(&ShutterSpec::default(), 30.0, [640, 480]).unwrap();
         assert_eq!(shutter.window_s(), (0.0, 0.0));

@@ -87,9 +87,7 @@ fn check_burst(check: &mut Check, i: usize, twin: &TwinSpec, scenario: &Scenario
     let shutter = &scenario.camera.shutter;
     let is_instant = match twin.over.unwrap_or_default() {
         BurstOver::Exposure => shutter.exposure_ms == 0.0,
-        BurstOver::Readout => {
-            scenario.camera.readout_ms() == 0.0 && shutter.interlace_ms == FieldOr::Ms(0.0)
-        }
+        BurstOver::Readout => scenario.camera.readout_ms() == 0.0 && shutter.interlace_ms == FieldOr::Ms(0.0),
     };
     check.require(count == 1 || !is_instant, key("instants"), || match twin.over.unwrap_or_default() {
         BurstOver::Exposure => "are all the same, as camera.shutter.exposure_ms is 0; give it, or leave the \
