@@ -64,11 +64,10 @@ struct Frame {
     // Linear fog of the paper preset, applied after the gather: sRGB-encoded colour, and 1 / (distance of
     // full fog) in w, 0 = no fog.
     linear_fog: vec4<f32>,
-    // Several ideal frames: their number, the distance in rows from one to the next in their textures, and
-    // the exposure as a share of the window.
+    // Several ideal frames: their number, and the distance in rows from one to the next in their textures.
     keys: u32,
     key_rows: u32,
-    exposure_share: f32,
+    pad1: f32,
     // Radius within which a surface replaces the sky at the last depth look-up, pixels of the ideal frame
     // (docs/ACCURACY.md, "Skylines").
     sky_reach_px: f32,

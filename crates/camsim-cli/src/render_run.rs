@@ -137,10 +137,11 @@ pub fn run(
     Ok(outcome)
 }
 
-/// Frames of this run's shard.
+/// Frames of this run's shard that arrive.
 fn shard_frames(job: &Job<'_>) -> Vec<u64> {
     let is_ours = |frame: &u64| job.shard.is_none_or(|shard| in_shard(*frame, shard.0));
-    job.frames.iter().copied().filter(is_ours).collect()
+    let arrives = |frame: &u64| job.sequence.arrives(*frame);
+    job.frames.iter().copied().filter(is_ours).filter(arrives).collect()
 }
 
 /// Frames of which a run renders the picture of a series.
@@ -384,6 +385,7 @@ fn prepare(
     }
     if folder_state == FolderState::Replaced {
         tables::remove_objects(&pictures.folder)?;
+        tables::remove_timing(&pictures.folder)?;
         tracks::remove(&pictures.folder)?;
     }
     manifest.write(&pictures.folder).or_failed()?;

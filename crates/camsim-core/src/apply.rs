@@ -21,7 +21,7 @@ use crate::{
     imaging::ImageSensor,
     noise::{camera_seed, tail_table},
     photometric::{Photometry, photometric, vignette_weights},
-    scenario::{CameraSpec, Preset, Solver},
+    scenario::{CameraSpec, Preset, Reset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
     shutter::Shutter,
@@ -127,6 +127,9 @@ impl<'a> Pipeline<'a> {
         }
         let camera = CameraModel::from_spec(spec)?;
         let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)?;
+        if shutter.reset() == Reset::Global {
+            return Err(ApplyError::Reset);
+        }
         frame.check()?;
         let (first_s, last_s) = shutter.window_s();
         motion.covers(first_s.min(frame.instant_s), last_s.max(frame.instant_s))?;

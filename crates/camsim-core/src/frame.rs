@@ -18,6 +18,8 @@ pub struct RowRecord {
     pub ned_from_camera: DQuat,
     /// Velocity of the optical centre in NED.
     pub velocity_ned_m_s: DVec3,
+    /// Exposure time, nanoseconds.
+    pub exposure_ns: i64,
 }
 
 /// Floats per pixel of [`RenderedFrame::coords`].

@@ -21,7 +21,9 @@ use crate::{
     exposure::FrameExposure,
     frame::{RawPicture, RenderedFrame},
     noise::camera_seed,
-    scenario::{CameraSpec, ImageSensorSpec, Mosaic, ShutterSpec},
+    scenario::{CameraSpec, ImageSensorSpec, Mosaic, Reset, ShutterSpec},
+    shutter::{RowAxis, Shutter},
+    timing_faults::TimingFaults,
 };
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
@@ -57,6 +59,8 @@ pub struct ImageSensor {
     nominal: Exposed,
     draws: &'static Draws,
     fixed: FixedPattern,
+    /// Exposure of each row of the readout as a multiple of `exposure_ms`, and their axis, where they differ.
+    row_gains: Option<(RowAxis, Vec<f32>)>,
 }
 
 /// What a sensor is made of.
@@ -69,6 +73,8 @@ struct SensorKey {
     fps: f64,
     seed: u64,
     name: String,
+    /// The camera, where it may show a picture twice.
+    timing: Option<CameraSpec>,
 }
 
 impl SensorKey {
@@ -83,6 +89,7 @@ impl SensorKey {
             fps: camera.fps,
             seed,
             name: camera.name.clone(),
+            timing: camera.timing.is_some().then(|| camera.clone()),
         })
     }
 }
@@ -110,7 +117,14 @@ impl ImageSensor {
         // The pictures of a burst have noise of their own each, but are of one sensor.
         let name = key.name.split('/').next().unwrap_or_default();
         let fixed = FixedPattern::new(&nominal.settings, draws, key.size_px, camera_seed(key.seed, name));
-        Self { key, nominal, draws, fixed }
+        // An invalid shutter has no frames.
+        let shutter = Shutter::from_spec(&key.shutter, key.fps, key.size_px).ok();
+        let row_gains = shutter.filter(|shutter| shutter.reset() == Reset::Global).map(|shutter| {
+            let longer_ms = |line| 1e3 * (shutter.exposure_row_s(line) - shutter.exposure_s());
+            let gain = |line| (1.0 + longer_ms(line) / key.exposure_ms) as f32;
+            (shutter.row_axis(), (0..shutter.lines()).map(gain).collect())
+        });
+        Self { key, nominal, draws, fixed, row_gains }
     }
 
     /// Takes the picture of a frame with this stamp in path time, whose colours are the light: makes its raw
@@ -118,7 +132,9 @@ impl ImageSensor {
     pub fn expose(&self, frame: &mut RenderedFrame, stamp_s: f64, exposure: Option<&FrameExposure>) {
         let own = exposure.map(|exposure| Exposed::of_frame(&self.key, exposure));
         let exposed = own.as_ref().unwrap_or(&self.nominal);
-        let raw = self.raw_of(exposed, frame.index as u32, stamp_s, &frame.color_rgba);
+        let faults = self.key.timing.as_ref().and_then(|camera| TimingFaults::new(camera, self.key.seed));
+        let picture = faults.map_or(frame.index, |faults| faults.picture(frame.index as i64) as u64);
+        let raw = self.raw_of(exposed, picture as u32, stamp_s, &frame.color_rgba);
         exposed.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
         frame.raw = Some(raw);
     }
@@ -194,6 +210,7 @@ impl RowJob<'_> {
                 flicker.light(self.y, self.stamp_s, &mut scratch.electrons);
             }
             self.dark(channel, &mut scratch.electrons);
+            self.wait_for_readout(&mut scratch.electrons);
             self.words(channel as u32, &mut scratch.words);
             self.count(scratch);
             self.digits(channel, scratch, codes);
@@ -246,6 +263,20 @@ impl RowJob<'_> {
             let i = i as usize - first;
             if i % channels == channel {
                 electrons[i / channels] += settings.hot_e * relative;
+            }
+        }
+    }
+
+    /// What rows collect more that are exposed until they are read.
+    fn wait_for_readout(&self, electrons: &mut [f32]) {
+        match &self.sensor.row_gains {
+            None => {}
+            Some((RowAxis::Rows, gains)) => {
+                let gain = gains[self.y as usize];
+                electrons.iter_mut().for_each(|e| *e *= gain);
+            }
+            Some((RowAxis::Columns, gains)) => {
+                electrons.iter_mut().zip(gains).for_each(|(e, gain)| *e *= gain);
             }
         }
     }

@@ -27,6 +27,7 @@
 //! | [`lens`], [`camera`], [`shutter`] | distortion and its inverse, intrinsics with zoom, exposure times of rows |
 //! | [`sensors`] | inertial units, satellite receivers, barometers, magnetometers |
 //! | [`scene`] | terrain, meshes, textures, light, levels of detail, calibration boards |
+//! | [`timing_faults`] | late triggers, wrong stamps, dropped and doubled frames |
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
@@ -78,6 +79,7 @@ pub mod sequence;
 pub mod shutter;
 pub mod silhouette;
 pub mod temporal;
+pub mod timing_faults;
 pub mod tracker;
 pub mod tracks;
 pub mod trajectory;

@@ -199,6 +199,17 @@ impl Oracle {
         self.timing.stamp_s(frame)
     }
 
+    /// Whether the camera has an image sensor, be it for the faces of its picture together.
+    fn sensor_collects(&self) -> bool {
+        self.sequence.scenario.camera.sensor.is_some()
+    }
+
+    /// Exposure time of a pixel of a frame, seconds.
+    #[must_use]
+    pub fn exposure_s(&self, frame: u64, pixel: [u32; 2]) -> f64 {
+        self.sequence.blurred_s(frame) + self.timing.longer_s(pixel)
+    }
+
     /// One frame, for taking many samples of it.
     #[must_use]
     pub fn view(&self, frame: u64) -> FrameView<'_> {
@@ -298,11 +309,21 @@ impl Oracle {
 }
 
 impl FrameView<'_> {
+    /// Exposure time of a pixel, seconds.
+    fn exposure_s(&self, pixel: [u32; 2]) -> f64 {
+        self.exposure_s + self.oracle.timing.longer_s(pixel)
+    }
+
+    /// Light that a pixel collects, as a multiple of that of the exposure of the row that is read first.
+    fn light_gain(&self, pixel: [u32; 2]) -> f64 {
+        if self.exposure_s > 0.0 { self.exposure_s(pixel) / self.exposure_s } else { 1.0 }
+    }
+
     /// As [`Oracle::sample`].
     #[must_use]
     pub fn sample(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         let uv = self.ray(pixel, offset_px)?;
-        let t_s = self.mid_s(pixel) + phase * self.exposure_s;
+        let t_s = self.mid_s(pixel) + phase * self.exposure_s(pixel);
         let pose = self.oracle.sequence.path.pose(t_s);
         Some(RaySample { t_s, pose, uv, hit: self.hit(t_s, &pose, uv) })
     }

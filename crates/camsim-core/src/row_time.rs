@@ -9,11 +9,11 @@
 //! This equation is implicit in `y`. It has one solution for a slow camera; none, where the point leaves the
 //! picture before its row is read; and several, where the picture moves faster than the readout. `t` is linear
 //! between the centres of rows and beyond the first and last one. With a sideways readout the same holds for
-//! `x`, and each field of an interlaced frame has an equation of its own.
+//! `x`, and each field of an interlaced frame, or half of a split readout, has an equation of its own.
 
 mod projector;
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use glam::{DVec2, DVec3};
 
@@ -101,7 +101,7 @@ pub struct FrameCamera {
     intervals: usize,
 }
 
-/// Rows that are read one after the other; columns with a sideways readout.
+/// Rows that are read one after the other, a field or a half of a frame's; columns with a sideways readout.
 #[derive(Debug)]
 struct Field {
     /// Pixel coordinate of the first row and distance to the next.
@@ -159,22 +159,29 @@ impl FrameCamera {
         let [columns, rows] = camera.size_px;
         let axis = shutter.row_axis();
         let is_interlaced = shutter.interlace_s() > 0.0 && rows > 1;
-        let parities: &[Option<u32>] = if is_interlaced { &[Some(0), Some(1)] } else { &[None] };
-        let field = |&parity: &Option<u32>| {
+        let half = rows / 2;
+        let is_split = shutter.is_split() && shutter.readout_s() > 0.0 && half > 0;
+        let parts: Vec<(Option<u32>, Range<u32>)> = match (is_interlaced, is_split) {
+            (true, _) => vec![(Some(0), 0..rows), (Some(1), 0..rows)],
+            (false, true) => vec![(None, 0..half), (None, half..rows)],
+            (false, false) => vec![(None, 0..rows)],
+        };
+        let field = |(parity, part): (Option<u32>, Range<u32>)| {
             let pixels: Vec<[u32; 2]> = match (axis, parity) {
                 (RowAxis::Rows, Some(parity)) => (parity..rows).step_by(2).map(|y| [0, y]).collect(),
-                (RowAxis::Rows, None) => (0..rows).map(|y| [0, y]).collect(),
+                (RowAxis::Rows, None) => part.clone().map(|y| [0, y]).collect(),
                 (RowAxis::Columns, _) => (0..columns).map(|x| [x, parity.unwrap_or(0)]).collect(),
             };
             let times_s: Vec<f64> = pixels.iter().map(|&[x, y]| stamp_s + shutter.dt_pixel_s(x, y)).collect();
             let poses = times_s.iter().map(|&t_s| path.pose(t_s)).collect();
             let (first_px, step_px) = match (axis, parity) {
                 (RowAxis::Rows, Some(parity)) => (f64::from(parity), 2.0),
-                _ => (0.0, 1.0),
+                (RowAxis::Rows, None) => (f64::from(part.start), 1.0),
+                (RowAxis::Columns, _) => (0.0, 1.0),
             };
             Field { first_px, step_px, parity, times_s, poses }
         };
-        let fields = parities.iter().map(field).collect();
+        let fields = parts.into_iter().map(field).collect();
         let periods = path.highest_vibration_hz() * shutter.readout_s();
         let intervals = (INTERVALS + (INTERVALS_A_PERIOD * periods) as usize).min(MOST_INTERVALS);
         Self { path, camera, axis, fields, intervals }

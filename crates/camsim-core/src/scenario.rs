@@ -8,6 +8,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::timing_faults::TimingFaults;
+
 mod auto;
 mod auto_exposure;
 mod camera;
@@ -19,6 +21,7 @@ mod motion;
 mod rig;
 mod scene;
 mod sensors;
+mod timing;
 mod tracks;
 mod twin;
 mod validate;
@@ -28,7 +31,7 @@ pub use auto::{Auto, FieldOr};
 pub use auto_exposure::{AutoExposureSpec, ExposureOrder, ExposureStart, MeterWeights};
 pub use camera::{
     Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout,
-    ShutterSpec, VibrationSpec, ZoomSpec,
+    Reset, ShutterSpec, VibrationSpec, ZoomSpec,
 };
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
@@ -47,6 +50,7 @@ pub use sensors::{
     BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec, PerAxis, SensorAxes, SensorCarrier, SensorMountSpec,
     TriadSpec,
 };
+pub use timing::{LateStamp, TimingSpec};
 pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
@@ -118,6 +122,14 @@ impl Scenario {
     #[must_use]
     pub fn noise_seed(&self) -> u64 {
         crate::noise::camera_seed(self.seed, &self.camera.name)
+    }
+
+    /// Number of the frame whose picture a frame shows: its own, but for doubled frames
+    /// ([`TimingFaults::picture`]).
+    #[must_use]
+    pub fn picture(&self, frame: u64) -> u64 {
+        let faults = TimingFaults::new(&self.camera, self.seed);
+        faults.map_or(frame, |faults| faults.picture(frame as i64) as u64)
     }
 }
 

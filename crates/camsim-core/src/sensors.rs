@@ -160,7 +160,8 @@ pub fn span_s(scenario: &Scenario, last_row_s: f64) -> [f64; 2] {
     let phase_s = camera.phase / camera.fps;
     let (first_s, last_s) = camera.longest_shutter().map_or((0.0, 0.0), |shutter| shutter.window_s());
     let before_s = (phase_s + first_s).min(0.0);
-    let after_s = (phase_s + last_s).max(0.0);
+    let late_s = camera.timing.as_ref().map_or(0.0, |timing| 1e-3 * timing.late_ms);
+    let after_s = (phase_s + last_s + late_s).max(0.0);
     [from_s + before_s - LEAD_S, to_s + after_s + LEAD_S]
 }
 

@@ -6,9 +6,10 @@ use crate::{
     exposure::{ExposureTrack, FrameExposure},
     mount::CameraPath,
     photometric::vignette_weights,
-    scenario::{Face, Scenario, TwinSpec},
+    scenario::{Face, Reset, Scenario, TwinSpec},
     scene::Scene,
-    shutter::ShutterError,
+    shutter::{Shutter, ShutterError},
+    timing_faults::TimingFaults,
 };
 
 /// All inputs of a run, loaded and validated. Immutable; shared between threads.
@@ -58,17 +59,44 @@ impl Sequence {
         sequence
     }
 
-    /// Stamp of a frame of any number, beyond the sequence as well: path time, seconds.
+    /// Instant to which the row times of a frame of any number refer, beyond the sequence as well: path time,
+    /// seconds. Without `[camera.timing]` it is the frame's stamp; else the trigger of the picture that the
+    /// frame shows.
     #[must_use]
     pub fn stamp_s(&self, frame: f64) -> f64 {
         let camera = &self.scenario.camera;
-        self.start_s + (frame + camera.phase) / camera.fps
+        match self.timing_faults() {
+            None => self.start_s + (frame + camera.phase) / camera.fps,
+            Some(faults) => self.start_s + faults.trigger_s(frame.round() as i64),
+        }
+    }
+
+    /// Stamp of a frame as the camera writes it, nanoseconds on its clock.
+    #[must_use]
+    pub fn stamp_ns(&self, frame: u64) -> i64 {
+        let t_s = match self.timing_faults() {
+            None => self.stamp_s(frame as f64),
+            Some(faults) => self.start_s + faults.stamp_s(frame as i64),
+        };
+        self.epoch_ns.saturating_add((t_s * 1e9).round() as i64)
+    }
+
+    /// What goes wrong with triggers, stamps and delivery; `None` without `[camera.timing]`.
+    #[must_use]
+    pub fn timing_faults(&self) -> Option<TimingFaults<'_>> {
+        TimingFaults::new(&self.scenario.camera, self.scenario.seed)
+    }
+
+    /// Whether a frame arrives: dropped ones have a number but no picture.
+    #[must_use]
+    pub fn arrives(&self, frame: u64) -> bool {
+        self.timing_faults().is_none_or(|faults| !faults.is_dropped(frame))
     }
 
     /// Exposure of a frame, if it follows the pictures; else it is the scenario's.
     #[must_use]
     pub fn exposure(&self, frame: u64) -> Option<FrameExposure> {
-        self.exposures.as_ref().map(|track| track.of(frame))
+        self.exposures.as_ref().map(|track| track.of(self.scenario.picture(frame)))
     }
 
     /// Time for which each row of a frame is exposed to motion, seconds: 0 where pictures are of one instant,
@@ -77,7 +105,7 @@ impl Sequence {
     pub fn blurred_s(&self, frame: u64) -> f64 {
         let nominal_s = 1e-3 * self.scenario.camera.shutter.exposure_ms;
         let own = self.exposures.as_ref().filter(|_| nominal_s > 0.0);
-        own.map_or(nominal_s, |track| track.of(frame).time_s)
+        own.map_or(nominal_s, |track| track.of(self.scenario.picture(frame)).time_s)
     }
 
     /// Time of the platform's clock at path time 0, nanoseconds: that of trajectories.
@@ -86,17 +114,33 @@ impl Sequence {
         self.epoch_ns.saturating_sub(self.scenario.camera.clock_offset_ns())
     }
 
-    /// Weights of the vignette map at every pixel, and the size of their picture; a single 1 without a map.
+    /// Weights of the light at every pixel, and the size of their picture: of the vignette map, times what rows
+    /// collect that are exposed for longer ([`Self::light_gains`]); a single 1 without both.
     #[must_use]
     pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {
         let camera = &self.scenario.camera;
-        match &self.vignette {
-            Some(map) => {
-                let thresholds = camera.photometric.vignette_thresholds;
-                (camera.size_px, vignette_weights(map, camera.size_px, thresholds))
-            }
-            None => ([1, 1], vec![1.0]),
+        let [width, height] = camera.size_px;
+        let weights = self.vignette.as_ref().map(|map| {
+            let thresholds = camera.photometric.vignette_thresholds;
+            vignette_weights(map, camera.size_px, thresholds)
+        });
+        let Some(shutter) = self.light_gains() else {
+            return weights.map_or(([1, 1], vec![1.0]), |weights| (camera.size_px, weights));
+        };
+        let mut weights = weights.unwrap_or_else(|| vec![1.0; width as usize * height as usize]);
+        for (row, y) in weights.chunks_mut(width as usize).zip(0..) {
+            row.iter_mut().zip(0..).for_each(|(weight, x)| *weight *= shutter.light_gain(x, y) as f32);
         }
+        (camera.size_px, weights)
+    }
+
+    /// The shutter, where rows collect more light than others ([`Shutter::light_gain`]) and no image sensor
+    /// counts it.
+    #[must_use]
+    pub fn light_gains(&self) -> Option<Shutter> {
+        let camera = &self.scenario.camera;
+        let differs = camera.shutter.reset == Reset::Global && camera.sensor.is_none();
+        differs.then(|| Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).ok()).flatten()
     }
 }
 

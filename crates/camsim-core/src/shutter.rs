@@ -9,8 +9,15 @@
 //! so the middle of the image has exactly `-delay`. Rows of the readout count from the top or, as columns,
 //! from the left; the two reverse readout directions count from the other end. Interlaced fields always
 //! consist of image rows, for any readout direction.
+//!
+//! **Split readout**: both halves of the rows are read at once, `dt = -delay + s (|2 row + 1 - N|/N - 0.5) t_r`
+//! with s = 1 from the middle outward and -1 from the edges inward; the middle of the readout has `-delay`.
+//!
+//! **Global reset**: all exposures begin at once and end at the readout of their rows. Their lengths are
+//! `t_e + (share - first share) t_r`, where the share of a row is the factor of `t_r` above, and mid-exposures
+//! are half as far apart: `dt = -delay + share t_r/2`.
 
-use crate::scenario::{FieldOr, FlowInstant, Parity, Readout, ShutterSpec};
+use crate::scenario::{FieldOr, FlowInstant, Parity, Readout, Reset, ShutterSpec};
 
 /// Invalid values in `[camera.shutter]`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -53,6 +60,7 @@ pub struct Shutter {
     exposure_s: f64,
     interlace_s: f64,
     first_field: Parity,
+    reset: Reset,
 }
 
 impl Shutter {
@@ -72,8 +80,8 @@ impl Shutter {
             size_px,
             delay_s: seconds("delay_ms", spec.delay_ms, "; it is the age of the image at its stamp")?,
             readout_s: seconds(
-                "readout_ms",
-                spec.readout_ms,
+                if spec.line_time_us.is_some() { "line_time_us" } else { "readout_ms" },
+                spec.readout_ms_of(size_px),
                 "; for a reverse readout set camera.shutter.readout",
             )?,
             direction: spec.readout,
@@ -84,6 +92,7 @@ impl Shutter {
                 "; to exchange the fields set camera.shutter.first_field",
             )?,
             first_field: spec.first_field,
+            reset: spec.reset,
         })
     }
 
@@ -91,7 +100,9 @@ impl Shutter {
     #[inline]
     pub fn row_axis(&self) -> RowAxis {
         match self.direction {
-            Readout::TopToBottom | Readout::BottomToTop => RowAxis::Rows,
+            Readout::TopToBottom | Readout::BottomToTop | Readout::MiddleOutward | Readout::EdgesInward => {
+                RowAxis::Rows
+            }
             Readout::LeftToRight | Readout::RightToLeft => RowAxis::Columns,
         }
     }
@@ -127,15 +138,15 @@ impl Shutter {
     /// read first or last, or the middle between both, which is `-delay` without interlacing.
     pub fn dt_instant_s(&self, instant: FlowInstant) -> f64 {
         let last = self.lines() - 1;
-        let [top_s, bottom_s] = [self.dt_row_s(0), self.dt_row_s(last)];
+        let outer_s = self.outer_lines().map(|line| self.dt_row_s(line));
         match instant {
-            FlowInstant::FirstRow => top_s.min(bottom_s),
+            FlowInstant::FirstRow => outer_s.fold(f64::INFINITY, f64::min),
             // The readout is symmetric about the delay; a mean of both ends would add rounding.
             FlowInstant::Centre => match self.row_axis() {
                 RowAxis::Rows => -self.delay_s - 0.5 * (self.field_lag_s(0) + self.field_lag_s(last)),
                 RowAxis::Columns => -self.delay_s,
             },
-            FlowInstant::LastRow => top_s.max(bottom_s),
+            FlowInstant::LastRow => outer_s.fold(f64::NEG_INFINITY, f64::max),
         }
     }
 
@@ -151,16 +162,87 @@ impl Shutter {
         // An image of one row has only one field; others have both. Among image rows, the earliest and latest
         // of each field are among the outer two.
         let rows = self.size_px[1];
-        let mids = [0, 1.min(last), last.saturating_sub(1), last].into_iter().flat_map(|line| {
+        let lines = self.outer_lines().chain([1.min(last), last.saturating_sub(1)]);
+        let exposures = lines.flat_map(|line| {
             let ys = match self.row_axis() {
                 RowAxis::Rows => [line, line],
                 RowAxis::Columns => [0, 1.min(rows - 1)],
             };
+            let half_s = 0.5 * self.exposure_row_s(line);
             ys.map(|y| self.dt_readout_s(line) - self.field_lag_s(y))
+                .map(|dt_s| [dt_s - half_s, dt_s + half_s])
         });
-        let (min, max) =
-            mids.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), dt_s| (min.min(dt_s), max.max(dt_s)));
-        (min - 0.5 * self.exposure_s, max + 0.5 * self.exposure_s)
+        exposures.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), [begin_s, end_s]| {
+            (min.min(begin_s), max.max(end_s))
+        })
+    }
+
+    /// Rows of the readout among which are the first and the last that are read, but for interlacing.
+    fn outer_lines(&self) -> impl Iterator<Item = u32> + use<> {
+        let last = self.lines() - 1;
+        let middle = self.is_split().then_some([last / 2, last.div_ceil(2)]);
+        [0, last].into_iter().chain(middle.into_iter().flatten())
+    }
+
+    /// Exposure time of a row of the readout, seconds.
+    pub fn exposure_row_s(&self, line: u32) -> f64 {
+        match self.reset {
+            Reset::Rolling => self.exposure_s,
+            Reset::Global => self.exposure_s + (self.share(line) - self.first_share()) * self.readout_s,
+        }
+    }
+
+    /// Exposure time of a pixel, seconds.
+    #[inline]
+    pub fn exposure_pixel_s(&self, x: u32, y: u32) -> f64 {
+        match (self.reset, self.row_axis()) {
+            (Reset::Rolling, _) => self.exposure_s,
+            (Reset::Global, RowAxis::Rows) => self.exposure_row_s(y),
+            (Reset::Global, RowAxis::Columns) => self.exposure_row_s(x),
+        }
+    }
+
+    /// Longest exposure time of any row, seconds.
+    pub fn longest_exposure_s(&self) -> f64 {
+        self.outer_lines().map(|line| self.exposure_row_s(line)).fold(self.exposure_s, f64::max)
+    }
+
+    /// Exposure time of a row in the middle of the readout, seconds.
+    pub fn centre_exposure_s(&self) -> f64 {
+        match self.reset {
+            Reset::Rolling => self.exposure_s,
+            Reset::Global => self.exposure_s - self.first_share() * self.readout_s,
+        }
+    }
+
+    /// Light that a pixel collects, as a multiple of that of `exposure_ms`; 1 but for a global reset.
+    pub fn light_gain(&self, x: u32, y: u32) -> f64 {
+        match self.reset {
+            Reset::Global if self.exposure_s > 0.0 => self.exposure_pixel_s(x, y) / self.exposure_s,
+            _ => 1.0,
+        }
+    }
+
+    /// When the exposures of the rows begin.
+    pub fn reset(&self) -> Reset {
+        self.reset
+    }
+
+    /// Whether both halves of the rows are read at once.
+    pub fn is_split(&self) -> bool {
+        matches!(self.direction, Readout::MiddleOutward | Readout::EdgesInward)
+    }
+
+    /// Where among the rows of the readout the middle of its time is: between two rows, with the share of the
+    /// way from the first to the second.
+    pub fn centre_lines(&self) -> (u32, u32, f64) {
+        let last = self.lines() - 1;
+        if !self.is_split() {
+            return (last / 2, last.div_ceil(2), 0.5);
+        }
+        let along = (0.25 * f64::from(self.lines()) - 0.5).max(0.0);
+        let first = along as u32;
+        (first, (first + 1).min(last), along - f64::from(first))
     }
 
     /// Age of the image centre at its stamp (-t_d), seconds.
@@ -173,7 +255,8 @@ impl Shutter {
         self.readout_s
     }
 
-    /// Exposure time t_e, seconds, centred on the mid-exposure of a row.
+    /// Exposure time t_e, seconds, centred on the mid-exposure of a row. With a global reset it is that of the
+    /// row that is read first, the shortest.
     pub fn exposure_s(&self) -> f64 {
         self.exposure_s
     }
@@ -200,12 +283,30 @@ impl Shutter {
     }
 
     fn dt_readout_s(&self, line: u32) -> f64 {
-        let position = (f64::from(line) + 0.5) / f64::from(self.lines()) - 0.5;
-        let share = match self.direction {
-            Readout::TopToBottom | Readout::LeftToRight => position,
-            Readout::BottomToTop | Readout::RightToLeft => -position,
+        let readout_s = match self.reset {
+            Reset::Rolling => self.readout_s,
+            Reset::Global => 0.5 * self.readout_s,
         };
-        share * self.readout_s - self.delay_s
+        self.share(line) * readout_s - self.delay_s
+    }
+
+    /// Share of the readout time after its middle at which a row is read, -0.5 to 0.5.
+    fn share(&self, line: u32) -> f64 {
+        let lines = self.lines();
+        let position = || (f64::from(line) + 0.5) / f64::from(lines) - 0.5;
+        // Rows as far above the middle as others below it have the same time to the last bit.
+        let from_middle = || f64::from((2 * line + 1).abs_diff(lines)) / f64::from(lines) - 0.5;
+        match self.direction {
+            Readout::TopToBottom | Readout::LeftToRight => position(),
+            Readout::BottomToTop | Readout::RightToLeft => -position(),
+            Readout::MiddleOutward => from_middle(),
+            Readout::EdgesInward => -from_middle(),
+        }
+    }
+
+    /// Share of the row that is read first.
+    fn first_share(&self) -> f64 {
+        self.outer_lines().map(|line| self.share(line)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -331,6 +432,82 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn halves_are_read_at_once() {
+        let with = |readout| Shutter::from_spec(&ShutterSpec { readout, ..spec() }, 30.0, [6, 8]).unwrap();
+        let (outward, inward) = (with(Readout::MiddleOutward), with(Readout::EdgesInward));
+        // Four pairs of rows, as a sensor of four rows would be read.
+        let four = Shutter::from_spec(&spec(), 30.0, [6, 4]).unwrap();
+        for pair in 0..4 {
+            for row in [3 - pair, 4 + pair] {
+                assert!((outward.dt_row_s(row) - four.dt_row_s(pair)).abs() < 1e-15);
+                assert!((inward.dt_row_s(row) - four.dt_row_s(3 - pair)).abs() < 1e-15);
+            }
+            assert_eq!(outward.dt_row_s(pair).to_bits(), outward.dt_row_s(7 - pair).to_bits());
+        }
+        for shutter in [outward, inward] {
+            assert_eq!(shutter.window_s(), window_by_pixels(&shutter, [6, 8]));
+            assert_eq!(shutter.row_axis(), RowAxis::Rows);
+            let instants = [FlowInstant::FirstRow, FlowInstant::Centre, FlowInstant::LastRow];
+            let found = instants.map(|instant| shutter.dt_instant_s(instant));
+            assert!((found[0] - four.dt_row_s(0)).abs() < 1e-15 && found[1] == -0.005, "{found:?}");
+            assert!((found[2] - four.dt_row_s(3)).abs() < 1e-15);
+            let (first, second, share) = shutter.centre_lines();
+            let mixed = shutter.dt_row_s(first) * (1.0 - share) + shutter.dt_row_s(second) * share;
+            assert!((mixed + 0.005).abs() < 1e-15, "{first} {second} {share}");
+        }
+    }
+
+    #[test]
+    fn a_global_reset_begins_all_exposures_at_once() {
+        for readout in [
+            Readout::TopToBottom,
+            Readout::BottomToTop,
+            Readout::LeftToRight,
+            Readout::RightToLeft,
+            Readout::MiddleOutward,
+            Readout::EdgesInward,
+        ] {
+            let spec = ShutterSpec { readout, reset: Reset::Global, ..spec() };
+            let shutter = Shutter::from_spec(&spec, 30.0, [6, 8]).unwrap();
+            let rolling = ShutterSpec { reset: Reset::Rolling, ..spec };
+            let rolling = Shutter::from_spec(&rolling, 30.0, [6, 8]).unwrap();
+            let begins = |line: u32| shutter.dt_row_s(line) - 0.5 * shutter.exposure_row_s(line);
+            let ends = |line: u32| shutter.dt_row_s(line) + 0.5 * shutter.exposure_row_s(line);
+            let lines = 0..shutter.lines();
+            for line in lines.clone() {
+                assert!((begins(line) - begins(0)).abs() < 1e-15, "{readout:?} {line}");
+                // Rows are read as far apart as those of a rolling reset.
+                let apart_s = rolling.dt_row_s(line) - rolling.dt_row_s(0);
+                assert!((ends(line) - ends(0) - apart_s).abs() < 1e-15, "{readout:?} {line}");
+                let [x, y] = if shutter.row_axis() == RowAxis::Rows { [0, line] } else { [line, 0] };
+                assert_eq!(shutter.exposure_pixel_s(x, y), shutter.exposure_row_s(line));
+                assert!((shutter.light_gain(x, y) - shutter.exposure_row_s(line) / 0.008).abs() < 1e-12);
+            }
+            let shortest = lines.clone().map(|line| shutter.exposure_row_s(line)).fold(1.0, f64::min);
+            let longest = lines.map(|line| shutter.exposure_row_s(line)).fold(0.0, f64::max);
+            assert!((shortest - 0.008).abs() < 1e-15 && longest == shutter.longest_exposure_s());
+            let (begin_s, end_s) = shutter.window_s();
+            assert!((begin_s - begins(0)).abs() < 1e-15 && (end_s - begin_s - longest).abs() < 1e-15);
+            assert_eq!(shutter.dt_instant_s(FlowInstant::Centre), -0.005);
+        }
+    }
+
+    #[test]
+    fn a_line_time_states_the_readout() {
+        let lines = |readout| {
+            let spec = ShutterSpec { readout, readout_ms: 0.0, line_time_us: Some(7.3), ..spec() };
+            Shutter::from_spec(&spec, 30.0, [600, 400]).unwrap()
+        };
+        for (readout, step) in
+            [(Readout::TopToBottom, 7.3e-6), (Readout::RightToLeft, -7.3e-6), (Readout::EdgesInward, 7.3e-6)]
+        {
+            let shutter = lines(readout);
+            let found = shutter.dt_row_s(31) - shutter.dt_row_s(30);
+            assert!((found - step).abs() < 1e-15, "{readout:?}: {found}");
         }
     }
 

@@ -111,12 +111,13 @@ impl MovingScene {
         let instants: Vec<(DVec2, Instant)> = (0..RAYS)
             .map(ray)
             .map(|(place, phase)| {
-                let t_s = mid_s + phase * plan.shutter.exposure_s();
+                let t_s = mid_s + phase * plan.shutter.exposure_pixel_s(x, y);
                 (place, caster.at(t_s, self.sequence.path.pose(t_s)))
             })
             .collect();
         let stage = Photometry::new(&self.sequence.scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
+        let picture = self.sequence.scenario.picture(plan.frame) as u32;
         let color = |pixel: [u32; 2]| {
             let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
             let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
@@ -126,7 +127,7 @@ impl MovingScene {
                 linear.to_array(),
                 weight,
                 pixel,
-                plan.frame as u32,
+                picture,
                 scenario.noise_seed(),
                 &self.noise_table,
             );

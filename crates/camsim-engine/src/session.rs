@@ -374,7 +374,7 @@ impl<'a> Session<'a> {
         let coords = truth.as_ref().map(|truth| finished::coords(truth, &color_rgba, plan, &sequence.path));
         let mut frame = RenderedFrame {
             index: plan.frame,
-            stamp_ns: sequence.epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
+            stamp_ns: sequence.stamp_ns(plan.frame),
             size_px: plan.camera.size_px,
             color_rgba,
             depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),

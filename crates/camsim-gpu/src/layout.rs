@@ -135,7 +135,7 @@ mod tests {
                 linear_fog,
                 keys,
                 key_rows,
-                exposure_share,
+                pad1,
                 sky_reach_px,
                 planes,
             ]

@@ -18,7 +18,7 @@
 //! one. The readers are in [`camera_file`](crate::camera_file): `import(export(x))` is x.
 
 use camsim_core::{
-    scenario::{CameraSpec, FlowInstant, Readout},
+    scenario::{CameraSpec, FlowInstant, Readout, Reset},
     shutter::Shutter,
 };
 use thiserror::Error;
@@ -84,15 +84,18 @@ impl Calibration {
         Rigid::of_mount(&self.spec.mount)
     }
 
-    /// Time from a row to the next one below it, of cameras that read rows one after the other, seconds.
+    /// Time from the mid-exposure of a row to that of the next one below it, of cameras that read rows one after
+    /// the other, seconds.
     #[must_use]
     pub fn line_delay_s(&self) -> Option<f64> {
         let line_s = self.shutter.readout_s() / f64::from(self.shutter.lines());
         match self.spec.shutter.readout {
-            _ if line_s == 0.0 => None,
+            _ if line_s == 0.0 || self.shutter.reset() == Reset::Global => None,
             Readout::TopToBottom => Some(line_s),
             Readout::BottomToTop => Some(-line_s),
-            Readout::LeftToRight | Readout::RightToLeft => None,
+            Readout::LeftToRight | Readout::RightToLeft | Readout::MiddleOutward | Readout::EdgesInward => {
+                None
+            }
         }
     }
 

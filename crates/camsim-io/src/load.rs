@@ -496,11 +496,6 @@ fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
     };
     let auto_ms = camera.auto_exposure.as_ref().map_or(0.0, |auto| auto.exposure_ms[1]);
     let longer = [
-        (
-            "camera.shutter.readout_ms",
-            shutter.readout_ms,
-            "the next frame would begin before this one is read",
-        ),
         ("camera.shutter.exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
         ("camera.auto_exposure.exposure_ms", auto_ms, "a row could be exposed for two frames at once"),
         (

@@ -59,6 +59,7 @@ mod raw_picture;
 mod rig;
 mod sensors;
 mod tables;
+mod timing;
 mod tracks;
 mod variations;
 mod video;
@@ -81,6 +82,7 @@ pub use tables::{
     CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
 };
+pub use timing::{TIMING_CSV, timing_csv};
 pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
 pub use variations::{VARIATIONS_CSV, VariationsError, variation_folder, write_variations};
 pub use video::Y4mStream;

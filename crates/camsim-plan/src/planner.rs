@@ -199,6 +199,11 @@ impl Planner {
         if let Some(face) = self.faces.first() {
             return face.plan(frame);
         }
+        // The same picture has the same plan, to the last bit.
+        let picture = self.inputs.sequence.scenario.picture(frame);
+        if picture != frame {
+            return Ok(FramePlan { frame, ..self.plan(picture)? });
+        }
         let mut plan = self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)?;
         if plan.shared_frames.is_none() {
             plan.unshared_reason = Some(unshared_reason(&self.inputs, &plan));

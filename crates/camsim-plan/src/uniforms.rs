@@ -64,7 +64,7 @@ pub struct FrameUniforms {
     pub linear_fog: [f32; 4],
     pub keys: u32,
     pub key_rows: u32,
-    pub exposure_share: f32,
+    pub pad1: f32,
     pub sky_reach_px: f32,
     pub planes: [[f32; 4]; MAX_KEYS as usize],
 }
@@ -149,7 +149,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         noise_sigma: stage.noise_sigma,
         vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
         seed: [noise_seed as u32, (noise_seed >> 32) as u32],
-        frame_number: plan.frame as u32,
+        frame_number: scenario.picture(plan.frame) as u32,
         mono: u32::from(stage.is_mono),
         key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),
         ned_from_key_x: column(0),
@@ -159,8 +159,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         edge_samples,
         keys: plan.keys.len() as u32,
         key_rows: key_rows(&plan.ideal),
-        exposure_share: (plan.shutter.exposure_s()
-            / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
+        pad1: 0.0,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],

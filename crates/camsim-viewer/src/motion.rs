@@ -54,7 +54,7 @@ pub fn pixel_path(oracle: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelP
     let sequence = oracle.sequence();
     let camera = camera_model(&sequence.scenario.camera)?;
     let position_px = |t_s: f64| project(&camera, &sequence.path.pose(t_s), &sample);
-    let exposure_s = sequence.blurred_s(frame);
+    let exposure_s = oracle.exposure_s(frame, pixel);
     let phases = (0..EXPOSURE_POINTS).map(|k| f64::from(k) / f64::from(EXPOSURE_POINTS - 1) - 0.5);
     let exposure_px = if exposure_s > 0.0 {
         phases.filter_map(|phase| position_px(sample.t_s + phase * exposure_s)).collect()

@@ -8,12 +8,12 @@ fn key_count() -> u32 {
     return unspecialised(frame.keys);
 }
 
-// Mid-exposure of the pixel's line, as a share of the window.
-fn window_share(pixel: vec2<u32>) -> f32 {
+// Mid-exposure of the pixel's line and its exposure time, as shares of the window.
+fn window_shares(pixel: vec2<u32>) -> vec2<f32> {
     let line = select(pixel.y, pixel.x, frame.line_axis == 1u);
     let field = select(0u, pixel.y & 1u, frame.fields == 2u);
     let stride = select(frame.nodes + 1u, 1u, frame.nodes == 1u);
-    return poses[frame.keys * (frame.fields * frame.lines * stride + 1u) + field * frame.lines + line].x.x;
+    return poses[frame.keys * (frame.fields * frame.lines * stride + 1u) + field * frame.lines + line].x.xy;
 }
 
 // The nearest key is that of the part of the window that contains the share; the others follow by their
@@ -34,11 +34,12 @@ fn select_rank(share: f32, rank: u32) {
 }
 
 fn select_key_of_line(pixel: vec2<u32>) {
-    select_rank(window_share(pixel), 0u);
+    select_rank(window_shares(pixel).x, 0u);
 }
 
 fn select_key_of_rank(pixel: vec2<u32>, exposure_share: f32, rank: u32) {
-    select_rank(window_share(pixel) + (exposure_share - 0.5) * frame.exposure_share, rank);
+    let shares = window_shares(pixel);
+    select_rank(shares.x + (exposure_share - 0.5) * shares.y, rank);
 }
 
 fn key_index() -> u32 {

@@ -7,6 +7,7 @@ use camsim_core::{
     scenario::{Auto, Face, LightSpec, Solver},
     scene::{self, ModelLod, SceneLods, TerrainDetail, TerrainTiles, TexelForm, tile_bytes},
     sequence::Sequence,
+    timing_faults::Delivery,
     tracker::{ResolvedLimits, Saturation},
 };
 use camsim_engine::MOVING_RAYS;
@@ -196,6 +197,19 @@ struct TerrainFacts {
     finest_triangles: u64,
 }
 
+/// Says where a frame does not arrive, or with another picture.
+fn warn_of_delivery(sequence: &Sequence, frame: u64, console: &mut Console<'_>) {
+    match sequence.timing_faults().map(|faults| faults.delivery(frame)) {
+        Some(Delivery::Dropped) => console.warn(format_args!(
+            "frame {frame} is dropped by camera.timing: `render` leaves it out; this is the plan that it would have"
+        )),
+        Some(Delivery::Doubled(picture)) => console.warn(format_args!(
+            "frame {frame} is doubled by camera.timing: it has the picture of frame {picture}, whose plan this is"
+        )),
+        Some(Delivery::Own) | None => {}
+    }
+}
+
 /// Loads the scenario and prints the plan of one frame.
 pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
@@ -214,6 +228,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
                    of the default solver",
         );
     }
+    warn_of_delivery(&loaded.sequence, args.frame, console);
     let engine = args.backend.open()?;
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, engine.max_side_px())
         .or_bad_input()?;

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use anyhow::anyhow;
@@ -15,8 +15,9 @@ use camsim_core::{
 use camsim_io::{
     portable::write_camera,
     write::{
-        CameraRecord, FrameRecord, FrameTable, SourceFrame, TableKind, TrajectoryRecord, WriteError,
-        camera_trajectory_csv, frames_path, objects_csv, trajectory_csv, write_atomic, write_sensors,
+        CameraRecord, FrameRecord, FrameTable, SourceFrame, TIMING_CSV, TableKind, TrajectoryRecord,
+        WriteError, camera_trajectory_csv, frames_path, objects_csv, timing_csv, trajectory_csv,
+        write_atomic, write_sensors,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -44,7 +45,15 @@ fn numbers_objects(scenario: &Scenario) -> bool {
 
 /// Removes the table of objects of another scenario.
 pub fn remove_objects(folder: &Path) -> Result<(), Failure> {
-    let path = folder.join(OBJECTS_CSV);
+    remove(folder.join(OBJECTS_CSV))
+}
+
+/// Removes the table of triggers and stamps of another scenario.
+pub fn remove_timing(folder: &Path) -> Result<(), Failure> {
+    remove(folder.join(TIMING_CSV))
+}
+
+fn remove(path: PathBuf) -> Result<(), Failure> {
     match std::fs::remove_file(&path) {
         Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
             Err(WriteError::Io { path, source }).or_failed()
@@ -68,6 +77,9 @@ pub fn write_fixed(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failu
     let sequence = job.sequence;
     write_camera(job.folder, &sequence.scenario.camera).or_failed()?;
     write_platform(job.folder, &[sequence])?;
+    if let Some(table) = timing_csv(sequence) {
+        write_atomic(&job.folder.join(TIMING_CSV), table.as_bytes()).or_failed()?;
+    }
     let rate_hz = sequence.scenario.tracker.rate_hz;
     let ticks = ticks(&sequence.path.trajectory, rate_hz, seen_s(sequence)?);
     let epoch_ns = sequence.platform_epoch_ns();
@@ -111,9 +123,12 @@ pub fn write_platform(folder: &Path, sequences: &[&Sequence]) -> Result<(), Fail
 
 /// Path times that the frames of a sequence see, the first and the last.
 fn seen_s(sequence: &Sequence) -> Result<[f64; 2], Failure> {
-    let (first_s, last_s) = sequence.scenario.camera.longest_shutter().or_bad_input()?.window_s();
+    let camera = &sequence.scenario.camera;
+    let (first_s, last_s) = camera.longest_shutter().or_bad_input()?.window_s();
     let last_frame = sequence.frames.saturating_sub(1) as f64;
-    Ok([sequence.stamp_s(0.0) + first_s, sequence.stamp_s(last_frame) + last_s])
+    let nominal_s = |frame: f64| sequence.start_s + (frame + camera.phase) / camera.fps;
+    let late_s = camera.timing.as_ref().map_or(0.0, |timing| 1e-3 * timing.late_ms);
+    Ok([nominal_s(0.0) + first_s, nominal_s(last_frame) + last_s + late_s])
 }
 
 fn table_kind(pictures: &Pictures) -> TableKind {
@@ -170,7 +185,7 @@ fn record(series: &Series, planner: &Planner, frame: u64, source: SourceFrame) -
     FrameRecord {
         frame,
         instant: files.instant(),
-        stamp_ns: stamp_ns(sequence.epoch_ns, stamp_s),
+        stamp_ns: sequence.stamp_ns(frame),
         pose: sequence.path.pose(stamp_s),
         source,
         exposure: sequence.exposure(frame),

@@ -14,6 +14,9 @@ pub enum ApplyError {
     /// The shutter is invalid.
     #[error(transparent)]
     Shutter(#[from] ShutterError),
+    /// Rows with exposures of different lengths.
+    #[error("camera.shutter.reset = \"global\" is not made of pictures of other programs: write \"rolling\"")]
+    Reset,
     /// The images of the frame are invalid.
     #[error("the ideal frame has {what}: {fix}")]
     Frame {

@@ -21,7 +21,10 @@ impl Flicker {
 
     /// Multiplies the light of the pixels of a row by the lamp's during their exposures.
     pub fn light(&self, y: u32, stamp_s: f64, electrons: &mut [f32]) {
-        let at = |x: u32| self.mean(stamp_s + self.shutter.dt_pixel_s(x, y)) as f32;
+        let at = |x: u32| {
+            let longer_s = self.shutter.exposure_pixel_s(x, y) - self.shutter.exposure_s();
+            self.mean(stamp_s + self.shutter.dt_pixel_s(x, y), self.exposure_s + longer_s) as f32
+        };
         match self.shutter.row_axis() {
             RowAxis::Rows => {
                 let light = at(0);
@@ -32,10 +35,10 @@ impl Flicker {
     }
 
     /// Mean of the lamp's light over an exposure with this middle; 1 in the long run.
-    fn mean(&self, mid_s: f64) -> f64 {
+    fn mean(&self, mid_s: f64, exposure_s: f64) -> f64 {
         let FlickerSpec { hz, depth, wave, duty, phase_deg } = self.spec;
         let turn = hz * mid_s + phase_deg / 360.0;
-        let turns = hz * self.exposure_s;
+        let turns = hz * exposure_s;
         let wave = match wave {
             FlickerWave::Sine => {
                 return 1.0 + depth * sinc(turns) * (std::f64::consts::TAU * turn.fract()).cos();
@@ -87,7 +90,7 @@ mod tests {
                     let sum: f64 =
                         (0..STEPS).map(|i| lamp(&flicker.spec, mid_s + share(i) * exposure_ms * 1e-3)).sum();
                     let expected = sum / f64::from(STEPS);
-                    let found = flicker.mean(mid_s);
+                    let found = flicker.mean(mid_s, exposure_ms * 1e-3);
                     assert!(
                         (found - expected).abs() < 3e-5,
                         "{wave:?} {exposure_ms} {mid_s}: {found} {expected}"
@@ -115,6 +118,6 @@ mod tests {
         assert!((re.hypot(im) / amplitude - 1.0).abs() < 0.01, "{} {amplitude}", re.hypot(im));
         // A whole period of the lamp has no bands.
         let even = self::flicker(FlickerWave::Sine, 10.0);
-        assert!((even.mean(0.123) - 1.0).abs() < 1e-12);
+        assert!((even.mean(0.123, 0.010) - 1.0).abs() < 1e-12);
     }
 }

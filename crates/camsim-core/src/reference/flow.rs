@@ -57,7 +57,7 @@ struct Place {
 impl Oracle {
     /// The picture of a frame of any number.
     pub(super) fn flow_frame(&self, frame: i64) -> FlowPicture<'_> {
-        let stamp_s = self.timing.stamp_of(frame as f64);
+        let stamp_s = self.timing.stamp_of(frame);
         let rows: &[u32] = if self.timing.field_rows() == 2 { &[0, 1] } else { &[0] };
         let scan = |&row: &u32| {
             let [first, last, step] = self.ends_of_field(row).map(f64::from);
@@ -83,7 +83,7 @@ impl Oracle {
     /// The picture of a frame's camera with all rows at one instant.
     pub(super) fn flow_global(&self, frame: u64, instant: FlowInstant) -> FlowPicture<'_> {
         let stamp_s = self.timing.stamp_s(frame);
-        let ends_s = [0, self.timing.lines() - 1].map(|line| self.timing.dt_row_s(line));
+        let ends_s = self.timing.ends_s();
         let dt_s = match instant {
             FlowInstant::FirstRow => ends_s[0].min(ends_s[1]),
             FlowInstant::Centre => 0.5 * (ends_s[0] + ends_s[1]),
@@ -279,8 +279,9 @@ impl FrameView<'_> {
 
     /// Displacement of the image of what a pixel sees at the begin and at the end of its exposure, pixels.
     pub(super) fn blur_path(&self, from_px: DVec2, seen: &RaySample) -> [DVec2; 2] {
+        let exposure_s = self.exposure_s(from_px.to_array().map(|px| px.round() as u32));
         [-0.5, 0.5].map(|phase| {
-            let t_s = seen.t_s + phase * self.exposure_s;
+            let t_s = seen.t_s + phase * exposure_s;
             self.show_at(seen, t_s).map_or(DVec2::ZERO, |px| px - from_px)
         })
     }

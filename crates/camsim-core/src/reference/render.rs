@@ -117,7 +117,8 @@ struct RenderedRow {
 struct FrameJob<'a> {
     oracle: &'a Oracle,
     view: FrameView<'a>,
-    frame: u64,
+    /// Number of the frame whose noise it has.
+    picture: u32,
     options: &'a RenderOptions,
     noise_table: Vec<f32>,
     exposure: Option<FrameExposure>,
@@ -144,7 +145,7 @@ impl Oracle {
             exposure,
             photometry: Photometry::new(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
-            frame,
+            picture: self.sequence.scenario.picture(frame) as u32,
             options,
             noise_table: tail_table(),
             truth: depth || coords,
@@ -162,7 +163,7 @@ impl Oracle {
         convergence.rms_error_dn = (sum_of_squares / convergence.pixels.max(1) as f64).sqrt();
         let mut rendered = RenderedFrame {
             index: frame,
-            stamp_ns: self.log_ns(self.stamp_s(frame)),
+            stamp_ns: self.sequence.stamp_ns(frame),
             size_px,
             color_rgba: rows.iter().flat_map(|row| row.color.as_flattened()).copied().collect(),
             depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
@@ -185,7 +186,14 @@ impl Oracle {
             let t_s = stamp_s + self.timing.dt_row_s(row);
             let CameraPose { position_ned_m, ned_from_camera } = self.sequence.path.pose(t_s);
             let velocity_ned_m_s = self.sequence.path.velocity_ned(t_s);
-            RowRecord { row, t_mid_ns: self.log_ns(t_s), position_ned_m, ned_from_camera, velocity_ned_m_s }
+            RowRecord {
+                row,
+                t_mid_ns: self.log_ns(t_s),
+                position_ned_m,
+                ned_from_camera,
+                velocity_ned_m_s,
+                exposure_ns: (self.exposure_s(frame, [row, row]) * 1e9).round() as i64,
+            }
         };
         (0..self.timing.lines()).map(record).collect()
     }
@@ -237,7 +245,7 @@ impl FrameJob<'_> {
     fn pixel(&self, [x, y]: [u32; 2], instants: &mut SamplePoses<'_>) -> PixelMean {
         let options = self.options;
         let [shift_x, shift_y, _] = shifts(u64::from(y) << 32 | u64::from(x));
-        let steps = if instants.exposure_s > 0.0 { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
+        let steps = if instants.is_exposed { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
         let max_batches = options.max_samples.div_ceil(BATCH).max(BATCHES_A_CHECK);
         let min_batches = options.min_samples.div_ceil(BATCH).clamp(BATCHES_A_CHECK, max_batches);
         let (mut sum, mut samples) = (DVec3::ZERO, 0_u32);
@@ -293,12 +301,17 @@ impl FrameJob<'_> {
                 _ => 1.0,
             }
         });
+        // An image sensor collects the light of its rows itself.
+        let gain = match self.oracle.sensor_collects() {
+            true => 1.0,
+            false => self.view.light_gain(pixel),
+        };
         photometric(
             &self.photometry,
             color,
-            weight as f32,
+            (weight * gain) as f32,
             pixel,
-            self.frame as u32,
+            self.picture,
             sequence.scenario.noise_seed(),
             &self.noise_table,
         )
@@ -328,28 +341,28 @@ struct PixelMean {
 struct SamplePoses<'a> {
     job: &'a FrameJob<'a>,
     y: u32,
-    exposure_s: f64,
+    is_exposed: bool,
     shift: f64,
     shared: Option<Vec<(f64, CameraPose)>>,
 }
 
 impl<'a> SamplePoses<'a> {
     fn new(job: &'a FrameJob<'a>, y: u32) -> Self {
-        let exposure_s = job.view.exposure_s;
+        let is_exposed = job.view.exposure_s([0, y]) > 0.0;
         let shared = job.oracle.timing.reads_rows().then(Vec::new);
-        Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
+        Self { job, y, is_exposed, shift: shifts(u64::from(y))[2], shared }
     }
 
     /// Path time and pose at sample `i` of pixel `x`.
     fn pose(&mut self, x: u32, i: u32) -> (f64, CameraPose) {
         let pose = |i: u32, shift: f64| {
-            let phase =
-                if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
-            let t_s = self.job.view.mid_s([x, self.y]) + phase * self.exposure_s;
+            let phase = if self.is_exposed { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
+            let exposure_s = self.job.view.exposure_s([x, self.y]);
+            let t_s = self.job.view.mid_s([x, self.y]) + phase * exposure_s;
             (t_s, self.job.oracle.sequence.path.pose(t_s))
         };
         let Some(shared) = &mut self.shared else { return pose(i, self.shift) };
-        let i = if self.exposure_s > 0.0 { i } else { 0 };
+        let i = if self.is_exposed { i } else { 0 };
         while shared.len() <= i as usize {
             let next = pose(shared.len() as u32, self.shift);
             shared.push(next);

@@ -1,8 +1,9 @@
 //! Times of the oracle: frame stamps, and the mid-exposure of each pixel.
 
 use crate::{
-    scenario::{CameraSpec, FieldOr, Parity, Readout},
+    scenario::{CameraSpec, FieldOr, Parity, Readout, Reset},
     sequence::Sequence,
+    timing_faults::TimingFaults,
 };
 
 /// Times of all frames of a sequence, in path time.
@@ -17,11 +18,15 @@ pub(super) struct FrameTiming {
     delay_s: f64,
     interlace_s: f64,
     first_field: Parity,
+    reset: Reset,
+    /// Camera and seed, where triggers are late or pictures doubled.
+    faults: Option<(CameraSpec, u64)>,
 }
 
 impl FrameTiming {
     pub(super) fn new(sequence: &Sequence) -> Self {
-        let CameraSpec { size_px, fps, phase, shutter, .. } = &sequence.scenario.camera;
+        let camera = &sequence.scenario.camera;
+        let CameraSpec { size_px, fps, phase, shutter, .. } = camera;
         let interlace_s = match shutter.interlace_ms {
             FieldOr::Field => 0.5 / fps,
             FieldOr::Ms(ms) => ms / 1000.0,
@@ -32,21 +37,29 @@ impl FrameTiming {
             phase: *phase,
             size_px: *size_px,
             readout: shutter.readout,
-            readout_s: shutter.readout_ms / 1000.0,
+            readout_s: camera.readout_ms() / 1000.0,
             delay_s: shutter.delay_ms / 1000.0,
             interlace_s,
             first_field: shutter.first_field,
+            reset: shutter.reset,
+            faults: camera.timing.is_some().then(|| (camera.clone(), sequence.scenario.seed)),
         }
     }
 
-    /// Stamp of a frame: `start + (i + phase) / fps`.
+    /// Instant of a frame to which its rows refer: `start + (i + phase) / fps`, and with faults of the timing
+    /// the late trigger of the picture that it shows.
     pub(super) fn stamp_s(&self, frame: u64) -> f64 {
-        self.start_s + (frame as f64 + self.phase) / self.fps
+        self.stamp_of(frame as i64)
     }
 
     /// As [`Self::stamp_s`], for a frame of any number.
-    pub(super) fn stamp_of(&self, frame: f64) -> f64 {
-        self.start_s + (frame + self.phase) / self.fps
+    pub(super) fn stamp_of(&self, frame: i64) -> f64 {
+        let faults = self.faults.as_ref().and_then(|(camera, seed)| TimingFaults::new(camera, *seed));
+        let (picture, late_s) = faults.map_or((frame, 0.0), |faults| {
+            let picture = faults.picture(frame);
+            (picture, faults.late_s(picture))
+        });
+        self.start_s + (picture as f64 + self.phase) / self.fps + late_s
     }
 
     /// Mid-exposure of a pixel relative to the stamp of its frame. The rows, counted along the readout, share
@@ -57,14 +70,27 @@ impl FrameTiming {
 
     /// Mid-exposure of a place along the readout, pixels, in the field of an image row.
     pub(super) fn dt_along_s(&self, along_px: f64, row: u32) -> f64 {
-        let count = f64::from(self.lines());
-        let nth = match self.readout {
-            Readout::TopToBottom | Readout::LeftToRight => along_px,
-            Readout::BottomToTop | Readout::RightToLeft => count - 1.0 - along_px,
-        };
+        let (nth, count) = self.place_in_readout(along_px);
         let lag_s =
             if row.is_multiple_of(2) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
-        self.readout_s * (2.0 * nth + 1.0 - count) / (2.0 * count) - self.delay_s - lag_s
+        // Rows whose exposures begin at once have their middles half as far apart as their ends.
+        let spread_s = match self.reset {
+            Reset::Rolling => self.readout_s,
+            Reset::Global => self.readout_s / 2.0,
+        };
+        spread_s * (2.0 * nth + 1.0 - count) / (2.0 * count) - self.delay_s - lag_s
+    }
+
+    /// How many rows are read before a place along the readout, and how many are read one after the other.
+    fn place_in_readout(&self, along_px: f64) -> (f64, f64) {
+        let count = f64::from(self.lines());
+        let from_edge = along_px.min(count - 1.0 - along_px);
+        match self.readout {
+            Readout::TopToBottom | Readout::LeftToRight => (along_px, count),
+            Readout::BottomToTop | Readout::RightToLeft => (count - 1.0 - along_px, count),
+            Readout::EdgesInward => (from_edge, count / 2.0),
+            Readout::MiddleOutward => (count / 2.0 - 1.0 - from_edge, count / 2.0),
+        }
     }
 
     /// Mid-exposure of row `line` of the readout relative to the stamp. With sideways readout it is a column,
@@ -78,6 +104,16 @@ impl FrameTiming {
         }
     }
 
+    /// Mid-exposures of two rows, relative to the stamp, of which one is the first that is read and the other
+    /// the last.
+    pub(super) fn ends_s(&self) -> [f64; 2] {
+        let other = match self.readout {
+            Readout::MiddleOutward | Readout::EdgesInward => self.lines() / 2,
+            _ => self.lines() - 1,
+        };
+        [0, other].map(|line| self.dt_row_s(line))
+    }
+
     /// Number of rows (or columns) of the readout.
     pub(super) fn lines(&self) -> u32 {
         self.size_px[usize::from(self.reads_rows())]
@@ -85,11 +121,21 @@ impl FrameTiming {
 
     /// Whether all pixels of an image row share one time.
     pub(super) fn reads_rows(&self) -> bool {
-        matches!(self.readout, Readout::TopToBottom | Readout::BottomToTop)
+        !matches!(self.readout, Readout::LeftToRight | Readout::RightToLeft)
     }
 
     /// Distance between rows of the same field: 2 if the fields have different times, else 1.
     pub(super) fn field_rows(&self) -> u32 {
         if self.interlace_s > 0.0 { 2 } else { 1 }
+    }
+
+    /// How much longer than `exposure_ms` a pixel is exposed, seconds: with a global reset by the time for which
+    /// it waits until it is read.
+    pub(super) fn longer_s(&self, [x, y]: [u32; 2]) -> f64 {
+        let (nth, count) = self.place_in_readout(f64::from(if self.reads_rows() { y } else { x }));
+        match self.reset {
+            Reset::Rolling => 0.0,
+            Reset::Global => self.readout_s * nth / count,
+        }
     }
 }

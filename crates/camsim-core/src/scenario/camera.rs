@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec};
+use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec, TimingSpec};
 use crate::{
     lens::LensTable,
     shutter::{Shutter, ShutterError},
@@ -61,6 +61,9 @@ pub struct CameraSpec {
     /// Exposure that follows the pictures, in place of that of `shutter`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub auto_exposure: Option<AutoExposureSpec>,
+    /// Faults of trigger, stamps and delivery.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimingSpec>,
 }
 
 impl Default for CameraSpec {
@@ -83,6 +86,7 @@ impl Default for CameraSpec {
             photometric: PhotometricSpec::default(),
             sensor: None,
             auto_exposure: None,
+            timing: None,
         }
     }
 }
@@ -109,6 +113,12 @@ impl CameraSpec {
         let shutter = Shutter::from_spec(&self.shutter, self.fps, self.size_px)?;
         let auto = self.auto_exposure.as_ref().filter(|_| shutter.exposure_s() > 0.0);
         Ok(auto.map_or(shutter, |auto| shutter.with_exposure_s(1e-3 * auto.exposure_ms[1])))
+    }
+
+    /// Readout time, milliseconds: [`ShutterSpec::readout_ms_of`] this camera's picture.
+    #[must_use]
+    pub fn readout_ms(&self) -> f64 {
+        self.shutter.readout_ms_of(self.size_px)
     }
 }
 
@@ -248,6 +258,52 @@ pub struct ShutterSpec {
     pub interlace_ms: FieldOr,
     /// Parity (0-based) of the rows of the earlier field.
     pub first_field: Parity,
+    /// Time from a row to the next, in place of `readout_ms`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_time_us: Option<f64>,
+    /// When the exposures of the rows begin.
+    #[serde(skip_serializing_if = "Reset::is_rolling")]
+    pub reset: Reset,
+    /// Whether the readout may be longer than the period of a frame.
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_overlap: bool,
+}
+
+/// Beginnings of the rows' exposures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reset {
+    /// Each row as long before its readout as all others.
+    #[default]
+    Rolling,
+    /// All rows at once: the exposure of the row that is read first is `exposure_ms`, and that of each next
+    /// one is longer by the time from row to row.
+    Global,
+}
+
+impl Reset {
+    fn is_rolling(&self) -> bool {
+        *self == Self::Rolling
+    }
+}
+
+impl ShutterSpec {
+    /// Time from the first row that is read to the last, milliseconds, of a picture of this size, by
+    /// `readout_ms` or `line_time_us`.
+    #[must_use]
+    pub fn readout_ms_of(&self, [width, height]: [u32; 2]) -> f64 {
+        let lines = match self.readout {
+            Readout::LeftToRight | Readout::RightToLeft => f64::from(width),
+            Readout::TopToBottom | Readout::BottomToTop => f64::from(height),
+            Readout::MiddleOutward | Readout::EdgesInward => 0.5 * f64::from(height),
+        };
+        self.line_time_us.map_or(self.readout_ms, |us| 1e-3 * us * lines)
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 impl Default for ShutterSpec {
@@ -259,6 +315,9 @@ impl Default for ShutterSpec {
             exposure_ms: 0.0,
             interlace_ms: FieldOr::Ms(0.0),
             first_field: Parity::Even,
+            line_time_us: None,
+            reset: Reset::Rolling,
+            allow_overlap: false,
         }
     }
 }
@@ -287,6 +346,10 @@ pub enum Readout {
     LeftToRight,
     /// Last column first.
     RightToLeft,
+    /// Both halves at once, the middle rows first.
+    MiddleOutward,
+    /// Both halves at once, the outer rows first.
+    EdgesInward,
 }
 
 /// `[camera.photometric]`: paper section 7.

@@ -6,7 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Channel, FieldOr, FlowInstant, ImageSensorSpec, LensSpec, PlaneKind, Scenario};
+use super::{
+    Channel, FieldOr, FlowInstant, ImageSensorSpec, LensSpec, PlaneKind, Reset, Scenario, ShutterSpec,
+};
 use crate::shutter::{Shutter, ShutterError};
 
 /// Largest number of pictures of a burst.
@@ -130,16 +132,28 @@ impl TwinSpec {
         let centre_s = if self.is_global() { at_s(self.instant.unwrap_or_default()) } else { 0.0 };
         let (Some(k), Some(count)) = (instant, self.instants) else { return centre_s };
         match self.over.unwrap_or_default() {
-            BurstOver::Exposure => {
-                let share = (f64::from(k) + 0.5) / f64::from(count) - 0.5;
-                centre_s + share * shutter.exposure_s()
-            }
+            BurstOver::Exposure => centre_s + exposure_share(k, count) * shutter.centre_exposure_s(),
             BurstOver::Readout if count == 1 => at_s(FlowInstant::Centre),
             BurstOver::Readout => {
                 let [first_s, last_s] = [FlowInstant::FirstRow, FlowInstant::LastRow].map(at_s);
                 first_s + (last_s - first_s) * f64::from(k) / f64::from(count - 1)
             }
         }
+    }
+}
+
+/// Share of the exposure after its middle at which a picture of a burst is taken.
+fn exposure_share(k: u32, count: u32) -> f64 {
+    (f64::from(k) + 0.5) / f64::from(count) - 0.5
+}
+
+/// Makes instants of exposures that begin all at once: the row times are those of a rolling shutter then.
+fn without_reset(shutter: &mut ShutterSpec, size_px: [u32; 2], share: f64) {
+    if shutter.reset == Reset::Global {
+        // From row to row half a line, as far as mid-exposures are apart, and what their exposures differ by.
+        shutter.readout_ms = (0.5 + share) * shutter.readout_ms_of(size_px);
+        shutter.line_time_us = None;
+        shutter.reset = Reset::Rolling;
     }
 }
 
@@ -169,9 +183,15 @@ impl Scenario {
                 auto.nominal_ms.get_or_insert(camera.shutter.exposure_ms);
             }
             camera.shutter.exposure_ms = 0.0;
+            let over_exposure =
+                twin.instants.filter(|_| twin.over.unwrap_or_default() == BurstOver::Exposure);
+            let share = instant.zip(over_exposure).map_or(0.0, |(k, count)| exposure_share(k, count));
+            without_reset(&mut camera.shutter, camera.size_px, share);
         }
         if twin.is_global() {
             camera.shutter.readout_ms = 0.0;
+            camera.shutter.line_time_us = None;
+            camera.shutter.reset = Reset::Rolling;
             camera.shutter.interlace_ms = FieldOr::Ms(0.0);
         }
         if twin.leaves_out(twin.lens) {

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::{
-    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver,
-    Stamps, TrackerSpec,
+    Auto, Axis, CameraSpec, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, Stamps,
+    TrackerSpec,
 };
 use crate::temporal::{MAX_KEYS, SAMPLES};
 
@@ -15,6 +15,7 @@ mod names;
 mod rig;
 mod scene;
 mod sensors;
+mod timing;
 mod tracks;
 mod twins;
 mod video;
@@ -64,6 +65,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     sensors::check_sensors(&mut check, scenario);
     image_sensor::check_with_output(&mut check, scenario);
     auto_exposure::check_with_scenario(&mut check, scenario);
+    timing::check_with_quality(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }
@@ -226,25 +228,8 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
         "needs a table of calibrations; add [[camera.zoom]] entries".into()
     });
 
-    let shutter = &camera.shutter;
-    check.not_negative(
-        "camera.shutter.delay_ms",
-        shutter.delay_ms,
-        "it is the age of the image centre at its stamp",
-    );
-    check.not_negative(
-        "camera.shutter.readout_ms",
-        shutter.readout_ms,
-        "reverse the direction with camera.shutter.readout",
-    );
-    check.not_negative("camera.shutter.exposure_ms", shutter.exposure_ms, "0 is an instant");
-    if let FieldOr::Ms(ms) = shutter.interlace_ms {
-        check.not_negative(
-            "camera.shutter.interlace_ms",
-            ms,
-            "choose the earlier rows with camera.shutter.first_field",
-        );
-    }
+    timing::check_shutter(check, camera);
+    timing::check_timing(check, camera);
 
     let photometric = &camera.photometric;
     let [t1, t2] = photometric.vignette_thresholds;

@@ -108,10 +108,10 @@ struct ReversePass<'a> {
     photometry: Photometry,
     vignette: &'a [f32],
     noise_seed: u64,
+    /// Number of the frame whose noise it has.
+    picture: u32,
     noise_table: Vec<f32>,
     coords_phase: f64,
-    /// Exposure as a share of the window.
-    exposure_share: f64,
 }
 
 /// An output pixel with a ray.
@@ -139,7 +139,6 @@ impl<'a> ReversePass<'a> {
         );
         let rows = Rows::new(plan, inputs.rows);
         let keys = ideal.iter().enumerate().map(|(number, image)| Key::new(plan, number, image, &rows));
-        let window_s = (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE);
         Self {
             plan,
             rays: Rays::new(&plan.camera, plan.ray, inputs.lens_map),
@@ -153,9 +152,9 @@ impl<'a> ReversePass<'a> {
             photometry: Photometry::new(&sequence.scenario.camera, plan.exposure.as_ref()),
             vignette: inputs.vignette,
             noise_seed: sequence.scenario.noise_seed(),
+            picture: sequence.scenario.picture(plan.frame) as u32,
             noise_table: tail_table(),
             coords_phase: inputs.coords_phase.into(),
-            exposure_share: plan.shutter.exposure_s() / window_s,
         }
     }
 
@@ -173,7 +172,7 @@ impl<'a> ReversePass<'a> {
             RayStage::GaussNewton if is_dark && !self.plan.truth => Ray::default(),
             _ => self.rays.ray(position)?,
         };
-        let key = nearest_first(self.rows.share(position), self.keys.len()).next().unwrap_or_default();
+        let key = nearest_first(self.rows.shares(position)[0], self.keys.len()).next().unwrap_or_default();
         let pixel = Pixel { position, ray, key, exposure: self.rows.exposure(key, position) };
         let (mut color, mut silhouette) = (DVec3::ZERO, None);
         if !is_dark {
@@ -221,7 +220,7 @@ impl<'a> ReversePass<'a> {
             color.as_vec3().to_array(),
             weight,
             pixel.position,
-            self.plan.frame as u32,
+            self.picture,
             self.noise_seed,
             &self.noise_table,
         );

@@ -87,8 +87,9 @@ impl Exposure<'_> {
 #[derive(Debug)]
 pub(super) struct Rows {
     poses: Vec<Pose>,
-    /// Mid-exposure of every field and row as a share of the window; empty with one key frame.
-    shares: Vec<f64>,
+    /// Mid-exposure of every field and row, and its exposure time, as shares of the window; empty with one key
+    /// frame.
+    shares: Vec<[f64; 2]>,
     axis: RowAxis,
     /// Rows of a field.
     rows: usize,
@@ -113,7 +114,8 @@ impl Rows {
                 let has_references = keys > 1 || plan.has_displaced_key();
                 let all = entries + if has_references { keys } else { 0 };
                 if keys > 1 {
-                    shares.extend(table.entries[all..].iter().map(|entry| f64::from(entry[0][0])));
+                    let of_row = |entry: &[[f32; 4]; 3]| [entry[0][0], entry[0][1]].map(f64::from);
+                    shares.extend(table.entries[all..].iter().map(of_row));
                 }
                 table.entries[..all].iter().map(Pose::from_entry).collect()
             }
@@ -145,8 +147,8 @@ impl Rows {
         self.poses.get(self.keys * self.fields * self.rows * self.stride + key).copied()
     }
 
-    /// Mid-exposure of a pixel's row as a share of the window.
-    pub fn share(&self, pixel: [u32; 2]) -> f64 {
-        self.shares.get(self.row(pixel)).copied().unwrap_or(0.5)
+    /// Mid-exposure of a pixel's row, and its exposure time, as shares of the window.
+    pub fn shares(&self, pixel: [u32; 2]) -> [f64; 2] {
+        self.shares.get(self.row(pixel)).copied().unwrap_or([0.5, 1.0])
     }
 }

@@ -345,7 +345,8 @@ impl ReversePass<'_> {
         uv: DVec2,
         share: f64,
     ) -> Option<(&SilhouetteImage<'_>, SurfaceHit)> {
-        let window_share = self.rows.share(pixel.position) + (share - 0.5) * self.exposure_share;
+        let [row_share, exposure_share] = self.rows.shares(pixel.position);
+        let window_share = row_share + (share - 0.5) * exposure_share;
         let mut first = None;
         for number in nearest_first(window_share, self.keys.len()) {
             let image = self.keys[number].silhouettes.as_ref()?;

@@ -101,10 +101,11 @@ impl Swept {
     fn project(&self, path: &CameraPath, plan: &FramePlan, line: usize) -> Vec<Projected> {
         let [x, y] = pixel(plan, line, 0);
         let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-        let half_s = 0.5 * plan.shutter.exposure_s();
+        let exposure_s = plan.shutter.exposure_pixel_s(x, y);
+        let half_s = 0.5 * exposure_s;
         let swept = self.motion.bounds(&self.bounds, mid_s - half_s, mid_s + half_s);
         let poses = PHASES.map(|phase| {
-            let t_s = mid_s + phase * plan.shutter.exposure_s();
+            let t_s = mid_s + phase * exposure_s;
             (t_s, path.pose(t_s))
         });
         self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way))).collect()

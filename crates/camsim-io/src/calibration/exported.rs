@@ -1,6 +1,6 @@
 //! The formats, and what each has no place for.
 
-use camsim_core::scenario::{CameraSpec, Readout};
+use camsim_core::scenario::{CameraSpec, Readout, Reset};
 use toml::{Table, Value};
 
 use super::{
@@ -129,6 +129,10 @@ impl CalibrationFormat {
     /// Whether it has the readout of a camera.
     fn has_readout(self, spec: &CameraSpec) -> bool {
         let is_down = spec.shutter.readout == Readout::TopToBottom;
+        // Rows that begin at once are exposed half as far apart as they are read, which no format says.
+        if spec.shutter.reset == Reset::Global {
+            return false;
+        }
         match self {
             Self::Kalibr | Self::OpenVins => is_down || spec.shutter.readout == Readout::BottomToTop,
             Self::Vins => is_down,
@@ -148,7 +152,7 @@ impl CalibrationFormat {
             "name" => matches!(self, Self::Ros | Self::Vins),
             "fps" => self.has_rate(spec),
             "clock_offset_ms" | "shutter.delay_ms" => self.has_time_shift(),
-            "shutter.readout_ms" | "shutter.readout" => self.has_readout(spec),
+            "shutter.readout_ms" | "shutter.readout" | "shutter.line_time_us" => self.has_readout(spec),
             "mount.angles_deg" | "mount.offset_m" => self.has_poses(),
             // A lens that a format does not have is an error.
             key => key.starts_with("lens"),

@@ -98,6 +98,7 @@ pub(super) fn apply(
             "the readout of {} ms is longer than the frame period of {period_ms:.3} ms",
             spec.shutter.readout_ms
         ));
+        spec.shutter.allow_overlap = true;
     }
     let lacks_shutter = timings.readout_ms.is_none() && timings.is_rolling.is_none() && !is_reported;
     match (timings.fps.is_none() && !timings.has_invalid_rate && !is_reported, lacks_shutter) {
@@ -279,6 +280,8 @@ fn reversed_if(direction: Readout, is_reversed: bool) -> Readout {
         (Readout::BottomToTop, true) => Readout::TopToBottom,
         (Readout::LeftToRight, true) => Readout::RightToLeft,
         (Readout::RightToLeft, true) => Readout::LeftToRight,
+        (Readout::MiddleOutward, true) => Readout::EdgesInward,
+        (Readout::EdgesInward, true) => Readout::MiddleOutward,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use camsim_core::scenario::{Readout, Reset};
 use glam::DVec3;
 
 use super::{
@@ -191,33 +192,53 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, notes: &[String]) -> Strin
 pub(super) fn timing(camera: &RunCamera) -> String {
     let shutter = &camera.shutter;
     let [delay_ms, readout_ms] = [shutter.delay_s(), shutter.readout_s()].map(|s| 1e3 * s);
+    let middle = if shutter.is_split() { "the middle of the readout" } else { "the image's centre" };
     let centre = if delay_ms == 0.0 {
-        "the image's centre is exposed at the stamp (middle of the exposure)".to_owned()
+        format!("{middle} is exposed at the stamp (middle of the exposure)")
     } else {
-        format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
+        format!("{middle} is exposed {delay_ms} ms before the stamp (middle of the exposure)")
     };
     let offset_ms = camera.spec.clock_offset_ms;
     let centre = match offset_ms == 0.0 {
         true => centre,
         false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
     };
+    let centre = match camera.spec.timing {
+        None => centre,
+        Some(_) => format!(
+            "{centre}; stamps have the faults of camera.timing, poses and trajectories the true times"
+        ),
+    };
     if readout_ms == 0.0 {
-        format!("{centre}; global shutter")
-    } else {
-        format!(
-            "{centre}; row (or column) y of N = {} is exposed ((y + 0.5)/N - 0.5) {readout_ms} ms later, read {}",
-            shutter.lines(),
-            direction(camera)
-        )
+        return format!("{centre}; global shutter");
     }
+    // With a global reset mid-exposures are half as far apart as rows are read.
+    let (resets_globally, lines, direction) =
+        (shutter.reset() == Reset::Global, shutter.lines(), direction(camera));
+    let apart_ms = if resets_globally { 0.5 * readout_ms } else { readout_ms };
+    let share = match camera.spec.shutter.readout {
+        Readout::MiddleOutward => "(|2y + 1 - N|/N - 0.5)",
+        Readout::EdgesInward => "(0.5 - |2y + 1 - N|/N)",
+        _ => "((y + 0.5)/N - 0.5)",
+    };
+    let growing = match resets_globally {
+        true => {
+            format!("; exposures begin at once and are {readout_ms} ms longer from the first row to the last")
+        }
+        false => String::new(),
+    };
+    format!(
+        "{centre}; row (or column) y of N = {lines} is exposed {share} {apart_ms} ms later, read {direction}{growing}"
+    )
 }
 
 fn direction(camera: &RunCamera) -> &'static str {
-    use camsim_core::scenario::Readout;
     match camera.spec.shutter.readout {
         Readout::TopToBottom => "from top to bottom",
         Readout::BottomToTop => "from bottom to top (y from there)",
         Readout::LeftToRight => "from left to right",
         Readout::RightToLeft => "from right to left (y from there)",
+        Readout::MiddleOutward => "in halves at once, from the middle outward",
+        Readout::EdgesInward => "in halves at once, from the edges inward",
     }
 }

@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use camsim_core::scenario::{FlowInstant, OutputEncoding, Readout};
+use camsim_core::scenario::{FlowInstant, OutputEncoding, Readout, Reset};
 use glam::{DQuat, DVec3};
 
 use super::{
@@ -87,10 +87,12 @@ pub(super) fn write_carla(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetErr
 /// Refuses cameras whose rows these layouts cannot describe.
 fn check_rolling(camera: &RunCamera) -> Result<(), DatasetError> {
     let shutter = &camera.spec.shutter;
-    let problem = if shutter.readout_ms == 0.0 {
+    let problem = if camera.shutter.readout_s() == 0.0 {
         "has a global shutter: set camera.shutter.readout_ms"
     } else if shutter.readout != Readout::TopToBottom || camera.shutter.interlace_s() != 0.0 {
         "is not read from top to bottom at once: set camera.shutter.readout = \"top-to-bottom\" and interlace_ms = 0"
+    } else if shutter.reset == Reset::Global {
+        "resets all rows at once: set camera.shutter.reset = \"rolling\""
     } else {
         return Ok(());
     };
@@ -141,7 +143,7 @@ fn write_sequence(
         &format!("# Ground truth velocity in camera frame\n# wx, wy, wz, x, y, z\n{}\n", numbers.join(" ")),
     )?;
     let [width, height] = camera.spec.size_px;
-    let row_ms = camera.spec.shutter.readout_ms / f64::from(height);
+    let row_ms = camera.spec.readout_ms() / f64::from(height);
     let meta = format!(
         "#Rolling shutter camera intrinsic parameters\nFPS: {}\nROW_READOUT_TIME(ms): {row_ms:.8}\nRESOLUTION_H: \
          {height}\nRESOLUTION_W: {width}\n",

@@ -6,6 +6,7 @@ use camsim_core::{
     pose::CameraPose,
     scenario::{CameraSpec, FieldOr, FlowInstant, TwinSpec},
     shutter::Shutter,
+    timing_faults::TimingFaults,
 };
 use glam::{DQuat, DVec3};
 use serde_json::Value;
@@ -204,10 +205,24 @@ impl RunCamera {
         )))
     }
 
-    /// Time of the mid-exposure of the image's centre on the platform's clock, nanoseconds.
+    /// Time of the mid-exposure of the image's centre on the platform's clock, nanoseconds, by the frame's stamp,
+    /// with its errors.
     #[must_use]
     pub fn centre_ns(&self, frame: &RunFrame) -> i64 {
         frame.stamp_ns.saturating_add((self.stamp_to_centre_s() * 1e9).round() as i64)
+    }
+
+    /// As [`Self::centre_ns`], but when it was really exposed.
+    #[must_use]
+    pub fn true_centre_ns(&self, frame: &RunFrame) -> i64 {
+        self.centre_ns(frame).saturating_sub(self.stamp_error_ns(frame))
+    }
+
+    /// How much a stamp is ahead of the trigger of its picture, but for the clock's offset, nanoseconds.
+    #[must_use]
+    pub fn stamp_error_ns(&self, frame: &RunFrame) -> i64 {
+        let faults = TimingFaults::new(&self.spec, self.manifest.scenario.seed);
+        faults.map_or(0, |faults| (faults.stamp_error_s(frame.number as i64) * 1e9).round() as i64)
     }
 
     /// What is added to a stamp to get the mid-exposure of the image's centre on the platform's clock, seconds.
@@ -224,7 +239,8 @@ impl RunCamera {
         self.shutter.delay_s() == 0.0 && self.shutter.interlace_s() == 0.0
     }
 
-    /// Pose at the mid-exposure of the image's centre: that at the stamp, or that between the two middle rows.
+    /// Pose at the mid-exposure of the image's centre, or of the middle of a readout in halves: that at the stamp,
+    /// or that between two rows.
     ///
     /// # Errors
     /// The camera has a delay, and the frames no `rows`.
@@ -235,8 +251,7 @@ impl RunCamera {
         self.require(format, &["rows"])?;
         let mut rows =
             CsvRows::open(&self.file(frame, "rows"), &["row", "n", "e", "d", "qw", "qx", "qy", "qz"])?;
-        let last = self.shutter.lines() - 1;
-        let (first, second) = (last / 2, last.div_ceil(2));
+        let (first, second, share) = self.shutter.centre_lines();
         let mut middle: Vec<(DVec3, DQuat)> = Vec::with_capacity(2);
         while rows.advance()? {
             let row: u32 = rows.whole(0)?;
@@ -248,7 +263,7 @@ impl RunCamera {
             let message = "has no row of the image's middle; render it again".to_owned();
             return Err(DatasetError::Input { path: self.file(frame, "rows"), message });
         };
-        Ok(CameraPose { position_ned_m: a.0.midpoint(b.0), ned_from_camera: a.1.slerp(b.1, 0.5) })
+        Ok(CameraPose { position_ned_m: a.0.lerp(b.0, share), ned_from_camera: a.1.slerp(b.1, share) })
     }
 
     /// Camera matrix and lens.
@@ -282,7 +297,7 @@ impl RunCamera {
     /// Whether all pixels have one instant.
     #[must_use]
     pub fn is_global(&self) -> bool {
-        self.spec.shutter.readout_ms == 0.0 && self.spec.shutter.interlace_ms == FieldOr::Ms(0.0)
+        self.shutter.readout_s() == 0.0 && self.spec.shutter.interlace_ms == FieldOr::Ms(0.0)
     }
 }
 

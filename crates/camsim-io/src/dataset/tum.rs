@@ -44,7 +44,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     Ok(notes)
 }
 
-/// Name of a frame's pictures: the time at which the image's centre is exposed.
+/// Name of a frame's pictures: the time at which the image's centre is exposed, by the camera's stamp.
 fn stamp(camera: &RunCamera, frame: &RunFrame) -> String {
     seconds(camera.centre_ns(frame))
 }
@@ -81,7 +81,7 @@ fn write_camera(
         writeln!(out, "# ground truth trajectory\n# camsim\n# timestamp tx ty tz qx qy qz qw")?;
         camera.frames.iter().try_for_each(|frame| {
             let pose = camera.centre_pose(job.name(), frame)?;
-            Ok(writeln!(out, "{} {}", stamp(camera, frame), pose_text(&pose))?)
+            Ok(writeln!(out, "{} {}", seconds(camera.true_centre_ns(frame)), pose_text(&pose))?)
         })
     })?;
     job.target.text(&file("calibration.txt"), &calibration_text)

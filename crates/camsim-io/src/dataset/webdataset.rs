@@ -137,14 +137,14 @@ fn describe(job: &ExportJob<'_>, series: &Series<'_>, frame: &RunFrame) -> Resul
         "frame": frame.number,
         "camera": camera.name,
         "stamp_ns": frame.stamp_ns,
-        "centre_ns": camera.centre_ns(frame),
+        "centre_ns": camera.true_centre_ns(frame),
         "position_enu_m": pose.translation_m.to_array(),
         "enu_from_camera_wxyz": wxyz(pose.rotation),
         "size_px": spec.size_px,
         "focal_px": spec.focal_px,
         "principal_point_px": camera.intrinsics().map(|lens| lens.principal_px).ok(),
         "lens": spec.lens,
-        "readout_ms": spec.shutter.readout_ms,
+        "readout_ms": spec.readout_ms(),
         "exposure_ms": frame.exposure_ms,
     });
     Ok(value.to_string() + "\n")
@@ -172,7 +172,7 @@ fn write_samples(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) ->
         writeln!(out, "key,shard,frame,camera,stamp_ns,centre_ns")?;
         for (k, shard) in shards.iter().enumerate() {
             for (series, frame) in *shard {
-                let (camera, centre_ns) = (&series.camera.name, series.camera.centre_ns(frame));
+                let (camera, centre_ns) = (&series.camera.name, series.camera.true_centre_ns(frame));
                 let (key, shard, number) = (key(series, frame), shard_name(k), frame.number);
                 writeln!(out, "{key},{shard},{number},{camera},{},{centre_ns}", frame.stamp_ns)?;
             }
@@ -193,7 +193,7 @@ fn write_parquet(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) ->
                 key: key(series, frame),
                 shard: shard_name(k),
                 camera: camera.name.clone(),
-                numbers: [frame.number as i64, frame.stamp_ns, camera.centre_ns(frame)],
+                numbers: [frame.number as i64, frame.stamp_ns, camera.true_centre_ns(frame)],
                 pose: [x, y, z, qw, qx, qy, qz],
             })
         };

@@ -60,7 +60,7 @@ impl<'a> Entry<'a> {
             fps: camera.fps,
             phase: camera.phase,
             delay_ms: shutter.delay_ms,
-            readout_ms: shutter.readout_ms,
+            readout_ms: camera.readout_ms(),
             exposure_ms: shutter.exposure_ms,
             clock_offset_ms: camera.clock_offset_ms,
             lens: &camera.lens,

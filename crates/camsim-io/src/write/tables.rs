@@ -9,7 +9,7 @@ use camsim_core::{
 };
 use glam::{DQuat, DVec3};
 
-/// Columns of `rows/*.csv`; q is ned_from_camera.
+/// Columns of `rows/*.csv`; q is ned_from_camera. Where the exposures of the rows differ, `exposure_ns` follows.
 pub const ROWS_COLUMNS: &str = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
 /// Columns of `trajectory.csv` and of `camsim track`; q is ned_from_body, body rates are in rad/s, t_s is on
 /// the log's clock.
@@ -62,12 +62,16 @@ fn seconds(t_ns: i64) -> String {
 
 /// Text of `rows/*.csv` of one frame.
 pub fn rows_csv(rows: &[RowRecord]) -> String {
-    let mut text = format!("{ROWS_COLUMNS}\n");
+    let differ = rows.windows(2).any(|pair| pair[0].exposure_ns != pair[1].exposure_ns);
+    let mut text = format!("{ROWS_COLUMNS}{}\n", if differ { ",exposure_ns" } else { "" });
     for row in rows {
         let _ = write!(text, "{},{}", row.row, row.t_mid_ns);
         push(&mut text, &row.position_ned_m.to_array());
         push(&mut text, &wxyz(row.ned_from_camera));
         push(&mut text, &row.velocity_ned_m_s.to_array());
+        if differ {
+            let _ = write!(text, ",{}", row.exposure_ns);
+        }
         text.push('\n');
     }
     text

@@ -27,6 +27,7 @@ fn frame(index: u64) -> RenderedFrame {
         depth_m: Some((0..pixels).map(|i| i as f32 * 1.25).collect()),
         coords: Some((0..pixels).map(|i| std::array::from_fn(|c| (i * 8 + c) as f32 * 0.1)).collect()),
         rows: vec![RowRecord {
+            exposure_ns: 0,
             row: 0,
             t_mid_ns: -5,
             position_ned_m: DVec3::new(0.1, 2.0, -3.0),

@@ -13,8 +13,8 @@ use super::frame_plan::FramePlan;
 /// Relative poses `x_key = R x_row + t` of a frame: `[key][field][row][node]`, each three rows of `(R, t)`;
 /// with more than one node the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the
 /// mid-window camera's the poses `x_mid = R x_key + t` of the keys in that camera follow, and of frames with
-/// several keys then an entry for each field and row with the row's mid-exposure as a share of the window
-/// in its first number.
+/// several keys then an entry for each field and row with the row's mid-exposure and exposure time as shares of
+/// the window in its first two numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowPoses {
     /// Rows of `(R | t)`.
@@ -52,10 +52,15 @@ pub fn row_poses(plan: &FramePlan, path: &CameraPath) -> RowPoses {
     if plan.keys.len() > 1 {
         entries.extend(rows_of(plan).map(|(field, row)| {
             let share = plan.window_share(plan.stamp_s + row_dt_s(plan, field, row));
-            [[share as f32, 0.0, 0.0, 0.0], [0.0; 4], [0.0; 4]]
+            [[share as f32, exposure_share(plan, row) as f32, 0.0, 0.0], [0.0; 4], [0.0; 4]]
         }));
     }
     RowPoses { entries, stride }
+}
+
+/// Exposure of a row as a share of the window.
+fn exposure_share(plan: &FramePlan, row: u32) -> f64 {
+    plan.shutter.exposure_row_s(row) / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)
 }
 
 /// The time table of a frame, for the solvers that take the motion as constant. Differences are taken in f64.
@@ -82,7 +87,7 @@ fn entries_of<T>(plan: &FramePlan, entry: impl Fn(f64) -> T) -> (Vec<T>, u32) {
         if nodes > 1 {
             entries.extend((0..nodes).map(|node| {
                 let along = f64::from(node) / f64::from(nodes - 1) - 0.5;
-                entry(mid_s + plan.shutter.exposure_s() * along)
+                entry(mid_s + plan.shutter.exposure_row_s(row) * along)
             }));
         }
         entries.push(entry(mid_s));
@@ -119,6 +124,7 @@ pub fn row_records(plan: &FramePlan, path: &CameraPath, epoch_ns: i64) -> Vec<Ro
                 position_ned_m: pose.position_ned_m,
                 ned_from_camera: pose.ned_from_camera,
                 velocity_ned_m_s: path.velocity_ned(t_s),
+                exposure_ns: (plan.shutter.exposure_row_s(row) * 1e9).round() as i64,
             }
         })
         .collect()

@@ -78,7 +78,7 @@ impl BlendSearch<'_> {
         let uv = probe.uv + probe.uv_from_px * moved_px;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let key_pose = nearest_first(self.keys, mid_s).first()?.pose;
-        let pose = self.path.pose(mid_s + phase * self.shutter.exposure_s());
+        let pose = self.path.pose(mid_s + phase * self.shutter.exposure_pixel_s(x, y));
         let ray_ned = pose.ned_from_camera * uv.extend(1.0);
         let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned);
         let range_per_depth = uv.extend(1.0).length();

@@ -128,7 +128,7 @@ impl<'a> TextureSearch<'a, '_> {
             return ProbeView::Several;
         };
         let Some(spectra) = self.spectra.of_surface(shown.surface) else { return ProbeView::Several };
-        let exposure_s = shutter.exposure_s();
+        let exposure_s = shutter.exposure_pixel_s(x, y);
         let path = path_px(&sequence.path, mid_s, exposure_s, probe.uv, shown.inverse_depth, focal_px);
         let clear = sequence
             .scene

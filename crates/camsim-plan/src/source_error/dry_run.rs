@@ -244,8 +244,9 @@ impl DryRun<'_> {
 
     /// Instant at a share of the exposure, 0 to 1.
     fn instant_s(&self, probe: &Probe, share: f64) -> f64 {
-        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
-        mid_s + self.shutter.exposure_s() * (share - 0.5)
+        let [x, y] = probe.pixel;
+        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
+        mid_s + self.shutter.exposure_pixel_s(x, y) * (share - 0.5)
     }
 
     /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth

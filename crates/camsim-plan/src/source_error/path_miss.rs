@@ -49,7 +49,8 @@ impl ExactSources<'_> {
         };
         let misses: Vec<f64> = probes.iter().step_by(every).enumerate().map(miss).collect();
         let between = PathMiss { largest_px: largest(&misses), rms_px: OVER_TIME * rms(&misses) };
-        if !may_alias(blur.solved() - 1, dry_run.path.highest_vibration_hz() * dry_run.shutter.exposure_s()) {
+        let longest_s = dry_run.shutter.longest_exposure_s();
+        if !may_alias(blur.solved() - 1, dry_run.path.highest_vibration_hz() * longest_s) {
             return between;
         }
         // Nodes and the middles between them may be whole periods apart.

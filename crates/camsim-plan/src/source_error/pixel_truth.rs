@@ -80,12 +80,14 @@ impl<'a> FrameRays<'a> {
             RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
             RowAxis::Columns => (0..columns).flat_map(|x| [[x, 0], [x, 1]]).collect(),
         };
-        let cameras = |shift_s: f64| {
-            let times = pixels.iter().map(|&[x, y]| plan.stamp_s + plan.shutter.dt_pixel_s(x, y) + shift_s);
+        let shutter = &plan.shutter;
+        let cameras = |phase: f64| {
+            let times = pixels.iter().map(|&[x, y]| {
+                plan.stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y)
+            });
             times.map(|t_s| RowCamera { t_s, pose: path.pose(t_s) }).collect()
         };
-        let shift_s = phase * plan.shutter.exposure_s();
-        let at_phase = if shift_s == 0.0 { Vec::new() } else { cameras(shift_s) };
+        let at_phase = if phase * shutter.exposure_s() == 0.0 { Vec::new() } else { cameras(phase) };
         Self { path, surfaces, plan, mid: cameras(0.0), at_phase }
     }
 
@@ -142,7 +144,7 @@ impl<'a> FrameRays<'a> {
     #[must_use]
     pub fn camera_at(&self, [x, y]: [u32; 2], phase: f64) -> (f64, CameraPose) {
         let FramePlan { shutter, stamp_s, .. } = self.plan;
-        let t_s = stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_s();
+        let t_s = stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y);
         (t_s, self.path.pose(t_s))
     }
 

@@ -137,7 +137,7 @@ impl ExposedFrame<'_> {
 
     /// Periods of the fastest vibration within the exposure, where it bends the path.
     fn periods(&self) -> f64 {
-        self.path.highest_vibration_hz() * self.shutter.exposure_s()
+        self.path.highest_vibration_hz() * self.shutter.longest_exposure_s()
     }
 
     /// Polynomials of one kind that keep within `allowed_px`, or as many as there may be.
@@ -167,11 +167,12 @@ impl ExposedFrame<'_> {
         let mut worst = 0.0_f64;
         for &(uv, [x, y]) in self.reach.rays.iter().step_by((self.reach.rays.len() / RAYS).max(1)) {
             let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
+            let exposure_s = self.shutter.exposure_pixel_s(x, y);
             let mid = self.path.pose(mid_s);
             for k in (0..tried).map(|k| k * stretches / tried) {
                 let pose = |half: u32| {
                     let share = (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
-                    self.path.pose(mid_s + self.shutter.exposure_s() * (share - 0.5)).relative_to(&mid)
+                    self.path.pose(mid_s + exposure_s * (share - 0.5)).relative_to(&mid)
                 };
                 let poses: Vec<(DMat3, DVec3)> = (0..=halves).map(pose).collect();
                 for w in [0.0, 1.0 / self.motion.nearest_m] {

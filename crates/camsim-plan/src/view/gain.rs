@@ -7,6 +7,7 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel, frame: u64) -> imp
     let photometric = &sequence.scenario.camera.photometric;
     let light = photometric.light * sequence.exposure(frame).map_or(1.0, |exposure| exposure.light);
     let size_px = camera.size_px;
+    let gains = sequence.light_gains();
     move |[x, y]: [u32; 2]| {
         let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
             let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / size_px[k]) as usize);
@@ -15,6 +16,7 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel, frame: u64) -> imp
                 photometric.vignette_thresholds,
             ))
         });
-        vignette * light
+        let exposed = gains.as_ref().map_or(1.0, |shutter| shutter.light_gain(x, y));
+        vignette * exposed * light
     }
 }

@@ -74,13 +74,14 @@ pub(crate) fn ideal_extent(
     // The grid of the reach steps over rows of one parity: a neighbour stands for the other field.
     let in_fields = reach.rays.iter().flat_map(|&(uv, [x, y])| {
         let other = if shutter.interlace_s() > 0.0 { Some((y ^ 1).min(last_row)) } else { None };
-        std::iter::once(y).chain(other).map(move |y| (uv, shutter.dt_pixel_s(x, y)))
+        std::iter::once(y).chain(other).map(move |y| (uv, [x, y]))
     });
-    for (uv, dt_s) in in_fields {
-        let mid_s = stamp_s + dt_s;
+    for (uv, [x, y]) in in_fields {
+        let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+        let exposure_s = shutter.exposure_pixel_s(x, y);
         let mut include = |tangent: DVec2| extent = extent.and(IdealExtent { low: tangent, high: tangent });
         for phase in [-0.5, 0.0, 0.5] {
-            let t_s = mid_s + phase * shutter.exposure_s();
+            let t_s = mid_s + phase * exposure_s;
             let pose = path.pose(t_s);
             for w in [0.0, inverse_near] {
                 for key in nearest_first(keys, mid_s).into_iter().take(2) {

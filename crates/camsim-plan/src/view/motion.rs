@@ -69,16 +69,16 @@ fn blur_path(
     ideal: &IdealGeometry,
     inverse_near: f64,
 ) -> (f64, f64) {
-    let exposure_s = shutter.exposure_s();
-    if exposure_s <= 0.0 {
+    let longest_s = shutter.longest_exposure_s();
+    if longest_s <= 0.0 {
         return (0.0, 0.0);
     }
     let steps =
-        (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
+        (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * longest_s).ceil().clamp(16.0, 256.0) as u32;
     let (mut longest, mut sagitta) = (0.0_f64, 0.0_f64);
     let every = (reach.rays.len() / 24).max(1);
     for &(uv, [x, y]) in reach.rays.iter().step_by(every) {
-        let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+        let (mid_s, exposure_s) = (stamp_s + shutter.dt_pixel_s(x, y), shutter.exposure_pixel_s(x, y));
         let mid = path.pose(mid_s);
         for w in [0.0, inverse_near] {
             let places: Vec<DVec2> = (0..=steps)

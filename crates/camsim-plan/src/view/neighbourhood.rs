@@ -193,7 +193,7 @@ impl NeighbourhoodSearch<'_> {
     /// farther than that.
     fn sides_px(&self, points: &NinePoints<'_>) -> [f64; 2] {
         let (probe, focal_px) = (points.probe, self.reach.camera.central_focal_px());
-        let exposure_s = self.shutter.exposure_s();
+        let exposure_s = self.shutter.exposure_pixel_s(probe.pixel[0], probe.pixel[1]);
         let path = path_px(self.path, points.mid_s, exposure_s, probe.uv, points.middle(), focal_px);
         [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.0.length()]
     }

@@ -227,12 +227,11 @@ fn row_times(ui: &mut Ui, state: &State) {
         );
     }
     let steps = 64.min(shutter.lines());
-    let half_s = 0.5 * shutter.exposure_s();
     let exposed = ui.visuals().selection.bg_fill;
     for step in 0..steps {
         let line = (u64::from(step) * u64::from(shutter.lines() - 1) / u64::from(steps.max(2) - 1)) as u32;
         let y = rect.top() + rect.height() * (line as f32 + 0.5) / shutter.lines() as f32;
-        let mid_s = shutter.dt_row_s(line);
+        let (mid_s, half_s) = (shutter.dt_row_s(line), 0.5 * shutter.exposure_row_s(line));
         let ends =
             [pos2(x_of(mid_s - half_s), y), pos2((x_of(mid_s + half_s)).max(x_of(mid_s - half_s) + 2.0), y)];
         painter.line_segment(ends, Stroke::new((rect.height() / steps as f32).max(1.0), exposed));

@@ -1,7 +1,7 @@
 //! Checks of `[camera.auto_exposure]`.
 
 use super::Check;
-use crate::scenario::{AutoExposureSpec, BurstOver, CameraSpec, Preset, Scenario};
+use crate::scenario::{AutoExposureSpec, BurstOver, CameraSpec, Preset, Reset, Scenario};
 
 /// Full key of a leaf.
 fn key(leaf: &str) -> String {
@@ -61,6 +61,11 @@ pub(super) fn check_with_scenario(check: &mut Check, scenario: &Scenario) {
     }
     check.require(scenario.quality.preset != Preset::Paper, "quality.preset", || {
         "\"paper\" has its own photometric model; leave [camera.auto_exposure] out, or write \"default\""
+            .into()
+    });
+    check.require(scenario.camera.shutter.reset == Reset::Rolling, "camera.shutter.reset", || {
+        "= \"global\" gives each row an exposure of its own, and [camera.auto_exposure] one to each frame; leave one of \
+         them out"
             .into()
     });
     for (i, twin) in scenario.output.twin.iter().enumerate() {
@@ -129,6 +134,7 @@ mod tests {
         with_sensor.camera.sensor = sensor(Some(2.0));
         assert_eq!(validate(&with_sensor)[0].key, "camera.sensor.exposure_ms");
         assert_eq!(problem(|s| s.quality.preset = Preset::Paper), ["quality.preset"]);
+        assert_eq!(problem(|s| s.camera.shutter.reset = Reset::Global), ["camera.shutter.reset"]);
         let bursts = problem(|s| {
             s.output.twin = vec![TwinSpec { name: "burst".into(), instants: Some(9), ..TwinSpec::default() }];
         });

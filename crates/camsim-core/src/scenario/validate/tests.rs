@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::scenario::{
-    BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, ObjectsOf, PatternSpec, SceneSpec, VibrationSpec,
-    ZoomSpec,
+    BoardSpec, FieldOr, FlightSpec, GltfSpec, LensSpec, LightSpec, ObjectsOf, PatternSpec, SceneSpec,
+    VibrationSpec, ZoomSpec,
 };
 
 pub(crate) fn good() -> Scenario {

@@ -1,7 +1,7 @@
 //! Checks of `[[output.twin]]`.
 
 use super::{Check, names, validate};
-use crate::scenario::{BurstOver, Channel, MAX_INSTANTS, Scenario, TwinSpec};
+use crate::scenario::{BurstOver, Channel, FieldOr, MAX_INSTANTS, Scenario, TwinSpec};
 
 /// Names below the output folder that are taken, beside those of channels.
 const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette", "sensors", "datasets"];
@@ -87,7 +87,7 @@ fn check_burst(check: &mut Check, i: usize, twin: &TwinSpec, scenario: &Scenario
     let shutter = &scenario.camera.shutter;
     let is_instant = match twin.over.unwrap_or_default() {
         BurstOver::Exposure => shutter.exposure_ms == 0.0,
-        BurstOver::Readout => shutter.readout_ms == 0.0 && shutter.interlace_ms == super::FieldOr::Ms(0.0),
+        BurstOver::Readout => scenario.camera.readout_ms() == 0.0 && shutter.interlace_ms == FieldOr::Ms(0.0),
     };
     check.require(count == 1 || !is_instant, key("instants"), || match twin.over.unwrap_or_default() {
         BurstOver::Exposure => "are all the same, as camera.shutter.exposure_ms is 0; give it, or leave the \

@@ -80,7 +80,8 @@ impl Source for Pictures<'_> {
         bag.send(&self.topic("camera_info"), "sensor_msgs/msg/CameraInfo", t_ns, &self.info)?;
         if self.camera.vibrates() {
             let pose = enu_from_camera(&frame.pose);
-            let moved = StampedTransform::new(t_ns, "map", self.name.as_str(), &pose);
+            let true_ns = t_ns.saturating_sub(self.camera.stamp_error_ns(frame));
+            let moved = StampedTransform::new(true_ns, "map", self.name.as_str(), &pose);
             bag.send("/tf", "tf2_msgs/msg/TFMessage", t_ns, &TransformMessage { transforms: vec![moved] })?;
         }
         self.send_picture(frame, bag)?;

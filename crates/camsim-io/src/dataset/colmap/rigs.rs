@@ -58,7 +58,8 @@ pub(super) fn rigs(cameras: &[&RunCamera]) -> Vec<ModelRig> {
 
 /// Whether two cameras expose their centres at one instant somewhere.
 fn shares_instant(a: &RunCamera, b: &RunCamera) -> bool {
-    let instants = |camera: &RunCamera| camera.frames.iter().map(|frame| camera.centre_ns(frame)).collect();
+    let instants =
+        |camera: &RunCamera| camera.frames.iter().map(|frame| camera.true_centre_ns(frame)).collect();
     let (a, b): (Vec<i64>, Vec<i64>) = (instants(a), instants(b));
     let mut later = b.iter().peekable();
     a.iter().any(|t_ns| {
@@ -73,7 +74,11 @@ pub(super) fn moments(rig: &ModelRig, cameras: &[&RunCamera]) -> Vec<Moment> {
     for (sensor, RigSensor { camera, .. }) in rig.sensors.iter().enumerate() {
         let camera = cameras[*camera];
         all.extend(
-            camera.frames.iter().enumerate().map(|(place, frame)| (camera.centre_ns(frame), sensor, place)),
+            camera
+                .frames
+                .iter()
+                .enumerate()
+                .map(|(place, frame)| (camera.true_centre_ns(frame), sensor, place)),
         );
     }
     // Of one instant in the order of sensors, whatever the last nanosecond says.

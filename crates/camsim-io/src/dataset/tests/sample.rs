@@ -198,6 +198,7 @@ fn frame(number: u64) -> RenderedFrame {
         let t_ns = stamp_ns(number) - 5_000_000 + (2 * i64::from(row) - 3) * 500_000;
         let pose = pose((t_ns - stamp_ns(4)) as f64 / 1e8);
         RowRecord {
+            exposure_ns: 0,
             row,
             t_mid_ns: t_ns,
             position_ned_m: pose.position_ned_m,

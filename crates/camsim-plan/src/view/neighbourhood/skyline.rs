@@ -141,6 +141,7 @@ impl NeighbourhoodSearch<'_> {
         let pixel = surface_px.round().max(DVec2::ZERO).to_array().map(|px| px as u32);
         let focal_px = self.reach.camera.central_focal_px();
         let normal = self.normal(surface_px);
+        let exposure_s = self.shutter.exposure_pixel_s(pixel[0], pixel[1]);
         Some(SkylinePoint {
             pixel,
             pose,
@@ -152,10 +153,8 @@ impl NeighbourhoodSearch<'_> {
             normal,
             ground: hit.terrain.map(|ground| (ground, pose.position_ned_m + hit.depth_m * way_ned(uv))),
             contrast2: (self.gain)(pixel).powi(2) * contrast.length_squared() / 3.0,
-            swept_px: self.swept_px(mid_s, uv, hit.depth_m.recip(), normal),
-            path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), uv, hit.depth_m.recip(), focal_px)
-                .0
-                .length(),
+            swept_px: self.swept_px([mid_s, exposure_s], uv, hit.depth_m.recip(), normal),
+            path_px: path_px(self.path, mid_s, exposure_s, uv, hit.depth_m.recip(), focal_px).0.length(),
         })
     }
 
@@ -192,8 +191,14 @@ impl NeighbourhoodSearch<'_> {
 
     /// How far something moves before the sky over the exposure, across the skyline where that is known: by
     /// where the camera goes.
-    fn swept_px(&self, mid_s: f64, uv: DVec2, inverse_depth: f64, normal: Option<DVec2>) -> f64 {
-        let half_s = 0.5 * self.shutter.exposure_s();
+    fn swept_px(
+        &self,
+        [mid_s, exposure_s]: [f64; 2],
+        uv: DVec2,
+        inverse_depth: f64,
+        normal: Option<DVec2>,
+    ) -> f64 {
+        let half_s = 0.5 * exposure_s;
         if half_s == 0.0 {
             return 0.0;
         }

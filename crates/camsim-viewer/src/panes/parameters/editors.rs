@@ -47,6 +47,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Numbers(count) => optional_numbers(ui, key, value, document, param, count, out),
         ValueKind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
         ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
+        // Numbers of frames, which are whole.
+        ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, param),
         ValueKind::NumberList => number_list(ui, document, key, value, param, out),
         ValueKind::Path => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
