@@ -12,16 +12,18 @@
 //! Instants are seconds relative to the stamp of the frame. The ideal frame shows the scene at
 //! [`IdealFrame::instant_s`], where 0 is the stamp itself.
 
+use std::borrow::Cow;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::{
     camera::CameraModel,
     frame::RenderedFrame,
-    imaging::ImageSensor,
+    imaging::{ImageSensor, Optics},
     noise::{camera_seed, tail_table},
     photometric::{photometric, vignette_weights},
-    scenario::{CameraSpec, Preset, Solver},
+    scenario::{CameraSpec, PhotometricSpec, Preset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
     shutter::Shutter,
@@ -108,6 +110,7 @@ pub struct Pipeline<'a> {
     /// Stored (encoded) colours; only for the paper's preset.
     stored_rgba: Vec<f32>,
     nodes: u32,
+    photometric: Cow<'a, PhotometricSpec>,
     noise_seed: u64,
 }
 
@@ -168,6 +171,7 @@ impl<'a> Pipeline<'a> {
             flow,
             stored_rgba,
             nodes: 1,
+            photometric: spec.photometric_of_renderers(),
             noise_seed,
         };
         pipeline.nodes = pipeline.exposure_nodes();
@@ -302,6 +306,9 @@ impl<'a> Pipeline<'a> {
             depth_m: Some(depth_m),
             ..RenderedFrame::default()
         };
+        if let Some(optics) = Optics::new(self.spec, self.settings.seed) {
+            optics.expose(&mut frame);
+        }
         if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
             // These frames have no place on a clock: the stamp is 0.
             sensor.expose(&mut frame, 0.0);
@@ -323,7 +330,7 @@ impl<'a> Pipeline<'a> {
         let frame = self.settings.frame as u32;
         let finish = |color: DVec3| {
             photometric(
-                &self.spec.photometric,
+                &self.photometric,
                 color.as_vec3().to_array(),
                 weight,
                 pixel,

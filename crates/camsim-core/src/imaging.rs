@@ -1,7 +1,7 @@
-//! The image sensor: from the linear light of an output frame to digital numbers, and from these to a picture
-//! (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
+//! The lens as a blur (`[camera.point_spread]`), and the image sensor: from the linear light of an output frame to
+//! digital numbers, and from these to a picture (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
 //!
-//! There is one implementation for all renderers: it takes the finished picture of any of them. Its numbers are
+//! There is one implementation for all renderers: it takes the finished picture of any of them. A sensor's numbers are
 //! a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas: docs/IMAGING.md.
 
 mod demosaic;
@@ -10,6 +10,7 @@ mod draw;
 mod facts;
 mod fixed_pattern;
 mod flicker;
+mod optics;
 mod settings;
 
 use std::sync::LazyLock;
@@ -25,6 +26,7 @@ use crate::{
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
+pub use optics::{KernelError, KernelFile, LensTransfer, Optics, SpreadKernel};
 
 use develop::Development;
 use fixed_pattern::FixedPattern;

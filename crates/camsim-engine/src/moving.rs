@@ -112,12 +112,13 @@ impl MovingScene {
             })
             .collect();
         let mut scratch = RayScratch::default();
+        let scenario = &self.sequence.scenario;
+        let photometric_spec = scenario.camera.photometric_of_renderers();
         let color = |pixel: [u32; 2]| {
             let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
             let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
-            let scenario = &self.sequence.scenario;
             let value = photometric(
-                &scenario.camera.photometric,
+                &photometric_spec,
                 linear.to_array(),
                 weight,
                 pixel,

@@ -1,6 +1,8 @@
 //! Rendering of whole frames: each sample has its own position in the pixel's area and its own instant of the
 //! exposure.
 
+use std::borrow::Cow;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -10,7 +12,7 @@ use crate::{
     noise::tail_table,
     photometric::photometric,
     pose::CameraPose,
-    scenario::Channel,
+    scenario::{Channel, PhotometricSpec},
     sequence::GrayImage,
     temporal::IdealGeometry,
 };
@@ -43,7 +45,8 @@ pub struct RenderOptions {
     pub photometric: bool,
     /// Ideal frame to which the source coordinates of [`Channel::Coords`] refer. Without one they are 0.
     pub key: Option<IdealView>,
-    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all.
+    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all. With
+    /// `[camera.point_spread]` the frame is not exposed then ([`Oracle::expose`]).
     pub only: Option<Vec<bool>>,
 }
 
@@ -118,6 +121,7 @@ struct FrameJob<'a> {
     view: FrameView<'a>,
     frame: u64,
     options: &'a RenderOptions,
+    photometric: Cow<'a, PhotometricSpec>,
     noise_table: Vec<f32>,
     truth: bool,
 }
@@ -140,6 +144,7 @@ impl Oracle {
             view: self.view(frame),
             frame,
             options,
+            photometric: self.sequence.scenario.camera.photometric_of_renderers(),
             noise_table: tail_table(),
             truth: depth || coords,
         };
@@ -165,10 +170,27 @@ impl Oracle {
             planes: self.planes(frame, options),
             raw: None,
         };
-        if let Some(sensor) = self.sensor.as_ref().filter(|_| options.photometric) {
-            sensor.expose(&mut rendered, self.stamp_s(frame));
+        if options.photometric && !(self.optics.is_some() && options.only.is_some()) {
+            self.expose(&mut rendered);
         }
         (rendered, convergence)
+    }
+
+    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`Oracle::render`] does at its
+    /// end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light comes from all.
+    pub fn expose(&self, frame: &mut RenderedFrame) {
+        if let Some(optics) = &self.optics {
+            optics.expose(frame);
+        }
+        if let Some(sensor) = &self.sensor {
+            sensor.expose(frame, self.stamp_s(frame.index));
+        }
+    }
+
+    /// Whether a pixel has light of others, so that only whole frames are complete.
+    #[must_use]
+    pub fn spreads_light(&self) -> bool {
+        self.optics.is_some()
     }
 
     /// Time, pose and velocity of each row of the readout at its mid-exposure.
@@ -277,7 +299,7 @@ impl FrameJob<'_> {
             return color;
         }
         let sequence = &self.oracle.sequence;
-        let spec = &sequence.scenario.camera.photometric;
+        let spec = &self.photometric;
         let weight = sequence.vignette.as_ref().map_or(1.0, |map| {
             let value = vignette(map, pixel, sequence.scenario.camera.size_px);
             let [black, full] = spec.vignette_thresholds;

@@ -1,10 +1,10 @@
 //! `[camera]`, which is also the content of a CAMERA.toml.
 
-use std::path::PathBuf;
+use std::{borrow::Cow, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Face, FieldOr, ImageSensorSpec};
+use super::{Face, FieldOr, ImageSensorSpec, PointSpreadSpec};
 use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
@@ -55,6 +55,9 @@ pub struct CameraSpec {
     /// The image sensor, in place of `photometric`'s light and noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<ImageSensorSpec>,
+    /// What the lens makes of a point of light; without it, a point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_spread: Option<PointSpreadSpec>,
 }
 
 impl Default for CameraSpec {
@@ -76,11 +79,23 @@ impl Default for CameraSpec {
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
             sensor: None,
+            point_spread: None,
         }
     }
 }
 
 impl CameraSpec {
+    /// What the renderers apply of [`Self::photometric`]. With [`Self::point_spread`] it is the vignette alone:
+    /// light, noise and grey come after the spread.
+    #[must_use]
+    pub fn photometric_of_renderers(&self) -> Cow<'_, PhotometricSpec> {
+        if self.point_spread.is_none() {
+            return Cow::Borrowed(&self.photometric);
+        }
+        let PhotometricSpec { vignette, vignette_thresholds, .. } = self.photometric.clone();
+        Cow::Owned(PhotometricSpec { vignette, vignette_thresholds, ..PhotometricSpec::default() })
+    }
+
     /// [`Self::clock_offset_ms`] in whole nanoseconds.
     #[must_use]
     pub fn clock_offset_ns(&self) -> i64 {

@@ -11,6 +11,7 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 mod image_sensor;
 mod motion;
 mod names;
+mod point_spread;
 mod rig;
 mod scene;
 mod sensors;
@@ -62,6 +63,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     video::check_video(&mut check, scenario);
     sensors::check_sensors(&mut check, scenario);
     image_sensor::check_with_output(&mut check, scenario);
+    point_spread::check_with_preset(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }
@@ -254,6 +256,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
     check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
     image_sensor::check_image_sensor(check, camera);
+    point_spread::check_point_spread(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
