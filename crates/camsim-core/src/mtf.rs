@@ -8,7 +8,7 @@
 mod camera;
 mod edge;
 
-pub use camera::{CameraMtf, ChannelMtf, EdgePicture, MtfPoint, camera_mtf, slanted_edge};
+pub use camera::{CameraMtf, ChannelMtf, EdgePicture, MtfPoint, camera_mtf, picture_mtf, slanted_edge};
 
 use std::f64::consts::{PI, TAU};
 

@@ -82,15 +82,32 @@ pub struct EdgePicture {
     pub channels: [Vec<f64>; 3],
 }
 
+impl EdgePicture {
+    /// Whether the channels are alike, but for rounding.
+    fn is_gray(&self) -> bool {
+        let [red, green, blue] = &self.channels;
+        let mut pixels = red.iter().zip(green).zip(blue);
+        pixels.all(|((r, g), b)| (r - g).abs().max((g - b).abs()) < 1e-4)
+    }
+}
+
 /// Measures the transfer function of a camera by [`slanted_edge`], beside that of its model: that of the pixel's area times
 /// that of its point spread. Glare, which takes the same share from all frequencies above 0, is in neither.
 ///
 /// # Errors
 /// A camera that cannot be used, or that has too few rays in the middle of its picture.
 pub fn camera_mtf(camera: &CameraSpec) -> Result<CameraMtf, EdgeError> {
-    let picture = slanted_edge(camera)?;
+    picture_mtf(camera, &slanted_edge(camera)?)
+}
+
+/// As [`camera_mtf`], of any picture of an edge.
+///
+/// # Errors
+/// The picture has no slanted edge.
+pub fn picture_mtf(camera: &CameraSpec, picture: &EdgePicture) -> Result<CameraMtf, EdgeError> {
     let transfer = LensTransfer::new(camera);
-    let channels = if transfer.is_gray() { 0..1 } else { 0..3 };
+    let is_gray = transfer.is_gray() && picture.is_gray();
+    let channels = if is_gray { 0..1 } else { 0..3 };
     let mut mtf = CameraMtf { region_px: picture.size, angle_deg: 0.0, channels: Vec::new() };
     for channel in channels {
         let edge = edge_mtf(&picture.channels[channel], picture.size)?;
@@ -106,7 +123,7 @@ pub fn camera_mtf(camera: &CameraSpec) -> Result<CameraMtf, EdgeError> {
         let curve: Vec<MtfPoint> = (0..=NYQUIST).map(point).collect();
         let difference = |point: &MtfPoint| (point.measured - point.model).abs();
         mtf.channels.push(ChannelMtf {
-            channel: if transfer.is_gray() { "all" } else { NAMES[channel] },
+            channel: if is_gray { "all" } else { NAMES[channel] },
             mtf50_cycles_px: edge.mtf50(),
             model_mtf50_cycles_px: half_of(model),
             largest_difference: curve.iter().map(difference).fold(0.0, f64::max),

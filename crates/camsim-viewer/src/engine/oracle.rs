@@ -7,6 +7,7 @@ use std::{
 };
 
 use camsim_core::{
+    frame::RenderedFrame,
     reference::{Oracle, RenderOptions},
     scenario::Channel,
 };
