@@ -1,8 +1,9 @@
-//! The lens as a blur (`[camera.point_spread]`), and the image sensor: from the linear light of an output frame to
-//! digital numbers, and from these to a picture (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
+//! The lens as a blur (`[camera.point_spread]`), and the image sensor: from the linear light of an output
+//! frame to digital numbers, and from these to a picture (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
 //!
-//! There is one implementation for all renderers: it takes the finished picture of any of them. A sensor's numbers are
-//! a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas: docs/IMAGING.md.
+//! There is one implementation for all renderers: it takes the finished picture of any of them. A sensor's
+//! numbers are a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas:
+//! docs/IMAGING.md.
 
 mod demosaic;
 mod develop;

@@ -1,9 +1,10 @@
 //! The modulation transfer function of a picture, from a slanted edge in it: the method e-SFR of ISO 12233.
 //!
-//! Each row's derivative has a centroid, and a curve through these is the edge. All pixels are sorted by their distance
-//! from it into bins of a quarter pixel; the derivative of their means is the line spread function, whose transform is
-//! the transfer function. Beside the standard's correction of the discrete derivative, that of the width of the bins is
-//! applied, and the edge may be bent (a parabola), as lenses bend it.
+//! Each row's derivative has a centroid, and a curve through these is the edge. All pixels are sorted by
+//! their distance from it into bins of a quarter pixel; the derivative of their means is the line spread
+//! function, whose transform is the transfer function. Beside the standard's correction of the discrete
+//! derivative, that of the width of the bins is applied, and the edge may be bent (a parabola), as lenses
+//! bend it.
 
 mod camera;
 mod edge;
@@ -26,16 +27,20 @@ pub enum EdgeError {
     #[error("the region is {0} x {1} pixels; an edge needs {least} x {least}", least = edge::LEAST_SIDE)]
     Small(usize, usize),
     /// No step, or values that are no numbers.
-    #[error("there is no edge: the two sides differ by less than a hundredth of the brighter one; choose another region")]
+    #[error(
+        "there is no edge: its sides differ by less than a hundredth of the brighter one; choose another region"
+    )]
     Flat,
     /// The edge is parallel to the pixels.
     #[error(
-        "the edge is {0:.2} degrees off the pixels' axes, and crosses too few columns; turn it by 2 to 10 degrees, or \
-         choose a longer region"
+        "the edge is {0:.2} degrees off the pixels' axes, and crosses too few columns; turn it by 2 to 10 \
+         degrees, or choose a longer region"
     )]
     Parallel(f64),
     /// The edge leaves the region.
-    #[error("the edge comes within {0:.1} px of the region's sides; choose a region with the edge in its middle")]
+    #[error(
+        "the edge comes within {0:.1} px of the region's sides; choose a region with the edge in its middle"
+    )]
     AtBorder(f64),
     /// Pixels that lie too unevenly about the edge.
     #[error("some quarters of a pixel about the edge have no pixel; choose a longer region")]
@@ -105,8 +110,8 @@ fn half_of(at: impl Fn(f64) -> f64) -> Option<f64> {
     None
 }
 
-/// The transfer function of a part of a picture with one straight or slightly bent edge, which leans by some degrees.
-/// `values` are linear light, row by row; the sides of the edge are even.
+/// The transfer function of a part of a picture with one straight or slightly bent edge, which leans by some
+/// degrees. `values` are linear light, row by row; the sides of the edge are even.
 ///
 /// # Errors
 /// The part has no such edge.

@@ -1,7 +1,7 @@
 //! Files of `camera.point_spread.kernel`: the picture of a point of light.
 //!
-//! A PNG or TIFF has its values as they are, without a transfer function; grey, or red, green and blue. An EXR has the
-//! channels Y, or R, G and B. A CSV has a row of numbers for each row of pixels.
+//! A PNG or TIFF has its values as they are, without a transfer function; grey, or red, green and blue. An
+//! EXR has the channels Y, or R, G and B. A CSV has a row of numbers for each row of pixels.
 
 use std::{path::Path, path::PathBuf, sync::Arc};
 

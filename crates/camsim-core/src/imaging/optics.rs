@@ -1,11 +1,11 @@
 //! The lens as a blur: point spread and veiling glare, on the linear light of a finished exposure
 //! (`[camera.point_spread]`; docs/IMAGING.md).
 //!
-//! There is one implementation for all renderers. It follows the vignette, which dims the light of a point before it
-//! is spread, and precedes the image sensor or the simple model's light and noise.
+//! There is one implementation for all renderers. It follows the vignette, which dims the light of a point
+//! before it is spread, and precedes the image sensor or the simple model's light and noise.
 
-mod beyond;
 mod bessel;
+mod beyond;
 mod fourier;
 mod kernel;
 mod separable;
@@ -86,8 +86,8 @@ impl OpticsKey {
 }
 
 impl Optics {
-    /// The optics of a camera with `[camera.point_spread]`. `seed` is the scenario's. A kernel whose file has not
-    /// been read is left out; [`crate::camera::CameraModel::from_spec`] refuses it.
+    /// The optics of a camera with `[camera.point_spread]`. `seed` is the scenario's. A kernel whose file has
+    /// not been read is left out; [`crate::camera::CameraModel::from_spec`] refuses it.
     #[must_use]
     pub fn new(camera: &CameraSpec, seed: u64) -> Option<Self> {
         OpticsKey::new(camera, seed).map(Self::of_key)
@@ -119,7 +119,8 @@ impl Optics {
         Self { key, blur, simple, nearest: Mutex::default() }
     }
 
-    /// Spreads the light of a frame, and applies the simple model's light and noise unless the camera has a sensor.
+    /// Spreads the light of a frame, and applies the simple model's light and noise unless the camera has a
+    /// sensor.
     pub fn expose(&self, frame: &mut RenderedFrame) {
         self.spread(&mut frame.color_rgba);
         if let Some(simple) = &self.simple {
@@ -127,8 +128,8 @@ impl Optics {
         }
     }
 
-    /// Spreads light, linear R G B A. Pixels with A = 0 stay as they are and give no light; in their place, and beyond
-    /// the picture, is the light of the nearest pixel.
+    /// Spreads light, linear R G B A. Pixels with A = 0 stay as they are and give no light; in their place,
+    /// and beyond the picture, is the light of the nearest pixel.
     pub fn spread(&self, color_rgba: &mut [f32]) {
         if let Some(blur) = &self.blur {
             let filled = self.filled(color_rgba);
@@ -168,8 +169,7 @@ impl SimpleModel {
         rows.for_each(|(y, row)| {
             for (x, rgba) in row.chunks_exact_mut(RGBA).enumerate().filter(|(_, rgba)| rgba[3] > 0.0) {
                 let (pixel, color) = ([x as u32, y as u32], [rgba[0], rgba[1], rgba[2]]);
-                let value =
-                    photometric(&self.spec, color, 1.0, pixel, index, self.seed, &self.noise_table);
+                let value = photometric(&self.spec, color, 1.0, pixel, index, self.seed, &self.noise_table);
                 rgba[..3].copy_from_slice(&value);
             }
         });
@@ -198,8 +198,9 @@ fn add_glare(share: f64, width: usize, color_rgba: &mut [f32]) {
     });
 }
 
-/// Copies the colours of a row that light has been spread over, where the picture has a ray. Transfer functions that end
-/// at the Nyquist frequency let sharp borders swing, by some 1 % of their step; light is not negative.
+/// Copies the colours of a row that light has been spread over, where the picture has a ray. Transfer
+/// functions that end at the Nyquist frequency let sharp borders swing, by some 1 % of their step; light is
+/// not negative.
 fn put_row(light: impl Iterator<Item = [f32; 3]>, row_rgba: &mut [f32]) {
     for (rgba, light) in row_rgba.chunks_exact_mut(RGBA).zip(light) {
         if rgba[3] > 0.0 {

@@ -91,8 +91,9 @@ impl EdgePicture {
     }
 }
 
-/// Measures the transfer function of a camera by [`slanted_edge`], beside that of its model: that of the pixel's area times
-/// that of its point spread. Glare, which takes the same share from all frequencies above 0, is in neither.
+/// Measures the transfer function of a camera by [`slanted_edge`], beside that of its model: that of the
+/// pixel's area times that of its point spread. Glare, which takes the same share from all frequencies above
+/// 0, is in neither.
 ///
 /// # Errors
 /// A camera that cannot be used, or that has too few rays in the middle of its picture.
@@ -133,8 +134,9 @@ pub fn picture_mtf(camera: &CameraSpec, picture: &EdgePicture) -> Result<CameraM
     Ok(mtf)
 }
 
-/// Renders a straight edge in the middle of a camera's picture: through its lens, by rays over the area of each pixel, and
-/// through its point spread. Exposure, vignette, noise and sensor are left out, and of a zoom lens its zoom table.
+/// Renders a straight edge in the middle of a camera's picture: through its lens, by rays over the area of
+/// each pixel, and through its point spread. Exposure, vignette, noise and sensor are left out, and of a zoom
+/// lens its zoom table.
 ///
 /// # Errors
 /// As [`camera_mtf`].

@@ -83,8 +83,10 @@ impl Region {
         let middle_row = 0.5 * (self.height as f64 - 1.0);
         let mut curve = Curve { middle: 0.5 * (self.width as f64 - 1.0), slope: 0.0, bend: 0.0, middle_row };
         for _ in 0..PASSES {
-            let places: Vec<f64> =
-                (0..self.height).map(|y| centroid(self.row(y), curve.at(y))).collect::<Option<_>>().ok_or(EdgeError::Flat)?;
+            let places: Vec<f64> = (0..self.height)
+                .map(|y| centroid(self.row(y), curve.at(y)))
+                .collect::<Option<_>>()
+                .ok_or(EdgeError::Flat)?;
             curve = parabola(&places, middle_row).ok_or(EdgeError::Flat)?;
         }
         if curve.slope.abs() * (self.height as f64) < LEAST_CROSSED {
@@ -114,7 +116,9 @@ impl Region {
             let (at, across) = (curve.at(y), curve.across(y));
             for (x, value) in self.row(y).iter().enumerate() {
                 let bin = ((x as f64 - at) * across * BINS + half).floor();
-                if bin >= 0.0 && let Some(sum) = sums.get_mut(bin as usize) {
+                if bin >= 0.0
+                    && let Some(sum) = sums.get_mut(bin as usize)
+                {
                     *sum = [sum[0] + value, sum[1] + 1.0];
                 }
             }
@@ -153,5 +157,10 @@ fn parabola(places: &[f64], middle_row: f64) -> Option<Curve> {
         right += *place * terms;
     }
     let fit = normal.inverse() * right;
-    fit.is_finite().then(|| Curve { middle: fit.x, slope: fit.y / scale, bend: fit.z / (scale * scale), middle_row })
+    fit.is_finite().then(|| Curve {
+        middle: fit.x,
+        slope: fit.y / scale,
+        bend: fit.z / (scale * scale),
+        middle_row,
+    })
 }

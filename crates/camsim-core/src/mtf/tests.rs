@@ -37,7 +37,10 @@ fn edges_in_closed_form_have_their_transfer_functions() {
             assert!((edge.angle_deg - lean_deg.abs()).abs() < 0.01, "{lean_deg}: {}", edge.angle_deg);
             for cycles_px in [0.0, 0.1, 0.2, 0.3, 0.4, 0.5] {
                 let (found, expected) = (edge.at(cycles_px), gaussian(sigma_px, cycles_px));
-                assert!((found - expected).abs() < 6e-3, "{sigma_px} {lean_deg} {cycles_px}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 6e-3,
+                    "{sigma_px} {lean_deg} {cycles_px}: {found} {expected}"
+                );
             }
             let half = (0.5 * std::f64::consts::LN_2).sqrt() / (PI * sigma_px);
             assert!((edge.mtf50().expect("below 1") / half - 1.0).abs() < 0.01);
@@ -48,8 +51,10 @@ fn edges_in_closed_form_have_their_transfer_functions() {
 #[test]
 fn flat_and_bent_edges_are_measured_too() {
     let upright = picture([100, 130], 6.0, 0.0, erf_edge(1.0));
-    let turned: Vec<f64> = (0..100).flat_map(|x| (0..130).map(move |y| (x, y))).map(|(x, y)| upright[y * 100 + x]).collect();
-    let [one, other] = [(upright, [100, 130]), (turned, [130, 100])].map(|(values, size)| edge_mtf(&values, size).expect("an edge"));
+    let turned: Vec<f64> =
+        (0..100).flat_map(|x| (0..130).map(move |y| (x, y))).map(|(x, y)| upright[y * 100 + x]).collect();
+    let [one, other] = [(upright, [100, 130]), (turned, [130, 100])]
+        .map(|(values, size)| edge_mtf(&values, size).expect("an edge"));
     assert_eq!(one.at(0.3), other.at(0.3));
     assert_eq!((one.normal.x, one.normal.y), (other.normal.y, other.normal.x));
     let bent = edge_mtf(&picture([100, 130], 6.0, 5e-4, erf_edge(1.0)), [100, 130]).expect("an edge");
@@ -66,7 +71,11 @@ fn what_is_no_slanted_edge_is_refused() {
     let parallel = picture([64, 64], 0.2, 0.0, &step);
     assert!(matches!(measure(&parallel, [64, 64]), Err(EdgeError::Parallel(_))));
     let beside = picture([64, 64], 8.0, 0.0, |distance| step(distance + 26.0));
-    assert!(matches!(measure(&beside, [64, 64]), Err(EdgeError::AtBorder(_))), "{:?}", measure(&beside, [64, 64]));
+    assert!(
+        matches!(measure(&beside, [64, 64]), Err(EdgeError::AtBorder(_))),
+        "{:?}",
+        measure(&beside, [64, 64])
+    );
 }
 
 fn lens(spec: PointSpreadSpec) -> CameraSpec {

@@ -176,8 +176,9 @@ impl Oracle {
         (rendered, convergence)
     }
 
-    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`Oracle::render`] does at its
-    /// end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light comes from all.
+    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`Oracle::render`]
+    /// does at its end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light
+    /// comes from all.
     pub fn expose(&self, frame: &mut RenderedFrame) {
         if let Some(optics) = &self.optics {
             optics.expose(frame);

@@ -85,8 +85,8 @@ impl Default for CameraSpec {
 }
 
 impl CameraSpec {
-    /// What the renderers apply of [`Self::photometric`]. With [`Self::point_spread`] it is the vignette alone:
-    /// light, noise and grey come after the spread.
+    /// What the renderers apply of [`Self::photometric`]. With [`Self::point_spread`] it is the vignette
+    /// alone: light, noise and grey come after the spread.
     #[must_use]
     pub fn photometric_of_renderers(&self) -> Cow<'_, PhotometricSpec> {
         if self.point_spread.is_none() {

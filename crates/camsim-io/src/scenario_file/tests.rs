@@ -5,8 +5,8 @@ use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
     Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, Dictionary, FieldOr,
     FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind, MagnetometerSpec, MotionSpec,
-    ObjectsOf, OutputSpec, PerChannel, PointSpreadSpec, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
-    TwinSpec,
+    ObjectsOf, OutputSpec, PerChannel, PointSpreadSpec, QualitySpec, Readout, SensorModel, SpinSpec,
+    TrackerSpec, TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};

@@ -103,9 +103,7 @@ fn render_rows(
         let difference = request.against.as_ref().filter(|_| is_comparable).and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
-                .then(|| {
-                    difference(size_px, &against.color_rgba, &color_rgba, *gain, partial.rows as u32)
-                })
+                .then(|| difference(size_px, &against.color_rgba, &color_rgba, *gain, partial.rows as u32))
                 .flatten()
         });
         replies.send(Reply::OraclePicture(Box::new(OraclePicture {

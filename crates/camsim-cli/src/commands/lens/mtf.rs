@@ -18,11 +18,12 @@ use crate::{
 /// What is measured of the modulation transfer.
 #[derive(Debug, clap::Args)]
 pub(super) struct MtfArgs {
-    /// Show the modulation transfer function too, by a slanted edge that is rendered through the camera (ISO 12233), beside
-    /// the model's
+    /// Show the modulation transfer function too, by a slanted edge that is rendered through the camera (ISO
+    /// 12233), beside the model's
     #[arg(long)]
     mtf: bool,
-    /// Measure this picture of a slanted edge in place of the rendered one: EXR, or PNG or TIFF, encoded as sRGB
+    /// Measure this picture of a slanted edge in place of the rendered one: EXR, or PNG or TIFF, encoded as
+    /// sRGB
     #[arg(long, value_name = "PICTURE", requires = "mtf")]
     picture: Option<PathBuf>,
     /// Part of the picture with the edge [default: all]
@@ -82,7 +83,8 @@ pub(super) fn print(mtf: &CameraMtf, console: &mut Console<'_>) -> Result<(), Fa
         let pairs = mtf.channels.iter().map(of).map(|[a, b]| format!(" | {a:>8} {b:>8}"));
         pairs.collect::<String>()
     };
-    console.line(format_args!("cycles/px{}", columns(&|channel| [channel.channel.into(), "model".into()])))?;
+    console
+        .line(format_args!("cycles/px{}", columns(&|channel| [channel.channel.into(), "model".into()])))?;
     let count = mtf.channels.first().map_or(0, |channel| channel.curve.len());
     for i in (0..count).step_by(2) {
         let values = |channel: &ChannelMtf| {

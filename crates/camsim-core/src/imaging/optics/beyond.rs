@@ -23,9 +23,8 @@ impl Nearest {
                 let (valid, rows) = (&valid[row.clone()], &in_columns[row]);
                 let invalid = (0..width).filter(|&x| !valid[x]);
                 let pair = |x: usize| {
-                    nearest_in(rows, x, y).map(|[from_x, from_y]| {
-                        [(y * width + x) as u32, (from_y * width + from_x) as u32]
-                    })
+                    nearest_in(rows, x, y)
+                        .map(|[from_x, from_y]| [(y * width + x) as u32, (from_y * width + from_x) as u32])
                 };
                 invalid.filter_map(pair).collect::<Vec<_>>()
             })
@@ -99,11 +98,13 @@ mod tests {
         let is_valid = |i: usize| (i * 7919 + 13) % 31 < 3;
         let valid: Vec<bool> = (0..width * height).map(is_valid).collect();
         let light = |i: usize| i as f32;
-        let mut rgba: Vec<f32> =
-            (0..width * height).flat_map(|i| if valid[i] { [light(i), 1.0, 2.0, 1.0] } else { [0.0; 4] }).collect();
+        let mut rgba: Vec<f32> = (0..width * height)
+            .flat_map(|i| if valid[i] { [light(i), 1.0, 2.0, 1.0] } else { [0.0; 4] })
+            .collect();
         Nearest::new(valid.clone(), width).fill(&mut rgba);
         for (i, pixel) in rgba.chunks_exact(4).enumerate() {
-            let square = |j: usize| (i % width).abs_diff(j % width).pow(2) + (i / width).abs_diff(j / width).pow(2);
+            let square =
+                |j: usize| (i % width).abs_diff(j % width).pow(2) + (i / width).abs_diff(j / width).pow(2);
             let least = (0..width * height).filter(|&j| valid[j]).map(square).min();
             assert_eq!(Some(square(pixel[0] as usize)), least, "{i}");
             assert_eq!((pixel[1], pixel[2], pixel[3] > 0.0), (1.0, 2.0, valid[i]), "{i}");

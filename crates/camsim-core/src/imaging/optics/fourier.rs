@@ -1,4 +1,5 @@
-//! Blur by the Fourier transform: exact for any transfer function, at a cost that does not grow with its width.
+//! Blur by the Fourier transform: exact for any transfer function, at a cost that does not grow with its
+//! width.
 
 use std::sync::Arc;
 
@@ -16,8 +17,8 @@ pub(super) struct Fourier {
     grid: [usize; 2],
     forth: [Arc<dyn Fft<f32>>; 2],
     back: [Arc<dyn Fft<f32>>; 2],
-    /// Transfer functions of red, green and blue, or of all three; column by column of the spectrum, divided by the
-    /// number of pixels of the grid.
+    /// Transfer functions of red, green and blue, or of all three; column by column of the spectrum, divided
+    /// by the number of pixels of the grid.
     factors: Vec<Vec<Complex32>>,
 }
 
@@ -55,7 +56,8 @@ impl Fourier {
         }
     }
 
-    /// Spreads the light of `filled`, all of whose pixels have light, into those of `color_rgba` that have a ray.
+    /// Spreads the light of `filled`, all of whose pixels have light, into those of `color_rgba` that have a
+    /// ray.
     pub fn spread(&self, filled: &[f32], color_rgba: &mut [f32]) {
         let stride = RGBA * self.size[0];
         let [red_green, blue] = [[Some(0), Some(1)], [Some(2), None]].map(|channels| {
@@ -95,14 +97,17 @@ impl Fourier {
         let [width, height] = self.grid;
         let mut spectrum = vec![Complex32::default(); width * height];
         let memory = || vec![Complex32::default(); self.forth[1].get_inplace_scratch_len()];
-        spectrum.par_chunks_mut(BLOCK * height).enumerate().for_each_init(memory, |scratch, (block, columns)| {
-            let x = BLOCK * block;
-            for y in 0..height {
-                let row = &rows[row_at(y, self.size[1], height) * width..][x..];
-                columns[y..].iter_mut().step_by(height).zip(row).for_each(|(to, from)| *to = *from);
-            }
-            self.forth[1].process_with_scratch(columns, scratch);
-        });
+        spectrum.par_chunks_mut(BLOCK * height).enumerate().for_each_init(
+            memory,
+            |scratch, (block, columns)| {
+                let x = BLOCK * block;
+                for y in 0..height {
+                    let row = &rows[row_at(y, self.size[1], height) * width..][x..];
+                    columns[y..].iter_mut().step_by(height).zip(row).for_each(|(to, from)| *to = *from);
+                }
+                self.forth[1].process_with_scratch(columns, scratch);
+            },
+        );
         let mut product = vec![Complex32::default(); width * height];
         let memory = || vec![Complex32::default(); self.back[1].get_inplace_scratch_len()];
         product.par_chunks_mut(height).enumerate().for_each_init(memory, |scratch, (x, column)| {
@@ -112,11 +117,19 @@ impl Fourier {
         product
     }
 
-    /// A column of the spectrum of a + i b, with the transfer functions of both channels: with F of a + i b and the
-    /// conjugate G of F at the opposite frequency, a has the spectrum (F + G) / 2 and i b has (F - G) / 2.
-    fn multiply(&self, spectrum: &[Complex32], [re, im]: [Option<usize>; 2], x: usize, column: &mut [Complex32]) {
+    /// A column of the spectrum of a + i b, with the transfer functions of both channels: with F of a + i b
+    /// and the conjugate G of F at the opposite frequency, a has the spectrum (F + G) / 2 and i b has (F - G)
+    /// / 2.
+    fn multiply(
+        &self,
+        spectrum: &[Complex32],
+        [re, im]: [Option<usize>; 2],
+        x: usize,
+        column: &mut [Complex32],
+    ) {
         let [width, height] = self.grid;
-        let factors = |channel: usize| &self.factors[channel.min(self.factors.len() - 1)][x * height..][..height];
+        let factors =
+            |channel: usize| &self.factors[channel.min(self.factors.len() - 1)][x * height..][..height];
         let own = &spectrum[x * height..][..height];
         let of_re = factors(re.unwrap_or_default());
         let (Some(im), 2..) = (im, self.factors.len()) else {
@@ -138,20 +151,26 @@ impl Fourier {
         let mut picture = vec![Complex32::default(); width * height];
         let back = &self.back[0];
         let memory = || {
-            (vec![Complex32::default(); BLOCK * length], vec![Complex32::default(); back.get_inplace_scratch_len()])
+            (
+                vec![Complex32::default(); BLOCK * length],
+                vec![Complex32::default(); back.get_inplace_scratch_len()],
+            )
         };
-        picture.par_chunks_mut(BLOCK * width).enumerate().for_each_init(memory, |(lines, scratch), (block, rows)| {
-            let y = BLOCK * block;
-            let count = rows.len() / width;
-            for x in 0..length {
-                let from = &spectrum[x * column + y..][..count];
-                lines[x..].iter_mut().step_by(length).zip(from).for_each(|(to, from)| *to = *from);
-            }
-            back.process_with_scratch(&mut lines[..count * length], scratch);
-            for (row, line) in rows.chunks_exact_mut(width).zip(lines.chunks_exact(length)) {
-                row.copy_from_slice(&line[..width]);
-            }
-        });
+        picture.par_chunks_mut(BLOCK * width).enumerate().for_each_init(
+            memory,
+            |(lines, scratch), (block, rows)| {
+                let y = BLOCK * block;
+                let count = rows.len() / width;
+                for x in 0..length {
+                    let from = &spectrum[x * column + y..][..count];
+                    lines[x..].iter_mut().step_by(length).zip(from).for_each(|(to, from)| *to = *from);
+                }
+                back.process_with_scratch(&mut lines[..count * length], scratch);
+                for (row, line) in rows.chunks_exact_mut(width).zip(lines.chunks_exact(length)) {
+                    row.copy_from_slice(&line[..width]);
+                }
+            },
+        );
         picture
     }
 }

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// `camera.point_spread.kernel`: the name of a file, and what was read from it. Equal names are equal, as with other
-/// files.
+/// `camera.point_spread.kernel`: the name of a file, and what was read from it. Equal names are equal, as
+/// with other files.
 #[derive(Clone, Debug, Default)]
 pub struct KernelFile {
     /// The file.
@@ -49,8 +49,8 @@ pub enum KernelError {
     },
     /// NaN, infinite or negative.
     #[error(
-        "the value in column {column}, row {row} (counted from 1) is {value}; values are shares of light: subtract the \
-         dark level, and write 0 for what is below it"
+        "the value in column {column}, row {row} (counted from 1) is {value}; values are shares of light: subtract \
+         the dark level, and write 0 for what is below it"
     )]
     Value {
         /// Column from 1.
@@ -85,7 +85,11 @@ impl SpreadKernel {
                 return Err(KernelError::Size { values: values.len(), width, height });
             }
             if let Some(i) = values.iter().position(|value| !value.is_finite() || *value < 0.0) {
-                return Err(KernelError::Value { column: i % width + 1, row: i / width + 1, value: values[i] });
+                return Err(KernelError::Value {
+                    column: i % width + 1,
+                    row: i / width + 1,
+                    value: values[i],
+                });
             }
             let sum: f64 = values.iter().sum();
             if sum <= 0.0 {
@@ -107,8 +111,9 @@ impl SpreadKernel {
         self.channels[0] == self.channels[1] && self.channels[1] == self.channels[2]
     }
 
-    /// Its transfer function at all pairs of frequencies, in cycles per pixel; those of `along_y` fastest. Its values
-    /// are `step_px` apart. At exactly 0.5 it is the mean of both signs, so that real pictures stay real.
+    /// Its transfer function at all pairs of frequencies, in cycles per pixel; those of `along_y` fastest.
+    /// Its values are `step_px` apart. At exactly 0.5 it is the mean of both signs, so that real pictures
+    /// stay real.
     pub(super) fn transfer(&self, channel: usize, step_px: f64, along: [&[f64]; 2]) -> Vec<Complex64> {
         let [width, height] = self.size;
         let in_rows = phases(along[1], step_px, height);

@@ -25,7 +25,8 @@ impl Separable {
         (sigma_px <= MAX_SIGMA_PX).then(|| Self { taps: taps(sigma_px) })
     }
 
-    /// Spreads the light of `filled`, all of whose pixels have light, into those of `color_rgba` that have a ray.
+    /// Spreads the light of `filled`, all of whose pixels have light, into those of `color_rgba` that have a
+    /// ray.
     pub fn spread(&self, size_px: [u32; 2], filled: &[f32], color_rgba: &mut [f32]) {
         let stride = RGBA * size_px[0] as usize;
         let edge = RGBA * (self.taps.len() / 2);
@@ -67,8 +68,8 @@ fn extend(padded: &mut [f32], edge: usize) {
     }
 }
 
-/// Taps whose transfer function is that of the Gaussian up to the Nyquist frequency: the picture holds means over
-/// pixels already, so that none is taken here.
+/// Taps whose transfer function is that of the Gaussian up to the Nyquist frequency: the picture holds means
+/// over pixels already, so that none is taken here.
 fn taps(sigma_px: f64) -> Vec<f32> {
     let radius = ((4.0 * sigma_px).ceil() as usize).max(LEAST_RADIUS);
     let spectrum: Vec<f64> = (0..SPECTRUM)

@@ -48,7 +48,8 @@ fn at(rgba: &[f32], x: u32, y: u32) -> [f32; 3] {
 
 /// The share of a wave's amplitude that is left in the middle of the picture.
 fn left_of_wave(spec: PointSpreadSpec, cycles_px: [f64; 2]) -> f64 {
-    let wave = |x: f64, y: f64| 0.5 + 0.4 * (TAU * (cycles_px[0] * (x - 48.0) + cycles_px[1] * (y - 40.0))).cos();
+    let wave =
+        |x: f64, y: f64| 0.5 + 0.4 * (TAU * (cycles_px[0] * (x - 48.0) + cycles_px[1] * (y - 40.0))).cos();
     let rgba = spread(spec, picture(|x, y| [wave(x, y); 3]));
     (f64::from(at(&rgba, 48, 40)[1]) - 0.5) / 0.4
 }
@@ -94,7 +95,8 @@ fn a_point_becomes_airys_pattern() {
 
 #[test]
 fn channels_do_not_mix() {
-    let colors = |x: f64, y: f64| [(0.3 * x).sin().abs(), (0.2 * y).cos().abs(), ((x + y) * 0.17).sin().abs()];
+    let colors =
+        |x: f64, y: f64| [(0.3 * x).sin().abs(), (0.2 * y).cos().abs(), ((x + y) * 0.17).sin().abs()];
     let together = spread(airy([3.0, 2.0, 1.0]), picture(colors));
     for (channel, width_px) in [3.0, 2.0, 1.0].into_iter().enumerate() {
         let alone = spread(airy([width_px; 3]), picture(colors));

@@ -12,8 +12,8 @@ use crate::{
     scenario::{CameraSpec, PointSpreadSpec},
 };
 
-/// Width of a diffraction pattern beyond which its faint rings are cut off, in units of wavelength times f-number: 2 %
-/// of the light is outside.
+/// Width of a diffraction pattern beyond which its faint rings are cut off, in units of wavelength times
+/// f-number: 2 % of the light is outside.
 const AIRY_REACH: f64 = 12.0;
 /// Reach of a Gaussian, standard deviations.
 const GAUSSIAN_REACH: f64 = 4.0;
@@ -65,9 +65,7 @@ impl LensTransfer {
     /// What is the same in all directions.
     fn formula(&self, channel: usize, cycles_px: f64) -> f64 {
         let gaussian = (-2.0 * (PI * self.sigma_px * cycles_px).powi(2)).exp();
-        gaussian
-            * diffraction(self.airy_px[channel] * cycles_px)
-            * jinc(PI * self.defocus_px * cycles_px)
+        gaussian * diffraction(self.airy_px[channel] * cycles_px) * jinc(PI * self.defocus_px * cycles_px)
     }
 
     /// On a grid of frequencies: those of `along_y` fastest.
@@ -113,7 +111,8 @@ impl LensTransfer {
             return [0.0; 2];
         }
         let airy_px = self.airy_px.iter().copied().fold(0.0, f64::max);
-        let round = GAUSSIAN_REACH * self.sigma_px + AIRY_REACH * airy_px + 0.5 * self.defocus_px + RINGING_PX;
+        let round =
+            GAUSSIAN_REACH * self.sigma_px + AIRY_REACH * airy_px + 0.5 * self.defocus_px + RINGING_PX;
         let of_kernel = |side: usize| {
             self.kernel.as_ref().map_or(0.0, |(kernel, step_px)| 0.5 * step_px * kernel.size()[side] as f64)
         };

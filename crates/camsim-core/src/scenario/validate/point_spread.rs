@@ -19,12 +19,11 @@ fn key(leaf: &str) -> String {
 pub(super) fn check_point_spread(check: &mut Check, camera: &CameraSpec) {
     let Some(spec) = &camera.point_spread else { return };
     let widths = [("sigma_px", spec.sigma_px), ("defocus_px", spec.defocus_px)];
-    let has_blur = widths.iter().any(|(_, width)| width.is_some())
-        || spec.f_number.is_some()
-        || spec.kernel.is_some();
+    let has_blur =
+        widths.iter().any(|(_, width)| width.is_some()) || spec.f_number.is_some() || spec.kernel.is_some();
     check.require(has_blur || spec.glare > 0.0, "camera.point_spread", || {
-        "has no effect; give sigma_px (Gaussian), f_number (diffraction), defocus_px (disc), kernel (a file) or \
-         glare, or leave it out"
+        "has no effect; give sigma_px (Gaussian), f_number (diffraction), defocus_px (disc), kernel (a file) \
+         or glare, or leave it out"
             .into()
     });
     for (leaf, width) in widths {
@@ -33,14 +32,14 @@ pub(super) fn check_point_spread(check: &mut Check, camera: &CameraSpec) {
         });
     }
     check_diffraction(check, camera, spec);
-    check.require((1..=MAX_OVERSAMPLING).contains(&spec.kernel_oversampling), key("kernel_oversampling"), || {
-        format!("must be 1 to {MAX_OVERSAMPLING} values a pixel, not {}", spec.kernel_oversampling)
-    });
     check.require(
-        spec.kernel.is_some() || spec.kernel_oversampling == 1,
+        (1..=MAX_OVERSAMPLING).contains(&spec.kernel_oversampling),
         key("kernel_oversampling"),
-        || "belongs to camera.point_spread.kernel; add that, or leave it out".into(),
+        || format!("must be 1 to {MAX_OVERSAMPLING} values a pixel, not {}", spec.kernel_oversampling),
     );
+    check.require(spec.kernel.is_some() || spec.kernel_oversampling == 1, key("kernel_oversampling"), || {
+        "belongs to camera.point_spread.kernel; add that, or leave it out".into()
+    });
     check.require((0.0..1.0).contains(&spec.glare), key("glare"), || {
         format!("must be the share of the light that is spread, 0 or more and below 1, not {}", spec.glare)
     });
@@ -76,7 +75,8 @@ fn check_diffraction(check: &mut Check, camera: &CameraSpec, spec: &PointSpreadS
 pub(super) fn check_with_preset(check: &mut Check, scenario: &Scenario) {
     let has_spread = scenario.camera.point_spread.is_some();
     check.require(!has_spread || scenario.quality.preset != Preset::Paper, "quality.preset", || {
-        "\"paper\" has its own photometric model; leave [camera.point_spread] out, or write \"default\"".into()
+        "\"paper\" has its own photometric model; leave [camera.point_spread] out, or write \"default\""
+            .into()
     });
 }
 
@@ -118,8 +118,14 @@ mod tests {
         let cases = [
             ("camera.point_spread", PointSpreadSpec::default()),
             ("camera.point_spread.sigma_px", PointSpreadSpec { sigma_px: Some(-1.0), ..Default::default() }),
-            ("camera.point_spread.sigma_px", PointSpreadSpec { sigma_px: Some(f64::NAN), ..Default::default() }),
-            ("camera.point_spread.defocus_px", PointSpreadSpec { defocus_px: Some(1e9), ..Default::default() }),
+            (
+                "camera.point_spread.sigma_px",
+                PointSpreadSpec { sigma_px: Some(f64::NAN), ..Default::default() },
+            ),
+            (
+                "camera.point_spread.defocus_px",
+                PointSpreadSpec { defocus_px: Some(1e9), ..Default::default() },
+            ),
             ("camera.point_spread.f_number", PointSpreadSpec { f_number: Some(0.0), ..airy() }),
             ("camera.point_spread.pixel_um", PointSpreadSpec { pixel_um: None, ..airy() }),
             ("camera.point_spread.pixel_um", PointSpreadSpec { pixel_um: Some(-3.0), ..airy() }),
