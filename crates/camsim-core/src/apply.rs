@@ -134,6 +134,9 @@ impl<'a> Pipeline<'a> {
         if settings.fog.is_some() && !paper {
             return Err(ApplyError::Fog);
         }
+        if spec.point_spread.is_some() && paper {
+            return Err(ApplyError::PointSpread);
+        }
         let solver = settings.solver.unwrap_or(if paper { Solver::Rk2 } else { Solver::Reproject });
         if solver == Solver::Oracle {
             return Err(ApplyError::Oracle);

@@ -40,6 +40,12 @@ pub enum ApplyError {
         "linear fog after the blur belongs to the paper's methods (otherwise fog is part of the ideal frame): use the preset \"paper\", or leave fog out"
     )]
     Fog,
+    /// The paper's methods with a point spread.
+    #[error(
+        "the paper's methods have their own photometric model: leave [point_spread] out of the camera, or use the \
+         preset \"default\""
+    )]
+    PointSpread,
 }
 
 /// A pinhole RGB-D image with its geometry.

@@ -92,8 +92,8 @@ impl CameraSpec {
         if self.point_spread.is_none() {
             return Cow::Borrowed(&self.photometric);
         }
-        let PhotometricSpec { vignette, vignette_thresholds, .. } = self.photometric.clone();
-        Cow::Owned(PhotometricSpec { vignette, vignette_thresholds, ..PhotometricSpec::default() })
+        let output = OutputEncoding::default();
+        Cow::Owned(PhotometricSpec { light: 1.0, noise_sigma: 0.0, output, ..self.photometric.clone() })
     }
 
     /// [`Self::clock_offset_ms`] in whole nanoseconds.
