@@ -9,11 +9,11 @@ use camsim_core::{
     imaging::Optics,
     metrics::{ImageView, compare},
     reference::{Oracle, RenderOptions},
-    scenario::{CameraSpec, Channel, PointSpreadSpec, Scenario, TwinSpec},
+    scenario::{CameraSpec, Channel, LensModel, LensSpec, PointSpreadSpec, Scenario, TwinSpec},
     sequence::Sequence,
 };
 use camsim_plan::Backend;
-use common::{barrel_lens, engine, pattern, render, rolling, scenario, sequence, steady};
+use common::{engine, pattern, render, rolling, scenario, sequence, steady};
 use glam::DVec3;
 
 /// Ground under a lens whose corners have no ray.
@@ -21,8 +21,8 @@ fn ground(change: impl Fn(&mut Scenario)) -> Arc<Sequence> {
     let mut scenario = scenario();
     let camera = &mut scenario.camera;
     camera.size_px = [96, 72];
-    camera.focal_px = [48.0, 48.0];
-    camera.lens = barrel_lens();
+    camera.focal_px = [80.0, 80.0];
+    camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.45] };
     camera.mount.angles_deg = [0.0, -90.0, 0.0];
     camera.shutter = rolling(20.0, 4.0);
     camera.photometric.noise_sigma = 0.0;
