@@ -173,10 +173,12 @@ fn modulation_transfer_is_that_of_lens_and_pixel() {
 fn pictures_of_an_edge_are_measured() {
     let folder = tempfile::tempdir().unwrap();
     let camera = file(folder.path(), "camera.toml", "size_px = [160, 120]\nfocal_px = [150.0, 150.0]\n");
-    // The area of each pixel beside an edge, of 200 rows of it.
+    // The area of each pixel beside an edge, of 200 rows of it. A slope of few digits would have the pixels at
+    // few distances from the edge.
+    let slope = 5_f64.to_radians().tan();
     let area = |x: u32, y: u32| {
         let row = |i: u32| {
-            let edge = 60.0 + 0.1 * (f64::from(y) + (f64::from(i) + 0.5) / 200.0 - 50.0);
+            let edge = 60.0 + slope * (f64::from(y) + (f64::from(i) + 0.5) / 200.0 - 50.0);
             (f64::from(x) + 0.5 - edge).clamp(0.0, 1.0)
         };
         (0..200).map(row).sum::<f64>() / 200.0
