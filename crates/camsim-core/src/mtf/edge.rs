@@ -54,8 +54,9 @@ impl Region {
         let down: f64 = (0..width).map(|x| (at(x, height - 1) - at(x, 0)).abs()).sum();
         let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         let step = (across / height as f64).max(down / width as f64);
-        // Written so that NaN counts as flat.
-        if !(step > LEAST_STEP * most) || !most.is_finite() {
+        // NaN is no step.
+        let is_step = step > LEAST_STEP * most && most.is_finite();
+        if !is_step {
             return Err(EdgeError::Flat);
         }
         let is_transposed = down / width as f64 > across / height as f64;
@@ -103,7 +104,7 @@ impl Region {
             at.min(last - at) * curve.across(y)
         });
         let margin = margin.fold(f64::INFINITY, f64::min);
-        if !(margin >= LEAST_MARGIN_PX) {
+        if margin < LEAST_MARGIN_PX {
             return Err(EdgeError::AtBorder(margin));
         }
         let half = (BINS * margin).floor();
