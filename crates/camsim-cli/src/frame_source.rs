@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    imaging::ImageSensor,
+    imaging::{ImageSensor, Optics},
     reference::{Oracle, RenderOptions},
     scenario::Auto,
     scene::LodSelection,
@@ -101,7 +101,8 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 pub struct ReferenceSource {
     /// One, or one a face.
     oracles: Vec<Oracle>,
-    /// For what faces are joined to; a single oracle has its own.
+    /// These two are for what faces are joined to; a single oracle has its own.
+    optics: Option<Optics>,
     sensor: Option<ImageSensor>,
     planner: Planner,
     options: RenderOptions,
@@ -129,8 +130,9 @@ impl ReferenceSource {
             _ => Oracle::new(planner.lane(lane).sequence().clone()),
         };
         let oracles = (0..planner.lanes()).map(oracle).collect::<Result<_, _>>().or_bad_input()?;
+        let optics = Optics::new(&scenario.camera, scenario.seed);
         let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
-        Ok(Self { oracles, sensor, planner, options })
+        Ok(Self { oracles, optics, sensor, planner, options })
     }
 
     fn finished(&self, oracle: &Oracle, plan: FramePlan) -> Finished {
@@ -183,6 +185,9 @@ impl FrameSource for ReferenceSource {
             let faces = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
             if let Some(mut whole) = join_faces(faces) {
                 whole.frame.rows = rows;
+                if let Some(optics) = &self.optics {
+                    optics.expose(&mut whole.frame, whole.plan.exposure.as_ref());
+                }
                 if let Some(sensor) = &self.sensor {
                     sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
                 }

@@ -142,3 +142,70 @@ fn stmaps_are_lens_tables() {
         assert!((a - b).abs() < 1e-3, "{a} {b}");
     }
 }
+
+#[test]
+fn modulation_transfer_is_that_of_lens_and_pixel() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = file(
+        folder.path(),
+        "camera.toml",
+        "size_px = [160, 120]\nfocal_px = [150.0, 150.0]\n[point_spread]\nf_number = 8\npixel_um = 3.45\n\
+         kernel = \"kernel.csv\"\nglare = 0.05\n",
+    );
+    let (code, _, err) = camsim(&["lens", &camera, "check"]);
+    assert!(code != 0 && err.contains("kernel.csv"), "{err}");
+    file(folder.path(), "kernel.csv", "1,2,1\n2,4,2\n1,2,1\n");
+    let (code, out, err) = camsim(&["lens", &camera, "check", "--mtf", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(report["bijective"], true);
+    let channels = report["mtf"]["channels"].as_array().unwrap();
+    let names: Vec<&str> = channels.iter().map(|channel| channel["channel"].as_str().unwrap()).collect();
+    assert_eq!(names, ["red", "green", "blue"]);
+    for channel in channels {
+        assert!(channel["largest_difference"].as_f64().unwrap() < 0.02, "{channel}");
+    }
+    let (code, out, err) = camsim(&["lens", &camera, "check", "--mtf"]);
+    assert!(code == 0 && out.contains("cycles/px |      red    model |"), "{out}{err}");
+}
+
+#[test]
+fn pictures_of_an_edge_are_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = file(folder.path(), "camera.toml", "size_px = [160, 120]\nfocal_px = [150.0, 150.0]\n");
+    // The area of each pixel beside an edge, of 200 rows of it. A slope of few digits would have the pixels at
+    // few distances from the edge.
+    let slope = 5_f64.to_radians().tan();
+    let area = |x: u32, y: u32| {
+        let row = |i: u32| {
+            let edge = 60.0 + slope * (f64::from(y) + (f64::from(i) + 0.5) / 200.0 - 50.0);
+            (f64::from(x) + 0.5 - edge).clamp(0.0, 1.0)
+        };
+        (0..200).map(row).sum::<f64>() / 200.0
+    };
+    let level = |x: u32, y: u32| (65535.0 * (0.2 + 0.6 * area(x, y))).round() as u16;
+    let picture = image::ImageBuffer::from_fn(130, 110, |x, y| image::Luma([level(x, y)]));
+    let path = folder.path().join("edge.png");
+    picture.save(&path).unwrap();
+    let name = path.to_str().unwrap();
+    let measured = |more: &[&str]| {
+        let mut args = vec!["lens", &camera, "check", "--mtf", "--picture", name, "--json"];
+        args.extend(more);
+        camsim(&args)
+    };
+    let (code, out, err) = measured(&["--linear", "--region", "5,3,115,100"]);
+    assert_eq!(code, 0, "{err}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(report["mtf"]["region_px"], serde_json::json!([115, 100]));
+    let [channel] = &report["mtf"]["channels"].as_array().unwrap()[..] else { panic!("{out}") };
+    // The model is the pixel alone.
+    assert!(channel["largest_difference"].as_f64().unwrap() < 0.01, "{channel}");
+    for (more, wanted) in [
+        (&["--region", "5,3,200,100"][..], "is not within its 130 x 110 pixels"),
+        (&["--region", "80,0,40,40"], "no edge"),
+        (&["--region", "1,2"], "X,Y,WIDTH,HEIGHT"),
+    ] {
+        let (code, _, err) = measured(more);
+        assert!(code != 0 && err.contains(wanted), "{err}");
+    }
+}

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use crate::{
     camera::CameraModel,
     frame::RenderedFrame,
-    imaging::ImageSensor,
+    imaging::{ImageSensor, Optics},
     noise::{camera_seed, tail_table},
     photometric::{Photometry, photometric, vignette_weights},
     scenario::{CameraSpec, Preset, Reset, Solver},
@@ -136,6 +136,9 @@ impl<'a> Pipeline<'a> {
         let paper = settings.preset == Preset::Paper;
         if settings.fog.is_some() && !paper {
             return Err(ApplyError::Fog);
+        }
+        if spec.point_spread.is_some() && paper {
+            return Err(ApplyError::PointSpread);
         }
         let solver = settings.solver.unwrap_or(if paper { Solver::Rk2 } else { Solver::Reproject });
         if solver == Solver::Oracle {
@@ -308,6 +311,9 @@ impl<'a> Pipeline<'a> {
             depth_m: Some(depth_m),
             ..RenderedFrame::default()
         };
+        if let Some(optics) = Optics::new(self.spec, self.settings.seed) {
+            optics.expose(&mut frame, None);
+        }
         if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
             // These frames have no place on a clock: the stamp is 0.
             sensor.expose(&mut frame, 0.0, None);

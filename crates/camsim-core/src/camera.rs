@@ -4,6 +4,8 @@
 //! Pixel coordinates are those of OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the
 //! top-left pixel, and a centred principal point is `((W - 1)/2, (H - 1)/2)`.
 
+use std::path::PathBuf;
+
 use glam::{DVec2, DVec3};
 
 use crate::lens::{Lens, LensError, LensModel};
@@ -69,6 +71,9 @@ pub enum CameraError {
     /// A zoom value that is not a number.
     #[error("the zoom value is {0}: it must be a finite number; check camera.zoom_track")]
     ZoomValue(f64),
+    /// A kernel that is only a name.
+    #[error("camera.point_spread.kernel: {} has not been read", .0.display())]
+    Kernel(PathBuf),
 }
 
 /// Checked intrinsics of a camera with its lens. Immutable.
@@ -100,6 +105,10 @@ impl CameraModel {
 
     /// A camera from `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
+        let kernel = spec.point_spread.as_ref().and_then(|spread| spread.kernel.as_ref());
+        if let Some(file) = kernel.filter(|file| file.kernel.is_none()) {
+            return Err(CameraError::Kernel(file.path.clone()));
+        }
         Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, |reach| {
             Lens::of_camera(spec, &spec.lens.coefficients, reach)
         })

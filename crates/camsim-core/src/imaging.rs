@@ -1,8 +1,9 @@
-//! The image sensor: from the linear light of an output frame to digital numbers, and from these to a picture
-//! (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
+//! The lens as a blur (`[camera.point_spread]`), and the image sensor: from the linear light of an output
+//! frame to digital numbers, and from these to a picture (`[camera.sensor]`; terms of EMVA 1288 release 4.0).
 //!
-//! There is one implementation for all renderers: it takes the finished picture of any of them. Its numbers are
-//! a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas: docs/IMAGING.md.
+//! There is one implementation for all renderers: it takes the finished picture of any of them. A sensor's
+//! numbers are a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas:
+//! docs/IMAGING.md.
 
 mod demosaic;
 mod develop;
@@ -11,6 +12,7 @@ mod exposed;
 mod facts;
 mod fixed_pattern;
 mod flicker;
+mod optics;
 mod settings;
 
 use std::sync::LazyLock;
@@ -23,11 +25,12 @@ use crate::{
     noise::camera_seed,
     scenario::{CameraSpec, ImageSensorSpec, Mosaic, Reset, ShutterSpec},
     shutter::{RowAxis, Shutter},
-    timing_faults::TimingFaults,
+    timing_faults::picture_of,
 };
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
+pub use optics::{KernelError, KernelFile, LensTransfer, Optics, SpreadKernel};
 
 use exposed::Exposed;
 pub(crate) use exposed::sensor_range;
@@ -132,8 +135,8 @@ impl ImageSensor {
     pub fn expose(&self, frame: &mut RenderedFrame, stamp_s: f64, exposure: Option<&FrameExposure>) {
         let own = exposure.map(|exposure| Exposed::of_frame(&self.key, exposure));
         let exposed = own.as_ref().unwrap_or(&self.nominal);
-        let faults = self.key.timing.as_ref().and_then(|camera| TimingFaults::new(camera, self.key.seed));
-        let picture = faults.map_or(frame.index, |faults| faults.picture(frame.index as i64) as u64);
+        let faulty = self.key.timing.as_ref();
+        let picture = faulty.map_or(frame.index, |camera| picture_of(camera, self.key.seed, frame.index));
         let raw = self.raw_of(exposed, picture as u32, stamp_s, &frame.color_rgba);
         exposed.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
         frame.raw = Some(raw);

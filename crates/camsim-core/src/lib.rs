@@ -32,7 +32,8 @@
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
 //! | [`exposure`] | exposure time and gain of each frame |
-//! | [`imaging`] | the image sensor: electrons, digital numbers, mosaics |
+//! | [`imaging`] | the lens as a blur; the image sensor: electrons, digital numbers, mosaics |
+//! | [`mtf`] | transfer function of a picture, from a slanted edge |
 //! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
@@ -67,6 +68,7 @@ pub mod imaging;
 pub mod lens;
 pub mod metrics;
 pub mod mount;
+pub mod mtf;
 pub mod noise;
 pub mod photometric;
 pub mod pose;

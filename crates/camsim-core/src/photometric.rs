@@ -22,9 +22,18 @@ pub struct Photometry {
 }
 
 impl Photometry {
-    /// The stage of a camera's frame; `exposure` is the frame's own. An image sensor applies it by itself.
+    /// What the renderers apply. With a point spread that is the vignette alone: all else comes after the spread.
     #[must_use]
     pub fn new(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
+        match camera.point_spread {
+            Some(_) => Self { light: 1.0, noise_sigma: 0.0, is_mono: false, most: f32::MAX },
+            None => Self::whole(camera, exposure),
+        }
+    }
+
+    /// The stage of a camera's frame; `exposure` is the frame's own. An image sensor applies it by itself.
+    #[must_use]
+    pub fn whole(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
         let spec = &camera.photometric;
         let own = exposure.filter(|_| camera.sensor.is_none()).map_or(1.0, |exposure| exposure.light);
         Self {

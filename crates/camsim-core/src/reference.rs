@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
-    imaging::ImageSensor,
+    imaging::{ImageSensor, Optics},
     lens::{DEFAULT_REACH, Lens},
     pose::CameraPose,
     scenario::CameraSpec,
@@ -88,6 +88,7 @@ pub struct Oracle {
     shading: Shading,
     /// Whether the scene has blended surfaces.
     blends: bool,
+    optics: Option<Optics>,
     sensor: Option<ImageSensor>,
 }
 
@@ -176,7 +177,8 @@ impl Oracle {
             moving: moving_meshes(&scene.meshes, scene.light),
             shading: Shading::new(scene),
             blends: scene.has_blended(),
-            sensor: None,
+            optics: Optics::new(&sequence.scenario.camera, sequence.scenario.seed),
+            sensor: ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed),
             sequence,
         }
     }

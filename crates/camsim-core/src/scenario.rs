@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::timing_faults::TimingFaults;
+use crate::timing_faults::picture_of;
 
 mod auto;
 mod auto_exposure;
@@ -18,6 +18,7 @@ mod dataset;
 mod face;
 mod image_sensor;
 mod motion;
+mod point_spread;
 mod rig;
 mod scene;
 mod sensors;
@@ -41,6 +42,7 @@ pub use image_sensor::{
     SensorModel,
 };
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
+pub use point_spread::PointSpreadSpec;
 pub use rig::Rig;
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
@@ -125,11 +127,10 @@ impl Scenario {
     }
 
     /// Number of the frame whose picture a frame shows: its own, but for doubled frames
-    /// ([`TimingFaults::picture`]).
+    /// ([`crate::timing_faults::TimingFaults::picture`]).
     #[must_use]
     pub fn picture(&self, frame: u64) -> u64 {
-        let faults = TimingFaults::new(&self.camera, self.seed);
-        faults.map_or(frame, |faults| faults.picture(frame as i64) as u64)
+        picture_of(&self.camera, self.seed, frame)
     }
 }
 

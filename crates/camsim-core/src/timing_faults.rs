@@ -46,6 +46,13 @@ pub struct TimingFaults<'a> {
     seed: u64,
 }
 
+/// Number of the frame whose picture a frame of a camera shows ([`TimingFaults::picture`]). `seed` is the
+/// scenario's.
+#[must_use]
+pub fn picture_of(camera: &CameraSpec, seed: u64, frame: u64) -> u64 {
+    TimingFaults::new(camera, seed).map_or(frame, |faults| faults.picture(frame as i64) as u64)
+}
+
 impl<'a> TimingFaults<'a> {
     /// Those of a camera; `None` where it has none. `seed` is the scenario's.
     #[must_use]

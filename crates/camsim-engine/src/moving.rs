@@ -117,11 +117,11 @@ impl MovingScene {
             .collect();
         let stage = Photometry::new(&self.sequence.scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
-        let picture = self.sequence.scenario.picture(plan.frame) as u32;
+        let scenario = &self.sequence.scenario;
+        let picture = scenario.picture(plan.frame) as u32;
         let color = |pixel: [u32; 2]| {
             let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
             let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
-            let scenario = &self.sequence.scenario;
             let value = photometric(
                 &stage,
                 linear.to_array(),

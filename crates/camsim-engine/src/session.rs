@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
-    imaging::ImageSensor,
+    imaging::{ImageSensor, Optics},
     scenario::{Channel, Preset, Scenario},
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
@@ -45,6 +45,7 @@ pub struct Session<'a> {
     channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
+    optics: Option<Optics>,
     sensor: Option<ImageSensor>,
 }
 
@@ -91,6 +92,7 @@ impl<'a> Session<'a> {
             .map(|gpu| GpuSession::new(gpu, &still, meshes.clone(), planner.wants_truth()))
             .transpose()?;
         let Scenario { camera, seed, .. } = &still.scenario;
+        let optics = Optics::new(camera, *seed);
         let sensor = ImageSensor::new(camera, *seed);
         Ok(Self {
             engine,
@@ -102,6 +104,7 @@ impl<'a> Session<'a> {
             coords_phase: 0.0,
             channels: channels.into(),
             hits: Vec::new(),
+            optics,
             sensor,
         })
     }
@@ -133,6 +136,7 @@ impl<'a> Session<'a> {
             gpu.renew((before, self.planner.wants_truth()), &still, planner.wants_truth())?;
         }
         let Scenario { camera, seed, .. } = &still.scenario;
+        self.optics = Optics::renewed(self.optics.take(), camera, *seed);
         self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
         self.cpu.renew(still);
         self.lanes = lanes(&planner, scene_planner.as_deref(), moving);
@@ -347,8 +351,11 @@ impl<'a> Session<'a> {
         Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
     }
 
-    /// What the image sensor makes of the light of a frame, if the camera has one.
+    /// What the lens and the image sensor make of the light of a frame, where the camera states them.
     fn exposed(&self, mut whole: Finished) -> Finished {
+        if let Some(optics) = &self.optics {
+            optics.expose(&mut whole.frame, whole.plan.exposure.as_ref());
+        }
         if let Some(sensor) = &self.sensor {
             sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
         }

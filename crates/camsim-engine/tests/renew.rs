@@ -6,7 +6,7 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    scenario::{Channel, LensModel, LensSpec, Preset, ShutterSpec},
+    scenario::{Channel, LensModel, LensSpec, PointSpreadSpec, Preset, ShutterSpec},
     sequence::{GrayImage, Sequence},
 };
 use camsim_engine::Session;
@@ -45,6 +45,15 @@ fn steps() -> Vec<(&'static str, Sequence, &'static [Channel])> {
         (
             "noise, so that the ideal frame stays",
             with(&|s| s.scenario.camera.photometric.noise_sigma = 0.1),
+            &COLOR,
+        ),
+        (
+            "a point spread",
+            with(&|s| {
+                let blur = PointSpreadSpec { sigma_px: Some(0.8), glare: 0.05, ..PointSpreadSpec::default() };
+                s.scenario.camera.point_spread = Some(blur);
+                s.scenario.camera.photometric.noise_sigma = 0.1;
+            }),
             &COLOR,
         ),
         ("a vignette", with(&|s| s.vignette = Some(Arc::new(vignette.clone()))), &COLOR),

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use camsim_core::camera::CameraModel;
 use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 
+use crate::kernel_file::{KernelFileError, load_kernel};
 use crate::lens_table::{LensTableError, load_lens_table};
 
 mod agisoft;
@@ -87,6 +88,9 @@ pub enum CameraFileError {
     /// The file of a lens cannot be used.
     #[error(transparent)]
     LensTable(#[from] LensTableError),
+    /// The file of a kernel cannot be used.
+    #[error(transparent)]
+    Kernel(#[from] KernelFileError),
     /// The values do not make a camera.
     #[error("{}: {source}", path.display())]
     Camera {
@@ -132,11 +136,14 @@ pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let lens_table = spec.lens_table.as_mut().map(|table| &mut table.path);
-    let files = [spec.photometric.vignette.as_mut(), spec.zoom_track.as_mut(), lens_table];
+    let kernel = spec.point_spread.as_mut().and_then(|spread| spread.kernel.as_mut());
+    let kernel = kernel.map(|file| &mut file.path);
+    let files = [spec.photometric.vignette.as_mut(), spec.zoom_track.as_mut(), lens_table, kernel];
     for file in files.into_iter().flatten() {
         *file = folder.join(&*file);
     }
     load_lens_table(&mut spec)?;
+    load_kernel(&mut spec)?;
     check(path, &spec)?;
     Ok(spec)
 }

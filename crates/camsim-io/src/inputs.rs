@@ -28,6 +28,8 @@ pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
     paths.extend(scenario.camera.photometric.vignette.clone());
     paths.extend(scenario.camera.zoom_track.clone());
     paths.extend(scenario.camera.lens_table.iter().map(|table| table.path.clone()));
+    let spread = scenario.camera.point_spread.as_ref();
+    paths.extend(spread.and_then(|spread| spread.kernel.as_ref()).map(|file| file.path.clone()));
     for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
         paths.push(picture.clone());
         paths.extend(sidecar_files(picture));
@@ -112,6 +114,7 @@ mod tests {
             "ortho.jgw",
             "pattern.png",
             "vignette.png",
+            "kernel.png",
             "zoom.csv",
             "board.yaml",
             "places.csv",
@@ -135,6 +138,8 @@ mod tests {
             focal_px = [100.0, 100.0]
             [camera.photometric]
             vignette = "vignette.png"
+            [camera.point_spread]
+            kernel = "kernel.png"
             [flight]
             log = "log.csv"
             [scene]

@@ -46,6 +46,7 @@ pub mod flight_log;
 pub mod frame_file;
 pub mod gltf_file;
 pub mod inputs;
+pub mod kernel_file;
 pub mod lens_table;
 pub mod load;
 pub mod manifest;

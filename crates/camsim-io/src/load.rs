@@ -22,6 +22,7 @@ use crate::{
     board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
     gltf_file::{GltfError, MAX_RADIUS_M},
+    kernel_file::{KernelFileError, load_kernel},
     lens_table::{LensTableError, load_lens_table},
     pictures::{PictureError, read_gray_image},
     terrain::{TerrainFileError, TerrainSummary},
@@ -211,6 +212,9 @@ pub enum LoadError {
     /// The file of a lens cannot be used.
     #[error(transparent)]
     LensTable(#[from] LensTableError),
+    /// The file of a kernel cannot be used.
+    #[error(transparent)]
+    Kernel(#[from] KernelFileError),
     /// A sensor cannot be simulated.
     #[error(transparent)]
     Sensor(#[from] SensorError),
@@ -342,6 +346,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     let epoch_ns = platform_ns.saturating_add(scenario.camera.clock_offset_ns());
     let mut with_table = scenario.clone();
     load_lens_table(&mut with_table.camera)?;
+    load_kernel(&mut with_table.camera)?;
     let sequence = Sequence {
         scenario: with_table,
         path: Arc::new(path),

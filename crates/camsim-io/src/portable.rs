@@ -86,10 +86,12 @@ pub fn portable_rig(rig: &Rig, folder: &Path) -> Result<serde_json::Value, serde
 pub fn write_camera(folder: &Path, camera: &CameraSpec) -> Result<(), WriteError> {
     let mut portable = camera.clone();
     let lens_table = portable.lens_table.as_mut().map(|table| &mut table.path);
+    let kernel = portable.point_spread.as_mut().and_then(|spread| spread.kernel.as_mut());
     let files = [
         (portable.photometric.vignette.as_mut(), "vignette"),
         (portable.zoom_track.as_mut(), "zoom"),
         (lens_table, "lens"),
+        (kernel.map(|file| &mut file.path), "kernel"),
     ];
     for (path, name) in files {
         if let Some(path) = path {

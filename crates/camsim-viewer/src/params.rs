@@ -461,6 +461,38 @@ pub const PARAMS: &[Param] = &[
         0.1,
         "exposure that makes white white with gain 1; else that of the shutter",
     ),
+    param(
+        "camera.point_spread.sigma_px",
+        "px",
+        [0.0, 4096.0],
+        0.01,
+        "standard deviation of the lens's Gaussian blur",
+    ),
+    param(
+        "camera.point_spread.f_number",
+        "",
+        [0.5, 100.0],
+        0.05,
+        "focal length over aperture: diffraction by a circular aperture",
+    ),
+    param("camera.point_spread.pixel_um", "um", [0.1, 100.0], 0.01, "side of a pixel, for the diffraction"),
+    param(
+        "camera.point_spread.wavelength_nm",
+        "nm",
+        [100.0, 2000.0],
+        1.0,
+        "wavelength of red, green and blue light, or one",
+    ),
+    param(
+        "camera.point_spread.defocus_px",
+        "px",
+        [0.0, 4096.0],
+        0.02,
+        "diameter of the even disc of a lens out of focus",
+    ),
+    param("camera.point_spread.kernel", "", ANY, 1.0, "picture of a point of light: PNG, EXR or CSV"),
+    param("camera.point_spread.kernel_oversampling", "", [1.0, 64.0], 0.1, "its values along a pixel"),
+    param("camera.point_spread.glare", "", [0.0, 1.0], 0.001, "share of the light spread over the picture"),
     param("scene.terrain.dem", "", ANY, 1.0, "GeoTIFF of heights"),
     param("scene.terrain.ortho", "", ANY, 1.0, "orthophoto of the terrain"),
     param("scene.terrain.height", "", ANY, 1.0, "vertical datum of the terrain's heights"),
@@ -678,10 +710,17 @@ pub const PARAMS: &[Param] = &[
     param("output.twin.lens", "", ANY, 1.0, "off: a pinhole with the same focal length and principal point"),
     param("output.twin.noise", "", ANY, 1.0, "off: no noise"),
     param("output.twin.vignette", "", ANY, 1.0, "off: no vignette"),
-    param("output.twin.ideal", "", ANY, 1.0, "no exposure, rolling shutter, lens, noise or vignette"),
+    param(
+        "output.twin.ideal",
+        "",
+        ANY,
+        1.0,
+        "no exposure, rolling shutter, lens, noise, vignette or point spread",
+    ),
     param("output.twin.instants", "", [1.0, 1000.0], 0.1, "pictures in a burst for each frame"),
     param("output.twin.over", "", ANY, 1.0, "what the instants of a burst are spread over"),
     param("output.twin.channels", "", ANY, 1.0, "channels of the twin; those of the frame if none is chosen"),
+    param("output.twin.point_spread", "", ANY, 1.0, "off: no point spread and no glare"),
     param("imu", "", ANY, 1.0, "inertial measurement units beside the camera"),
     param("imu.name", "", ANY, 1.0, "names the sensor's files; part of the seed of its noise"),
     param("imu.rate_hz", "Hz", [0.01, 100_000.0], 1.0, "samples a second"),
@@ -890,7 +929,7 @@ pub const PARAMS: &[Param] = &[
 
 #[cfg(test)]
 mod tests {
-    use camsim_io::scenario_file::{ValueKind, keys};
+    use camsim_io::scenario_file::keys;
 
     use super::*;
 

@@ -283,9 +283,11 @@ fn warn_of_extrapolation(args: &ApplyArgs, pipeline: &Pipeline<'_>, console: &mu
 /// Prefixes an error with the file that it concerns.
 fn in_file(args: &ApplyArgs, error: &ApplyError) -> anyhow::Error {
     let file = match error {
-        ApplyError::Camera(_) | ApplyError::Shutter(_) | ApplyError::AutoExposure | ApplyError::Reset => {
-            &args.camera
-        }
+        ApplyError::Camera(_)
+        | ApplyError::Shutter(_)
+        | ApplyError::AutoExposure
+        | ApplyError::Reset
+        | ApplyError::PointSpread => &args.camera,
         ApplyError::Frame { .. } | ApplyError::Motion(_) | ApplyError::Fog => &args.frame,
         ApplyError::Flow => return anyhow!("{error}"),
         ApplyError::Oracle => return anyhow!("--solver: {error}"),

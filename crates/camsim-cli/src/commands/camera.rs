@@ -9,6 +9,7 @@ use camsim_io::{
     camera_file::{
         BodyAxes, CameraFormat, ImportOptions, LensfunQuery, import_camera_with, import_lensfun, import_rig,
     },
+    kernel_file::load_kernel,
     lens_table::load_lens_table,
     scenario_file::read_cameras,
     write::write_atomic,
@@ -210,6 +211,7 @@ fn export_cameras(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Fa
         cameras = vec![cameras.swap_remove(index)];
     }
     cameras.iter_mut().try_for_each(load_lens_table).or_bad_input()?;
+    cameras.iter_mut().try_for_each(load_kernel).or_bad_input()?;
     let exported = export(&cameras, format).or_bad_input()?;
     for note in &exported.notes {
         console.note(format_args!("note: {note}"));

@@ -1,5 +1,7 @@
 //! `camsim lens`: projects points through a lens, and checks the lens.
 
+mod mtf;
+
 use std::{
     fs::File,
     io::{self, Read},
@@ -8,9 +10,11 @@ use std::{
 
 use anyhow::{Context, anyhow, bail};
 use camsim_core::camera::{CameraModel, LensCheck};
+use camsim_core::mtf::CameraMtf;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
     camera_file::read_camera_toml,
+    kernel_file::load_kernel,
     lens_table::{lens_table_csv, load_lens_table},
     scenario_file::{read_cameras, read_rig},
 };
@@ -30,7 +34,9 @@ Examples:
   camsim lens CAMERA.toml distort --points rays.csv -o pixels.csv
   echo 'x_px,y_px
   319.5,239.5' | camsim lens flight.toml undistort
-  camsim lens CAMERA.toml check --json")]
+  camsim lens CAMERA.toml check --json
+  camsim lens CAMERA.toml check --mtf                  the modulation transfer of lens and pixel
+  camsim lens CAMERA.toml check --mtf --picture edge.png --region 100,80,200,150")]
 pub struct LensArgs {
     /// Camera file, or a scenario: its [camera] is used, or one of its [[cameras]]
     camera: PathBuf,
@@ -61,6 +67,8 @@ enum LensCommand {
         /// Print JSON
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        mtf: mtf::MtfArgs,
     },
 }
 
@@ -79,7 +87,9 @@ struct PointsArgs {
 
 /// Runs a lens command.
 pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
-    let camera = read_camera(args, console)?;
+    let spec = read_camera(args, console)?;
+    let camera =
+        CameraModel::from_spec(&spec).with_context(|| args.camera.display().to_string()).or_bad_input()?;
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
@@ -87,12 +97,15 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             let text = lens_table_csv(&camera, *nodes);
             write_output(output.as_deref(), console, |out| out.write_all(text.as_bytes()))
         }
-        LensCommand::Check { json } => check(&camera, *json, console),
+        LensCommand::Check { json, mtf } => {
+            let report = LensReport { lens: camera.check(), mtf: mtf::measure(&spec, mtf)? };
+            check(&report, *json, console)
+        }
     }
 }
 
 /// A camera file has its keys at the root, a scenario has them in `[camera]` or `[[cameras]]`.
-fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel, Failure> {
+fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraSpec, Failure> {
     let (path, name) = (&args.camera, args.name.as_deref());
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("{}: cannot be read", path.display()))
@@ -103,10 +116,12 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
         let mut spec =
             choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone();
         load_lens_table(&mut spec).or_bad_input()?;
+        load_kernel(&mut spec).or_bad_input()?;
         spec
     } else if root.contains_key("cameras") {
         let mut spec = listed_camera(read_cameras(path).or_bad_input()?, name, console)?;
         load_lens_table(&mut spec).or_bad_input()?;
+        load_kernel(&mut spec).or_bad_input()?;
         spec
     } else if let Some(name) = name {
         return Err(Failure::bad_input(anyhow!(
@@ -116,7 +131,7 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
     } else {
         read_camera_toml(path).or_bad_input()?
     };
-    CameraModel::from_spec(&spec).with_context(|| path.display().to_string()).or_bad_input()
+    Ok(spec)
 }
 
 /// The camera of a name in a file with `[[cameras]]` alone, or the first.
@@ -201,14 +216,22 @@ fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>)
     Ok(())
 }
 
-fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {
-    let check = camera.check();
+/// What `check` prints.
+#[derive(Debug, serde::Serialize)]
+struct LensReport {
+    #[serde(flatten)]
+    lens: LensCheck,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mtf: Option<CameraMtf>,
+}
+
+fn check(report: &LensReport, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {
     if json {
-        console.json(&check)?;
+        console.json(report)?;
         return Ok(());
     }
-    let LensCheck { valid_fraction, ray_fraction, angle_max_deg, .. } = check;
-    let LensCheck { fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective, .. } = check;
+    let LensCheck { valid_fraction, ray_fraction, angle_max_deg, .. } = report.lens;
+    let LensCheck { fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective, .. } = report.lens;
     console.line(format_args!("pixels with an ideal ray       {:.3} %", 100.0 * valid_fraction))?;
     console.line(format_args!("pixels with a ray              {:.3} %", 100.0 * ray_fraction))?;
     console.line(format_args!("largest angle off axis         {angle_max_deg:.3} degrees"))?;
@@ -225,7 +248,7 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
         "no: some pixels have several ideal rays, so the calibration is unusable there"
     };
     console.line(format_args!("one ray per pixel              {answer}"))?;
-    Ok(())
+    report.mtf.as_ref().map_or(Ok(()), |measured| mtf::print(measured, console))
 }
 
 /// Points of a CSV by the names of their columns; as many bare columns of numbers need no header. Lines that

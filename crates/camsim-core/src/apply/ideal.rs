@@ -49,6 +49,12 @@ pub enum ApplyError {
          it out, and give camera.shutter.exposure_ms"
     )]
     AutoExposure,
+    /// The paper's methods with a point spread.
+    #[error(
+        "the paper's methods have their own photometric model: leave [point_spread] out of the camera, or use the \
+         preset \"default\""
+    )]
+    PointSpread,
 }
 
 /// A pinhole RGB-D image with its geometry.

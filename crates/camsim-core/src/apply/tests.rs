@@ -4,7 +4,7 @@ use glam::{DMat2, DMat3};
 
 use super::*;
 use crate::lens::LensModel;
-use crate::scenario::{FieldOr, LensSpec, ShutterSpec};
+use crate::scenario::{FieldOr, LensSpec, PointSpreadSpec, ShutterSpec};
 use crate::temporal::IdealGeometry;
 
 mod flow;
@@ -230,6 +230,10 @@ fn linear_fog_needs_the_paper_preset() {
     let motion = Motion::Twist(Twist::default());
     let settings = Settings { fog: Some(fog), ..Settings::default() };
     assert!(matches!(Pipeline::new(&spec, &ideal, &motion, &settings), Err(ApplyError::Fog)));
+    let spread = PointSpreadSpec { sigma_px: Some(1.0), ..PointSpreadSpec::default() };
+    let blurred = CameraSpec { point_spread: Some(spread), ..spec.clone() };
+    let paper = Settings { preset: Preset::Paper, ..Settings::default() };
+    assert!(matches!(Pipeline::new(&blurred, &ideal, &motion, &paper), Err(ApplyError::PointSpread)));
     let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings { preset: Preset::Paper, ..settings })
         .unwrap()
         .render(None);

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::{FrameView, Oracle, RaySample};
 use crate::{
-    exposure::FrameExposure,
     frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
     photometric::{Photometry, photometric},
@@ -44,7 +43,8 @@ pub struct RenderOptions {
     pub photometric: bool,
     /// Ideal frame to which the source coordinates of [`Channel::Coords`] refer. Without one they are 0.
     pub key: Option<IdealView>,
-    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all.
+    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all. With
+    /// `[camera.point_spread]` the frame is not exposed then ([`Oracle::expose`]).
     pub only: Option<Vec<bool>>,
 }
 
@@ -121,7 +121,6 @@ struct FrameJob<'a> {
     picture: u32,
     options: &'a RenderOptions,
     noise_table: Vec<f32>,
-    exposure: Option<FrameExposure>,
     photometry: Photometry,
     truth: bool,
 }
@@ -142,7 +141,6 @@ impl Oracle {
         let exposure = self.sequence.exposure(frame);
         let job = FrameJob {
             oracle: self,
-            exposure,
             photometry: Photometry::new(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
             picture: self.sequence.scenario.picture(frame) as u32,
@@ -172,10 +170,29 @@ impl Oracle {
             planes: self.planes(frame, options),
             raw: None,
         };
-        if let Some(sensor) = self.sensor.as_ref().filter(|_| options.photometric) {
-            sensor.expose(&mut rendered, self.stamp_s(frame), job.exposure.as_ref());
+        if options.photometric && !(self.optics.is_some() && options.only.is_some()) {
+            self.expose(&mut rendered);
         }
         (rendered, convergence)
+    }
+
+    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`Oracle::render`]
+    /// does at its end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light
+    /// comes from all.
+    pub fn expose(&self, frame: &mut RenderedFrame) {
+        let exposure = self.sequence.exposure(frame.index);
+        if let Some(optics) = &self.optics {
+            optics.expose(frame, exposure.as_ref());
+        }
+        if let Some(sensor) = &self.sensor {
+            sensor.expose(frame, self.stamp_s(frame.index), exposure.as_ref());
+        }
+    }
+
+    /// Whether a pixel has light of others, so that only whole frames are complete.
+    #[must_use]
+    pub fn spreads_light(&self) -> bool {
+        self.optics.is_some()
     }
 
     /// Time, pose and velocity of each row of the readout at its mid-exposure.

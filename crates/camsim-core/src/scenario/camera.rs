@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec, TimingSpec};
+use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec, PointSpreadSpec, TimingSpec};
 use crate::{
     lens::LensTable,
     shutter::{Shutter, ShutterError},
@@ -64,6 +64,9 @@ pub struct CameraSpec {
     /// Faults of trigger, stamps and delivery.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timing: Option<TimingSpec>,
+    /// What the lens makes of a point of light; without it, a point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_spread: Option<PointSpreadSpec>,
 }
 
 impl Default for CameraSpec {
@@ -87,6 +90,7 @@ impl Default for CameraSpec {
             sensor: None,
             auto_exposure: None,
             timing: None,
+            point_spread: None,
         }
     }
 }

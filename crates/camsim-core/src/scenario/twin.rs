@@ -38,7 +38,7 @@ pub struct TwinSpec {
     /// `false`: no vignette.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<bool>,
-    /// No exposure, rolling shutter, lens, noise or vignette.
+    /// No exposure, rolling shutter, lens, noise, vignette or point spread.
     #[serde(skip_serializing_if = "is_false")]
     pub ideal: bool,
     /// A burst of this many pictures without exposure, at most [`MAX_INSTANTS`].
@@ -50,6 +50,9 @@ pub struct TwinSpec {
     /// Channels of the twin; those of the frame by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<Channel>>,
+    /// `false`: no point spread and no glare.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_spread: Option<bool>,
 }
 
 /// Shutters of a twin.
@@ -96,14 +99,14 @@ impl TwinSpec {
         self.ideal || self.shutter == Some(TwinShutter::Global) || self.over == Some(BurstOver::Readout)
     }
 
-    /// Whether a flag, `lens`, `noise` or `vignette`, leaves its part out.
+    /// Whether a flag, such as `lens`, leaves its part out.
     fn leaves_out(&self, flag: Option<bool>) -> bool {
         self.ideal || flag == Some(false)
     }
 
     /// Whether the twin could differ from the frame.
     pub(super) fn differs(&self) -> bool {
-        let flags = [self.exposure, self.lens, self.noise, self.vignette];
+        let flags = [self.exposure, self.lens, self.noise, self.vignette, self.point_spread];
         self.is_sharp() || self.is_global() || flags.contains(&Some(false))
     }
 
@@ -116,6 +119,7 @@ impl TwinSpec {
             (self.leaves_out(self.lens), "no lens"),
             (self.leaves_out(self.noise), "no noise"),
             (self.leaves_out(self.vignette), "no vignette"),
+            (self.leaves_out(self.point_spread), "no point spread"),
         ];
         let words: Vec<&str> = parts.iter().filter(|(has, _)| *has).map(|(_, word)| *word).collect();
         let over = match self.over.unwrap_or_default() {
@@ -205,6 +209,9 @@ impl Scenario {
         }
         if twin.leaves_out(twin.vignette) {
             camera.photometric.vignette = None;
+        }
+        if twin.leaves_out(twin.point_spread) {
+            camera.point_spread = None;
         }
         if let Some(k) = instant.filter(|_| camera.photometric.noise_sigma > 0.0 || camera.sensor.is_some()) {
             camera.name += &format!("/{}/{k}", twin.name);

@@ -12,6 +12,7 @@ mod auto_exposure;
 mod image_sensor;
 mod motion;
 mod names;
+mod point_spread;
 mod rig;
 mod scene;
 mod sensors;
@@ -66,6 +67,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     image_sensor::check_with_output(&mut check, scenario);
     auto_exposure::check_with_scenario(&mut check, scenario);
     timing::check_with_quality(&mut check, scenario);
+    point_spread::check_with_preset(&mut check, scenario);
     twins::check_twins(&mut check, scenario);
     check.problems
 }
@@ -242,6 +244,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
     image_sensor::check_image_sensor(check, camera);
     auto_exposure::check_auto_exposure(check, camera);
+    point_spread::check_point_spread(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {

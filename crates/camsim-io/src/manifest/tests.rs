@@ -195,6 +195,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
             [camera]
             zoom_track = "x/2"
             photometric = { vignette = "x/3" }
+            point_spread = { kernel = "x/14" }
             [[camera.zoom]]
             at = 1.0
             focal_px = [1.0, 1.0]
@@ -216,7 +217,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
         assert!(visited.iter().any(|visited| visited == key), "{key}");
     }
     assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");
-    assert_eq!(visited.len(), 13);
+    assert_eq!(visited.len(), 14);
 }
 
 #[test]

@@ -1,11 +1,12 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use camsim_core::imaging::KernelFile;
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
     Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
     Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind,
-    MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel, QualitySpec, Readout, SensorModel,
-    SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
+    MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel, PointSpreadSpec, QualitySpec, Readout,
+    SensorModel, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -141,6 +142,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
         instants: Some(3),
         over: Some(BurstOver::Readout),
         channels: Some(vec![Channel::Color]),
+        point_spread: Some(false),
     }];
     scenario.scene.board = Some(BoardSpec {
         target: Some("target.yaml".into()),
@@ -164,6 +166,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
     }
     scenario.output.raw_format = camsim_core::scenario::RawFormat::Tiff;
     scenario.camera.sensor = Some(full_sensor());
+    scenario.camera.point_spread = Some(full_point_spread());
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
     let terrain = scenario.scene.terrain.as_mut().unwrap();
@@ -226,6 +229,18 @@ fn full_sensor() -> ImageSensorSpec {
         response_points: vec![[0.0, 0.0], [1.0, 1.0]],
         flicker: Some(camsim_core::scenario::FlickerSpec::default()),
         ..ImageSensorSpec::default()
+    }
+}
+
+/// Every key has a value.
+fn full_point_spread() -> PointSpreadSpec {
+    PointSpreadSpec {
+        sigma_px: Some(1.0),
+        f_number: Some(8.0),
+        pixel_um: Some(3.0),
+        defocus_px: Some(1.0),
+        kernel: Some(KernelFile { path: "kernel.png".into(), kernel: None }),
+        ..PointSpreadSpec::default()
     }
 }
 

@@ -41,7 +41,9 @@ const SHADOW_BORDER_RAYS: u32 = 21;
 /// What follows the last pass of a renderer.
 fn finishing(camera: &CameraSpec) -> Vec<&'static str> {
     let sensor = camera.sensor.as_ref().map(|_| "image sensor: light -> electrons -> numbers -> colours");
-    sensor.into_iter().collect()
+    let spread = camera.point_spread.as_ref().map(|_| "point spread of the lens, glare");
+    let simple = spread.filter(|_| sensor.is_none()).map(|_| "light, noise and saturation");
+    spread.into_iter().chain(simple).chain(sensor).collect()
 }
 
 fn shadow_stage(light: Option<Light>) -> Option<ShadowStage> {

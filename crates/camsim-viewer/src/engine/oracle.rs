@@ -7,6 +7,7 @@ use std::{
 };
 
 use camsim_core::{
+    frame::RenderedFrame,
     reference::{Oracle, RenderOptions},
     scenario::Channel,
 };
@@ -74,6 +75,17 @@ pub fn run(mailbox: &Mailbox<OracleRequest>, replies: &ReplySender) {
     }
 }
 
+/// The picture of the rows so far. Where light spreads, rows show what comes in, until all are there.
+fn shown(oracle: &Oracle, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32> {
+    let color_rgba = partial.color_rgba.clone();
+    if !oracle.spreads_light() || partial.rows < size_px[1] as usize {
+        return color_rgba;
+    }
+    let mut whole = RenderedFrame { index: partial.frame, size_px, color_rgba, ..RenderedFrame::default() };
+    oracle.expose(&mut whole);
+    whole.color_rgba
+}
+
 /// Renders the missing rows from the top, until a newer request arrives.
 fn render_rows(
     oracle: &Oracle,
@@ -86,19 +98,19 @@ fn render_rows(
     let size_px = scenario.camera.size_px;
     let [width, height] = size_px.map(|side| side as usize);
     let send = |partial: &PartialFrame| {
-        let difference = request.against.as_ref().and_then(|(picture, gain)| {
+        let color_rgba = shown(oracle, partial, size_px);
+        let is_comparable = partial.rows == height || !oracle.spreads_light();
+        let difference = request.against.as_ref().filter(|_| is_comparable).and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
-                .then(|| {
-                    difference(size_px, &against.color_rgba, &partial.color_rgba, *gain, partial.rows as u32)
-                })
+                .then(|| difference(size_px, &against.color_rgba, &color_rgba, *gain, partial.rows as u32))
                 .flatten()
         });
         replies.send(Reply::OraclePicture(Box::new(OraclePicture {
             sequence: request.sequence.clone(),
             frame: partial.frame,
-            image: Arc::new(srgb_image(size_px, &partial.color_rgba)),
-            color_rgba: Arc::new(partial.color_rgba.clone()),
+            image: Arc::new(srgb_image(size_px, &color_rgba)),
+            color_rgba: Arc::new(color_rgba),
             difference: difference.map(Arc::new),
             rows: partial.rows as u32,
         })));

@@ -1,5 +1,6 @@
 //! Variants of a scenario: stages of the pipeline, and previews.
 
+use camsim_core::imaging::with_facts;
 use camsim_core::scenario::{Auto, CameraSpec, LensSpec, Scenario, ShutterSpec, Silhouettes};
 
 use super::messages::Stage;
@@ -16,6 +17,7 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
         camera.photometric.light = 1.0;
         camera.photometric.noise_sigma = 0.0;
         camera.sensor = None;
+        camera.point_spread = None;
     }
     if stage < Stage::Time {
         camera.shutter = ShutterSpec::default();
@@ -67,6 +69,14 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
     for entry in &mut camera.zoom {
         entry.focal_px = focal(entry.focal_px);
         entry.principal_point_px = principal(entry.principal_point_px);
+    }
+    if let Some(spread) = &mut camera.point_spread {
+        for width_px in [&mut spread.sigma_px, &mut spread.defocus_px].into_iter().flatten() {
+            *width_px /= scale;
+        }
+        let sensor_um = camera.sensor.as_ref().and_then(|sensor| with_facts(sensor).pixel_um);
+        spread.pixel_um = spread.pixel_um.or(sensor_um).map(|pixel_um| pixel_um * scale);
+        spread.kernel_oversampling *= factor;
     }
 }
 

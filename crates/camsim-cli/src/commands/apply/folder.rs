@@ -240,7 +240,9 @@ fn inputs(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<ApplyIn
         |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::size_and_mtime(path));
     let mut camera = spec.clone();
     let lens_table = camera.lens_table.as_mut().map(|table| &mut table.path);
-    let paths = [camera.photometric.vignette.as_mut(), camera.zoom_track.as_mut(), lens_table];
+    let kernel = camera.point_spread.as_mut().and_then(|spread| spread.kernel.as_mut());
+    let kernel = kernel.map(|file| &mut file.path);
+    let paths = [camera.photometric.vignette.as_mut(), camera.zoom_track.as_mut(), lens_table, kernel];
     for path in paths.into_iter().flatten() {
         *path = relative_to(path, folder);
     }
@@ -248,6 +250,7 @@ fn inputs(args: &ApplyArgs, spec: &CameraSpec, set: &FrameSet) -> Result<ApplyIn
         set.motion_file()
             .into_iter()
             .chain(spec.photometric.vignette.as_deref())
+            .chain(spec.point_spread.iter().filter_map(|spread| Some(spread.kernel.as_ref()?.path.as_path())))
             .map(Path::to_owned)
             .collect(),
     );

@@ -41,7 +41,7 @@ fn check_keys(check: &mut Check, i: usize, twin: &TwinSpec) {
     let key = |leaf: &str| format!("output.twin.{i}.{leaf}");
     check.require(twin.differs(), format!("output.twin.{i}"), || {
         "is the frame itself; leave something out (exposure = false, shutter = \"global\", lens = false, noise = \
-         false, vignette = false, ideal = true or instants = 9), or leave the twin out"
+         false, vignette = false, point_spread = false, ideal = true or instants = 9), or leave the twin out"
             .into()
     });
     let flags = [
@@ -49,6 +49,7 @@ fn check_keys(check: &mut Check, i: usize, twin: &TwinSpec) {
         ("lens", twin.lens),
         ("noise", twin.noise),
         ("vignette", twin.vignette),
+        ("point_spread", twin.point_spread),
     ];
     for (name, _) in flags.iter().filter(|(_, flag)| twin.ideal && *flag == Some(true)) {
         check.fail(

@@ -23,7 +23,7 @@ const TWINS: &str = "output.twin.";
 
 /// Whether a key is one of a sensor beside the camera, all of which but the name may be left out.
 fn is_of_sensor(key: &str) -> bool {
-    ["imu.", "gnss.", "barometer.", "magnetometer.", "camera.sensor."]
+    ["imu.", "gnss.", "barometer.", "magnetometer.", "camera.sensor.", "camera.point_spread."]
         .iter()
         .any(|table| key.starts_with(table))
 }
