@@ -93,16 +93,17 @@ impl CameraModel {
         model: LensModel,
         coefficients: &[f64],
     ) -> Result<Self, CameraError> {
-        Self::with_key("camera", size_px, focal_px, principal_point_px, |reach| {
+        Self::with_key("camera", size_px, focal_px, principal_point_px, |reach, _, _| {
             Lens::with_reach(model, coefficients, reach)
         })
     }
 
     /// A camera from `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
-        Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, |reach| {
-            Lens::of_camera(spec, &spec.lens.coefficients, reach)
-        })
+        let lens = |reach, focal_px, principal_px| {
+            Lens::of_camera(spec, focal_px, principal_px, &spec.lens.coefficients, reach)
+        };
+        Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, lens)
     }
 
     /// A camera from `[camera]` at one zoom value, by the zoom table if there is one, else as
@@ -119,7 +120,7 @@ impl CameraModel {
         size_px: [u32; 2],
         [fx, fy]: [f64; 2],
         principal_point_px: Option<[f64; 2]>,
-        lens_with_reach: impl FnOnce(f64) -> Result<Lens, LensError>,
+        lens: impl FnOnce(f64, DVec2, DVec2) -> Result<Lens, LensError>,
     ) -> Result<Self, CameraError> {
         let [width, height] = size_px;
         if width == 0 || height == 0 || width > MAX_SIZE_PX || height > MAX_SIZE_PX {
@@ -144,8 +145,8 @@ impl CameraModel {
             .into_iter()
             .map(|corner| ((corner - principal_point_px) / focal_px).length())
             .fold(0.0, f64::max);
-        let lens =
-            lens_with_reach(reach).map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
+        let lens = lens(reach, focal_px, principal_point_px)
+            .map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
         Ok(Self { size_px, focal_px, principal_point_px, lens })
     }
 

@@ -29,7 +29,7 @@
 //! | [`scene`] | terrain, meshes, textures, light, levels of detail, calibration boards |
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
-//! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`photometric`], [`vignetting`], [`noise`], [`late_photometric`] | vignette, gain, noise, saturation |
 //! | [`imaging`] | the image sensor: electrons, digital numbers, mosaics |
 //! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
@@ -61,6 +61,7 @@ pub mod flight_log;
 pub mod frame;
 pub mod geodesy;
 pub mod imaging;
+pub mod late_photometric;
 pub mod lens;
 pub mod metrics;
 pub mod mount;
@@ -80,3 +81,4 @@ pub mod tracker;
 pub mod tracks;
 pub mod trajectory;
 pub mod transfer;
+pub mod vignetting;

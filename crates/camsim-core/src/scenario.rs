@@ -15,6 +15,7 @@ mod dataset;
 mod face;
 mod image_sensor;
 mod motion;
+mod optics;
 mod rig;
 mod scene;
 mod sensors;
@@ -36,6 +37,7 @@ pub use image_sensor::{
     SensorModel,
 };
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
+pub use optics::{ChromaticSpec, ImageCircleSpec, Primary, PrimaryLensSpec, VignettingSpec};
 pub use rig::Rig;
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,

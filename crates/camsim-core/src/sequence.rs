@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use crate::{
     mount::CameraPath,
-    photometric::vignette_weights,
-    scenario::{Face, Scenario, TwinSpec},
+    scenario::{Face, Primary, Scenario, TwinSpec},
     scene::Scene,
     shutter::ShutterError,
+    vignetting::pixel_weights,
 };
 
 /// All inputs of a run, loaded and validated. Immutable; shared between threads.
@@ -55,6 +55,14 @@ impl Sequence {
         sequence
     }
 
+    /// The sequence of one primary of a chromatic camera: what its lens shows of the same frames.
+    #[must_use]
+    pub fn primary(&self, primary: Primary) -> Self {
+        let mut sequence = self.clone();
+        sequence.scenario.camera = self.scenario.camera.of_primary(primary);
+        sequence
+    }
+
     /// Stamp of a frame of any number, beyond the sequence as well: path time, seconds.
     #[must_use]
     pub fn stamp_s(&self, frame: f64) -> f64 {
@@ -68,17 +76,16 @@ impl Sequence {
         self.epoch_ns.saturating_sub(self.scenario.camera.clock_offset_ns())
     }
 
-    /// Weights of the vignette map at every pixel, and the size of their picture; a single 1 without a map.
+    /// Weights of light at every pixel in the passes, and the size of their picture; a single 1 without any, and
+    /// where they come later.
     #[must_use]
     pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {
         let camera = &self.scenario.camera;
-        match &self.vignette {
-            Some(map) => {
-                let thresholds = camera.photometric.vignette_thresholds;
-                (camera.size_px, vignette_weights(map, camera.size_px, thresholds))
-            }
-            None => ([1, 1], vec![1.0]),
-        }
+        let weights = match camera.is_finished_late() {
+            true => None,
+            false => pixel_weights(camera, self.vignette.as_deref(), Primary::Green),
+        };
+        weights.map_or(([1, 1], vec![1.0]), |weights| (camera.size_px, weights))
     }
 }
 

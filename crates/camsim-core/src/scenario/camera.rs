@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Face, FieldOr, ImageSensorSpec};
+use super::{ChromaticSpec, Face, FieldOr, ImageCircleSpec, ImageSensorSpec, Primary, VignettingSpec};
 use crate::lens::LensTable;
 
 /// Camera geometry, lens, shutter and photometry.
@@ -55,6 +55,16 @@ pub struct CameraSpec {
     /// The image sensor, in place of `photometric`'s light and noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<ImageSensorSpec>,
+    /// Lenses of red and blue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chromatic: Option<ChromaticSpec>,
+    /// What of the picture the lens shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_circle: Option<ImageCircleSpec>,
+    /// The primary that this camera is for, where it is one of three ([`CameraSpec::of_primary`]); files have
+    /// whole cameras.
+    #[serde(skip)]
+    pub primary: Option<Primary>,
 }
 
 impl Default for CameraSpec {
@@ -76,6 +86,9 @@ impl Default for CameraSpec {
             shutter: ShutterSpec::default(),
             photometric: PhotometricSpec::default(),
             sensor: None,
+            chromatic: None,
+            image_circle: None,
+            primary: None,
         }
     }
 }
@@ -280,6 +293,9 @@ pub struct PhotometricSpec {
     pub noise_sigma: f64,
     /// Encoding of PNG files.
     pub output: OutputEncoding,
+    /// Vignetting by a model, beside the map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vignetting: Option<VignettingSpec>,
 }
 
 impl Default for PhotometricSpec {
@@ -290,6 +306,7 @@ impl Default for PhotometricSpec {
             light: 1.0,
             noise_sigma: 0.0,
             output: OutputEncoding::default(),
+            vignetting: None,
         }
     }
 }

@@ -174,6 +174,8 @@ impl Scenario {
         if twin.leaves_out(twin.lens) {
             camera.lens = LensSpec::default();
             camera.lens_table = None;
+            camera.chromatic = None;
+            camera.image_circle = None;
             camera.zoom.iter_mut().for_each(|zoom| zoom.coefficients.clear());
         }
         if twin.leaves_out(twin.noise) {
@@ -182,6 +184,7 @@ impl Scenario {
         }
         if twin.leaves_out(twin.vignette) {
             camera.photometric.vignette = None;
+            camera.photometric.vignetting = None;
         }
         if let Some(k) = instant.filter(|_| camera.photometric.noise_sigma > 0.0 || camera.sensor.is_some()) {
             camera.name += &format!("/{}/{k}", twin.name);

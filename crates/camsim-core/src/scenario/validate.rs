@@ -11,6 +11,7 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 mod image_sensor;
 mod motion;
 mod names;
+mod optics;
 mod rig;
 mod scene;
 mod sensors;
@@ -254,6 +255,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
     check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
     image_sensor::check_image_sensor(check, camera);
+    optics::check_optics(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
@@ -340,6 +342,7 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
 /// Combinations that the paper's methods do not support, and keys without an effect in that preset.
 fn check_paper(check: &mut Check, scenario: &Scenario) {
     let (quality, camera) = (&scenario.quality, &scenario.camera);
+    optics::check_paper(check, camera);
     let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
     let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
     let is_papers = matches!(camera.lens.model, LensModel::Pinhole | LensModel::BrownConrady);

@@ -105,7 +105,7 @@ struct ReversePass<'a> {
     rows: Rows,
     keys: Vec<Key<'a>>,
     gather: Gather,
-    photometric: &'a PhotometricSpec,
+    photometric: PhotometricSpec,
     vignette: &'a [f32],
     noise_seed: u64,
     noise_table: Vec<f32>,
@@ -150,7 +150,7 @@ impl<'a> ReversePass<'a> {
                 blur: plan.blur,
                 paper: plan.preset == Preset::Paper,
             },
-            photometric: &sequence.scenario.camera.photometric,
+            photometric: sequence.scenario.camera.photometric_of_passes(),
             vignette: inputs.vignette,
             noise_seed: sequence.scenario.noise_seed(),
             noise_table: tail_table(),
@@ -217,7 +217,7 @@ impl<'a> ReversePass<'a> {
             color = linear_fog(color, sky, pixel.ray.uv, depth.image.nearest(own_px), fog.end_m);
         }
         let value = photometric(
-            self.photometric,
+            &self.photometric,
             color.as_vec3().to_array(),
             weight,
             pixel.position,

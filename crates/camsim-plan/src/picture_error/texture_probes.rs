@@ -70,7 +70,7 @@ impl<'a> TextureProbes<'a> {
         stamp_s: f64,
         key_pose: &CameraPose,
     ) -> Self {
-        let (probes, focal_px) = (&reach.probes, reach.camera.central_focal_px());
+        let (probes, focal_px) = (&*reach.probes_of_colors(), reach.camera.central_focal_px());
         let gain = &gain(sequence, &reach.camera);
         let search =
             TextureSearch { sequence, surfaces, spectra, shutter, stamp_s, key_pose, focal_px, gain };

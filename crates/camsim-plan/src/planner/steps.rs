@@ -1,7 +1,7 @@
 //! The steps of a plan.
 
 use camsim_core::{
-    scenario::{Auto, CameraSpec},
+    scenario::{Auto, CameraSpec, Primary},
     scene::Light,
     temporal::{IdealGeometry, SKY_REACH_PX},
 };
@@ -288,7 +288,7 @@ impl<'a> Draft<'a> {
         if camera.sensor.is_none() && camera.photometric.noise_sigma <= 0.0 {
             self.skip("noise", "camera.photometric.noise_sigma is 0");
         }
-        if inputs.sequence.vignette.is_none() {
+        if inputs.sequence.vignette.is_none() && camera.photometric.vignetting.is_none() {
             self.skip("vignette map", "camera.photometric.vignette is not set");
         }
         if !inputs.truth {
@@ -357,7 +357,13 @@ impl<'a> Draft<'a> {
             skipped: self.skipped,
             price_ms: picture.price.ms + temporal_ms(method),
             ideal_price_ms: picture.price.ideal_ms,
+            primary: context.reach.others.is_some().then_some(Primary::Green),
+            others: context.reach.others.clone(),
         };
+        if plan.others.is_some() {
+            // Three output passes.
+            plan.price_ms += 2.0 * (plan.price_ms - plan.ideal_price_ms);
+        }
         if plan.copied_from().is_some() {
             plan.skipped.push(Skip {
                 what: "taps between ideal pixels",

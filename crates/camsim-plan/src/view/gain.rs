@@ -1,6 +1,9 @@
 //! Value of a pixel for each unit of light that arrives.
 
-use camsim_core::{camera::CameraModel, photometric::vignette_weight, sequence::Sequence};
+use camsim_core::{
+    camera::CameraModel, photometric::vignette_weight, scenario::Primary, sequence::Sequence,
+    vignetting::model_weight,
+};
 
 /// Value of a pixel, of the linear range, for each unit of light that arrives.
 pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2]) -> f64 + Sync {
@@ -14,6 +17,8 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2
                 photometric.vignette_thresholds,
             ))
         });
-        vignette * photometric.light
+        let model = photometric.vignetting.as_ref();
+        let model = model.map_or(1.0, |spec| model_weight(spec, camera, [x, y], Primary::Green));
+        vignette * model * photometric.light
     }
 }

@@ -13,6 +13,7 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
     let camera = &mut stage_scenario.camera;
     if stage < Stage::Photometric {
         camera.photometric.vignette = None;
+        camera.photometric.vignetting = None;
         camera.photometric.light = 1.0;
         camera.photometric.noise_sigma = 0.0;
         camera.sensor = None;
@@ -23,6 +24,8 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
     }
     if stage < Stage::Lens {
         camera.lens = LensSpec::default();
+        camera.chromatic = None;
+        camera.image_circle = None;
         camera.zoom.iter_mut().for_each(|entry| entry.coefficients.clear());
     }
     stage_scenario
@@ -67,6 +70,17 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
     for entry in &mut camera.zoom {
         entry.focal_px = focal(entry.focal_px);
         entry.principal_point_px = principal(entry.principal_point_px);
+    }
+    for lens in
+        camera.chromatic.iter_mut().flat_map(|chromatic| [&mut chromatic.red, &mut chromatic.blue]).flatten()
+    {
+        lens.focal_px = lens.focal_px.map(focal);
+        lens.principal_point_px =
+            lens.principal_point_px.map(|point_px| (point_px.map(|c| (c + 0.5) / scale - 0.5)));
+    }
+    if let Some(circle) = &mut camera.image_circle {
+        circle.radius_px = circle.radius_px.map(|radius_px| radius_px / scale);
+        circle.centre_px = circle.centre_px.map(|centre_px| centre_px.map(|c| (c + 0.5) / scale - 0.5));
     }
 }
 
