@@ -13,7 +13,7 @@ mod check;
 mod lens_inverse;
 mod zoom;
 
-pub use check::LensCheck;
+pub use check::{LensCheck, fringes_px};
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 

@@ -15,8 +15,7 @@ pub const MOVING_RAYS: u32 = RAYS;
 use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
-    noise::tail_table, photometric::photometric, scenario::PhotometricSpec, scene::Scene, sequence::Sequence,
-    shutter::RowAxis,
+    noise::tail_table, photometric::photometric, scene::Scene, sequence::Sequence, shutter::RowAxis,
 };
 use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
@@ -35,7 +34,6 @@ pub(crate) struct MovingScene {
     still: Arc<Sequence>,
     /// Built for the first frame that shows something that moves.
     caster: Arc<OnceLock<MovingCaster>>,
-    photometric: PhotometricSpec,
     vignette: Vec<f32>,
     noise_table: Vec<f32>,
 }
@@ -62,7 +60,6 @@ impl MovingScene {
             sequence: sequence.clone(),
             still: Arc::new(still),
             caster: known.map_or_else(Arc::default, |before| before.caster.clone()),
-            photometric: sequence.scenario.camera.photometric_of_passes(),
             vignette: sequence.vignette_weights().1,
             noise_table: tail_table(),
         })
@@ -115,16 +112,18 @@ impl MovingScene {
             })
             .collect();
         let mut scratch = RayScratch::default();
+        let scenario = &self.sequence.scenario;
+        let photometric_spec = scenario.camera.photometric_of_renderers();
         let color = |pixel: [u32; 2]| {
             let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
             let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
             let value = photometric(
-                &self.photometric,
+                &photometric_spec,
                 linear.to_array(),
                 weight,
                 pixel,
                 plan.frame as u32,
-                self.sequence.scenario.noise_seed(),
+                scenario.noise_seed(),
                 &self.noise_table,
             );
             Some((index(pixel), value))

@@ -103,7 +103,7 @@ pub struct Truth {
 #[must_use]
 pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
     // Long because: a line for each field of the shaders' struct.
-    let photometric = scenario.camera.photometric_of_passes();
+    let photometric = scenario.camera.photometric_of_renderers();
     let noise_seed = scenario.noise_seed();
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);

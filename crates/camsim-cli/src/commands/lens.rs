@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail};
-use camsim_core::camera::{CameraModel, LensCheck};
+use camsim_core::camera::{CameraModel, LensCheck, fringes_px};
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
     camera_file::read_camera_toml,
@@ -79,7 +79,9 @@ struct PointsArgs {
 
 /// Runs a lens command.
 pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
-    let camera = read_camera(args, console)?;
+    let spec = read_camera(args, console)?;
+    let in_file = || args.camera.display().to_string();
+    let camera = CameraModel::from_spec(&spec).with_context(in_file).or_bad_input()?;
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
@@ -87,19 +89,22 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             let text = lens_table_csv(&camera, *nodes);
             write_output(output.as_deref(), console, |out| out.write_all(text.as_bytes()))
         }
-        LensCommand::Check { json } => check(&camera, *json, console),
+        LensCommand::Check { json } => {
+            let fringes_px = fringes_px(&spec).with_context(in_file).or_bad_input()?;
+            check(LensCheck { fringes_px, ..camera.check() }, *json, console)
+        }
     }
 }
 
 /// A camera file has its keys at the root, a scenario has them in `[camera]` or `[[cameras]]`.
-fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel, Failure> {
+fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraSpec, Failure> {
     let (path, name) = (&args.camera, args.name.as_deref());
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("{}: cannot be read", path.display()))
         .or_bad_input()?;
     // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
-    let spec = if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
+    Ok(if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
         let mut spec =
             choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone();
         load_lens_table(&mut spec).or_bad_input()?;
@@ -115,8 +120,7 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraModel
         )));
     } else {
         read_camera_toml(path).or_bad_input()?
-    };
-    CameraModel::from_spec(&spec).with_context(|| path.display().to_string()).or_bad_input()
+    })
 }
 
 /// The camera of a name in a file with `[[cameras]]` alone, or the first.
@@ -201,8 +205,7 @@ fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>)
     Ok(())
 }
 
-fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {
-    let check = camera.check();
+fn check(check: LensCheck, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {
     if json {
         console.json(&check)?;
         return Ok(());
@@ -225,6 +228,10 @@ fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<
         "no: some pixels have several ideal rays, so the calibration is unusable there"
     };
     console.line(format_args!("one ray per pixel              {answer}"))?;
+    if let Some([red_px, blue_px]) = check.fringes_px {
+        console
+            .line(format_args!("red and blue beside green      at most {red_px:.3} and {blue_px:.3} px"))?;
+    }
     Ok(())
 }
 

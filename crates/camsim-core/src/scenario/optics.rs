@@ -1,5 +1,7 @@
 //! Optics beyond one lens for all light: lateral chromatic aberration, vignetting and the image circle.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::{CameraSpec, LensModel, LensSpec, OutputEncoding, PhotometricSpec};
@@ -195,12 +197,12 @@ impl CameraSpec {
         is_chromatic && is_grey || vignetting.is_some_and(VignettingSpec::is_colored)
     }
 
-    /// The photometric stage of the passes: where it comes later, one that leaves light as it is.
+    /// What the renderers apply of [`Self::photometric`]: nothing where it comes later.
     #[must_use]
-    pub fn photometric_of_passes(&self) -> PhotometricSpec {
+    pub fn photometric_of_renderers(&self) -> Cow<'_, PhotometricSpec> {
         match self.is_finished_late() {
-            true => PhotometricSpec { output: OutputEncoding::LinearF32, ..PhotometricSpec::default() },
-            false => self.photometric.clone(),
+            true => Cow::Owned(PhotometricSpec::default()),
+            false => Cow::Borrowed(&self.photometric),
         }
     }
 }
@@ -244,7 +246,7 @@ mod tests {
         camera.photometric.output = OutputEncoding::Luma8;
         assert!(camera.is_finished_late() && camera.of_primary(Primary::Red).is_finished_late());
         camera.photometric.noise_sigma = 0.1;
-        assert_eq!(camera.photometric_of_passes().noise_sigma, 0.0);
+        assert_eq!(camera.photometric_of_renderers().noise_sigma, 0.0);
         let vignetting = VignettingSpec { polynomial_red: Some(vec![-0.1]), ..VignettingSpec::default() };
         let photometric = PhotometricSpec { vignetting: Some(vignetting), ..PhotometricSpec::default() };
         assert!(CameraSpec { photometric, ..CameraSpec::default() }.is_finished_late());

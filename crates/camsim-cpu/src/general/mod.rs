@@ -5,6 +5,8 @@
 //! the output pixel, pose of its row, temporal inverse, gather over the exposure, silhouette rays,
 //! photometric stage, truth.
 
+use std::borrow::Cow;
+
 use camsim_core::{
     noise::tail_table,
     photometric::photometric,
@@ -105,7 +107,7 @@ struct ReversePass<'a> {
     rows: Rows,
     keys: Vec<Key<'a>>,
     gather: Gather,
-    photometric: PhotometricSpec,
+    photometric: Cow<'a, PhotometricSpec>,
     vignette: &'a [f32],
     noise_seed: u64,
     noise_table: Vec<f32>,
@@ -150,7 +152,7 @@ impl<'a> ReversePass<'a> {
                 blur: plan.blur,
                 paper: plan.preset == Preset::Paper,
             },
-            photometric: sequence.scenario.camera.photometric_of_passes(),
+            photometric: sequence.scenario.camera.photometric_of_renderers(),
             vignette: inputs.vignette,
             noise_seed: sequence.scenario.noise_seed(),
             noise_table: tail_table(),

@@ -2,10 +2,10 @@
 
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
-    Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, ChromaticSpec, Dictionary, FieldOr,
-    FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec, ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec,
-    ObjectsOf, OutputSpec, PerChannel, PrimaryLensSpec, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
-    TwinSpec, VignettingSpec,
+    Auto, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel, ChromaticSpec,
+    Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec, ImuSpec,
+    LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel, PrimaryLensSpec,
+    QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter, TwinSpec, VignettingSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -207,11 +207,8 @@ fn full_optics(camera: &mut CameraSpec) {
     let scale = || vec![1.0, 0.0, 0.1];
     camera.chromatic =
         Some(ChromaticSpec { red_scale: scale(), blue_scale: scale(), red: lens.clone(), blue: lens });
-    camera.image_circle = Some(ImageCircleSpec {
-        radius_px: Some(1.0),
-        centre_px: Some([1.0; 2]),
-        half_angle_deg: Some(1.0),
-    });
+    camera.image_circle =
+        Some(ImageCircleSpec { radius_px: Some(1.0), centre_px: Some([1.0; 2]), half_angle_deg: Some(1.0) });
     camera.photometric.vignetting = Some(VignettingSpec {
         cos_power: 4.0,
         polynomial: scale(),
