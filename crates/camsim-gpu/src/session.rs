@@ -457,7 +457,7 @@ impl<'a> GpuSession<'a> {
             vignette: &self.vignette,
             lens_map,
             out_color: &buffers.color.gpu_buffer,
-            out_truth: buffers.truth.as_ref().map(|truth| &truth.gpu_buffer),
+            out_truth: buffers.truth.as_ref().filter(|_| plan.truth).map(|truth| &truth.gpu_buffer),
         };
         // The other fields of the target are borrowed by the bindings.
         let groups = &mut target.groups[group_of(slot, plan.primary)];
