@@ -181,8 +181,7 @@ fn what_a_format_has_no_place_for_is_named() {
     spec.clock_offset_ms = 1.5;
     spec.photometric.noise_sigma = 0.01;
     spec.chromatic = Some(ChromaticSpec { red_scale: vec![1.001], ..ChromaticSpec::default() });
-    spec.image_circle =
-        Some(ImageCircleSpec { radius_px: Some(300.0), ..ImageCircleSpec::default() });
+    spec.image_circle = Some(ImageCircleSpec { radius_px: Some(300.0), ..ImageCircleSpec::default() });
     let set = [
         "fps",
         "phase",
