@@ -52,6 +52,8 @@ pub fn pixel_weights(camera: &CameraSpec, map: Option<&GrayImage>, primary: Prim
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
     use crate::scenario::{Face, LensModel, LensSpec, PhotometricSpec};
 

@@ -70,6 +70,8 @@ impl CircleLens {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
     use crate::{
         camera::CameraModel,

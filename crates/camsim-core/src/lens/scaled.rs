@@ -162,6 +162,8 @@ impl ScaledLens {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
     use crate::lens::LensModel;
 

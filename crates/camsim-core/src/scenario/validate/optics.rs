@@ -70,7 +70,7 @@ fn check_scale(check: &mut Check, camera: &CameraSpec, chromatic: &ChromaticSpec
     let most = corner_px(camera) / half_short_px;
     let is_near = |r: f64| {
         let factor = v + c * r + b * r * r;
-        factor <= MOST_SCALE && factor >= 1.0 / MOST_SCALE
+        (1.0 / MOST_SCALE..=MOST_SCALE).contains(&factor)
     };
     check.require((0..=PLACES).all(|i| is_near(most * f64::from(i) / f64::from(PLACES))), &key, || {
         format!(
