@@ -48,6 +48,11 @@ fn shadow_stage(light: Option<Light>) -> Option<ShadowStage> {
     light.filter(|light| light.shadows).map(|_| ShadowStage { border_rays: SHADOW_BORDER_RAYS })
 }
 
+/// Price of the output passes that red and blue have beside that of green, ms.
+fn price_of_other_colors(plan: &FramePlan) -> f64 {
+    if plan.others.is_some() { 2.0 * (plan.price_ms - plan.ideal_price_ms) } else { 0.0 }
+}
+
 /// A plan in the making.
 pub(super) struct Draft<'a> {
     context: &'a FrameContext<'a>,
@@ -360,10 +365,7 @@ impl<'a> Draft<'a> {
             primary: context.reach.others.is_some().then_some(Primary::Green),
             others: context.reach.others.clone(),
         };
-        if plan.others.is_some() {
-            // Three output passes.
-            plan.price_ms += 2.0 * (plan.price_ms - plan.ideal_price_ms);
-        }
+        plan.price_ms += price_of_other_colors(&plan);
         if plan.copied_from().is_some() {
             plan.skipped.push(Skip {
                 what: "taps between ideal pixels",
