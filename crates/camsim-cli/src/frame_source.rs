@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use camsim_core::{
     imaging::{ImageSensor, Optics},
+    late_photometric::LatePhotometric,
     reference::{Oracle, RenderOptions},
-    scenario::Auto,
+    scenario::{Auto, Primary},
     scene::LodSelection,
     sequence::Sequence,
 };
-use camsim_engine::{Engine, Finished, FrameTimes, Session, join_faces};
+use camsim_engine::{Engine, Finished, FrameTimes, Session, join_parts};
 use camsim_io::write::WriteError;
 use camsim_plan::{FramePlan, PlanError, Planner};
 
@@ -99,9 +100,10 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 /// would choose it.
 #[derive(Debug)]
 pub struct ReferenceSource {
-    /// One, or one a face.
+    /// One; or one a face, or one of each colour of each face.
     oracles: Vec<Oracle>,
-    /// These two are for what faces are joined to; a single oracle has its own.
+    /// These three are for what parts are joined to; a single oracle has its own.
+    late: Option<LatePhotometric>,
     optics: Option<Optics>,
     sensor: Option<ImageSensor>,
     planner: Planner,
@@ -125,14 +127,15 @@ impl ReferenceSource {
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
             ..RenderOptions::default()
         };
-        let oracle = |lane| match planner.lanes() {
-            1 => Oracle::new(sequence.clone()),
-            _ => Oracle::new(planner.lane(lane).sequence().clone()),
+        let parts = match planner.lanes() {
+            1 => vec![sequence.clone()],
+            lanes => (0..lanes).flat_map(|lane| colors(planner.lane(lane).sequence())).collect(),
         };
-        let oracles = (0..planner.lanes()).map(oracle).collect::<Result<_, _>>().or_bad_input()?;
-        let optics = Optics::new(&scenario.camera, scenario.seed);
+        let oracles = parts.into_iter().map(Oracle::new).collect::<Result<_, _>>().or_bad_input()?;
         let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
-        Ok(Self { oracles, optics, sensor, planner, options })
+        let late = LatePhotometric::new(sequence);
+        let optics = Optics::new(&scenario.camera, scenario.seed);
+        Ok(Self { oracles, late, optics, sensor, planner, options })
     }
 
     fn finished(&self, oracle: &Oracle, plan: FramePlan) -> Finished {
@@ -145,6 +148,14 @@ impl ReferenceSource {
             out_of_order: 0,
             times: FrameTimes::default(),
         }
+    }
+}
+
+/// The sequences of all colours of a face, whose borders are where each colour's lens has them.
+fn colors(face: &Arc<Sequence>) -> Vec<Arc<Sequence>> {
+    match face.scenario.camera.is_chromatic() {
+        true => Primary::ALL.map(|primary| Arc::new(face.primary(primary))).into(),
+        false => vec![face.clone()],
     }
 }
 
@@ -182,14 +193,22 @@ impl FrameSource for ReferenceSource {
                 continue;
             }
             let rows = plans.first().map(|plan| self.planner.rows(plan)).unwrap_or_default();
-            let faces = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
-            if let Some(mut whole) = join_faces(faces) {
+            let plans = plans.into_iter().flat_map(|plan| {
+                let others: Vec<FramePlan> = plan.other_colors().collect();
+                std::iter::once(plan).chain(others)
+            });
+            let parts = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
+            if let Some(mut whole) = join_parts(parts) {
                 whole.frame.rows = rows;
+                let exposure = whole.plan.exposure;
+                if let Some(late) = &self.late {
+                    late.finish(&mut whole.frame, exposure.as_ref());
+                }
                 if let Some(optics) = &self.optics {
-                    optics.expose(&mut whole.frame, whole.plan.exposure.as_ref());
+                    optics.expose(&mut whole.frame, exposure.as_ref());
                 }
                 if let Some(sensor) = &self.sensor {
-                    sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
+                    sensor.expose(&mut whole.frame, whole.plan.stamp_s, exposure.as_ref());
                 }
                 sink(whole).or_failed()?;
             }

@@ -20,8 +20,8 @@ use crate::{
     frame::RenderedFrame,
     imaging::{ImageSensor, Optics},
     noise::{camera_seed, tail_table},
-    photometric::{Photometry, photometric, vignette_weights},
-    scenario::{CameraSpec, Preset, Reset, Solver},
+    photometric::{Photometry, photometric},
+    scenario::{CameraSpec, Preset, Primary, Reset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
     shutter::Shutter,
@@ -30,6 +30,7 @@ use crate::{
         displacement::{self, RK2_STEP_DEG, Twist},
         gather, samples_for,
     },
+    vignetting::pixel_weights,
 };
 
 mod depth_search;
@@ -287,8 +288,7 @@ impl<'a> Pipeline<'a> {
     #[must_use]
     pub fn render_and_count(&self, vignette: Option<&GrayImage>) -> (RenderedFrame, NoSourceCounts) {
         let size_px @ [width, height] = self.camera.size_px;
-        let weights =
-            vignette.map(|map| vignette_weights(map, size_px, self.spec.photometric.vignette_thresholds));
+        let weights = pixel_weights(self.spec, vignette, Primary::Green);
         let table = tail_table();
         let pixels: Vec<Result<([f32; 3], f32), NoSource>> = (0..height)
             .into_par_iter()

@@ -15,7 +15,7 @@ mod check;
 mod lens_inverse;
 mod zoom;
 
-pub use check::LensCheck;
+pub use check::{LensCheck, fringes_px};
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
@@ -98,7 +98,7 @@ impl CameraModel {
         model: LensModel,
         coefficients: &[f64],
     ) -> Result<Self, CameraError> {
-        Self::with_key("camera", size_px, focal_px, principal_point_px, |reach| {
+        Self::with_key("camera", size_px, focal_px, principal_point_px, |reach, _, _| {
             Lens::with_reach(model, coefficients, reach)
         })
     }
@@ -109,9 +109,10 @@ impl CameraModel {
         if let Some(file) = kernel.filter(|file| file.kernel.is_none()) {
             return Err(CameraError::Kernel(file.path.clone()));
         }
-        Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, |reach| {
-            Lens::of_camera(spec, &spec.lens.coefficients, reach)
-        })
+        let lens = |reach, focal_px, principal_px| {
+            Lens::of_camera(spec, focal_px, principal_px, &spec.lens.coefficients, reach)
+        };
+        Self::with_key("camera", spec.size_px, spec.focal_px, spec.principal_point_px, lens)
     }
 
     /// A camera from `[camera]` at one zoom value, by the zoom table if there is one, else as
@@ -128,7 +129,7 @@ impl CameraModel {
         size_px: [u32; 2],
         [fx, fy]: [f64; 2],
         principal_point_px: Option<[f64; 2]>,
-        lens_with_reach: impl FnOnce(f64) -> Result<Lens, LensError>,
+        lens: impl FnOnce(f64, DVec2, DVec2) -> Result<Lens, LensError>,
     ) -> Result<Self, CameraError> {
         let [width, height] = size_px;
         if width == 0 || height == 0 || width > MAX_SIZE_PX || height > MAX_SIZE_PX {
@@ -153,8 +154,8 @@ impl CameraModel {
             .into_iter()
             .map(|corner| ((corner - principal_point_px) / focal_px).length())
             .fold(0.0, f64::max);
-        let lens =
-            lens_with_reach(reach).map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
+        let lens = lens(reach, focal_px, principal_point_px)
+            .map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
         Ok(Self { size_px, focal_px, principal_point_px, lens })
     }
 

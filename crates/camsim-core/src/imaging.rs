@@ -83,7 +83,7 @@ struct SensorKey {
 impl SensorKey {
     /// `None` also for a face: the sensor takes the whole picture, once its faces are joined.
     fn new(camera: &CameraSpec, seed: u64) -> Option<Self> {
-        let sensor = camera.sensor.as_ref().filter(|_| camera.face.is_none())?;
+        let sensor = camera.sensor.as_ref().filter(|_| camera.face.is_none() && camera.primary.is_none())?;
         Some(Self {
             spec: sensor.clone(),
             size_px: camera.size_px,

@@ -23,6 +23,7 @@ pub use crate::scenario::LensModel;
 mod branch;
 mod brown_conrady;
 mod brown_conrady_prism;
+mod circle;
 mod direction;
 mod division;
 mod double_sphere;
@@ -41,11 +42,13 @@ pub mod paper;
 mod pinhole;
 mod radial;
 mod radial_table;
+mod scaled;
 mod spline;
 mod table;
 mod ucm;
 
 pub use brown_conrady::BrownConrady;
+pub use circle::CircleLens;
 pub use direction::DirectionLens;
 pub use face::FaceLens;
 pub use facts::ModelFacts;
@@ -54,10 +57,13 @@ pub use foreign::{ForeignLens, ForeignLensError, foreign_f_theta, foreign_lens, 
 pub use pinhole::Pinhole;
 pub use radial::RadialLens;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
+pub use scaled::ScaledLens;
+pub(crate) use scaled::largest_radius;
 pub use table::{GridOf, LensGrid, LensGridError, LensTable, RayChart};
 
 use facts::Shape;
 pub(crate) use fold::MAX_FIELD_RAD;
+use scaled::RadialScale;
 
 /// Default distorted radius covered by the start table of [`Lens::new`], in units of the focal length; see
 /// [`Lens::with_reach`].
@@ -117,6 +123,10 @@ pub enum Lens {
     Direction(Box<DirectionLens>),
     /// Another lens in the axes of one of its faces.
     Face(Box<FaceLens>),
+    /// Another lens with its image scaled.
+    Scaled(Box<ScaledLens>),
+    /// Another lens within its image circle.
+    Circle(Box<CircleLens>),
 }
 
 impl Lens {
@@ -165,17 +175,62 @@ impl Lens {
         Self::Direction(Box::new(DirectionLens::new(LensModel::Table, Vec::new(), formula)))
     }
 
-    /// The lens of a camera, with these coefficients instead of its own: the table that it names, or a model.
-    pub(crate) fn of_camera(spec: &CameraSpec, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
+    /// The lens of a camera, with this calibration instead of its own: the table that it names, or a model; of
+    /// its primary, within its image circle, in the axes of its face.
+    pub(crate) fn of_camera(
+        spec: &CameraSpec,
+        focal_px: DVec2,
+        principal_px: DVec2,
+        coefficients: &[f64],
+        reach: f64,
+    ) -> Result<Self, LensError> {
         let grid = spec.lens_table.as_ref().and_then(|table| table.grid.as_ref());
         let whole = match grid.filter(|_| spec.lens.model == LensModel::Table) {
             Some(grid) => Self::from_grid(grid),
             None => Self::with_reach(spec.lens.model, coefficients, reach)?,
         };
-        Ok(match spec.face {
-            Some(face) => Self::Face(Box::new(FaceLens::new(whole, face))),
+        let [width, height] = spec.size_px;
+        let half_short_px = 0.5 * f64::from(width.min(height));
+        let scaled = match spec.primary_scale() {
+            Some(terms) => {
+                let scale = RadialScale::new(terms, focal_px / half_short_px);
+                Self::Scaled(Box::new(ScaledLens::new(whole, scale)))
+            }
             None => whole,
+        };
+        let within = match &spec.image_circle {
+            Some(circle) => Self::Circle(Box::new(CircleLens::new(scaled, circle, focal_px, principal_px))),
+            None => scaled,
+        };
+        Ok(match spec.face {
+            Some(face) => Self::Face(Box::new(FaceLens::new(within, face))),
+            None => within,
         })
+    }
+
+    /// The lens that this one alters, if it does: in a face's axes, scaled, or within an image circle.
+    fn altered(&self) -> Option<&Self> {
+        match self {
+            Self::Face(lens) => Some(lens.whole()),
+            Self::Scaled(lens) => Some(lens.whole()),
+            Self::Circle(lens) => Some(lens.whole()),
+            Self::Pinhole(_) | Self::BrownConrady(_) | Self::Radial(_) | Self::Direction(_) => None,
+        }
+    }
+
+    /// Whether it is another lens that is altered, which is inverted by that one's inverse.
+    #[must_use]
+    pub fn is_altered(&self) -> bool {
+        self.altered().is_some()
+    }
+
+    /// The lens in the axes of the whole camera.
+    #[must_use]
+    pub fn of_whole_camera(&self) -> &Self {
+        match self {
+            Self::Face(lens) => lens.whole(),
+            _ => self,
+        }
     }
 
     /// Which model this is.
@@ -185,7 +240,9 @@ impl Lens {
             Self::BrownConrady(_) => LensModel::BrownConrady,
             Self::Radial(lens) => lens.model,
             Self::Direction(lens) => lens.model,
-            Self::Face(lens) => lens.whole().model(),
+            Self::Face(_) | Self::Scaled(_) | Self::Circle(_) => {
+                self.altered().map_or(LensModel::Pinhole, Self::model)
+            }
         }
     }
 
@@ -196,7 +253,9 @@ impl Lens {
             Self::BrownConrady(lens) => &lens.coefficients,
             Self::Radial(lens) => &lens.coefficients,
             Self::Direction(lens) => &lens.coefficients,
-            Self::Face(lens) => lens.whole().coefficients(),
+            Self::Face(_) | Self::Scaled(_) | Self::Circle(_) => {
+                self.altered().map_or(&[], Self::coefficients)
+            }
         }
     }
 
@@ -205,7 +264,7 @@ impl Lens {
         match self {
             Self::Pinhole(_) => true,
             Self::BrownConrady(lens) => lens.coefficients.iter().all(|k| *k == 0.0),
-            Self::Radial(_) | Self::Direction(_) | Self::Face(_) => false,
+            _ => false,
         }
     }
 
@@ -219,6 +278,8 @@ impl Lens {
             Self::Radial(lens) => lens.distort(ideal),
             Self::Direction(lens) => lens.distort(ideal),
             Self::Face(lens) => lens.distort(ideal),
+            Self::Scaled(lens) => lens.distort(ideal),
+            Self::Circle(lens) => lens.distort(ideal),
         }
     }
 
@@ -230,6 +291,8 @@ impl Lens {
             Self::Radial(lens) => lens.jacobian(ideal),
             Self::Direction(lens) => lens.jacobian(ideal),
             Self::Face(lens) => lens.jacobian(ideal),
+            Self::Scaled(lens) => lens.jacobian(ideal),
+            Self::Circle(lens) => lens.jacobian(ideal),
         }
     }
 
@@ -242,6 +305,8 @@ impl Lens {
             Self::Radial(lens) => lens.undistort(distorted),
             Self::Direction(lens) => lens.undistort(distorted),
             Self::Face(lens) => lens.undistort(distorted),
+            Self::Scaled(lens) => lens.undistort(distorted),
+            Self::Circle(lens) => lens.undistort(distorted),
         }
     }
 
@@ -253,6 +318,8 @@ impl Lens {
             Self::Radial(lens) => lens.image(ray),
             Self::Direction(lens) => lens.image(ray),
             Self::Face(lens) => lens.image(ray),
+            Self::Scaled(lens) => lens.image(ray),
+            Self::Circle(lens) => lens.whole().image(ray),
         }
     }
 
@@ -265,6 +332,8 @@ impl Lens {
             Self::Radial(lens) => lens.gradient(ray),
             Self::Direction(lens) => lens.gradient(ray),
             Self::Face(lens) => lens.gradient(ray),
+            Self::Scaled(lens) => lens.gradient(ray),
+            Self::Circle(lens) => lens.whole().gradient(ray),
         }
     }
 
@@ -277,6 +346,8 @@ impl Lens {
             Self::Radial(lens) => lens.ray(distorted),
             Self::Direction(lens) => lens.ray(distorted),
             Self::Face(lens) => lens.ray(distorted),
+            Self::Scaled(lens) => lens.ray(distorted),
+            Self::Circle(lens) => lens.ray(distorted),
         }
     }
 
@@ -287,6 +358,8 @@ impl Lens {
             Self::Radial(lens) => lens.contains_ray(ray),
             Self::Direction(lens) => lens.contains_ray(ray),
             Self::Face(lens) => lens.contains_ray(ray),
+            Self::Scaled(lens) => lens.contains_ray(ray),
+            Self::Circle(lens) => lens.contains_ray(ray),
         }
     }
 
@@ -299,6 +372,8 @@ impl Lens {
             Self::Direction(lens) => lens.angle_max_rad(),
             // Measured from the axis of the face.
             Self::Face(_) => std::f64::consts::PI,
+            Self::Scaled(lens) => lens.whole().angle_max_rad(),
+            Self::Circle(lens) => lens.whole().angle_max_rad().min(lens.half_angle_rad()),
         }
     }
 
@@ -307,6 +382,8 @@ impl Lens {
         match self {
             Self::Pinhole(_) | Self::BrownConrady(_) => 1.0,
             Self::Face(lens) => lens.whole().axial_magnification(),
+            Self::Scaled(lens) => lens.axial_scale() * lens.whole().axial_magnification(),
+            Self::Circle(lens) => lens.whole().axial_magnification(),
             Self::Radial(_) | Self::Direction(_) => self.jacobian(DVec2::ZERO).determinant().abs().sqrt(),
         }
     }
@@ -318,15 +395,17 @@ impl Lens {
             Self::BrownConrady(lens) => Some(&lens.fold),
             Self::Radial(lens) => Some(&lens.fold),
             Self::Direction(lens) => Some(&lens.fold),
+            Self::Scaled(lens) => lens.whole().fold_curve(),
+            Self::Circle(lens) => lens.whole().fold_curve(),
         }
     }
 
     /// Start table of the inverse, or `None` for a model without one.
     pub fn radial_table(&self) -> Option<&RadialTable> {
         match self {
-            Self::Pinhole(_) | Self::Direction(_) | Self::Face(_) => None,
             Self::BrownConrady(lens) => Some(&lens.table),
             Self::Radial(lens) => Some(&lens.table),
+            _ => None,
         }
     }
 
@@ -338,6 +417,8 @@ impl Lens {
             Self::Radial(lens) => lens.distorted_max(),
             Self::Direction(lens) => lens.fold.distorted_max(),
             Self::Face(lens) => lens.whole().distorted_max(),
+            Self::Scaled(lens) => lens.distorted_max(),
+            Self::Circle(lens) => lens.whole().distorted_max(),
         }
     }
 
@@ -350,7 +431,7 @@ impl Lens {
     /// Ideal radius within which all points lie on the principal branch; infinite for a pinhole.
     #[inline]
     pub fn contained_radius(&self) -> f64 {
-        if self.face().is_some() {
+        if self.is_altered() {
             return 0.0;
         }
         self.fold_curve().map_or(f64::INFINITY, FoldCurve::smallest)
@@ -358,7 +439,7 @@ impl Lens {
 
     /// Whether an ideal point lies on the principal branch, so that `undistort(distort(ideal))` is `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
-        if let Self::Face(_) = self {
+        if self.is_altered() {
             return ideal.is_finite() && self.contains_ray(ideal.extend(1.0));
         }
         // Most points are within every radius, and need no angle.

@@ -30,7 +30,7 @@
 //! | [`timing_faults`] | late triggers, wrong stamps, dropped and doubled frames |
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
-//! | [`photometric`], [`noise`] | vignette, gain, noise, saturation |
+//! | [`photometric`], [`vignetting`], [`noise`], [`late_photometric`] | vignette, gain, noise, saturation |
 //! | [`exposure`] | exposure time and gain of each frame |
 //! | [`imaging`] | the lens as a blur; the image sensor: electrons, digital numbers, mosaics |
 //! | [`mtf`] | transfer function of a picture, from a slanted edge |
@@ -65,6 +65,7 @@ pub mod flight_log;
 pub mod frame;
 pub mod geodesy;
 pub mod imaging;
+pub mod late_photometric;
 pub mod lens;
 pub mod metrics;
 pub mod mount;
@@ -86,3 +87,4 @@ pub mod tracker;
 pub mod tracks;
 pub mod trajectory;
 pub mod transfer;
+pub mod vignetting;

@@ -22,13 +22,19 @@ pub struct Photometry {
 }
 
 impl Photometry {
-    /// What the renderers apply. With a point spread that is the vignette alone: all else comes after the spread.
+    /// The light as it is.
+    const NEUTRAL: Self = Self { light: 1.0, noise_sigma: 0.0, is_mono: false, most: f32::MAX };
+
+    /// What the passes apply: nothing where that comes later ([`CameraSpec::is_finished_late`]).
     #[must_use]
     pub fn new(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
-        match camera.point_spread {
-            Some(_) => Self { light: 1.0, noise_sigma: 0.0, is_mono: false, most: f32::MAX },
-            None => Self::whole(camera, exposure),
-        }
+        if camera.is_finished_late() { Self::NEUTRAL } else { Self::before_spread(camera, exposure) }
+    }
+
+    /// What comes before the point spread: with one, the vignette alone.
+    #[must_use]
+    pub fn before_spread(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
+        if camera.point_spread.is_some() { Self::NEUTRAL } else { Self::whole(camera, exposure) }
     }
 
     /// The stage of a camera's frame; `exposure` is the frame's own. An image sensor applies it by itself.

@@ -17,7 +17,7 @@ use crate::{
     imaging::{ImageSensor, Optics},
     lens::{DEFAULT_REACH, Lens},
     pose::CameraPose,
-    scenario::CameraSpec,
+    scenario::{CameraSpec, Primary},
     sequence::Sequence,
     shutter::{Shutter, ShutterError},
 };
@@ -155,12 +155,7 @@ impl Oracle {
         if let Some(row) = sequence.zoom_track.iter().find(|row| row.1.is_nan()) {
             return Err(CameraError::ZoomValue(row.1).into());
         }
-        let fixed = if camera.zoom.is_empty() {
-            let principal_px = camera.principal_point_px.unwrap_or_else(|| centre_px(camera));
-            Some(lens_inverse(camera, camera.focal_px, principal_px, &camera.lens.coefficients)?)
-        } else {
-            None
-        };
+        let fixed = if camera.zoom.is_empty() { Some(lenses(camera, None)?) } else { None };
         let sensor = ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed);
         Ok(Self { fixed, sensor, ..Self::of_scene(sequence) })
     }
@@ -300,7 +295,7 @@ impl Oracle {
         if let Some((_, lens)) = cache().iter().find(|(bits, _)| *bits == zoom.to_bits()) {
             return Some(lens.clone());
         }
-        let made = Arc::new(lens_at_zoom(&self.sequence.scenario.camera, zoom).ok()?);
+        let made = Arc::new(lenses(&self.sequence.scenario.camera, Some(zoom)).ok()?);
         let mut cache = cache();
         if cache.len() >= ZOOM_CACHE_SIZE {
             cache.remove(0);
@@ -332,14 +327,26 @@ impl FrameView<'_> {
 
     /// Ideal ray (u, v) of an image position.
     #[must_use]
-    pub fn ray(&self, [x, y]: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
-        let lens: &LensInverse = match &self.lens {
-            FrameLens::Fixed(lens) => lens,
-            FrameLens::Zoomed(lens) => lens,
-            FrameLens::Invalid => return None,
-        };
-        let pixel = DVec2::new(f64::from(x), f64::from(y));
-        if lens.holds(pixel) { lens.ray(pixel + offset_px) } else { None }
+    pub fn ray(&self, pixel: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
+        self.lens()?.ray_of(pixel, offset_px)
+    }
+
+    /// As [`FrameView::ray`], of the lenses of red and blue; `None` where they have that of green.
+    pub(super) fn ray_of_red_and_blue(
+        &self,
+        pixel: [u32; 2],
+        offset_px: DVec2,
+    ) -> Option<[Option<DVec2>; 2]> {
+        let others = self.lens()?.others.as_ref()?;
+        Some(others.each_ref().map(|lens| lens.ray_of(pixel, offset_px)))
+    }
+
+    fn lens(&self) -> Option<&LensInverse> {
+        match &self.lens {
+            FrameLens::Fixed(lens) => Some(lens),
+            FrameLens::Zoomed(lens) => Some(lens),
+            FrameLens::Invalid => None,
+        }
     }
 
     /// Mid-exposure of a pixel, path time, seconds.
@@ -358,15 +365,36 @@ fn limit_of(hit: Option<Hit>) -> f64 {
     hit.map_or(f64::INFINITY, |hit| hit.depth_m)
 }
 
+/// The lens of a camera, with those of red and blue.
+fn lenses(camera: &CameraSpec, zoom: Option<f64>) -> Result<LensInverse, CameraError> {
+    let of = |camera: &CameraSpec| match zoom {
+        Some(zoom) => lens_at_zoom(camera, zoom),
+        None => {
+            let principal_px = camera.principal_point_px.unwrap_or_else(|| centre_px(camera));
+            lens_inverse(camera, camera.focal_px, principal_px, &camera.lens.coefficients)
+        }
+    };
+    let mut lens = of(camera)?;
+    if camera.is_chromatic() {
+        let [red, blue] = [Primary::Red, Primary::Blue].map(|primary| of(&camera.of_primary(primary)));
+        lens.others = Some(Box::new([red?, blue?]));
+    }
+    Ok(lens)
+}
+
 fn lens_inverse(
     camera: &CameraSpec,
     focal_px: [f64; 2],
     principal_px: [f64; 2],
     coefficients: &[f64],
 ) -> Result<LensInverse, CameraError> {
-    let lens = Lens::of_camera(camera, coefficients, DEFAULT_REACH)
+    let lens = Lens::of_camera(camera, focal_px.into(), principal_px.into(), coefficients, DEFAULT_REACH)
         .map_err(|source| CameraError::Lens { key: "camera".to_owned(), source })?;
-    Ok(LensInverse::new(camera.size_px, focal_px, principal_px, lens))
+    let lens = LensInverse::new(camera.size_px, focal_px, principal_px, lens);
+    Ok(match &camera.image_circle {
+        Some(circle) => lens.within(circle),
+        None => lens,
+    })
 }
 
 /// The camera at a zoom value: every number of the calibration is linear between two entries of the table and

@@ -18,6 +18,7 @@ mod dataset;
 mod face;
 mod image_sensor;
 mod motion;
+mod optics;
 mod point_spread;
 mod rig;
 mod scene;
@@ -42,6 +43,7 @@ pub use image_sensor::{
     SensorModel,
 };
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
+pub use optics::{ChromaticSpec, ImageCircleSpec, Primary, PrimaryLensSpec, VignettingSpec};
 pub use point_spread::PointSpreadSpec;
 pub use rig::Rig;
 pub use scene::{

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use crate::{
     exposure::{ExposureTrack, FrameExposure},
     mount::CameraPath,
-    photometric::vignette_weights,
-    scenario::{Face, Reset, Scenario, TwinSpec},
+    scenario::{Face, Primary, Reset, Scenario, TwinSpec},
     scene::Scene,
     shutter::{Shutter, ShutterError},
     timing_faults::TimingFaults,
+    vignetting::pixel_weights,
 };
 
 /// All inputs of a run, loaded and validated. Immutable; shared between threads.
@@ -56,6 +56,14 @@ impl Sequence {
         let mut sequence = self.clone();
         sequence.scenario.camera.face = Some(face);
         sequence.path = Arc::new(self.path.turned(face.camera_from_face()));
+        sequence
+    }
+
+    /// The sequence of one primary of a chromatic camera: what its lens shows of the same frames.
+    #[must_use]
+    pub fn primary(&self, primary: Primary) -> Self {
+        let mut sequence = self.clone();
+        sequence.scenario.camera = self.scenario.camera.of_primary(primary);
         sequence
     }
 
@@ -114,24 +122,31 @@ impl Sequence {
         self.epoch_ns.saturating_sub(self.scenario.camera.clock_offset_ns())
     }
 
-    /// Weights of the light at every pixel, and the size of their picture: of the vignette map, times what rows
-    /// collect that are exposed for longer ([`Self::light_gains`]); a single 1 without both.
+    /// Weights of the light at every pixel in the passes, and the size of their picture; a single 1 without any,
+    /// and where they come later ([`crate::scenario::CameraSpec::is_finished_late`]).
     #[must_use]
     pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {
         let camera = &self.scenario.camera;
-        let [width, height] = camera.size_px;
-        let weights = self.vignette.as_ref().map(|map| {
-            let thresholds = camera.photometric.vignette_thresholds;
-            vignette_weights(map, camera.size_px, thresholds)
-        });
-        let Some(shutter) = self.light_gains() else {
-            return weights.map_or(([1, 1], vec![1.0]), |weights| (camera.size_px, weights));
+        let weights = match camera.is_finished_late() {
+            true => None,
+            false => self.light_weights(Primary::Green),
         };
-        let mut weights = weights.unwrap_or_else(|| vec![1.0; width as usize * height as usize]);
-        for (row, y) in weights.chunks_mut(width as usize).zip(0..) {
+        weights.map_or(([1, 1], vec![1.0]), |weights| (camera.size_px, weights))
+    }
+
+    /// Weights of the light of a primary at every pixel, row-major: of the vignette, times what rows collect that
+    /// are exposed for longer ([`Self::light_gains`]). `None` where all are 1.
+    #[must_use]
+    pub fn light_weights(&self, primary: Primary) -> Option<Vec<f32>> {
+        let camera = &self.scenario.camera;
+        let weights = pixel_weights(camera, self.vignette.as_deref(), primary);
+        let Some(shutter) = self.light_gains() else { return weights };
+        let [width, height] = camera.size_px.map(|side| side as usize);
+        let mut weights = weights.unwrap_or_else(|| vec![1.0; width * height]);
+        for (row, y) in weights.chunks_mut(width).zip(0..) {
             row.iter_mut().zip(0..).for_each(|(weight, x)| *weight *= shutter.light_gain(x, y) as f32);
         }
-        (camera.size_px, weights)
+        Some(weights)
     }
 
     /// The shutter, where rows collect more light than others ([`Shutter::light_gain`]) and no image sensor

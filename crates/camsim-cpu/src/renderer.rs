@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
-    scenario::{Face, Preset},
+    scenario::{Face, Preset, Primary},
     scene::{LodTolerance, PlacedMesh, SceneBatches},
     sequence::Sequence,
     temporal::IdealGeometry,
@@ -45,8 +45,8 @@ pub struct CpuRenderer {
     /// Created when an ideal frame is first cast.
     cast: Option<CastScene>,
     vignette: Vec<f32>,
-    /// Lens map of each face, and the bits of its zoom value.
-    lens_maps: HashMap<Option<Face>, (u64, LensMap)>,
+    /// Lens map of each face and colour, and the bits of its zoom value.
+    lens_maps: HashMap<(Option<Face>, Option<Primary>), (u64, LensMap)>,
     buffers: [Ideal; BUFFERS + Face::ALL.len()],
     last: usize,
 }
@@ -218,16 +218,16 @@ impl CpuRenderer {
     /// Makes the lens map of a plan, unless it is cached.
     fn fit_lens_map(&mut self, plan: &FramePlan) {
         let bits = plan.zoom.unwrap_or_default().to_bits();
-        let face = plan.camera.lens.face();
-        let is_there = self.lens_maps.get(&face).is_some_and(|(zoom, _)| *zoom == bits);
+        let key = plan.lens_key();
+        let is_there = self.lens_maps.get(&key).is_some_and(|(zoom, _)| *zoom == bits);
         if plan.ray == RayStage::LensMap && !is_there {
             let camera: &CameraModel = &plan.camera;
-            self.lens_maps.insert(face, (bits, LensMap::new(camera)));
+            self.lens_maps.insert(key, (bits, LensMap::new(camera)));
         }
     }
 
     fn lens_map(&self, plan: &FramePlan) -> Option<&LensMap> {
-        self.lens_maps.get(&plan.camera.lens.face()).map(|(_, map)| map)
+        self.lens_maps.get(&plan.lens_key()).map(|(_, map)| map)
     }
 }
 

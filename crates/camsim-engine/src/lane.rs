@@ -4,7 +4,7 @@ use camsim_core::{
     camera::CameraModel,
     frame::{Plane, PlaneValues, RenderedFrame},
     pose::CameraPose,
-    scenario::Channel,
+    scenario::{Channel, Primary},
     scene::{LodSelection, LodTolerance},
     temporal::IdealGeometry,
 };
@@ -70,28 +70,57 @@ pub(crate) fn in_whole_camera(frame: &mut RenderedFrame, plan: &FramePlan) {
     }
 }
 
-/// The frame that faces make, each rendered as a camera of its own; `None` of none. Its rows are those of the
-/// first face.
+/// The frame that faces and colours make, each rendered as a camera of its own; `None` of none. Its rows are those
+/// of the first.
 #[must_use]
-pub fn join_faces(faces: impl IntoIterator<Item = Finished>) -> Option<Finished> {
-    faces
-        .into_iter()
-        .map(|mut face| {
-            in_whole_camera(&mut face.frame, &face.plan);
-            face
-        })
-        .reduce(|mut whole, face| {
-            add_face(&mut whole, face);
-            whole
-        })
+pub fn join_parts(parts: impl IntoIterator<Item = Finished>) -> Option<Finished> {
+    let mut whole: Option<Finished> = None;
+    for mut part in parts {
+        in_whole_camera(&mut part.frame, &part.plan);
+        add_part(&mut whole, part);
+    }
+    whole.map(joined)
 }
 
-/// Adds what a face has made to the frame of those before it.
-pub(crate) fn add_face(whole: &mut Finished, face: Finished) {
-    let Finished { frame, plan, lod: _, out_of_order, times, faces } = face;
+/// Adds what a face or a colour has made to the frame of those before it.
+pub(crate) fn add_part(whole: &mut Option<Finished>, mut part: Finished) {
+    match whole {
+        Some(whole) => add(whole, part),
+        None => {
+            if let Some(primary) = part.plan.primary {
+                part.frame.color_rgba.par_chunks_exact_mut(4).for_each(|rgba| keep(rgba, primary));
+            }
+            *whole = Some(part);
+        }
+    }
+}
+
+/// The frame of all parts: pixels are black where the lens of truth has no ray.
+pub(crate) fn joined(mut whole: Finished) -> Finished {
+    if whole.plan.primary.is_some() {
+        let invalid = whole.frame.color_rgba.par_chunks_exact_mut(4).filter(|rgba| rgba[3] == 0.0);
+        invalid.for_each(|rgba| rgba.fill(0.0));
+    }
+    whole
+}
+
+/// Leaves a pixel one of its colours.
+fn keep(rgba: &mut [f32], primary: Primary) {
+    (0..3).filter(|&k| k != primary.channel()).for_each(|k| rgba[k] = 0.0);
+}
+
+fn add(whole: &mut Finished, part: Finished) {
+    let Finished { frame, plan, lod: _, out_of_order, times, faces } = part;
     let held: Vec<bool> = frame.color_rgba.par_chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let into = &mut whole.frame;
-    copy(&mut into.color_rgba, &frame.color_rgba, &held);
+    match plan.primary {
+        None => copy(&mut into.color_rgba, &frame.color_rgba, &held),
+        Some(primary) => copy_color(&mut into.color_rgba, &frame.color_rgba, primary),
+    }
+    whole.times.add(&times);
+    if matches!(plan.primary, Some(Primary::Red | Primary::Blue)) {
+        return;
+    }
     if let (Some(into), Some(from)) = (&mut into.depth_m, &frame.depth_m) {
         copy(into, from, &held);
     }
@@ -103,9 +132,21 @@ pub(crate) fn add_face(whole: &mut Finished, face: Finished) {
         }
     }
     whole.out_of_order += out_of_order;
-    whole.times.add(&times);
     whole.faces.push(plan);
     whole.faces.extend(faces);
+}
+
+/// Copies a colour of the pixels that have it; green, whose lens is that of truth, says which are valid.
+fn copy_color(into: &mut [f32], from: &[f32], primary: Primary) {
+    let k = primary.channel();
+    into.par_chunks_exact_mut(4).zip(from.par_chunks_exact(4)).for_each(|(into, from)| {
+        if from[3] > 0.0 {
+            into[k] = from[k];
+            if primary == Primary::Green {
+                into[3] = from[3];
+            }
+        }
+    });
 }
 
 /// Copies the values of the pixels that are held; a pixel has equally many in both.

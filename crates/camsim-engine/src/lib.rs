@@ -40,7 +40,7 @@ pub use camsim_plan::Backend;
 pub use engine::Engine;
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
-pub use lane::join_faces;
+pub use lane::join_parts;
 pub use memory::peak_memory_mb;
 pub use moving::MOVING_RAYS;
 pub use session::Session;

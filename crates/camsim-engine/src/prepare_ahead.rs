@@ -40,6 +40,18 @@ pub(super) struct Prepared {
     pub plan_ms: f64,
 }
 
+impl Prepared {
+    /// Itself, followed by the passes of red and blue where their lenses are others.
+    pub fn with_other_colors(self) -> impl Iterator<Item = Self> {
+        let others: Vec<Self> = self
+            .plan
+            .other_colors()
+            .map(|plan| Self { plan, meshes: self.meshes.clone(), rows: self.rows.clone(), plan_ms: 0.0 })
+            .collect();
+        std::iter::once(self).chain(others)
+    }
+}
+
 /// Inputs of the choice of terrain triangles.
 #[derive(Debug, PartialEq)]
 struct TerrainView {

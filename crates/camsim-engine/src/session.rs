@@ -1,11 +1,12 @@
 //! One sequence: its frames in the order asked for.
 
-use std::{sync::Arc, time::Instant};
+use std::{collections::VecDeque, sync::Arc, time::Instant};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
     imaging::{ImageSensor, Optics},
-    scenario::{Channel, Preset, Scenario},
+    late_photometric::LatePhotometric,
+    scenario::{Channel, Preset, Primary, Scenario},
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
 };
@@ -23,7 +24,7 @@ use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
     finished,
-    lane::{IdealCache, IdealKey, Lane, add_face, in_whole_camera},
+    lane::{IdealCache, IdealKey, Lane, add_part, in_whole_camera, joined},
     moving::MovingScene,
     planner_threads,
     prepare_ahead::{Job, PrepareAhead, Prepared, Preparer},
@@ -46,6 +47,7 @@ pub struct Session<'a> {
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
     optics: Option<Optics>,
+    late: Option<LatePhotometric>,
     sensor: Option<ImageSensor>,
 }
 
@@ -94,6 +96,7 @@ impl<'a> Session<'a> {
         let Scenario { camera, seed, .. } = &still.scenario;
         let optics = Optics::new(camera, *seed);
         let sensor = ImageSensor::new(camera, *seed);
+        let late = LatePhotometric::new(&still);
         Ok(Self {
             engine,
             lanes: lanes(&planner, scene_planner.as_deref(), moving),
@@ -105,6 +108,7 @@ impl<'a> Session<'a> {
             channels: channels.into(),
             hits: Vec::new(),
             optics,
+            late,
             sensor,
         })
     }
@@ -138,6 +142,7 @@ impl<'a> Session<'a> {
         let Scenario { camera, seed, .. } = &still.scenario;
         self.optics = Optics::renewed(self.optics.take(), camera, *seed);
         self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
+        self.late = LatePhotometric::new(&still);
         self.cpu.renew(still);
         self.lanes = lanes(&planner, scene_planner.as_deref(), moving);
         self.planner = planner;
@@ -207,12 +212,23 @@ impl<'a> Session<'a> {
         planner_threads::scope(self.engine.shares_processor(), is_single, |scope| {
             let mut ahead = PrepareAhead::start(scope, &preparers, jobs);
             let mut in_flight: Option<InFlight> = None;
-            let mut faces = Faces { wanted: lanes, whole: None };
+            let mut parts = Parts { wanted: lanes * self.planner.colors(), count: 0, whole: None };
+            // Those of the next frame that are not yet submitted.
+            let mut waiting = VecDeque::new();
             let mut slot = 0;
             loop {
-                let submitted = match ahead.next() {
-                    Some((job, Ok(prepared))) => self.submit(job, prepared, slot).map(Some),
-                    Some((_, Err(fault))) => Err(fault.into()),
+                if waiting.is_empty() {
+                    match ahead.next() {
+                        Some((job, Ok(prepared))) => {
+                            waiting.extend(prepared.with_other_colors().map(|part| Ok((job, part))));
+                        }
+                        Some((_, Err(fault))) => waiting.push_back(Err(fault)),
+                        None => {}
+                    }
+                }
+                let submitted = match waiting.pop_front() {
+                    Some(Ok((job, prepared))) => self.submit(job, prepared, slot).map(Some),
+                    Some(Err(fault)) => Err(fault.into()),
                     None => Ok(None),
                 };
                 slot = (slot + 1) % FRAMES_IN_FLIGHT;
@@ -223,7 +239,7 @@ impl<'a> Session<'a> {
                 let is_last = next.is_none();
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
                     && let Err(fault) = self.finish(done).map_err(RenderError::lift).and_then(|done| {
-                        let whole = faces.add(done).map(|whole| self.exposed(whole));
+                        let whole = parts.add(done).map(|whole| self.exposed(whole));
                         whole.map_or(Ok(()), &mut *sink).map_err(RenderError::Sink)
                     })
                 {
@@ -256,7 +272,9 @@ impl<'a> Session<'a> {
             samples_a_pixel: plan.samples_a_pixel,
             renderer: plan.placement.ideal,
         };
-        let redraws = lane.ideal.as_ref().is_none_or(|ideal| ideal.key != key);
+        // Red and blue are made from the ideal frame that green has just been.
+        let is_drawn = is_beside_green(plan);
+        let redraws = lane.ideal.as_ref().is_none_or(|ideal| !is_drawn && ideal.key != key);
         let mut times = FrameTimes { plan_ms: prepared.plan_ms, ..FrameTimes::default() };
         if redraws {
             let lod = prepared.meshes.get(plan.keys.len() / 2).map(|mesh| mesh.lod).unwrap_or_default();
@@ -351,10 +369,15 @@ impl<'a> Session<'a> {
         Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
     }
 
-    /// What the lens and the image sensor make of the light of a frame, where the camera states them.
+    /// What is made of the light of a whole frame: weights of colours, the lens's blur, the image sensor, where
+    /// the camera states them.
     fn exposed(&self, mut whole: Finished) -> Finished {
+        let exposure = whole.plan.exposure;
+        if let Some(late) = &self.late {
+            late.finish(&mut whole.frame, exposure.as_ref());
+        }
         if let Some(optics) = &self.optics {
-            optics.expose(&mut whole.frame, whole.plan.exposure.as_ref());
+            optics.expose(&mut whole.frame, exposure.as_ref());
         }
         if let Some(sensor) = &self.sensor {
             sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
@@ -371,6 +394,7 @@ impl<'a> Session<'a> {
         mut truth: Option<Vec<Truth>>,
     ) -> Result<RenderedFrame, PlanError> {
         let sequence = self.planner.lane(lane).sequence().clone();
+        let is_other = is_beside_green(plan);
         if let Some(moving) = &self.lanes[lane].moving {
             moving.paint(&mut color_rgba, plan);
         }
@@ -386,7 +410,7 @@ impl<'a> Session<'a> {
             color_rgba,
             depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
             coords,
-            rows: self.planner.rows(plan),
+            rows: if is_other { Vec::new() } else { self.planner.rows(plan) },
             planes,
             raw: None,
         };
@@ -469,21 +493,25 @@ fn lanes(planner: &Planner, scene_planner: Option<&Planner>, moving: Option<Movi
     (0..planner.lanes()).map(|number| Lane { moving: of_face(number), ideal: None }).collect()
 }
 
-/// Collects the faces of a frame, which are finished one after the other.
-struct Faces {
+/// Collects the faces and colours of a frame, which are finished one after the other.
+struct Parts {
     wanted: usize,
+    count: usize,
     whole: Option<Finished>,
 }
 
-impl Faces {
-    /// The frame, once this is its last face.
+impl Parts {
+    /// The frame, once this is its last part.
     fn add(&mut self, done: Finished) -> Option<Finished> {
-        match &mut self.whole {
-            None => self.whole = Some(done),
-            Some(whole) => add_face(whole, done),
-        }
-        self.whole.take_if(|whole| whole.faces.len() + 1 >= self.wanted)
+        add_part(&mut self.whole, done);
+        self.count = (self.count + 1) % self.wanted;
+        if self.count == 0 { self.whole.take().map(joined) } else { None }
     }
+}
+
+/// Whether it is a pass that red or blue has beside that of green.
+fn is_beside_green(plan: &FramePlan) -> bool {
+    matches!(plan.primary, Some(Primary::Red | Primary::Blue))
 }
 
 pub(crate) fn ms_since(begin: Instant) -> f64 {

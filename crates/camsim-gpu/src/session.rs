@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc, time::Instant};
 
 use camsim_core::{
     camera::ZoomTable,
-    scenario::Face,
+    scenario::{Face, Primary},
     scene::{LodTolerance, PlacedMesh, Scene, SceneBatches, TerrainTiles},
     sequence::Sequence,
 };
@@ -32,7 +32,7 @@ mod inspect;
 mod readback;
 mod tables;
 
-use frame_slot::{FrameSlot, SessionTarget, list_buffer, pose_buffer};
+use frame_slot::{FrameSlot, SessionTarget, group_of, list_buffer, pose_buffer};
 use ideal_copies::IdealCopies;
 pub use ideal_copies::IdealCopy;
 pub use inspect::IdealImages;
@@ -81,6 +81,7 @@ pub enum Readback {
 pub struct Submitted {
     slot: usize,
     submission: wgpu::SubmissionIndex,
+    truth: bool,
     /// The copy of the ideal frame, if it is read back.
     pub copy: Option<IdealCopy>,
     /// Blended triangles that are drawn before something behind them, over all ideal frames.
@@ -110,8 +111,8 @@ pub struct GpuSession<'a> {
     ideal_pass: IdealPass,
     reverse_pass: ReversePass,
     lens_pass: Option<LensInversePass>,
-    /// Current lens map of each face, and the bits of its zoom value.
-    lens_maps: HashMap<Option<Face>, (u64, LensMap)>,
+    /// Current lens map of each face and colour, and the bits of its zoom value.
+    lens_maps: HashMap<(Option<Face>, Option<Primary>), (u64, LensMap)>,
     /// Lens maps of the zoom table's entries: initial values for the zoom values in between.
     zoom_maps: HashMap<usize, LensMap>,
     targets: Vec<SessionTarget>,
@@ -237,12 +238,13 @@ impl<'a> GpuSession<'a> {
         let start = Instant::now();
         let submission = self.gpu.queue.submit([commands]);
         let submit_ms = ms_since(start);
-        self.frame_slots[slot].request_mapping(job.readback == Readback::Output);
+        self.frame_slots[slot].request_mapping(job.readback == Readback::Output, job.plan.truth);
         self.copies.request_mapping();
         self.gpu.check()?;
         let (out_of_order, copy) =
             self.last_ideal.map(|last_ideal| (last_ideal.out_of_order, last_ideal.copy)).unwrap_or_default();
-        Ok(Submitted { slot, submission, copy, out_of_order, record_ms, submit_ms })
+        let truth = job.plan.truth;
+        Ok(Submitted { slot, submission, truth, copy, out_of_order, record_ms, submit_ms })
     }
 
     /// Waits for a submitted frame.
@@ -262,7 +264,8 @@ impl<'a> GpuSession<'a> {
     /// Faults of the device.
     pub fn output(&self, submitted: &Submitted) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
         let slot = &self.frame_slots[submitted.slot];
-        let truth = slot.truth.as_ref().map(|truth| truth.read::<Truth>()).transpose()?;
+        let truth = slot.truth.as_ref().filter(|_| submitted.truth);
+        let truth = truth.map(|truth| truth.read::<Truth>()).transpose()?;
         Ok((slot.color.read()?, truth))
     }
 
@@ -306,7 +309,7 @@ impl<'a> GpuSession<'a> {
         if has_output {
             self.reverse(&mut recorder, job, slot)?;
             let slot = &self.frame_slots[slot];
-            for output in std::iter::once(&slot.color).chain(&slot.truth) {
+            for output in slot.outputs(job.plan.truth) {
                 output.copy(recorder.encoder());
             }
         } else if let Some(last_ideal) =
@@ -322,17 +325,17 @@ impl<'a> GpuSession<'a> {
     fn lens_inverse(&mut self, recorder: &mut Recorder<'_>, job: &GpuJob<'_>) {
         let (device, plan) = (&self.gpu.device, job.plan);
         let zoom_bits = plan.zoom.unwrap_or_default().to_bits();
-        let face = plan.camera.lens.face();
-        if self.lens_maps.get(&face).is_some_and(|(of, _)| *of == zoom_bits) {
+        let key = plan.lens_key();
+        if self.lens_maps.get(&key).is_some_and(|(of, _)| *of == zoom_bits) {
             return;
         }
-        let mut map = match self.lens_maps.remove(&face) {
+        let mut map = match self.lens_maps.remove(&key) {
             Some((_, map)) => map,
             None => LensMap::new(device, plan.camera.size_px),
         };
         if !has_shader(&plan.camera.lens) {
             map.upload(device, recorder, &plan.camera);
-            self.lens_maps.insert(face, (zoom_bits, map));
+            self.lens_maps.insert(key, (zoom_bits, map));
             return;
         }
         let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(device));
@@ -349,7 +352,7 @@ impl<'a> GpuSession<'a> {
             warm = self.zoom_maps.get(&entry);
         }
         pass.encode(device, recorder, &plan.camera, &mut map, warm);
-        self.lens_maps.insert(face, (zoom_bits, map));
+        self.lens_maps.insert(key, (zoom_bits, map));
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
@@ -424,7 +427,7 @@ impl<'a> GpuSession<'a> {
         let buffers = &mut self.frame_slots[slot];
         if buffers.poses.size() < job.rows.len() as u64 {
             buffers.poses = pose_buffer(gpu, job.rows.len() as u64);
-            self.targets.iter_mut().for_each(|target| target.groups[slot].clear());
+            self.targets.iter_mut().for_each(|target| target.clear(slot));
         }
         recorder.write(&buffers.frame, 0, bytemuck::bytes_of(job.uniforms));
         recorder.write(&buffers.poses, 0, job.rows);
@@ -432,7 +435,7 @@ impl<'a> GpuSession<'a> {
             return Ok(());
         };
         let lens_map = match plan.ray {
-            RayStage::LensMap => self.lens_maps.get(&plan.camera.lens.face()).map(|(_, map)| &map.view),
+            RayStage::LensMap => self.lens_maps.get(&plan.lens_key()).map(|(_, map)| &map.view),
             _ => None,
         };
         let lists = (plan.edges != EdgeStage::None).then(|| {
@@ -454,9 +457,10 @@ impl<'a> GpuSession<'a> {
             vignette: &self.vignette,
             lens_map,
             out_color: &buffers.color.gpu_buffer,
-            out_truth: buffers.truth.as_ref().map(|truth| &truth.gpu_buffer),
+            out_truth: buffers.truth.as_ref().filter(|_| plan.truth).map(|truth| &truth.gpu_buffer),
         };
-        let groups = &mut target.groups[slot];
+        // The other fields of the target are borrowed by the bindings.
+        let groups = &mut target.groups[group_of(slot, plan.primary)];
         self.reverse_pass.encode(gpu, recorder, plan, &bindings, groups)
     }
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use camsim_core::scenario::{CameraSpec, LensModel, LensSpec, Readout};
+use camsim_core::scenario::{CameraSpec, ChromaticSpec, ImageCircleSpec, LensModel, LensSpec, Readout};
 use camsim_io::{
     calibration::{CalibrationFormat, export},
     camera_file::{CameraFormat, ImportOptions, ImportedRig, import_rig},
@@ -180,6 +180,8 @@ fn what_a_format_has_no_place_for_is_named() {
     spec.shutter.delay_ms = 7.0;
     spec.clock_offset_ms = 1.5;
     spec.photometric.noise_sigma = 0.01;
+    spec.chromatic = Some(ChromaticSpec { red_scale: vec![1.001], ..ChromaticSpec::default() });
+    spec.image_circle = Some(ImageCircleSpec { radius_px: Some(300.0), ..ImageCircleSpec::default() });
     let set = [
         "fps",
         "phase",
@@ -188,6 +190,8 @@ fn what_a_format_has_no_place_for_is_named() {
         "shutter.readout_ms",
         "clock_offset_ms",
         "photometric.noise_sigma",
+        "chromatic.red_scale",
+        "image_circle.radius_px",
         "mount.angles_deg",
         "mount.offset_m",
     ];
@@ -200,7 +204,7 @@ fn what_a_format_has_no_place_for_is_named() {
         };
         let values = |spec: &CameraSpec| toml::Table::try_from(spec).unwrap();
         let value = |table: &toml::Table, key: &str| match key.split_once('.') {
-            Some((first, second)) => table[first].get(second).cloned(),
+            Some((first, second)) => table.get(first).and_then(|below| below.get(second)).cloned(),
             None => table.get(key).cloned(),
         };
         for key in set {

@@ -177,6 +177,12 @@ impl Planner {
         self.faces.len().max(1)
     }
 
+    /// Number of output passes of each plan: 3 where red and blue have lenses of their own.
+    #[must_use]
+    pub fn colors(&self) -> usize {
+        if self.inputs.sequence.scenario.camera.is_chromatic() { 3 } else { 1 }
+    }
+
     /// The planner of a face, or this one where there are none.
     #[must_use]
     pub fn lane(&self, number: usize) -> &Self {

@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Instant};
 use anyhow::anyhow;
 use camsim_core::{
     apply::{ApplyError, NoSourceCounts, Pipeline, Settings},
-    scenario::{MAX_BLUR_SAMPLES, Preset, Solver},
+    scenario::{CameraSpec, MAX_BLUR_SAMPLES, Preset, Solver, VignettingSpec},
 };
 use camsim_io::{
     frame_file::{FrameFile, FrameSet, read_frame_set},
@@ -120,6 +120,22 @@ enum SolverArg {
     Reproject,
 }
 
+/// Names what one lens for all colours leaves out.
+fn warn_of_one_lens(spec: &CameraSpec, args: &ApplyArgs, console: &mut Console<'_>) {
+    let is_colored = spec.photometric.vignetting.as_ref().is_some_and(VignettingSpec::is_colored);
+    for (present, key) in [
+        (spec.is_chromatic(), "chromatic"),
+        (is_colored, "photometric.vignetting: a polynomial of red or blue"),
+    ] {
+        if present {
+            console.warn(format_args!(
+                "{}: {key} is ignored: all colours have what green has; `camsim render` makes them apart",
+                args.camera.display()
+            ));
+        }
+    }
+}
+
 /// Reads, renders, writes.
 pub fn run(args: &ApplyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     // The same rule as for a scenario.
@@ -147,6 +163,7 @@ pub fn run(args: &ApplyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             ));
         }
     }
+    warn_of_one_lens(&spec, args, console);
     let set = read_frame_set(&args.frame).or_bad_input()?;
     set.notes().iter().for_each(|note| console.warn(note));
     let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail};
-use camsim_core::camera::{CameraModel, LensCheck};
+use camsim_core::camera::{CameraModel, LensCheck, fringes_px};
 use camsim_core::mtf::CameraMtf;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
@@ -88,8 +88,8 @@ struct PointsArgs {
 /// Runs a lens command.
 pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let spec = read_camera(args, console)?;
-    let camera =
-        CameraModel::from_spec(&spec).with_context(|| args.camera.display().to_string()).or_bad_input()?;
+    let in_file = || args.camera.display().to_string();
+    let camera = CameraModel::from_spec(&spec).with_context(in_file).or_bad_input()?;
     match &args.command {
         LensCommand::Distort(points) => distort(&camera, points, console),
         LensCommand::Undistort(points) => undistort(&camera, points, console),
@@ -98,7 +98,9 @@ pub fn run(args: &LensArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             write_output(output.as_deref(), console, |out| out.write_all(text.as_bytes()))
         }
         LensCommand::Check { json, mtf } => {
-            let report = LensReport { lens: camera.check(), mtf: mtf::measure(&spec, mtf)? };
+            let fringes_px = fringes_px(&spec).with_context(in_file).or_bad_input()?;
+            let lens = LensCheck { fringes_px, ..camera.check() };
+            let report = LensReport { lens, mtf: mtf::measure(&spec, mtf)? };
             check(&report, *json, console)
         }
     }
@@ -112,7 +114,7 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraSpec,
         .or_bad_input()?;
     // The reader of camera files explains errors of files that are not TOML.
     let root: toml::Table = text.parse().unwrap_or_default();
-    let spec = if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
+    Ok(if ["camera", "flight"].iter().any(|key| root.contains_key(*key)) {
         let mut spec =
             choose_camera(&read_rig(path, &[], None).or_bad_input()?, name, console)?.camera.clone();
         load_lens_table(&mut spec).or_bad_input()?;
@@ -130,8 +132,7 @@ fn read_camera(args: &LensArgs, console: &mut Console<'_>) -> Result<CameraSpec,
         )));
     } else {
         read_camera_toml(path).or_bad_input()?
-    };
-    Ok(spec)
+    })
 }
 
 /// The camera of a name in a file with `[[cameras]]` alone, or the first.
@@ -248,6 +249,10 @@ fn check(report: &LensReport, json: bool, console: &mut Console<'_>) -> Result<(
         "no: some pixels have several ideal rays, so the calibration is unusable there"
     };
     console.line(format_args!("one ray per pixel              {answer}"))?;
+    if let Some([red_px, blue_px]) = report.lens.fringes_px {
+        console
+            .line(format_args!("red and blue beside green      at most {red_px:.3} and {blue_px:.3} px"))?;
+    }
     report.mtf.as_ref().map_or(Ok(()), |measured| mtf::print(measured, console))
 }
 

@@ -1,11 +1,12 @@
 //! Check of a calibration: where the lens folds, and for which part of the image it has ideal rays.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::CameraModel;
+use super::{CameraError, CameraModel};
 use crate::lens::{FOLD_RAYS, Lens};
+use crate::scenario::{CameraSpec, Primary};
 
 /// Approximate number of pixels that are tested. Larger images are sampled on a regular grid that includes
 /// the borders.
@@ -32,6 +33,36 @@ pub struct LensCheck {
     pub worst_roundtrip_px: f64,
     /// Whether no pixel has two ideal rays on the principal branch.
     pub bijective: bool,
+    /// Largest distances at which red and blue are imaged from green, pixels, where they have lenses of their
+    /// own ([`fringes_px`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fringes_px: Option<[f64; 2]>,
+}
+
+/// Largest distances of the images of red and blue from that of green over the picture, pixels; `None` of a camera
+/// with one lens for all colours.
+///
+/// # Errors
+/// A camera that cannot be used.
+pub fn fringes_px(spec: &CameraSpec) -> Result<Option<[f64; 2]>, CameraError> {
+    if !spec.is_chromatic() {
+        return Ok(None);
+    }
+    let green = CameraModel::from_spec(spec)?;
+    let [width, height] = green.size_px.map(|side| f64::from(side - 1) / f64::from(BIJECTIVITY_GRID - 1));
+    let pixels = (0..BIJECTIVITY_GRID * BIJECTIVITY_GRID).map(|cell| {
+        let (column, row) = (cell % BIJECTIVITY_GRID, cell / BIJECTIVITY_GRID);
+        DVec2::new(f64::from(column) * width, f64::from(row) * height)
+    });
+    let rays: Vec<(DVec2, DVec3)> =
+        pixels.filter_map(|pixel| green.ray(pixel).map(|ray| (pixel, ray))).collect();
+    let widest = |primary| {
+        let camera = CameraModel::from_spec(&spec.of_primary(primary))?;
+        let seen = rays.iter().filter(|(_, ray)| camera.lens.contains_ray(*ray));
+        let widths = seen.map(|(pixel, ray)| camera.project_ray(*ray).distance(*pixel));
+        Ok::<f64, CameraError>(widths.fold(0.0, f64::max))
+    };
+    Ok(Some([widest(Primary::Red)?, widest(Primary::Blue)?]))
 }
 
 /// What some of the pixels see.
@@ -75,6 +106,7 @@ impl CameraModel {
             fold_radius_max: fold.map(|(_, max)| max),
             worst_roundtrip_px: seen.worst_px,
             bijective: self.is_bijective(),
+            fringes_px: None,
         }
     }
 
@@ -144,6 +176,23 @@ fn samples(size: u32, stride: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::ChromaticSpec;
+
+    #[test]
+    fn fringes_are_widest_in_the_corner() {
+        let chromatic = ChromaticSpec {
+            red_scale: vec![1.0, 0.0, 0.002],
+            blue_scale: vec![0.999],
+            ..ChromaticSpec::default()
+        };
+        let spec = CameraSpec { chromatic: Some(chromatic), ..CameraSpec::default() };
+        let [red, blue] = fringes_px(&spec).expect("a camera").expect("two lenses");
+        // The corner's pixel of 640x480, in pixels and in halves of the shorter side.
+        let corner = 319.5_f64.hypot(239.5);
+        assert!((blue - 0.001 * corner).abs() < 1e-9, "{blue}");
+        assert!((red - 0.002 * corner * (corner / 240.0).powi(2)).abs() < 1e-9, "{red}");
+        assert_eq!(fringes_px(&CameraSpec::default()), Ok(None));
+    }
 
     #[test]
     fn winding_numbers_count_turns() {

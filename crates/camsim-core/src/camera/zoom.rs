@@ -2,7 +2,7 @@
 
 use super::{CameraError, CameraModel};
 use crate::lens::Lens;
-use crate::scenario::{CameraSpec, LensModel, ZoomSpec};
+use crate::scenario::{CameraSpec, ZoomSpec};
 
 /// The `[[camera.zoom]]` table. Every number of a calibration is linear in the zoom value between two
 /// entries, and constant beyond the ends.
@@ -11,8 +11,8 @@ use crate::scenario::{CameraSpec, LensModel, ZoomSpec};
 /// for instance) stay monotone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZoomTable {
-    size_px: [u32; 2],
-    model: LensModel,
+    /// What does not depend on the zoom value.
+    spec: Box<CameraSpec>,
     entries: Vec<ZoomSpec>,
 }
 
@@ -35,9 +35,9 @@ impl ZoomTable {
         for (index, entry) in entries.iter_mut().enumerate() {
             let facts = spec.lens.model.facts();
             entry.coefficients = (0..count).map(|i| facts.or_default(&entry.coefficients, i)).collect();
-            camera(&format!("camera.zoom[{index}]"), spec.size_px, spec.lens.model, entry)?;
+            camera(&format!("camera.zoom[{index}]"), spec, entry)?;
         }
-        Ok(Some(Self { size_px: spec.size_px, model: spec.lens.model, entries }))
+        Ok(Some(Self { spec: Box::new(CameraSpec { zoom: Vec::new(), ..spec.clone() }), entries }))
     }
 
     /// The calibration at a zoom value.
@@ -54,7 +54,7 @@ impl ZoomTable {
         let principal_point_px = match (low.principal_point_px, high.principal_point_px) {
             (None, None) => None,
             (a, b) => {
-                let centre = self.size_px.map(|size| 0.5 * (f64::from(size) - 1.0));
+                let centre = self.spec.size_px.map(|size| 0.5 * (f64::from(size) - 1.0));
                 let (a, b) = (a.unwrap_or(centre), b.unwrap_or(centre));
                 Some([mix(a[0], b[0]), mix(a[1], b[1])])
             }
@@ -65,7 +65,7 @@ impl ZoomTable {
             principal_point_px,
             coefficients: low.coefficients.iter().zip(&high.coefficients).map(|(a, b)| mix(*a, *b)).collect(),
         };
-        camera("camera.zoom", self.size_px, self.model, &entry)
+        camera("camera.zoom", &self.spec, &entry)
     }
 
     /// Index of the entry with the nearest zoom value (the lower of two equally near). The lens map of that
@@ -86,13 +86,9 @@ impl ZoomTable {
     }
 }
 
-fn camera(
-    key: &str,
-    size_px: [u32; 2],
-    model: LensModel,
-    entry: &ZoomSpec,
-) -> Result<CameraModel, CameraError> {
-    CameraModel::with_key(key, size_px, entry.focal_px, entry.principal_point_px, |reach| {
-        Lens::with_reach(model, &entry.coefficients, reach)
-    })
+fn camera(key: &str, spec: &CameraSpec, entry: &ZoomSpec) -> Result<CameraModel, CameraError> {
+    let lens = |reach, focal_px, principal_px| {
+        Lens::of_camera(spec, focal_px, principal_px, &entry.coefficients, reach)
+    };
+    CameraModel::with_key(key, spec.size_px, entry.focal_px, entry.principal_point_px, lens)
 }

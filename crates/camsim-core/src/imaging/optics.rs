@@ -76,7 +76,8 @@ struct SimpleModel {
 impl OpticsKey {
     /// `None` also for a face: light spreads over the whole picture, once its faces are joined.
     fn new(camera: &CameraSpec, seed: u64) -> Option<Self> {
-        let spec = camera.point_spread.as_ref().filter(|_| camera.face.is_none())?;
+        let spec =
+            camera.point_spread.as_ref().filter(|_| camera.face.is_none() && camera.primary.is_none())?;
         Some(Self {
             spec: spec.clone(),
             kernel: spec.kernel.as_ref().and_then(|file| file.kernel.clone()),

@@ -4,7 +4,7 @@
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
-use crate::lens::Lens;
+use crate::{lens::Lens, scenario::ImageCircleSpec};
 
 /// Number of directions in which the border of the principal branch is tabulated.
 const DIRECTIONS: usize = 1440;
@@ -38,6 +38,9 @@ pub(super) struct LensInverse {
     rim: Vec<f64>,
     /// Ideal points of a coarse grid over the image, as starts of the inverse.
     starts: Vec<Option<DVec2>>,
+    circle: ImageCircleSpec,
+    /// The lenses of red and blue, where these are others.
+    pub(super) others: Option<Box<[Self; 2]>>,
 }
 
 impl LensInverse {
@@ -52,6 +55,8 @@ impl LensInverse {
             border_min: f64::INFINITY,
             rim: Vec::new(),
             starts: Vec::new(),
+            circle: ImageCircleSpec::default(),
+            others: None,
         };
         if !lens.plain && !lens.is_face() {
             lens.border = (0..DIRECTIONS)
@@ -66,6 +71,10 @@ impl LensInverse {
                 .collect();
         }
         lens
+    }
+
+    pub(super) fn within(self, circle: &ImageCircleSpec) -> Self {
+        Self { circle: circle.clone(), ..self }
     }
 
     /// Ideal `(u, v)` at an image position; `None` without a pre-image on the principal branch.
@@ -86,9 +95,30 @@ impl LensInverse {
         near.and_then(|start| self.polish(start, wanted)).or_else(|| self.solve_from_nothing(wanted))
     }
 
-    /// Whether the pixel is one that this camera makes, and not another face.
+    /// Ideal `(u, v)` of a place in a pixel that this camera makes.
+    pub(super) fn ray_of(&self, pixel: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
+        let pixel = DVec2::from_array(pixel.map(f64::from));
+        if self.holds(pixel) { self.ray(pixel + offset_px) } else { None }
+    }
+
+    /// Whether the pixel is one that this camera makes, and not another face, or none.
     pub(super) fn holds(&self, pixel: DVec2) -> bool {
         self.lens.holds(self.distorted(pixel))
+            && self.is_near(pixel)
+            // A face's lens ends at the angle by itself.
+            && (self.is_face()
+                || self.circle.half_angle_deg.is_none()
+                || self.ray(pixel).is_some_and(|ideal| self.is_steep(ideal)))
+    }
+
+    fn is_near(&self, pixel: DVec2) -> bool {
+        let centre_px = self.circle.centre_px.map_or(self.principal_px, DVec2::from);
+        // A distance that is the radius to within rounding is.
+        self.circle.radius_px.is_none_or(|radius_px| pixel.distance(centre_px) <= radius_px + 1e-9)
+    }
+
+    fn is_steep(&self, ideal: DVec2) -> bool {
+        self.circle.half_angle_deg.is_none_or(|most_deg| ideal.length().atan().to_degrees() <= most_deg)
     }
 
     /// The branch of a face is that of its whole lens, whose certified inverse gives the start.
@@ -102,7 +132,9 @@ impl LensInverse {
             true => self.lens.contains(ideal),
             false => ideal.is_finite() && (self.plain || self.inside(ideal)),
         };
-        is_imaged.then(|| self.lens.distort(ideal) * self.focal_px + self.principal_px)
+        let pixel = || self.lens.distort(ideal) * self.focal_px + self.principal_px;
+        let is_seen = |pixel: &DVec2| self.is_near(*pixel) && (self.is_face() || self.is_steep(ideal));
+        is_imaged.then(pixel).filter(is_seen)
     }
 
     fn distorted(&self, position_px: DVec2) -> DVec2 {

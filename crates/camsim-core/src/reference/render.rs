@@ -1,7 +1,7 @@
 //! Rendering of whole frames: each sample has its own position in the pixel's area and its own instant of the
 //! exposure.
 
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{FrameView, Oracle, RaySample};
@@ -10,7 +10,7 @@ use crate::{
     noise::tail_table,
     photometric::{Photometry, photometric},
     pose::CameraPose,
-    scenario::Channel,
+    scenario::{Channel, Face, VignettingSpec},
     sequence::GrayImage,
     temporal::IdealGeometry,
 };
@@ -141,7 +141,7 @@ impl Oracle {
         let exposure = self.sequence.exposure(frame);
         let job = FrameJob {
             oracle: self,
-            photometry: Photometry::new(&self.sequence.scenario.camera, exposure.as_ref()),
+            photometry: Photometry::before_spread(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
             picture: self.sequence.scenario.picture(frame) as u32,
             options,
@@ -265,29 +265,42 @@ impl FrameJob<'_> {
         let steps = if instants.is_exposed { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
         let max_batches = options.max_samples.div_ceil(BATCH).max(BATCHES_A_CHECK);
         let min_batches = options.min_samples.div_ceil(BATCH).clamp(BATCHES_A_CHECK, max_batches);
-        let (mut sum, mut samples) = (DVec3::ZERO, 0_u32);
+        let visible = Visible::new(&self.view, [x, y]);
+        // Of each colour.
+        let (mut sum, mut samples) = (DVec3::ZERO, DVec3::ZERO);
         let (mut mean_of_means, mut spread, mut means) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         let mut error_dn = 0.0;
         for batch in 0..max_batches {
-            let (mut part, mut count) = (DVec3::ZERO, 0_u32);
+            let (mut part, mut count) = (DVec3::ZERO, DVec3::ZERO);
             for i in batch * BATCH..(batch + 1) * BATCH {
                 let place = DVec2::new(
                     (shift_x + f64::from(i) * steps[0]).fract(),
                     (shift_y + f64::from(i) * steps[1]).fract(),
                 );
                 // At the border of the lens's field, the mean is over the part of the pixel that has rays.
+                let at = |uv: DVec2, instants: &mut SamplePoses<'_>| {
+                    let (t_s, pose) = instants.pose(x, i);
+                    self.oracle.radiance_at(t_s, &pose, uv)
+                };
+                if let Some(others) = visible.red_and_blue {
+                    let rays = self.view.ray_of_red_and_blue([x, y], place - 0.5).unwrap_or_default();
+                    for ((ray, is_visible), k) in rays.into_iter().zip(others).zip([0, 2]) {
+                        let Some(uv) = ray.filter(|_| is_visible) else { continue };
+                        part[k] += at(uv, instants)[k];
+                        count[k] += 1.0;
+                    }
+                }
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
-                let (t_s, pose) = instants.pose(x, i);
-                part += self.oracle.radiance_at(t_s, &pose, uv);
-                count += 1;
+                part += visible.own * at(uv, instants);
+                count += visible.own;
             }
-            if count == 0 {
+            if count == DVec3::ZERO {
                 continue;
             }
             sum += part;
             samples += count;
             means += 1.0;
-            let mean = part / f64::from(count);
+            let mean = part / count.max(DVec3::ONE);
             let before = mean - mean_of_means;
             mean_of_means += before / means;
             spread += before * (mean - mean_of_means);
@@ -295,11 +308,11 @@ impl FrameJob<'_> {
             if means > 1.0 && done >= min_batches && done % BATCHES_A_CHECK == 0 {
                 error_dn = 255.0 * (spread.max_element() / (means * (means - 1.0))).sqrt();
                 if error_dn < options.tolerance_dn {
-                    return PixelMean { color: sum / f64::from(samples), samples, error_dn, finished: true };
+                    return PixelMean::new(sum, samples, error_dn, true);
                 }
             }
         }
-        PixelMean { color: sum / f64::from(samples.max(1)), samples, error_dn, finished: false }
+        PixelMean::new(sum, samples, error_dn, false)
     }
 
     fn exposed(&self, color: DVec3, pixel: [u32; 2]) -> [f32; 3] {
@@ -308,30 +321,59 @@ impl FrameJob<'_> {
             return color;
         }
         let sequence = &self.oracle.sequence;
-        let thresholds = sequence.scenario.camera.photometric.vignette_thresholds;
-        let weight = sequence.vignette.as_ref().map_or(1.0, |map| {
-            let value = vignette(map, pixel, sequence.scenario.camera.size_px);
-            let [black, full] = thresholds;
+        let camera = &sequence.scenario.camera;
+        let is_part = camera.face.is_some() || camera.primary.is_some();
+        // Parts of a camera give light where the stage takes all of them at once.
+        if is_part && camera.is_finished_late() {
+            return color;
+        }
+        let spec = &camera.photometric;
+        // An image sensor collects the light of its rows itself.
+        let gain = match self.oracle.sensor_collects() {
+            true => 1.0,
+            false => self.view.light_gain(pixel),
+        };
+        let map = sequence.vignette.as_ref().map_or(1.0, |map| {
+            let value = vignette(map, pixel, camera.size_px);
+            let [black, full] = spec.vignette_thresholds;
             match value {
                 value if value < black => 0.0,
                 value if full > 0.0 => (value / full).min(1.0),
                 _ => 1.0,
             }
         });
-        // An image sensor collects the light of its rows itself.
-        let gain = match self.oracle.sensor_collects() {
-            true => 1.0,
-            false => self.view.light_gain(pixel),
-        };
+        let model = spec.vignetting.as_ref().map_or(DVec3::ONE, |model| self.vignetting(model, pixel));
+        let light = DVec3::from_array(color.map(f64::from)) * model;
         photometric(
             &self.photometry,
-            color,
-            (weight * gain) as f32,
+            light.as_vec3().to_array(),
+            (map * gain) as f32,
             pixel,
             self.picture,
             sequence.scenario.noise_seed(),
             &self.noise_table,
         )
+    }
+
+    /// Weights of red, green and blue by the model of the light's fall.
+    fn vignetting(&self, spec: &VignettingSpec, pixel: [u32; 2]) -> DVec3 {
+        let camera = &self.oracle.sequence.scenario.camera;
+        let [width, height] = camera.size_px.map(f64::from);
+        let axis =
+            DVec2::from(camera.principal_point_px.unwrap_or([0.5 * (width - 1.0), 0.5 * (height - 1.0)]));
+        let r = DVec2::from_array(pixel.map(f64::from)).distance(axis) / (0.5 * width.hypot(height));
+        let series = |terms: &[f64]| {
+            let sum: f64 = terms.iter().zip([2, 4, 6]).map(|(k, power)| k * r.powi(power)).sum();
+            (1.0 + sum).max(0.0)
+        };
+        let all = &spec.polynomial;
+        let of = |own: &Option<Vec<f64>>| series(own.as_ref().unwrap_or(all));
+        let cosine = self.view.ray(pixel, DVec2::ZERO).map_or(0.0, |uv| {
+            let whole_from_own = camera.face.map_or(DQuat::IDENTITY, Face::camera_from_face);
+            (whole_from_own * uv.extend(1.0).normalize()).z.max(0.0)
+        });
+        DVec3::new(of(&spec.polynomial_red), series(all), of(&spec.polynomial_blue))
+            * cosine.powf(spec.cos_power)
     }
 
     fn coords(&self, pixel: [u32; 2], sample: &RaySample) -> [f32; COORDS_CHANNELS] {
@@ -351,6 +393,30 @@ struct PixelMean {
     samples: u32,
     error_dn: f64,
     finished: bool,
+}
+
+impl PixelMean {
+    /// `sum` and `samples` are of each colour.
+    fn new(sum: DVec3, samples: DVec3, error_dn: f64, finished: bool) -> Self {
+        let color = sum / samples.max(DVec3::ONE);
+        Self { color, samples: samples.max_element() as u32, error_dn, finished }
+    }
+}
+
+/// What the lenses of a camera show of a pixel: a colour is seen where the pixel's centre has a ray.
+struct Visible {
+    /// 1 in the colours of the camera's own lens.
+    own: DVec3,
+    red_and_blue: Option<[bool; 2]>,
+}
+
+impl Visible {
+    fn new(view: &FrameView<'_>, pixel: [u32; 2]) -> Self {
+        match view.ray_of_red_and_blue(pixel, DVec2::ZERO) {
+            Some(rays) => Self { own: DVec3::Y, red_and_blue: Some(rays.map(|ray| ray.is_some())) },
+            None => Self { own: DVec3::ONE, red_and_blue: None },
+        }
+    }
 }
 
 /// Poses at the instants of a row's samples. With readout by rows, all pixels of a row share the instants,

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AutoExposureSpec, Face, FieldOr, ImageSensorSpec, PointSpreadSpec, TimingSpec};
+use super::{
+    AutoExposureSpec, ChromaticSpec, Face, FieldOr, ImageCircleSpec, ImageSensorSpec, PointSpreadSpec,
+    Primary, TimingSpec, VignettingSpec,
+};
 use crate::{
     lens::LensTable,
     shutter::{Shutter, ShutterError},
@@ -67,6 +70,16 @@ pub struct CameraSpec {
     /// What the lens makes of a point of light; without it, a point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_spread: Option<PointSpreadSpec>,
+    /// Lenses of red and blue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chromatic: Option<ChromaticSpec>,
+    /// What of the picture the lens shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_circle: Option<ImageCircleSpec>,
+    /// The primary that this camera is for, where it is one of three ([`CameraSpec::of_primary`]); files have
+    /// whole cameras.
+    #[serde(skip)]
+    pub primary: Option<Primary>,
 }
 
 impl Default for CameraSpec {
@@ -91,6 +104,9 @@ impl Default for CameraSpec {
             auto_exposure: None,
             timing: None,
             point_spread: None,
+            chromatic: None,
+            image_circle: None,
+            primary: None,
         }
     }
 }
@@ -371,6 +387,9 @@ pub struct PhotometricSpec {
     pub noise_sigma: f64,
     /// Encoding of PNG files.
     pub output: OutputEncoding,
+    /// Vignetting by a model, beside the map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vignetting: Option<VignettingSpec>,
 }
 
 impl Default for PhotometricSpec {
@@ -381,6 +400,7 @@ impl Default for PhotometricSpec {
             light: 1.0,
             noise_sigma: 0.0,
             output: OutputEncoding::default(),
+            vignetting: None,
         }
     }
 }

@@ -201,6 +201,8 @@ impl Scenario {
         if twin.leaves_out(twin.lens) {
             camera.lens = LensSpec::default();
             camera.lens_table = None;
+            camera.chromatic = None;
+            camera.image_circle = None;
             camera.zoom.iter_mut().for_each(|zoom| zoom.coefficients.clear());
         }
         if twin.leaves_out(twin.noise) {
@@ -209,6 +211,7 @@ impl Scenario {
         }
         if twin.leaves_out(twin.vignette) {
             camera.photometric.vignette = None;
+            camera.photometric.vignetting = None;
         }
         if twin.leaves_out(twin.point_spread) {
             camera.point_spread = None;

@@ -12,6 +12,7 @@ mod auto_exposure;
 mod image_sensor;
 mod motion;
 mod names;
+mod optics;
 mod point_spread;
 mod rig;
 mod scene;
@@ -245,6 +246,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     image_sensor::check_image_sensor(check, camera);
     auto_exposure::check_auto_exposure(check, camera);
     point_spread::check_point_spread(check, camera);
+    optics::check_optics(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
@@ -331,6 +333,7 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
 /// Combinations that the paper's methods do not support, and keys without an effect in that preset.
 fn check_paper(check: &mut Check, scenario: &Scenario) {
     let (quality, camera) = (&scenario.quality, &scenario.camera);
+    optics::check_paper(check, camera);
     let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
     let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
     let is_papers = matches!(camera.lens.model, LensModel::Pinhole | LensModel::BrownConrady);

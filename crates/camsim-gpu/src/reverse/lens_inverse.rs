@@ -78,7 +78,9 @@ impl LensUniform {
             padding: [0.0; 2],
         };
         match &camera.lens {
-            Lens::Pinhole(_) | Lens::Direction(_) | Lens::Face(_) => {}
+            Lens::Pinhole(_) | Lens::Direction(_) => {}
+            // Their maps are solved in f64.
+            Lens::Face(_) | Lens::Scaled(_) | Lens::Circle(_) => {}
             Lens::BrownConrady(_) => {
                 if let [k1, k2, p1, p2, k3, k4, k5, k6] = *camera.lens.coefficients() {
                     uniform.radial = [k1, k2, k3, 0.0].map(finite_f32);
@@ -192,7 +194,7 @@ impl LensMap {
 /// Whether a shader makes the map of a lens.
 #[must_use]
 pub fn has_shader(lens: &Lens) -> bool {
-    lens.face().is_none() && VARIANTS.iter().any(|(model, _)| *model == lens.model())
+    !lens.is_altered() && VARIANTS.iter().any(|(model, _)| *model == lens.model())
 }
 
 /// Pipelines of all variants, and the buffers of a lens.

@@ -1,6 +1,9 @@
 //! Buffers of the frames in flight.
 
-use camsim_core::{scenario::Face, sequence::Sequence};
+use camsim_core::{
+    scenario::{Face, Primary},
+    sequence::Sequence,
+};
 
 use super::{FRAMES_IN_FLIGHT, readback::ReadbackBuffer};
 use crate::{
@@ -12,13 +15,29 @@ use crate::{
     staging::Staging,
 };
 
+/// Colours of a picture.
+const COLORS: usize = Primary::ALL.len();
+
 /// Textures of ideal frames, and the bind groups with which each frame in flight reads them.
 #[derive(Debug)]
 pub(super) struct SessionTarget {
     /// The face whose lens map the bind groups have.
     pub face: Option<Face>,
     pub ideal: IdealTarget,
-    pub groups: [ReverseBindGroups; FRAMES_IN_FLIGHT],
+    /// Those of each colour that has a lens map of its own, one colour after the other.
+    pub groups: [ReverseBindGroups; COLORS * FRAMES_IN_FLIGHT],
+}
+
+/// Number of the bind groups of a frame in flight with the lens map of a colour.
+pub(super) fn group_of(slot: usize, primary: Option<Primary>) -> usize {
+    FRAMES_IN_FLIGHT * primary.map_or(0, Primary::channel) + slot
+}
+
+impl SessionTarget {
+    /// Forgets the bind groups of a frame in flight.
+    pub fn clear(&mut self, slot: usize) {
+        self.groups.iter_mut().skip(slot).step_by(FRAMES_IN_FLIGHT).for_each(|groups| groups.clear());
+    }
 }
 
 /// Buffers of one frame in flight.
@@ -57,11 +76,16 @@ impl FrameSlot {
         }
     }
 
+    /// What a frame puts out: its colour, and its truth if it has any.
+    pub fn outputs(&self, has_truth: bool) -> impl Iterator<Item = &ReadbackBuffer> {
+        std::iter::once(&self.color).chain(self.truth.as_ref().filter(|_| has_truth))
+    }
+
     /// To be called after submission: requests the mapping of the buffers that the CPU reads, the outputs
     /// only if the frame has any, and of the staging memory.
-    pub fn request_mapping(&mut self, has_outputs: bool) {
+    pub fn request_mapping(&mut self, has_outputs: bool, has_truth: bool) {
         let outputs = has_outputs
-            .then(|| std::iter::once(&self.color).chain(&self.truth))
+            .then(|| self.outputs(has_truth))
             .into_iter()
             .flatten()
             .map(|output| &output.cpu_buffer);

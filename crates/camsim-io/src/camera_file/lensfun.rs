@@ -18,6 +18,9 @@ use super::{CameraFileError, check, read};
 use crate::calibration::text::shortest;
 
 mod fit;
+mod tca;
+
+use tca::Tca;
 
 /// Diagonal of a sensor with crop factor 1, millimetres.
 const FULL_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -55,7 +58,8 @@ struct Calibration {
     model: String,
     /// Ascending by focal length.
     entries: Vec<Entry>,
-    has_tca: bool,
+    tca: Vec<Tca>,
+    has_other_tca: bool,
     has_vignetting: bool,
 }
 
@@ -161,6 +165,7 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
         let same = nodes.iter().filter(|node| node.attribute("model") == Some(&model));
         let mut entries = same.map(|node| entry(*node, &model)).collect::<Result<Vec<_>, String>>()?;
         entries.sort_by(|a, b| a.focal_mm.total_cmp(&b.focal_mm));
+        let tca = tca::entries(calibration)?;
         Ok(Calibration {
             name: name.clone(),
             kind: text(lens, "type").unwrap_or("rectilinear").to_owned(),
@@ -168,7 +173,8 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
             aspect: ratio(calibration.attribute("aspect-ratio").unwrap_or(aspect))?,
             model,
             entries,
-            has_tca: has("tca"),
+            has_other_tca: has("tca") && tca.is_empty(),
+            tca,
             has_vignetting: has("vignetting"),
         })
     };
@@ -313,6 +319,8 @@ fn camera(calibration: &Calibration, query: &LensfunQuery<'_>) -> Result<Lensfun
             ));
         }
     };
+    let half_short = 0.5 * width.min(height) * pitch_mm / half_short_mm;
+    spec.chromatic = tca::chromatic(&calibration.tca, query.focal_mm, half_short);
     notes.extend(left_out(calibration, &entry, crop));
     Ok(LensfunCamera { spec, notes })
 }
@@ -337,7 +345,7 @@ fn left_out(calibration: &Calibration, entry: &Entry, crop: f64) -> Vec<String> 
         shortest(entry.real_focal_mm, 1e-4),
         calibration.crop
     )];
-    let parts = [(calibration.has_tca, "tca"), (calibration.has_vignetting, "vignetting")];
+    let parts = [(calibration.has_other_tca, "tca"), (calibration.has_vignetting, "vignetting")];
     let parts: Vec<&str> = parts.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
     if !parts.is_empty() {
         notes.push(format!("not applied: {} of this lens", parts.join(", ")));

@@ -4,9 +4,10 @@ use camsim_core::imaging::KernelFile;
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
     Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
-    Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageSensorSpec, ImuSpec, LoopKind,
-    MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel, PointSpreadSpec, QualitySpec, Readout,
-    SensorModel, SpinSpec, TrackerSpec, TwinShutter, TwinSpec,
+    ChromaticSpec, Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec,
+    ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel,
+    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
+    TwinSpec, VignettingSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -167,6 +168,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
     scenario.output.raw_format = camsim_core::scenario::RawFormat::Tiff;
     scenario.camera.sensor = Some(full_sensor());
     scenario.camera.point_spread = Some(full_point_spread());
+    full_optics(&mut scenario.camera);
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
     let terrain = scenario.scene.terrain.as_mut().unwrap();
@@ -202,6 +204,27 @@ fn every_key_of_the_structs_is_in_the_schema() {
     for (key, _) in KEYS {
         assert!(visited.iter().any(|s| s == key), "{key} stands in the schema but not in the struct");
     }
+}
+
+/// Every key of chromatic lenses, image circle and vignetting has a value.
+fn full_optics(camera: &mut CameraSpec) {
+    let lens = Some(PrimaryLensSpec {
+        focal_px: Some([1.0; 2]),
+        principal_point_px: Some([1.0; 2]),
+        model: Some(LensModel::Fov),
+        coefficients: Some(vec![0.9]),
+    });
+    let scale = || vec![1.0, 0.0, 0.1];
+    camera.chromatic =
+        Some(ChromaticSpec { red_scale: scale(), blue_scale: scale(), red: lens.clone(), blue: lens });
+    camera.image_circle =
+        Some(ImageCircleSpec { radius_px: Some(1.0), centre_px: Some([1.0; 2]), half_angle_deg: Some(1.0) });
+    camera.photometric.vignetting = Some(VignettingSpec {
+        cos_power: 4.0,
+        polynomial: scale(),
+        polynomial_red: Some(scale()),
+        polynomial_blue: Some(scale()),
+    });
 }
 
 /// Every key has a value.

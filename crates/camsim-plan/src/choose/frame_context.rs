@@ -121,9 +121,7 @@ impl<'a> FrameContext<'a> {
         let half = if has_half { inputs.half_the_probes(frame) } else { None };
         let reach = match (&half.or_else(|| inputs.fixed.clone()), &inputs.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
-            (None, Some(table), Some(value)) => {
-                Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?)
-            }
+            (None, Some(table), Some(value)) => Arc::new(inputs.zoomed(table, value)?),
             _ => return Err(PlanError::NoRay),
         };
         let quarter = if has_half { inputs.quarter_of_the_probes(frame) } else { None };
@@ -247,7 +245,7 @@ impl<'a> FrameContext<'a> {
                 self.frame,
             ),
             triangles: TrianglePrices::new(&sequence.scene),
-            is_bent: !reach.camera.lens.is_identity(),
+            is_bent: !reach.camera.lens.is_identity() || reach.others.is_some(),
             silhouettes: self.silhouettes(&ideal, no_silhouettes_reason.is_none()),
             blended: self.blended(&[self.key()]),
             may_have_samples: !self.is_paper() && sequence.scene.has_triangle_borders_only(),

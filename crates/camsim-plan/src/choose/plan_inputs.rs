@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    camera::{CameraModel, ZoomTable},
+    camera::{CameraError, CameraModel, ZoomTable},
     mount::CameraPath,
-    scenario::{Auto, Channel, Preset, QualitySpec, Silhouettes},
+    scenario::{Auto, CameraSpec, Channel, Preset, Primary, QualitySpec, Silhouettes},
     sequence::Sequence,
     shutter::Shutter,
 };
@@ -54,6 +54,8 @@ pub(crate) struct PlanInputs {
     /// With the scenario's exposure; row times are the same with any.
     pub shutter: Shutter,
     pub zoom: Option<ZoomTable>,
+    /// The lenses of red and blue, where these zoom and are others.
+    pub zoom_of_others: Option<[ZoomTable; 2]>,
     /// Reach of a lens that does not zoom.
     pub fixed: Option<Arc<LensReach>>,
     /// The fixed lens with half of its probes, for even frames and odd ones of a group.
@@ -80,11 +82,19 @@ impl PlanInputs {
         let camera = &sequence.scenario.camera;
         let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
         let zoom = ZoomTable::from_spec(camera)?;
+        let zoom_of_others = match zoom {
+            Some(_) => red_and_blue(camera, ZoomTable::from_spec)?
+                .and_then(|[red, blue]| red.zip(blue))
+                .map(<[ZoomTable; 2]>::from),
+            None => None,
+        };
         let fixed = match zoom {
             Some(_) => None,
-            None => Some(Arc::new(
-                LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?,
-            )),
+            None => {
+                let others = red_and_blue(camera, CameraModel::from_spec)?.map(|both| both.map(Arc::new));
+                let camera = Arc::new(CameraModel::from_spec(camera)?);
+                Some(Arc::new(LensReach::with_others(camera, others).ok_or(PlanError::NoRay)?))
+            }
         };
         let halves =
             fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
@@ -100,6 +110,7 @@ impl PlanInputs {
             scene,
             shutter,
             zoom,
+            zoom_of_others,
             fixed,
             halves,
             quarters,
@@ -110,6 +121,15 @@ impl PlanInputs {
             neighbourhoods: RecentCache::new(cached),
             neighbourhoods_of_halves: RecentCache::new(cached),
         })
+    }
+
+    /// Reach of a zoom lens at a zoom value.
+    pub fn zoomed(&self, table: &ZoomTable, zoom: f64) -> Result<LensReach, PlanError> {
+        let others = match &self.zoom_of_others {
+            Some([red, blue]) => Some([Arc::new(red.at(zoom)?), Arc::new(blue.at(zoom)?)]),
+            None => None,
+        };
+        LensReach::with_others(Arc::new(table.at(zoom)?), others).ok_or(PlanError::NoRay)
     }
 
     pub fn quality(&self) -> &QualitySpec {
@@ -188,6 +208,18 @@ impl PlanInputs {
 /// not all of it.
 pub(crate) fn groups_at_once() -> usize {
     (rayon::current_num_threads() / THREADS_A_GROUP).clamp(1, MOST_GROUPS_AT_ONCE)
+}
+
+/// What is made of the cameras of red and blue, where these are others.
+fn red_and_blue<T>(
+    camera: &CameraSpec,
+    make: impl Fn(&CameraSpec) -> Result<T, CameraError>,
+) -> Result<Option<[T; 2]>, CameraError> {
+    if !camera.is_chromatic() {
+        return Ok(None);
+    }
+    let [red, blue] = [Primary::Red, Primary::Blue].map(|primary| make(&camera.of_primary(primary)));
+    Ok(Some([red?, blue?]))
 }
 
 /// Zoom at a time: linear between the rows of the track, held outside.

@@ -1,7 +1,7 @@
 //! The passes of a plan as text.
 
 use camsim_core::{
-    scenario::Preset,
+    scenario::{Preset, Primary},
     temporal::{TapStage, displacement::RK2_STEP_DEG},
 };
 
@@ -30,6 +30,10 @@ pub(crate) fn passes(plan: &FramePlan) -> Vec<String> {
     let (ray, temporal) = (ray(plan.ray), temporal(plan.temporal));
     let (gather, taps) = (gather(plan), taps(plan.taps));
     passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}) -> photometric{truth}"));
+    for other in plan.other_colors() {
+        let name = other.primary.map_or("", Primary::name);
+        passes.push(format!("reverse: as before, of {name}, by a lens of its own"));
+    }
     if let EdgeStage::Supersampled { samples, .. } = plan.edges {
         passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
     }

@@ -7,7 +7,7 @@ use camsim_core::{
     exposure::FrameExposure,
     pose::CameraPose,
     reference::IdealView,
-    scenario::{Preset, QualitySpec},
+    scenario::{Face, Preset, Primary, QualitySpec},
     scene::LodTolerance,
     shutter::Shutter,
     temporal::{IdealGeometry, TapStage, displacement::Twist},
@@ -113,9 +113,31 @@ pub struct FramePlan {
     pub price_ms: f64,
     /// Part of `price_ms` that this frame's share of the ideal frame takes.
     pub ideal_price_ms: f64,
+    /// The colour that its output pass makes, of a camera whose colours have a lens each; plans are those of green.
+    pub primary: Option<Primary>,
+    /// The cameras of red and blue of such a camera.
+    pub others: Option<[Arc<CameraModel>; 2]>,
 }
 
 impl FramePlan {
+    /// The plans of the output passes that red and blue have beside this one's, from the same ideal frames.
+    pub fn other_colors(&self) -> impl Iterator<Item = Self> + '_ {
+        let both = [Primary::Red, Primary::Blue].into_iter();
+        both.zip(self.others.iter().flatten()).map(|(primary, camera)| Self {
+            primary: Some(primary),
+            ray: if camera.lens.is_identity() { RayStage::Pinhole } else { RayStage::LensMap },
+            camera: camera.clone(),
+            truth: false,
+            ..self.clone()
+        })
+    }
+
+    /// What its lens map belongs to: a face, and a colour.
+    #[must_use]
+    pub fn lens_key(&self) -> (Option<Face>, Option<Primary>) {
+        (self.camera.lens.face(), self.primary)
+    }
+
     /// Whether the one ideal frame was taken at another instant than the middle of the window.
     #[must_use]
     pub fn has_displaced_key(&self) -> bool {

@@ -71,7 +71,7 @@ impl<'a> TextureProbes<'a> {
         key_pose: &CameraPose,
         frame: u64,
     ) -> Self {
-        let (probes, focal_px) = (&reach.probes, reach.camera.central_focal_px());
+        let (probes, focal_px) = (&*reach.probes_of_colors(), reach.camera.central_focal_px());
         let gain = &gain(sequence, &reach.camera, frame);
         let search =
             TextureSearch { sequence, surfaces, spectra, shutter, stamp_s, key_pose, focal_px, gain };

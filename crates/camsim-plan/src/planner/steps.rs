@@ -1,7 +1,7 @@
 //! The steps of a plan.
 
 use camsim_core::{
-    scenario::{Auto, CameraSpec},
+    scenario::{Auto, CameraSpec, Primary},
     scene::Light,
     temporal::{IdealGeometry, SKY_REACH_PX},
 };
@@ -48,6 +48,11 @@ fn finishing(camera: &CameraSpec) -> Vec<&'static str> {
 
 fn shadow_stage(light: Option<Light>) -> Option<ShadowStage> {
     light.filter(|light| light.shadows).map(|_| ShadowStage { border_rays: SHADOW_BORDER_RAYS })
+}
+
+/// Price of the output passes that red and blue have beside that of green, ms.
+fn price_of_other_colors(plan: &FramePlan) -> f64 {
+    if plan.others.is_some() { 2.0 * (plan.price_ms - plan.ideal_price_ms) } else { 0.0 }
 }
 
 /// A plan in the making.
@@ -290,7 +295,7 @@ impl<'a> Draft<'a> {
         if camera.sensor.is_none() && camera.photometric.noise_sigma <= 0.0 {
             self.skip("noise", "camera.photometric.noise_sigma is 0");
         }
-        if inputs.sequence.vignette.is_none() {
+        if inputs.sequence.vignette.is_none() && camera.photometric.vignetting.is_none() {
             self.skip("vignette map", "camera.photometric.vignette is not set");
         }
         if !inputs.truth {
@@ -360,7 +365,10 @@ impl<'a> Draft<'a> {
             skipped: self.skipped,
             price_ms: picture.price.ms + temporal_ms(method),
             ideal_price_ms: picture.price.ideal_ms,
+            primary: context.reach.others.is_some().then_some(Primary::Green),
+            others: context.reach.others.clone(),
         };
+        plan.price_ms += price_of_other_colors(&plan);
         if plan.copied_from().is_some() {
             plan.skipped.push(Skip {
                 what: "taps between ideal pixels",

@@ -1,6 +1,9 @@
 //! Value of a pixel for each unit of light that arrives.
 
-use camsim_core::{camera::CameraModel, photometric::vignette_weight, sequence::Sequence};
+use camsim_core::{
+    camera::CameraModel, photometric::vignette_weight, scenario::Primary, sequence::Sequence,
+    vignetting::model_weight,
+};
 
 /// Value of a pixel of a frame, of the linear range, for each unit of light that arrives.
 pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel, frame: u64) -> impl Fn([u32; 2]) -> f64 + Sync {
@@ -16,7 +19,9 @@ pub(crate) fn gain(sequence: &Sequence, camera: &CameraModel, frame: u64) -> imp
                 photometric.vignette_thresholds,
             ))
         });
+        let model = photometric.vignetting.as_ref();
+        let model = model.map_or(1.0, |spec| model_weight(spec, camera, [x, y], Primary::Green));
         let exposed = gains.as_ref().map_or(1.0, |shutter| shutter.light_gain(x, y));
-        vignette * exposed * light
+        vignette * model * exposed * light
     }
 }

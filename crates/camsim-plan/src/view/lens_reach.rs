@@ -1,11 +1,11 @@
 //! The outermost rays of a camera, and its probes.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use camsim_core::camera::CameraModel;
 use glam::DVec2;
 
-use super::probes::{Probe, probes, spacing_px};
+use super::probes::{Probe, probes, same_probe, spacing_px};
 
 /// Grid step of the search for the lens's reach, pixels.
 const STEP_PX: u32 = 4;
@@ -28,13 +28,23 @@ pub struct LensReach {
     pub(crate) probes: Vec<Probe>,
     /// Side of the part of the image that each of them stands for, pixels.
     pub(crate) probe_px: f64,
+    /// The cameras of red and blue, where these are others: their rays are among the outermost.
+    pub others: Option<[Arc<CameraModel>; 2]>,
 }
 
 impl LensReach {
     /// Scans the image; `None` when no pixel has an ideal ray.
     #[must_use]
     pub fn new(camera: Arc<CameraModel>) -> Option<Self> {
-        let candidates = candidates(&camera);
+        Self::with_others(camera, None)
+    }
+
+    /// As [`LensReach::new`], with the cameras of red and blue.
+    #[must_use]
+    pub fn with_others(camera: Arc<CameraModel>, others: Option<[Arc<CameraModel>; 2]>) -> Option<Self> {
+        let own = candidates(&camera);
+        let of_others = others.iter().flatten().flat_map(|other| self::candidates(other));
+        let candidates: Vec<_> = own.iter().copied().chain(of_others).collect();
         let mut rays = Vec::new();
         for band in 0..BANDS * BANDS {
             let of_band: Vec<_> =
@@ -53,12 +63,20 @@ impl LensReach {
         // A tenth of the pixels may be magnified more: finer ideal pixels for a few corners would cost time
         // in all of the image.
         let mut stretches: Vec<f64> =
-            candidates.iter().step_by(7).map(|(uv, _)| least_stretch(&camera, *uv)).collect();
+            own.iter().step_by(7).map(|(uv, _)| least_stretch(&camera, *uv)).collect();
         stretches.sort_by(f64::total_cmp);
         let least_stretch = stretches.get(stretches.len() / 10).copied().unwrap_or(1.0);
         let probes = probes(&camera);
         let probe_px = spacing_px(&camera);
-        (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes, probe_px })
+        (!own.is_empty()).then_some(Self { camera, rays, least_stretch, probes, probe_px, others })
+    }
+
+    /// The probes with the rays of green, red and blue in turn, where these differ.
+    pub(crate) fn probes_of_colors(&self) -> Cow<'_, [Probe]> {
+        let Some([red, blue]) = &self.others else { return Cow::Borrowed(&self.probes) };
+        let cameras = [&self.camera, red, blue];
+        let turn = |(i, probe): (usize, &Probe)| same_probe(cameras[i % 3], probe);
+        Cow::Owned(self.probes.iter().enumerate().filter_map(turn).collect())
     }
 
     /// The lens with every second of its probes: two neighbours in time, one `odd` and one not, have all of
@@ -73,13 +91,14 @@ impl LensReach {
     }
 
     fn with_every_second(&self, is_one: impl Fn(&Probe) -> bool) -> Self {
-        let Self { camera, rays, least_stretch, .. } = self;
+        let Self { camera, rays, least_stretch, others, .. } = self;
         Self {
             camera: camera.clone(),
             rays: rays.clone(),
             least_stretch: *least_stretch,
             probes: self.probes.iter().filter(|probe| is_one(probe)).copied().collect(),
             probe_px: std::f64::consts::SQRT_2 * self.probe_px,
+            others: others.clone(),
         }
     }
 

@@ -72,6 +72,11 @@ pub(crate) fn spacing_px(camera: &CameraModel) -> f64 {
     (width * height).sqrt()
 }
 
+/// The probe of the same pixel in another camera.
+pub(crate) fn same_probe(camera: &CameraModel, of: &Probe) -> Option<Probe> {
+    probe(camera, of.pixel, [of.is_odd, of.is_low])
+}
+
 fn probe(camera: &CameraModel, pixel: [u32; 2], [is_odd, is_low]: [bool; 2]) -> Option<Probe> {
     let distorted = camera.distorted_from_pixel(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])));
     let uv = camera.unproject_pixel(pixel)?;

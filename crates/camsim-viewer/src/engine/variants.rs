@@ -14,6 +14,7 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
     let camera = &mut stage_scenario.camera;
     if stage < Stage::Photometric {
         camera.photometric.vignette = None;
+        camera.photometric.vignetting = None;
         camera.photometric.light = 1.0;
         camera.photometric.noise_sigma = 0.0;
         camera.sensor = None;
@@ -25,6 +26,8 @@ pub fn stage_scenario(scenario: &Scenario, stage: Stage) -> Scenario {
     }
     if stage < Stage::Lens {
         camera.lens = LensSpec::default();
+        camera.chromatic = None;
+        camera.image_circle = None;
         camera.zoom.iter_mut().for_each(|entry| entry.coefficients.clear());
     }
     stage_scenario
@@ -61,8 +64,8 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
     let centre = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
     let focal = |focal_px: [f64; 2]| focal_px.map(|f| f / scale);
     // The outer border stays in place: the centre of a small pixel is the centre of the pixels it replaces.
-    let principal =
-        |point_px: Option<[f64; 2]>| Some(point_px.unwrap_or(centre).map(|c| (c + 0.5) / scale - 0.5));
+    let place = |point_px: [f64; 2]| point_px.map(|c| (c + 0.5) / scale - 0.5);
+    let principal = |point_px: Option<[f64; 2]>| Some(place(point_px.unwrap_or(centre)));
     camera.size_px = camera.size_px.map(|side| side.div_ceil(factor));
     camera.focal_px = focal(camera.focal_px);
     camera.principal_point_px = principal(camera.principal_point_px);
@@ -77,6 +80,16 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
         let sensor_um = camera.sensor.as_ref().and_then(|sensor| with_facts(sensor).pixel_um);
         spread.pixel_um = spread.pixel_um.or(sensor_um).map(|pixel_um| pixel_um * scale);
         spread.kernel_oversampling *= factor;
+    }
+    for lens in
+        camera.chromatic.iter_mut().flat_map(|chromatic| [&mut chromatic.red, &mut chromatic.blue]).flatten()
+    {
+        lens.focal_px = lens.focal_px.map(focal);
+        lens.principal_point_px = lens.principal_point_px.map(place);
+    }
+    if let Some(circle) = &mut camera.image_circle {
+        circle.radius_px = circle.radius_px.map(|radius_px| radius_px / scale);
+        circle.centre_px = circle.centre_px.map(place);
     }
 }
 

@@ -24,6 +24,8 @@ const DATABASE: &str = r#"<!DOCTYPE lensdatabase SYSTEM "lensfun-database.dtd">
             <distortion model="ptlens" focal="50" real-focal="49.2" a="-0.001" b="0.002" c="0.003"/>
             <distortion model="ptlens" focal="80" a="0" b="0.006" c="0.001"/>
             <tca model="linear" focal="20" kr="1.0003" kb="0.9998"/>
+            <tca model="poly3" focal="40" vr="1.0007" cr="0.0002" br="-0.0004" vb="0.9996"/>
+            <vignetting model="pa" focal="20" aperture="4" distance="10" k1="-0.3" k2="0.1" k3="0"/>
         </calibration>
     </lens>
     <lens>
@@ -132,7 +134,26 @@ fn polynomials_are_lensfuns() {
     let stated: f64 = note.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
     // numpy's least squares for the same rational function: 0.282 px.
     assert!(error <= 1.1 * stated && (stated - 0.282).abs() < 0.02, "{error} {note}");
-    assert!(camera.notes.iter().any(|note| note.contains("not applied: tca")));
+    assert!(camera.notes.iter().any(|note| note.contains("not applied: vignetting")));
+}
+
+#[test]
+fn colors_are_scaled_as_lensfun_has_it() {
+    let scales = |focal_mm: f64, crop: Option<f64>| {
+        let chromatic = import("Zoom 20-80mm f/4", focal_mm, crop).unwrap().spec.chromatic.unwrap();
+        [chromatic.red_scale, chromatic.blue_scale]
+    };
+    // The pictures have the calibration's sensor and aspect: r is the same.
+    assert_eq!(scales(20.0, None), [vec![1.0003], vec![0.9998]]);
+    let close = |got: &[f64], wanted: &[f64]| {
+        got.len() == wanted.len() && got.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12)
+    };
+    let between = scales(30.0, None);
+    assert!(close(&between[0], &[1.0005, 0.0001, -0.0002]) && close(&between[1], &[0.9997]), "{between:?}");
+    // Half of that sensor's size: r of the calibration is half of the picture's.
+    let smaller = scales(60.0, Some(2.0 * 1.534));
+    assert!(close(&smaller[0], &[1.0007, 0.0001, -0.0001]), "{smaller:?}");
+    assert!(import("Prime 35mm", 35.0, None).unwrap().spec.chromatic.is_none());
 }
 
 #[test]

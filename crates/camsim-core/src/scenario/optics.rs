@@ -1,0 +1,244 @@
+//! Optics beyond one lens for all light: lateral chromatic aberration, vignetting and the image circle.
+
+use serde::{Deserialize, Serialize};
+
+use super::{CameraSpec, LensModel, LensSpec, OutputEncoding};
+
+/// A primary colour of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Primary {
+    /// Channel 0.
+    Red,
+    /// Channel 1. Its lens is the camera's, and truth is that of its rays.
+    Green,
+    /// Channel 2.
+    Blue,
+}
+
+impl Primary {
+    /// All three, the one with the truth first.
+    pub const ALL: [Self; 3] = [Self::Green, Self::Red, Self::Blue];
+
+    /// Its channel in a picture.
+    #[must_use]
+    pub fn channel(self) -> usize {
+        match self {
+            Self::Red => 0,
+            Self::Green => 1,
+            Self::Blue => 2,
+        }
+    }
+
+    /// The word for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Red => "red",
+            Self::Green => "green",
+            Self::Blue => "blue",
+        }
+    }
+}
+
+/// `[camera.chromatic]`: where red and blue are imaged, by a radial scale of green's image or by a lens each.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ChromaticSpec {
+    /// `[v, c, b]`: red is imaged `v + c r + b r^2` times as far from the principal point as green; r is
+    /// green's distance from it over half the picture's shorter side. Trailing terms may be left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub red_scale: Vec<f64>,
+    /// Likewise of blue.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub blue_scale: Vec<f64>,
+    /// Red's own lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub red: Option<PrimaryLensSpec>,
+    /// Blue's own lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blue: Option<PrimaryLensSpec>,
+}
+
+/// `[camera.chromatic.red]`, `[camera.chromatic.blue]`: a calibration of one colour. What is left out is the
+/// camera's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PrimaryLensSpec {
+    /// Focal lengths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_px: Option<[f64; 2]>,
+    /// Principal point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub principal_point_px: Option<[f64; 2]>,
+    /// Model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<LensModel>,
+    /// Coefficients. Where they are left out with a model other than the camera's there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coefficients: Option<Vec<f64>>,
+}
+
+impl ChromaticSpec {
+    /// Terms of a primary's scale; none of green, and where none are given.
+    #[must_use]
+    pub fn scale(&self, primary: Primary) -> Option<[f64; 3]> {
+        let given = match primary {
+            Primary::Red => &self.red_scale,
+            Primary::Green => return None,
+            Primary::Blue => &self.blue_scale,
+        };
+        let term = |i: usize| given.get(i).copied().unwrap_or(0.0);
+        (!given.is_empty()).then(|| [term(0), term(1), term(2)])
+    }
+
+    /// A primary's own lens.
+    #[must_use]
+    pub fn lens(&self, primary: Primary) -> Option<&PrimaryLensSpec> {
+        match primary {
+            Primary::Red => self.red.as_ref(),
+            Primary::Green => None,
+            Primary::Blue => self.blue.as_ref(),
+        }
+    }
+
+    fn differs(&self) -> bool {
+        Primary::ALL.into_iter().any(|primary| self.scale(primary).is_some() || self.lens(primary).is_some())
+    }
+}
+
+/// `[camera.image_circle]`: pixels beyond it have no ray.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImageCircleSpec {
+    /// Radius.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_px: Option<f64>,
+    /// Centre; `None` is the principal point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centre_px: Option<[f64; 2]>,
+    /// Largest angle of a ray to the optical axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_angle_deg: Option<f64>,
+}
+
+/// `[camera.photometric.vignetting]`: a model of the light that reaches a pixel. It multiplies that of the map.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VignettingSpec {
+    /// Power of the cosine of a ray's angle to the optical axis: 4 is natural vignetting, 0 none.
+    pub cos_power: f64,
+    /// `[k1, k2, k3]` of `1 + k1 r^2 + k2 r^4 + k3 r^6`; r is the distance from the principal point over half
+    /// the picture's diagonal. Trailing terms may be left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub polynomial: Vec<f64>,
+    /// Red's polynomial, instead of that of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polynomial_red: Option<Vec<f64>>,
+    /// Blue's polynomial, instead of that of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polynomial_blue: Option<Vec<f64>>,
+}
+
+impl VignettingSpec {
+    /// The polynomial of a primary.
+    #[must_use]
+    pub fn polynomial(&self, primary: Primary) -> &[f64] {
+        match primary {
+            Primary::Red => self.polynomial_red.as_ref().unwrap_or(&self.polynomial),
+            Primary::Green => &self.polynomial,
+            Primary::Blue => self.polynomial_blue.as_ref().unwrap_or(&self.polynomial),
+        }
+    }
+
+    /// Whether colours differ.
+    #[must_use]
+    pub fn is_colored(&self) -> bool {
+        self.polynomial_red.is_some() || self.polynomial_blue.is_some()
+    }
+}
+
+impl CameraSpec {
+    /// Whether red or blue have a lens of their own, so that a picture is made by three.
+    #[must_use]
+    pub fn is_chromatic(&self) -> bool {
+        self.primary.is_none() && self.chromatic.as_ref().is_some_and(ChromaticSpec::differs)
+    }
+
+    /// The camera of one primary.
+    #[must_use]
+    pub fn of_primary(&self, primary: Primary) -> Self {
+        let mut camera = Self { primary: Some(primary), ..self.clone() };
+        let Some(own) = self.chromatic.as_ref().and_then(|chromatic| chromatic.lens(primary)) else {
+            return camera;
+        };
+        let model = own.model.unwrap_or(self.lens.model);
+        let same = if model == self.lens.model { self.lens.coefficients.clone() } else { Vec::new() };
+        camera.lens = LensSpec { model, coefficients: own.coefficients.clone().unwrap_or(same) };
+        camera.focal_px = own.focal_px.unwrap_or(self.focal_px);
+        camera.principal_point_px = own.principal_point_px.or(self.principal_point_px);
+        camera
+    }
+
+    /// Terms of the scale of this camera's primary.
+    #[must_use]
+    pub fn primary_scale(&self) -> Option<[f64; 3]> {
+        self.chromatic.as_ref().zip(self.primary).and_then(|(chromatic, primary)| chromatic.scale(primary))
+    }
+
+    /// Whether the photometric stage needs all colours of a pixel at once, so that it comes after the passes:
+    /// gains that differ between colours, or luminance of three lenses.
+    #[must_use]
+    pub fn is_finished_late(&self) -> bool {
+        let vignetting = self.photometric.vignetting.as_ref();
+        let is_grey = matches!(self.photometric.output, OutputEncoding::Luma8 | OutputEncoding::Luma16);
+        let is_chromatic = self.chromatic.as_ref().is_some_and(ChromaticSpec::differs);
+        is_chromatic && is_grey || vignetting.is_some_and(VignettingSpec::is_colored)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::PhotometricSpec;
+
+    fn chromatic() -> CameraSpec {
+        let red = PrimaryLensSpec { focal_px: Some([501.0, 502.0]), ..PrimaryLensSpec::default() };
+        CameraSpec {
+            lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![0.1, 0.02] },
+            chromatic: Some(ChromaticSpec {
+                red: Some(red),
+                blue_scale: vec![0.999],
+                ..ChromaticSpec::default()
+            }),
+            ..CameraSpec::default()
+        }
+    }
+
+    #[test]
+    fn a_primary_has_what_is_given_and_else_the_cameras() {
+        let camera = chromatic();
+        assert!(camera.is_chromatic() && !camera.of_primary(Primary::Red).is_chromatic());
+        let [green, red, blue] = Primary::ALL.map(|primary| camera.of_primary(primary));
+        assert_eq!((red.focal_px, &red.lens), ([501.0, 502.0], &camera.lens));
+        assert_eq!((green.focal_px, green.primary_scale()), (camera.focal_px, None));
+        assert_eq!((blue.primary_scale(), red.primary_scale()), (Some([0.999, 0.0, 0.0]), None));
+        let mut other = camera;
+        other.chromatic.iter_mut().flat_map(|all| &mut all.red).for_each(|red| {
+            red.model = Some(LensModel::KannalaBrandt);
+        });
+        assert!(other.of_primary(Primary::Red).lens.coefficients.is_empty());
+    }
+
+    #[test]
+    fn luminance_of_three_lenses_and_colored_gains_come_late() {
+        let mut camera = chromatic();
+        assert!(!camera.is_finished_late());
+        camera.photometric.output = OutputEncoding::Luma8;
+        assert!(camera.is_finished_late() && camera.of_primary(Primary::Red).is_finished_late());
+        camera.photometric.noise_sigma = 0.1;
+        assert_eq!(camera.photometric_of_renderers().noise_sigma, 0.0);
+        let vignetting = VignettingSpec { polynomial_red: Some(vec![-0.1]), ..VignettingSpec::default() };
+        let photometric = PhotometricSpec { vignetting: Some(vignetting), ..PhotometricSpec::default() };
+        assert!(CameraSpec { photometric, ..CameraSpec::default() }.is_finished_late());
+    }
+}
