@@ -10,56 +10,24 @@ use camsim::{
         scenario::{Channel, Preset, Rig},
         sequence::Sequence,
     },
-    engine::Backend,
     io::{
         load::{LoadError, Loaded, load_sequence, reload_sequence},
         portable::portable_rig,
-        scenario_file::{
-            self, RANDOMIZE, RandomScenario, ScenarioError, drawn_json, parse_random_scenario,
-            read_random_scenario, rig_json, rig_table,
-        },
+        scenario_file::{self, RANDOMIZE, drawn_json, rig_json, rig_table},
     },
 };
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     camera::Camera,
-    engine::{self, SessionKey, SessionPool, in_own_pool, lock},
+    engine::{Renderer, SessionKey, SessionPool, in_own_pool, lock},
     error::{OrRaise, input_error},
     pictures::board_of,
     sensors,
+    source::Source,
     stream::{FrameNumbers, Stream, render_one},
     trajectory::Trajectory,
 };
-
-/// Where a scenario comes from.
-#[derive(Clone, Debug)]
-struct Source {
-    path: PathBuf,
-    /// Text of the file; `None` for a `run.json`, which is read again.
-    text: Option<String>,
-    sets: Vec<(String, String)>,
-    preset: Option<Preset>,
-    /// Which variation of a scenario with `[randomize]` it is.
-    variation: Option<u64>,
-}
-
-impl Source {
-    fn random(&self) -> Result<RandomScenario, ScenarioError> {
-        match &self.text {
-            Some(text) if self.preset.is_none() => parse_random_scenario(text, &self.path, &self.sets),
-            _ => read_random_scenario(&self.path, &self.sets, self.preset),
-        }
-    }
-
-    fn rig(&self) -> Result<Rig, ScenarioError> {
-        let scenario = self.random()?;
-        match self.variation {
-            None => Ok(scenario.into_base()),
-            Some(index) => Ok(scenario.variation(index)?.rig),
-        }
-    }
-}
 
 /// A checked scenario of one camera, with the cameras beside it.
 #[derive(Clone)]
@@ -76,38 +44,34 @@ struct State {
 #[pyclass(frozen, module = "camsim._camsim")]
 pub struct Scenario {
     state: Mutex<State>,
-    backend: Backend,
     sessions: SessionPool,
 }
 
 impl std::fmt::Debug for Scenario {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Scenario").field("backend", &self.backend).finish_non_exhaustive()
+        f.debug_struct("Scenario").field("source", &self.snapshot().source).finish_non_exhaustive()
     }
 }
 
 impl Scenario {
-    fn new(source: Source, camera: Option<&str>, backend: &str) -> PyResult<Self> {
-        let rig = source.rig().or_input_error()?;
+    fn new(source: Source, camera: Option<&str>) -> PyResult<Self> {
+        let rig = source.rig()?;
         let camera = match camera {
             None => 0,
             Some(name) => rig.position(name).ok_or_else(|| no_camera(&rig, name))?,
         };
-        let backend = engine::backend(backend).ok_or_else(|| {
-            input_error(format!("backend {backend:?}: there are \"auto\", \"cpu\" and \"gpu\""))
-        })?;
         let state = State { source, rig: Arc::new(rig), camera, loaded: None, before: None };
-        Ok(Self { state: Mutex::new(state), backend, sessions: SessionPool::default() })
+        Ok(Self { state: Mutex::new(state), sessions: SessionPool::default() })
     }
 
     /// Another scenario, that shares what the change does not touch.
     fn with_source(&self, change: impl FnOnce(&mut Source)) -> PyResult<Self> {
         let mut state = self.snapshot();
         change(&mut state.source);
-        state.rig = Arc::new(state.source.rig().or_input_error()?);
+        state.rig = Arc::new(state.source.rig()?);
         state.camera = state.camera.min(state.rig.scenarios().len() - 1);
         state.before = state.loaded.take().or(state.before);
-        Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: self.sessions.clone() })
+        Ok(Self { state: Mutex::new(state), sessions: self.sessions.clone() })
     }
 
     fn snapshot(&self) -> State {
@@ -141,7 +105,8 @@ impl Scenario {
             None => sequence.scenario.output.channels.clone(),
             Some(names) => names.iter().map(|name| channel(name)).collect::<PyResult<_>>()?,
         };
-        Ok(SessionKey { backend: self.backend, sequence, channels })
+        let renderer = self.snapshot().source.renderer.of_sequence(&sequence);
+        Ok(SessionKey { renderer, sequence, channels })
     }
 }
 
@@ -158,6 +123,12 @@ fn channel(name: &str) -> PyResult<Channel> {
     known.ok_or_else(|| {
         let names = Channel::ALL.map(Channel::name).join(", ");
         input_error(format!("channel {name:?}: there is no such channel; the channels are {names}"))
+    })
+}
+
+fn renderer(name: &str) -> PyResult<Renderer> {
+    Renderer::by_name(name).ok_or_else(|| {
+        input_error(format!("backend {name:?}: there are \"auto\", \"cpu\", \"gpu\" and \"reference\""))
     })
 }
 
@@ -188,15 +159,15 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let preset = preset(preset_name)?;
+        let (preset, renderer) = (preset(preset_name)?, renderer(backend)?);
         py.detach(|| {
-            let mut source = Source { path, text: None, sets, preset, variation: None };
+            let mut source = Source { path, text: None, sets, preset, variation: None, twin: None, renderer };
             // The first reading says what is wrong with the file itself.
-            source.rig().or_input_error()?;
+            source.rig()?;
             let text = std::fs::read_to_string(&source.path).unwrap_or_default();
             let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
             source.text = (!is_json(text)).then(|| text.to_owned());
-            Self::new(source, camera, backend)
+            Self::new(source, camera)
         })
     }
 
@@ -209,8 +180,9 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let source = Source { path, text: Some(text), sets: Vec::new(), preset: None, variation: None };
-        py.detach(|| Self::new(source, camera, backend))
+        let (text, sets, renderer) = (Some(text), Vec::new(), renderer(backend)?);
+        let source = Source { path, text, sets, preset: None, variation: None, twin: None, renderer };
+        py.detach(|| Self::new(source, camera))
     }
 
     /// Another scenario with changes on top, that shares what these do not touch.
@@ -221,6 +193,11 @@ impl Scenario {
     /// Variation `index` of a scenario with `[randomize]`.
     fn variation(&self, py: Python<'_>, index: u64) -> PyResult<Self> {
         py.detach(|| self.with_source(|source| source.variation = Some(index)))
+    }
+
+    /// The scenario of a twin's pictures, of number `instant` if it is a burst.
+    fn twin(&self, py: Python<'_>, name: String, instant: Option<u32>) -> PyResult<Self> {
+        py.detach(|| self.with_source(|source| source.twin = Some((name, instant))))
     }
 
     /// Number of the variation that it is.
@@ -261,7 +238,7 @@ impl Scenario {
             let mut state = self.snapshot();
             state.camera = state.rig.position(name).ok_or_else(|| no_camera(&state.rig, name))?;
             state.before = state.loaded.take().or(state.before);
-            Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: SessionPool::default() })
+            Ok(Self { state: Mutex::new(state), sessions: SessionPool::default() })
         })
     }
 
@@ -308,7 +285,7 @@ impl Scenario {
     /// Name of the renderer.
     #[getter]
     fn backend(&self) -> &'static str {
-        engine::backend_name(self.backend)
+        self.snapshot().source.renderer.name()
     }
 
     /// Every key with its value, as JSON; with `absolute` all paths are, and `[randomize]` is among the keys.

@@ -23,6 +23,7 @@ pub use crate::scenario::LensModel;
 mod branch;
 mod brown_conrady;
 mod brown_conrady_prism;
+mod bulk;
 mod direction;
 mod division;
 mod double_sphere;
@@ -46,6 +47,7 @@ mod table;
 mod ucm;
 
 pub use brown_conrady::BrownConrady;
+pub(crate) use bulk::{BLOCK, Block, Bulk};
 pub use direction::DirectionLens;
 pub use face::FaceLens;
 pub use facts::ModelFacts;
