@@ -44,7 +44,7 @@ mod _camsim {
         frame::write_picture,
         lens::Lens,
         pictures::{board_of_file, board_of_keys, compare},
-        scenario::{Scenario, default_scenario},
+        scenario::{Scenario, default_scenario, unpack_demo},
         stream::{Stream, stop_streams},
         trajectory::Trajectory,
     };

@@ -11,6 +11,7 @@ use camsim::{
         sequence::Sequence,
     },
     io::{
+        builtin,
         load::{LoadError, Loaded, load_sequence, reload_sequence},
         portable::portable_rig,
         scenario_file::{self, RANDOMIZE, drawn_json, rig_json, rig_table},
@@ -362,6 +363,12 @@ impl Scenario {
         let key = self.key(py, channels)?;
         Stream::begin(self.sessions.clone(), key, FrameNumbers { first, step, count })
     }
+}
+
+/// Writes the built-in flight to a folder, and returns the path of its scenario.
+#[pyfunction]
+pub fn unpack_demo(folder: PathBuf) -> PyResult<PathBuf> {
+    builtin::unpack(&folder).or_run_error()
 }
 
 /// Every key of a scenario file, as `camsim render --print-default` prints it.

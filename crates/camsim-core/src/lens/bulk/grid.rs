@@ -23,12 +23,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    pub(super) fn new(
-        lens: &Lens,
-        formula: &dyn PlaneFormula,
-        [low, high]: [DVec2; 2],
-        inside: f64,
-    ) -> Self {
+    pub(super) fn new(lens: &Lens, formula: &dyn PlaneFormula, [low, high]: [DVec2; 2], inside: f64) -> Self {
         let step = (high - low) / CELLS as f64;
         let node = |k: usize| {
             let at = low + step * DVec2::new((k % (CELLS + 1)) as f64, (k / (CELLS + 1)) as f64);

@@ -30,8 +30,7 @@ pub(in crate::lens) trait PlaneFormula {
         for i in 0..BLOCK {
             let (value, jacobian) = self.value_and_jacobian(DVec2::new(u[i], v[i]));
             let (off_x, off_y) = (value.x - x[i], value.y - y[i]);
-            let (a, c, b, d) =
-                (jacobian.x_axis.x, jacobian.x_axis.y, jacobian.y_axis.x, jacobian.y_axis.y);
+            let (a, c, b, d) = (jacobian.x_axis.x, jacobian.x_axis.y, jacobian.y_axis.x, jacobian.y_axis.y);
             let inverse = 1.0 / (a * d - b * c);
             u[i] -= (d * off_x - b * off_y) * inverse;
             v[i] -= (a * off_y - c * off_x) * inverse;

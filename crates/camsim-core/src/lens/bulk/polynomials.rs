@@ -34,7 +34,8 @@ impl Polynomials {
         let local = 2.0 * (place - i as f64) - 1.0;
         let [c0, c1, c2, c3, c4, c5, c6, c7] = self.cells[i];
         let square = local * local;
-        let (low, high) = ((c0 + c1 * local) + (c2 + c3 * local) * square, (c4 + c5 * local) + (c6 + c7 * local) * square);
+        let (low, high) =
+            ((c0 + c1 * local) + (c2 + c3 * local) * square, (c4 + c5 * local) + (c6 + c7 * local) * square);
         low + high * (square * square)
     }
 
@@ -57,9 +58,11 @@ impl Polynomials {
 fn fit(function: impl Fn(f64) -> f64) -> [f64; TERMS] {
     let angle = |node: usize| PI * (node as f64 + 0.5) / TERMS as f64;
     let values: [f64; TERMS] = std::array::from_fn(|node| function(angle(node).cos()));
+    // Of the differences, so that roundings of the weights do not count.
+    let base = values[TERMS / 2];
     // Chebyshev's polynomials T and their weights.
     let weight = |k: usize| {
-        let sum: f64 = (0..TERMS).map(|node| values[node] * (k as f64 * angle(node)).cos()).sum();
+        let sum: f64 = (0..TERMS).map(|node| (values[node] - base) * (k as f64 * angle(node)).cos()).sum();
         sum * if k == 0 { 1.0 } else { 2.0 } / TERMS as f64
     };
     let mut powers = [0.0; TERMS];
@@ -77,5 +80,6 @@ fn fit(function: impl Fn(f64) -> f64) -> [f64; TERMS] {
         }
         (before, now) = (now, next);
     }
+    powers[0] += base;
     powers
 }
