@@ -93,6 +93,16 @@ class Scenario(Sequence[Frame]):
         text = _toml.document_text(files.placed(tree))
         return cls(_camsim.Scenario.parse(text, pathlib.Path(folder) / "<dict>", camera, backend), files)
 
+    @classmethod
+    def demo(cls, *, backend: str = "auto") -> Scenario:
+        """The built-in flight over a valley, which needs no file.
+
+        >>> Scenario.demo()[7].save("first.png")
+        """
+        files = InputFiles()
+        path = _camsim.unpack_demo(files.folder)
+        return cls(_camsim.Scenario.load(path, [], None, None, backend), files)
+
     def to_dict(self) -> dict[str, Any]:
         """Every key with its value, those of defaults too. Times are as in the file (s, ms), angles in degrees."""
         tree: dict[str, Any] = json.loads(self._native.json(False))

@@ -142,11 +142,6 @@ fn preset(name: Option<&str>) -> PyResult<Option<Preset>> {
     }
 }
 
-/// Whether a file is a `run.json`: no TOML file begins with a brace.
-fn is_json(text: &str) -> bool {
-    text.trim_start().starts_with('{')
-}
-
 #[pymethods]
 impl Scenario {
     /// Reads a scenario file or `run.json`, with changes on top.
@@ -161,15 +156,7 @@ impl Scenario {
         backend: &str,
     ) -> PyResult<Self> {
         let (preset, renderer) = (preset(preset_name)?, renderer(backend)?);
-        py.detach(|| {
-            let mut source = Source { path, text: None, sets, preset, variation: None, twin: None, renderer };
-            // The first reading says what is wrong with the file itself.
-            source.rig()?;
-            let text = std::fs::read_to_string(&source.path).unwrap_or_default();
-            let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-            source.text = (!is_json(text)).then(|| text.to_owned());
-            Self::new(source, camera)
-        })
+        py.detach(|| Self::new(Source::of_file(path, sets, preset, renderer)?, camera))
     }
 
     /// A scenario from TOML text; relative paths are those of a file at `path`.
@@ -181,14 +168,13 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let (text, sets, renderer) = (Some(text), Vec::new(), renderer(backend)?);
-        let source = Source { path, text, sets, preset: None, variation: None, twin: None, renderer };
+        let source = Source::of_text(path, Some(text), renderer(backend)?);
         py.detach(|| Self::new(source, camera))
     }
 
     /// Another scenario with changes on top, that shares what these do not touch.
     fn changed(&self, py: Python<'_>, sets: Vec<(String, String)>) -> PyResult<Self> {
-        py.detach(|| self.with_source(|source| source.sets.extend(sets)))
+        py.detach(|| self.with_source(|source| source.set(sets)))
     }
 
     /// Variation `index` of a scenario with `[randomize]`.
@@ -221,8 +207,8 @@ impl Scenario {
 
     /// What variation `index` draws, as JSON by key.
     fn drawn(&self, index: u64) -> PyResult<String> {
-        let scenario = self.snapshot().source.random().or_input_error()?;
-        let values = drawn_json(&scenario.drawn(index).or_input_error()?);
+        let source = self.snapshot().source;
+        let values = drawn_json(&source.random().or_input_error()?.drawn(index).or_input_error()?);
         Ok(serde_json::Value::Object(values).to_string())
     }
 

@@ -158,17 +158,17 @@ impl Formula {
         Self { k1, k2, k3, k4, k5, k6, p1, p2 }
     }
 
-    #[inline]
+    #[inline(always)]
     fn numerator(&self, r2: f64) -> f64 {
         1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn denominator(&self, r2: f64) -> f64 {
         1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6))
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn distort(&self, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
         let r2 = u * u + v * v;
         let d = self.numerator(r2) / self.denominator(r2);
@@ -178,7 +178,7 @@ impl Formula {
         )
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn jacobian(&self, DVec2 { x: u, y: v }: DVec2) -> DMat2 {
         let r2 = u * u + v * v;
         let denominator = self.denominator(r2);
@@ -203,17 +203,17 @@ impl Formula {
 }
 
 impl PlaneFormula for Formula {
-    #[inline]
+    #[inline(always)]
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
         (self.distort(at), self.jacobian(at))
     }
 
-    #[inline]
+    #[inline(always)]
     fn place(&self, ray: DVec3) -> DVec2 {
         ray.truncate() / ray.z
     }
 
-    #[inline]
+    #[inline(always)]
     fn ray(&self, at: DVec2) -> DVec3 {
         at.extend(1.0)
     }

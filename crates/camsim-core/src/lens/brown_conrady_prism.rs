@@ -34,7 +34,7 @@ impl Prism {
     }
 
     /// Before the tilt, with the Jacobian.
-    #[inline]
+    #[inline(always)]
     fn flat(&self, ideal: DVec2) -> (DVec2, DMat2) {
         let [s1, s2, s3, s4] = self.prism;
         let r2 = ideal.length_squared();
@@ -85,7 +85,7 @@ impl DirectionFormula for Prism {
 }
 
 impl PlaneFormula for Prism {
-    #[inline]
+    #[inline(always)]
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
         let (flat, jacobian) = self.flat(at);
         let tilted = self.tilt * flat.extend(1.0);
@@ -95,12 +95,12 @@ impl PlaneFormula for Prism {
         (image, of_tilt * jacobian)
     }
 
-    #[inline]
+    #[inline(always)]
     fn place(&self, ray: DVec3) -> DVec2 {
         ray.truncate() / ray.z
     }
 
-    #[inline]
+    #[inline(always)]
     fn ray(&self, at: DVec2) -> DVec3 {
         at.extend(1.0)
     }

@@ -60,7 +60,7 @@ impl DirectionFormula for Mei {
 
 /// The plane is that of the mirrored point.
 impl PlaneFormula for Mei {
-    #[inline]
+    #[inline(always)]
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
         self.formula.value_and_jacobian(at)
     }
@@ -70,7 +70,7 @@ impl PlaneFormula for Mei {
     }
 
     /// The unit sphere's farther meeting with the line through the mirrored point.
-    #[inline]
+    #[inline(always)]
     fn ray(&self, at: DVec2) -> DVec3 {
         let r2 = at.length_squared();
         let along = (self.xi + (1.0 + (1.0 - self.xi * self.xi) * r2).sqrt()) / (1.0 + r2);

@@ -11,8 +11,8 @@ const MAX_RESIDUAL: f64 = 2e-15;
 
 /// A lens as a smooth map of a plane of its own, to which rays belong in closed form.
 ///
-/// The functions of blocks are compiled for each formula, with its own functions inlined: no implementation replaces
-/// them.
+/// The functions of blocks are compiled for each formula: no implementation replaces them. A formula's own functions
+/// are `#[inline(always)]`, so that the loops become vector instructions.
 pub(in crate::lens) trait PlaneFormula {
     /// Distorted point and Jacobian of a point of the plane.
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2);
@@ -40,7 +40,6 @@ pub(in crate::lens) trait PlaneFormula {
     /// Sets points to NaN that do not reproduce their image or are not within a radius; returns whether all remain.
     fn certify(&self, block: &mut Block, inside: f64) -> bool {
         let ([x, y], [u, v]) = (&block.image, &block.at);
-        let mut lost = 0;
         for i in 0..BLOCK {
             let (value, _) = self.value_and_jacobian(DVec2::new(u[i], v[i]));
             let (off_x, off_y) = (value.x - x[i], value.y - y[i]);
@@ -48,11 +47,9 @@ pub(in crate::lens) trait PlaneFormula {
             // False for NaN.
             let is_solved = off_x * off_x + off_y * off_y <= most;
             let is_inside = u[i] * u[i] + v[i] * v[i] < inside * inside;
-            let is_good = is_solved & is_inside;
-            block.solved[0][i] = if is_good { u[i] } else { f64::NAN };
-            lost += u32::from(!is_good);
+            block.solved[0][i] = if is_solved & is_inside { u[i] } else { f64::NAN };
         }
-        lost == 0
+        !block.solved[0].iter().any(|u| u.is_nan())
     }
 
     /// Ideal points of certified points.
