@@ -101,7 +101,9 @@ fn twin_of(keys: &Keys, name: &str, instant: Option<u32>) -> PyResult<Keys> {
         let names: Vec<&str> = twins.iter().map(|twin| twin.name.as_str()).collect();
         return Err(input_error(match names.is_empty() {
             true => format!("twin {name:?}: the scenario has no [[output.twin]]"),
-            false => format!("twin {name:?}: there is no such [[output.twin]]; there are {}", names.join(", ")),
+            false => {
+                format!("twin {name:?}: there is no such [[output.twin]]; there are {}", names.join(", "))
+            }
         }));
     };
     if !twin.instants().any(|known| known == instant) {

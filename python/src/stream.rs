@@ -143,8 +143,8 @@ fn render(
     let epoch_ns = key.sequence.epoch_ns;
     pool.with_opened(key, |opened| {
         opened.render(frames.iter(), &mut |finished| {
-            let is_wanted = !ENDS.load(Ordering::SeqCst)
-                && sender.send(Ok(Delivery::new(finished, epoch_ns))).is_ok();
+            let is_wanted =
+                !ENDS.load(Ordering::SeqCst) && sender.send(Ok(Delivery::new(finished, epoch_ns))).is_ok();
             if is_wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         })
     })?

@@ -118,9 +118,9 @@ pub fn with_reference(mut scenario: Scenario) -> Result<Scenario, Failure> {
     }
     // Keys that are valid with `auto` but not with the oracle.
     match validate(&scenario).first() {
-        Some(problem) => Err(Failure::bad_input(anyhow!(
-            "{problem} (--backend reference is quality.solver = \"oracle\")"
-        ))),
+        Some(problem) => {
+            Err(Failure::bad_input(anyhow!("{problem} (--backend reference is quality.solver = \"oracle\")")))
+        }
         None => Ok(scenario),
     }
 }

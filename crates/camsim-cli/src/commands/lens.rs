@@ -14,7 +14,7 @@ use camsim_io::{
     lens_table::{lens_table_csv, load_lens_table},
     scenario_file::{read_cameras, read_rig},
 };
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use crate::{
     console::Console,
