@@ -28,7 +28,7 @@ class Scenario(Sequence[Frame]):
     >>> import camsim
     >>> scenario = camsim.Scenario.load("assets/demo.toml")
     >>> len(scenario)
-    60
+    120
     >>> scenario[7].save("frame-7.png")
     >>> for frame in scenario.frames(0, 10, channels=["color", "depth"]):
     ...     print(frame.index, frame.stamp_ns, float(frame.depth.max()))

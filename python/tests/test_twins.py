@@ -127,7 +127,7 @@ def test_what_the_reference_renderer_cannot_do_is_said(pattern: pathlib.Path) ->
 def test_the_demo_needs_no_file(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path) -> None:
     monkeypatch.chdir(tmp_path)
     scenario = camsim.Scenario.demo(backend="cpu")
-    assert len(scenario) == 60
+    assert len(scenario) == 120
     picture = scenario.replace(SMALL)[7].color
     assert 0.05 < picture[..., :3].mean() < 0.95
     sent = pickle.loads(pickle.dumps(scenario.replace(SMALL)))
