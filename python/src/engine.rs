@@ -133,7 +133,7 @@ pub type OnFrame<'f> = dyn FnMut(Finished) -> ControlFlow<()> + 'f;
 /// A renderer with the scene of a sequence.
 #[derive(Debug)]
 pub enum Opened {
-    Engine(Session<'static>),
+    Engine(Box<Session<'static>>),
     Reference(Box<ReferenceSource>),
 }
 
@@ -142,7 +142,8 @@ impl Opened {
         Ok(match key.renderer {
             Renderer::Engine(backend) => {
                 let engine = engine(backend)?;
-                Self::Engine(engine.session::<NoError>(key.sequence.clone(), &key.channels)?)
+                let session = engine.session::<NoError>(key.sequence.clone(), &key.channels)?;
+                Self::Engine(Box::new(session))
             }
             Renderer::Reference => Self::Reference(Box::new(ReferenceSource::new(&key.planned())?)),
         })

@@ -45,7 +45,7 @@ impl Lens {
     /// A ray beside or behind the camera that the lens does not image: formulas mirror some of these.
     fn is_lost(&self, ray: DVec3) -> bool {
         let is_before = ray.z > 0.0;
-        !is_before && !(ray.is_finite() && self.camera.lens.contains_ray(ray))
+        !(is_before || ray.is_finite() && self.camera.lens.contains_ray(ray))
     }
 }
 
