@@ -69,7 +69,6 @@ fn many_points_are_solved_as_single_ones() {
                 );
             }
             let share = unsolved as f64 / points.len() as f64;
-            println!("{name}, rays {is_ray}: {:.2} % remain", 100.0 * share);
             let is_bulk = !matches!(
                 lens.model(),
                 LensModel::Fisheye624 | LensModel::Equirectangular | LensModel::Table
