@@ -169,5 +169,6 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         scene: Arc::new(scene),
         vignette: None,
         zoom_track: Vec::new(),
+        exposures: None,
     }))
 }

@@ -50,5 +50,6 @@ for readout_ms in READOUTS_MS:
 
 plt.plot(READOUTS_MS, medians, "o-")
 plt.xlabel("readout, ms")
-plt.ylabel("rotation error of a tracker that knows no rolling shutter, degrees")
+plt.ylabel("median error of the rotation, degrees")
+plt.title("A tracker that takes a rolling shutter for a global one")
 plt.savefig(sys.argv[2])

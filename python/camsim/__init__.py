@@ -21,6 +21,7 @@ if "XDG_RUNTIME_DIR" not in _os.environ:
 from . import _camsim
 from ._errors import AdapterError, Error, InputError, RunError, ScenarioWarning
 from .frame import Frame, Rows, Source
+from .frames import Frames
 from .inputs import HeightMap, PoseTable
 from .lens import Lens
 from .pictures import Applied, Board, Comparison, Flow, Poses, Twist, apply, board, compare, verify
@@ -37,8 +38,7 @@ from .randomize import (
     Variations,
     randomize,
 )
-from .scenario import Frames, Scenario, default_scenario, load_rig
-
+from .scenario import Scenario, default_scenario, load_rig
 from .trajectory import (
     BarometerSamples,
     BodyStates,

@@ -71,7 +71,7 @@ class Frame(Mapping[str, NDArray[Any]]):
     ['color', 'depth']
     """
 
-    __slots__ = ("_arrays", "_encoding", "camera", "index", "rows", "size_px", "source", "stamp_ns")
+    __slots__ = ("_arrays", "_encoding", "camera", "index", "rows", "size_px", "source", "stamp_ns", "twins")
 
     index: int
     """Number of the frame, from 0."""
@@ -85,6 +85,8 @@ class Frame(Mapping[str, NDArray[Any]]):
     """Time, pose and velocity of each row."""
     source: Source
     """The pinhole camera that `coords` refers to."""
+    twins: dict[str, list[Frame]]
+    """Pictures of each twin by its name, if `Scenario.frames` was asked for them: one, or all of a burst."""
 
     def __init__(self, parts: Mapping[str, Any], camera: str, encoding: str) -> None:
         self.index = parts["index"]
@@ -95,6 +97,18 @@ class Frame(Mapping[str, NDArray[Any]]):
         self.source = Source(**parts["source"])
         self._arrays: dict[str, NDArray[Any]] = parts["channels"]
         self._encoding = encoding
+        self.twins = {}
+
+    def twin(self, name: str, instant: int = 0) -> Frame:
+        """The same frame by a better camera: a picture of `[[output.twin]]`, number `instant` of a burst.
+
+        >>> for frame in scenario.frames(twins=True):
+        ...     train(frame.color, frame.twin("sharp").color)
+        """
+        if name not in self.twins:
+            held = ", ".join(self.twins) or "none"
+            raise KeyError(f"the frame has no twin {name!r}: ask for it by frames(twins=True); it has {held}")
+        return self.twins[name][instant]
 
     def __getitem__(self, channel: str) -> NDArray[Any]:
         try:

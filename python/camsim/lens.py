@@ -91,7 +91,8 @@ class Lens:
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     def project(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Pixels (N, 2) of points (N, 3) in camera axes; NaN beside and behind the camera.
+        """Pixels (N, 2) of points (N, 3) in camera axes; NaN beside and behind the camera, but for what a wide lens
+        images there.
 
         Beyond the fold of the lens the formula is evaluated too: `valid` says which points the lens images.
         """
@@ -102,23 +103,23 @@ class Lens:
         return self._native.distort(rows_of(ideal, 2, "ideal"))
 
     def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Unit rays (N, 3) in camera axes of pixels (N, 2); NaN where the lens has no ray."""
+        """Unit rays (N, 3) in camera axes of pixels (N, 2), at any angle off axis; NaN where the lens has no ray."""
         return self._native.unproject(rows_of(pixels, 2, "pixels"))
 
     def undistort(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Ideal points (N, 2), x/z and y/z, of pixels (N, 2); NaN where the lens has no ray.
+        """Ideal points (N, 2), x/z and y/z, of pixels (N, 2); NaN where the lens has no ray before the camera.
 
         What `cv2.undistortPoints` and `cv2.fisheye.undistortPoints` approximate, to the last bits.
         """
         return self._native.undistort(rows_of(pixels, 2, "pixels"))
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Derivatives (N, 2, 3) of the pixels of points (N, 3) by these points, analytic."""
+        """Derivatives (N, 2, 3) of the pixels of points (N, 3) by these points, analytic; NaN where `project` is."""
         return self._native.jacobian(rows_of(points, 3, "points")).reshape(-1, 2, 3)
 
     def valid(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the lens images points (N, 3), inside of the picture or not: before the camera, and within the
-        fold, beyond which the formula gives mirror images that no real lens shows. Shape (N,)."""
+        """Whether the lens images points (N, 3), inside of the picture or not: within its fold, beyond which the
+        formula gives mirror images that no real lens shows, and for most models before the camera. Shape (N,)."""
         return self._native.valid(rows_of(points, 3, "points"))
 
     def __repr__(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import pathlib
@@ -12,8 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, overload
 
 from . import _camsim, _command, _toml
-from ._errors import InputError, ScenarioWarning
+from ._errors import ScenarioWarning
 from .frame import Frame
+from .frames import Frames, channel_names, with_bar
 from .inputs import InputFiles
 from .lens import Lens
 from .randomize import Variations
@@ -28,7 +28,7 @@ class Scenario(Sequence[Frame]):
     >>> import camsim
     >>> scenario = camsim.Scenario.load("assets/demo.toml")
     >>> len(scenario)
-    60
+    120
     >>> scenario[7].save("frame-7.png")
     >>> for frame in scenario.frames(0, 10, channels=["color", "depth"]):
     ...     print(frame.index, frame.stamp_ns, float(frame.depth.max()))
@@ -38,6 +38,7 @@ class Scenario(Sequence[Frame]):
         """Not for users: `Scenario.load` and `Scenario.from_dict` make scenarios."""
         self._native = native
         self._files = files
+        self._twin_of: tuple[Scenario, str, int | None] | None = None
         for warning in native.warnings():
             if warning not in known:
                 warnings.warn(warning, ScenarioWarning, stacklevel=3)
@@ -58,7 +59,8 @@ class Scenario(Sequence[Frame]):
         :param sets: Keys with values on top of the file's, as `--set` of the command line.
         :param camera: Name of one of `[[cameras]]`; the first if left out.
         :param preset: ``"default"`` or ``"paper"``.
-        :param backend: ``"cpu"``, ``"gpu"``, or ``"auto"``: the gpu on a graphics card, else the cpu.
+        :param backend: ``"cpu"``, ``"gpu"``, ``"reference"`` (exact rays in double precision, slowly), or ``"auto"``: the
+            gpu on a graphics card, else the cpu, and the reference renderer if `quality.solver` is ``"oracle"``.
         :raises camsim.InputError: The message names the file, line or key and what to do.
 
         >>> scenario = Scenario.load("flight.toml", sets={"camera.shutter.readout_ms": 0})
@@ -90,6 +92,16 @@ class Scenario(Sequence[Frame]):
         files = InputFiles()
         text = _toml.document_text(files.placed(tree))
         return cls(_camsim.Scenario.parse(text, pathlib.Path(folder) / "<dict>", camera, backend), files)
+
+    @classmethod
+    def demo(cls, *, backend: str = "auto") -> Scenario:
+        """The built-in flight over a valley, which needs no file.
+
+        >>> Scenario.demo()[7].save("first.png")
+        """
+        files = InputFiles()
+        path = _camsim.unpack_demo(files.folder)
+        return cls(_camsim.Scenario.load(path, [], None, None, backend), files)
 
     def to_dict(self) -> dict[str, Any]:
         """Every key with its value, those of defaults too. Times are as in the file (s, ms), angles in degrees."""
@@ -151,6 +163,27 @@ class Scenario(Sequence[Frame]):
         return {name: Scenario(self._native.of_camera(name), self._files, known) for name in self._native.cameras}
 
     @property
+    def twins(self) -> dict[str, int]:
+        """Names of the twins of `[[output.twin]]`, with the number of their pictures of each frame."""
+        return {spec["name"]: spec.get("instants") or 1 for spec in self._twin_specs()}
+
+    def twin(self, name: str, instant: int | None = None) -> Scenario:
+        """The scenario whose frames are a twin's pictures: a camera without what `[[output.twin]]` leaves out.
+
+        :param name: As in the file.
+        :param instant: Number of the picture, from 0, if the twin is a burst.
+
+        >>> sharp = scenario.twin("sharp")
+        >>> scenario[7].color - sharp[7].color
+        """
+        twin = Scenario(self._native.twin(name, instant), self._files, self.warnings)
+        twin._twin_of = (self, name, instant)
+        return twin
+
+    def _twin_specs(self) -> list[dict[str, Any]]:
+        return list(self.to_dict()["output"].get("twin", []))
+
+    @property
     def channels(self) -> list[str]:
         """The channels of `output.channels`, which frames have if nothing else is asked for."""
         return self._native.channels
@@ -197,6 +230,8 @@ class Scenario(Sequence[Frame]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Scenarios travel to other processes with their keys and arrays; what they load is loaded there."""
+        if self._twin_of is not None:
+            return Scenario.twin, self._twin_of
         camera = self.camera if len(self._native.cameras) > 1 else None
         folder = str(self._files.folder) if self._files.contents() else ""
         return _restored, (self._native.json(True), camera, self._native.backend, folder, self._files.contents())
@@ -227,7 +262,7 @@ class Scenario(Sequence[Frame]):
         """
         number = range(len(self))[index]
         native = self._native
-        return Frame(native.render_one(number, _names(channels)), native.camera, native.encoding)
+        return Frame(native.render_one(number, channel_names(channels)), native.camera, native.encoding)
 
     def frames(
         self,
@@ -236,22 +271,25 @@ class Scenario(Sequence[Frame]):
         step: int | None = None,
         *,
         channels: Iterable[str] | None = None,
+        twins: bool = False,
         progress: bool = False,
     ) -> Iterator[Frame]:
         """Renders frames in order; while Python works on one, the next ones are under way.
 
         :param start, stop, step: As those of a slice of this scenario.
         :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :param twins: Render the twins of each frame too, with the channels of `[[output.twin]]` or those of the frame;
+            `Frame.twin` gives them.
         :param progress: Show a bar by tqdm, if that is installed.
 
         >>> for frame in scenario.frames(0, 100, channels=["color", "flow"]):
         ...     train(frame.color, frame.flow)
         """
-        frames = self._frames(range(len(self))[start:stop:step], _names(channels))
-        return _with_bar(frames) if progress else frames
+        frames = self._frames(range(len(self))[start:stop:step], channel_names(channels), twins)
+        return with_bar(frames) if progress else frames
 
-    def _frames(self, numbers: range, channels: list[str] | None) -> Frames:
-        return Frames(self._native, numbers, channels)
+    def _frames(self, numbers: range, channels: list[str] | None, twins: bool = False) -> Frames:
+        return Frames(self._native, numbers, channels, self._twin_specs() if twins else [])
 
     def explain(self, frame: int = 0, *, as_dict: bool = False) -> Any:
         """The plan of a frame: passes, sizes, samples, predicted errors, what is left out and why.
@@ -273,7 +311,9 @@ class Scenario(Sequence[Frame]):
             with open(path, "w", encoding="utf-8") as file:
                 json.dump({"scenario": self.to_dict()}, file)
             camera = ["--camera", self.camera] if len(self._native.cameras) > 1 else []
-            backend = [] if self._native.backend == "auto" else ["--backend", self._native.backend]
+            # That of the reference renderer is among the keys.
+            is_named = self._native.backend in ("cpu", "gpu")
+            backend = ["--backend", self._native.backend] if is_named else []
             command = [path if word == "{scenario}" else word for word in words]
             return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
 
@@ -284,30 +324,6 @@ class Scenario(Sequence[Frame]):
     # Two scenarios are not compared frame by frame.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
-
-
-class Frames(Iterator[Frame]):
-    """Frames on their way: an iterator with a length, and `close`."""
-
-    def __init__(self, native: _camsim.Scenario, numbers: range, channels: list[str] | None) -> None:
-        self._camera, self._encoding = native.camera, native.encoding
-        self._left = len(numbers)
-        first = numbers[0] if numbers else 0
-        self._stream = native.stream(first, numbers.step, len(numbers), channels)
-
-    def __next__(self) -> Frame:
-        parts = next(self._stream)
-        self._left -= 1
-        return Frame(parts, self._camera, self._encoding)
-
-    def __len__(self) -> int:
-        """Number of frames that are still to come."""
-        return self._left
-
-    def close(self) -> None:
-        """Renders no more than the frames under way."""
-        self._stream.close()
-        self._left = 0
 
 
 def load_rig(path: Path, *, sets: Mapping[str, Any] | None = None, backend: str = "auto") -> dict[str, Scenario]:
@@ -336,17 +352,3 @@ def _restored(text: str, camera: str | None, backend: str, folder: str, contents
     document = _toml.document_text(json.loads(text))
     native = _camsim.Scenario.parse(document, pathlib.Path("scenario"), camera, backend)
     return Scenario(native, files, known=native.warnings())
-
-
-def _names(channels: Iterable[str] | None) -> list[str] | None:
-    if isinstance(channels, str):
-        raise InputError(f'channels: write channels=["{channels}"], a list of names')
-    return None if channels is None else list(channels)
-
-
-def _with_bar(frames: Frames) -> Iterator[Frame]:
-    try:
-        tqdm = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
-        return frames
-    return iter(tqdm(frames, total=len(frames), unit="frame"))

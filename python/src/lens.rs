@@ -1,7 +1,9 @@
 //! A camera's lens over arrays of points.
 
+use std::sync::OnceLock;
+
 use camsim::core::{
-    camera::CameraModel,
+    camera::{BulkInverse, CameraModel},
     scenario::{CameraSpec, LensModel},
 };
 use glam::{DVec2, DVec3};
@@ -15,7 +17,7 @@ use crate::{
     error::{OrRaise, input_error},
 };
 
-/// Points that a task takes: a hundred microseconds of work.
+/// Points that a task takes: some ten microseconds of work and more.
 const BATCH: usize = 1024;
 
 /// Native lens; `camsim.Lens` is what users see.
@@ -23,33 +25,53 @@ const BATCH: usize = 1024;
 #[derive(Debug)]
 pub struct Lens {
     camera: CameraModel,
+    /// Made at its first use.
+    inverse: OnceLock<BulkInverse>,
 }
 
 impl Lens {
     pub fn of_spec(spec: &CameraSpec) -> PyResult<Self> {
-        Ok(Self { camera: CameraModel::from_spec(spec).or_input_error()? })
+        Ok(Self::of_camera(CameraModel::from_spec(spec).or_input_error()?))
+    }
+
+    fn of_camera(camera: CameraModel) -> Self {
+        Self { camera, inverse: OnceLock::new() }
+    }
+
+    fn inverse(&self) -> &BulkInverse {
+        self.inverse.get_or_init(|| BulkInverse::new(self.camera.clone()))
+    }
+
+    /// A ray beside or behind the camera that the lens does not image: formulas mirror some of these.
+    fn is_lost(&self, ray: DVec3) -> bool {
+        let is_before = ray.z > 0.0;
+        !(is_before || ray.is_finite() && self.camera.lens.contains_ray(ray))
     }
 }
 
-/// The ideal point of a point in camera axes; NaN beside and behind the camera.
-fn ideal_of([x, y, z]: [f64; 3]) -> DVec2 {
-    if z > 0.0 { DVec2::new(x / z, y / z) } else { DVec2::NAN }
+/// Maps all rows, a batch at a time, on all processors.
+fn map_batches<const N: usize, const M: usize>(
+    points: &[[f64; N]],
+    each: impl Fn(&[[f64; N]], &mut [[f64; M]]) + Sync,
+) -> Vec<f64> {
+    let mut mapped = vec![[0.0; M]; points.len()];
+    in_own_pool(|| {
+        let batches = mapped.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH));
+        batches.for_each(|(mapped, points)| each(points, mapped));
+    });
+    mapped.into_flattened()
 }
 
-/// Maps every row, on all processors.
+/// Maps every row.
 fn map<const N: usize, const M: usize>(
     py: Python<'_>,
     points: &[[f64; N]],
     each: impl Fn([f64; N]) -> [f64; M] + Sync,
 ) -> Vec<f64> {
     py.detach(|| {
-        let mut mapped = vec![[0.0; M]; points.len()];
-        in_own_pool(|| {
-            mapped.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).for_each(|(mapped, points)| {
-                mapped.iter_mut().zip(points).for_each(|(mapped, point)| *mapped = each(*point));
-            });
-        });
-        mapped.into_flattened()
+        map_batches(points, |points, mapped: &mut [[f64; M]]| {
+            mapped.iter_mut().zip(points).for_each(|(mapped, point)| *mapped = each(*point));
+        })
     })
 }
 
@@ -68,7 +90,7 @@ impl Lens {
             .try_into()
             .map_err(|error: toml::de::Error| input_error(format!("model {model:?}: {}", error.message())))?;
         let camera = CameraModel::new(size_px, focal_px, principal_point_px, model, &coefficients);
-        Ok(Self { camera: camera.or_input_error()? })
+        Ok(Self::of_camera(camera.or_input_error()?))
     }
 
     #[getter]
@@ -97,15 +119,17 @@ impl Lens {
         self.camera.lens.coefficients().to_vec()
     }
 
-    /// Pixels of points in camera axes.
+    /// Pixels of points in camera axes; NaN beside and behind the camera, but for what the lens images there.
     fn project<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let pixels =
-            map(py, rows(&points, "points")?, |point| self.camera.project(ideal_of(point)).to_array());
-        table(py, pixels, 2)
+        let pixel = |point| {
+            let ray = DVec3::from_array(point);
+            if self.is_lost(ray) { [f64::NAN; 2] } else { self.camera.project_ray(ray).to_array() }
+        };
+        table(py, map(py, rows(&points, "points")?, pixel), 2)
     }
 
     /// Pixels of ideal points.
@@ -119,27 +143,32 @@ impl Lens {
         table(py, pixels, 2)
     }
 
-    /// Ideal points of pixels; NaN where the lens has no inverse.
+    /// Ideal points of pixels; NaN where the lens has none.
     fn undistort<'py>(
         &self,
         py: Python<'py>,
         pixels: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let ideal = |pixel| self.camera.unproject(DVec2::from_array(pixel)).unwrap_or(DVec2::NAN).to_array();
-        table(py, map(py, rows(&pixels, "pixels")?, ideal), 2)
+        let pixels = rows(&pixels, "pixels")?;
+        let ideal = py.detach(|| {
+            let inverse = self.inverse();
+            map_batches::<2, 2>(pixels, |pixels, ideal| inverse.unproject(pixels, ideal))
+        });
+        table(py, ideal, 2)
     }
 
-    /// Unit rays of pixels in camera axes; NaN where the lens has no inverse.
+    /// Unit rays of pixels in camera axes; NaN where the lens has none.
     fn unproject<'py>(
         &self,
         py: Python<'py>,
         pixels: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let ray = |pixel| {
-            let ideal = self.camera.unproject(DVec2::from_array(pixel));
-            ideal.map_or(DVec3::NAN, |ideal| ideal.extend(1.0).normalize()).to_array()
-        };
-        table(py, map(py, rows(&pixels, "pixels")?, ray), 3)
+        let pixels = rows(&pixels, "pixels")?;
+        let seen = py.detach(|| {
+            let inverse = self.inverse();
+            map_batches::<2, 3>(pixels, |pixels, seen| inverse.rays(pixels, seen))
+        });
+        table(py, seen, 3)
     }
 
     /// Derivatives of the pixels of points in camera axes by these: two rows of three.
@@ -150,20 +179,21 @@ impl Lens {
     ) -> PyResult<Bound<'py, PyAny>> {
         let focal_px = self.camera.focal_px;
         let derivatives = |point: [f64; 3]| {
-            let ideal = ideal_of(point);
-            let by_ideal = self.camera.lens.jacobian(ideal);
-            let (by_u, by_v) = (by_ideal.x_axis * focal_px / point[2], by_ideal.y_axis * focal_px / point[2]);
-            let by_z = -(by_u * ideal.x + by_v * ideal.y);
-            [by_u.x, by_v.x, by_z.x, by_u.y, by_v.y, by_z.y]
+            let ray = DVec3::from_array(point);
+            if self.is_lost(ray) {
+                return [f64::NAN; 6];
+            }
+            let [by_x, by_y, by_z] = self.camera.lens.gradient(ray).map(|column| column * focal_px);
+            [by_x.x, by_y.x, by_z.x, by_x.y, by_y.y, by_z.y]
         };
         table(py, map(py, rows(&points, "points")?, derivatives), 6)
     }
 
-    /// Whether the lens images points in camera axes: before the camera, inside the fold, and finite.
+    /// Whether the lens images points in camera axes: inside the fold, and finite.
     fn valid<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyAny>> {
         let is_valid = |point| {
-            let ideal = ideal_of(point);
-            [f64::from(u8::from(ideal.is_finite() && self.camera.lens.contains(ideal)))]
+            let ray = DVec3::from_array(point);
+            [f64::from(u8::from(ray.is_finite() && ray != DVec3::ZERO && self.camera.lens.contains_ray(ray)))]
         };
         let valid: Vec<bool> =
             map(py, rows(&points, "points")?, is_valid).into_iter().map(|valid| valid > 0.0).collect();

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`error`] | failures as Python exceptions |
 //! | [`engine`] | the renderers of this process, and sessions that wait for their next frames |
+//! | [`source`] | where a scenario comes from |
 //! | [`scenario`] | a scenario with what it has loaded |
 //! | [`stream`] | frames one after the other, rendered ahead on a thread of their own |
 //! | [`frame`] | a frame as numpy arrays that own what Rust has allocated |
@@ -26,6 +27,7 @@ mod lens;
 mod pictures;
 mod scenario;
 mod sensors;
+mod source;
 mod stream;
 mod trajectory;
 
@@ -42,7 +44,7 @@ mod _camsim {
         frame::write_picture,
         lens::Lens,
         pictures::{board_of_file, board_of_keys, compare},
-        scenario::{Scenario, default_scenario},
+        scenario::{Scenario, default_scenario, unpack_demo},
         stream::{Stream, stop_streams},
         trajectory::Trajectory,
     };

@@ -10,56 +10,25 @@ use camsim::{
         scenario::{Channel, Preset, Rig},
         sequence::Sequence,
     },
-    engine::Backend,
     io::{
+        builtin,
         load::{LoadError, Loaded, load_sequence, reload_sequence},
         portable::portable_rig,
-        scenario_file::{
-            self, RANDOMIZE, RandomScenario, ScenarioError, drawn_json, parse_random_scenario,
-            read_random_scenario, rig_json, rig_table,
-        },
+        scenario_file::{self, RANDOMIZE, drawn_json, rig_json, rig_table},
     },
 };
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     camera::Camera,
-    engine::{self, SessionKey, SessionPool, in_own_pool, lock},
+    engine::{Renderer, SessionKey, SessionPool, in_own_pool, lock},
     error::{OrRaise, input_error},
     pictures::board_of,
     sensors,
+    source::Source,
     stream::{FrameNumbers, Stream, render_one},
     trajectory::Trajectory,
 };
-
-/// Where a scenario comes from.
-#[derive(Clone, Debug)]
-struct Source {
-    path: PathBuf,
-    /// Text of the file; `None` for a `run.json`, which is read again.
-    text: Option<String>,
-    sets: Vec<(String, String)>,
-    preset: Option<Preset>,
-    /// Which variation of a scenario with `[randomize]` it is.
-    variation: Option<u64>,
-}
-
-impl Source {
-    fn random(&self) -> Result<RandomScenario, ScenarioError> {
-        match &self.text {
-            Some(text) if self.preset.is_none() => parse_random_scenario(text, &self.path, &self.sets),
-            _ => read_random_scenario(&self.path, &self.sets, self.preset),
-        }
-    }
-
-    fn rig(&self) -> Result<Rig, ScenarioError> {
-        let scenario = self.random()?;
-        match self.variation {
-            None => Ok(scenario.into_base()),
-            Some(index) => Ok(scenario.variation(index)?.rig),
-        }
-    }
-}
 
 /// A checked scenario of one camera, with the cameras beside it.
 #[derive(Clone)]
@@ -76,38 +45,34 @@ struct State {
 #[pyclass(frozen, module = "camsim._camsim")]
 pub struct Scenario {
     state: Mutex<State>,
-    backend: Backend,
     sessions: SessionPool,
 }
 
 impl std::fmt::Debug for Scenario {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Scenario").field("backend", &self.backend).finish_non_exhaustive()
+        f.debug_struct("Scenario").field("source", &self.snapshot().source).finish_non_exhaustive()
     }
 }
 
 impl Scenario {
-    fn new(source: Source, camera: Option<&str>, backend: &str) -> PyResult<Self> {
-        let rig = source.rig().or_input_error()?;
+    fn new(source: Source, camera: Option<&str>) -> PyResult<Self> {
+        let rig = source.rig()?;
         let camera = match camera {
             None => 0,
             Some(name) => rig.position(name).ok_or_else(|| no_camera(&rig, name))?,
         };
-        let backend = engine::backend(backend).ok_or_else(|| {
-            input_error(format!("backend {backend:?}: there are \"auto\", \"cpu\" and \"gpu\""))
-        })?;
         let state = State { source, rig: Arc::new(rig), camera, loaded: None, before: None };
-        Ok(Self { state: Mutex::new(state), backend, sessions: SessionPool::default() })
+        Ok(Self { state: Mutex::new(state), sessions: SessionPool::default() })
     }
 
     /// Another scenario, that shares what the change does not touch.
     fn with_source(&self, change: impl FnOnce(&mut Source)) -> PyResult<Self> {
         let mut state = self.snapshot();
         change(&mut state.source);
-        state.rig = Arc::new(state.source.rig().or_input_error()?);
+        state.rig = Arc::new(state.source.rig()?);
         state.camera = state.camera.min(state.rig.scenarios().len() - 1);
         state.before = state.loaded.take().or(state.before);
-        Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: self.sessions.clone() })
+        Ok(Self { state: Mutex::new(state), sessions: self.sessions.clone() })
     }
 
     fn snapshot(&self) -> State {
@@ -141,7 +106,8 @@ impl Scenario {
             None => sequence.scenario.output.channels.clone(),
             Some(names) => names.iter().map(|name| channel(name)).collect::<PyResult<_>>()?,
         };
-        Ok(SessionKey { backend: self.backend, sequence, channels })
+        let renderer = self.snapshot().source.renderer.of_sequence(&sequence);
+        Ok(SessionKey { renderer, sequence, channels })
     }
 }
 
@@ -161,6 +127,12 @@ fn channel(name: &str) -> PyResult<Channel> {
     })
 }
 
+fn renderer(name: &str) -> PyResult<Renderer> {
+    Renderer::by_name(name).ok_or_else(|| {
+        input_error(format!("backend {name:?}: there are \"auto\", \"cpu\", \"gpu\" and \"reference\""))
+    })
+}
+
 fn preset(name: Option<&str>) -> PyResult<Option<Preset>> {
     match name {
         None => Ok(None),
@@ -168,11 +140,6 @@ fn preset(name: Option<&str>) -> PyResult<Option<Preset>> {
         Some("paper") => Ok(Some(Preset::Paper)),
         Some(name) => Err(input_error(format!("preset {name:?}: there are \"default\" and \"paper\""))),
     }
-}
-
-/// Whether a file is a `run.json`: no TOML file begins with a brace.
-fn is_json(text: &str) -> bool {
-    text.trim_start().starts_with('{')
 }
 
 #[pymethods]
@@ -188,16 +155,8 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let preset = preset(preset_name)?;
-        py.detach(|| {
-            let mut source = Source { path, text: None, sets, preset, variation: None };
-            // The first reading says what is wrong with the file itself.
-            source.rig().or_input_error()?;
-            let text = std::fs::read_to_string(&source.path).unwrap_or_default();
-            let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-            source.text = (!is_json(text)).then(|| text.to_owned());
-            Self::new(source, camera, backend)
-        })
+        let (preset, renderer) = (preset(preset_name)?, renderer(backend)?);
+        py.detach(|| Self::new(Source::of_file(path, sets, preset, renderer)?, camera))
     }
 
     /// A scenario from TOML text; relative paths are those of a file at `path`.
@@ -209,18 +168,23 @@ impl Scenario {
         camera: Option<&str>,
         backend: &str,
     ) -> PyResult<Self> {
-        let source = Source { path, text: Some(text), sets: Vec::new(), preset: None, variation: None };
-        py.detach(|| Self::new(source, camera, backend))
+        let source = Source::of_text(path, Some(text), renderer(backend)?);
+        py.detach(|| Self::new(source, camera))
     }
 
     /// Another scenario with changes on top, that shares what these do not touch.
     fn changed(&self, py: Python<'_>, sets: Vec<(String, String)>) -> PyResult<Self> {
-        py.detach(|| self.with_source(|source| source.sets.extend(sets)))
+        py.detach(|| self.with_source(|source| source.set(sets)))
     }
 
     /// Variation `index` of a scenario with `[randomize]`.
     fn variation(&self, py: Python<'_>, index: u64) -> PyResult<Self> {
         py.detach(|| self.with_source(|source| source.variation = Some(index)))
+    }
+
+    /// The scenario of a twin's pictures, of number `instant` if it is a burst.
+    fn twin(&self, py: Python<'_>, name: String, instant: Option<u32>) -> PyResult<Self> {
+        py.detach(|| self.with_source(|source| source.twin = Some((name, instant))))
     }
 
     /// Number of the variation that it is.
@@ -243,8 +207,8 @@ impl Scenario {
 
     /// What variation `index` draws, as JSON by key.
     fn drawn(&self, index: u64) -> PyResult<String> {
-        let scenario = self.snapshot().source.random().or_input_error()?;
-        let values = drawn_json(&scenario.drawn(index).or_input_error()?);
+        let source = self.snapshot().source;
+        let values = drawn_json(&source.random().or_input_error()?.drawn(index).or_input_error()?);
         Ok(serde_json::Value::Object(values).to_string())
     }
 
@@ -261,7 +225,7 @@ impl Scenario {
             let mut state = self.snapshot();
             state.camera = state.rig.position(name).ok_or_else(|| no_camera(&state.rig, name))?;
             state.before = state.loaded.take().or(state.before);
-            Ok(Self { state: Mutex::new(state), backend: self.backend, sessions: SessionPool::default() })
+            Ok(Self { state: Mutex::new(state), sessions: SessionPool::default() })
         })
     }
 
@@ -308,7 +272,7 @@ impl Scenario {
     /// Name of the renderer.
     #[getter]
     fn backend(&self) -> &'static str {
-        engine::backend_name(self.backend)
+        self.snapshot().source.renderer.name()
     }
 
     /// Every key with its value, as JSON; with `absolute` all paths are, and `[randomize]` is among the keys.
@@ -385,6 +349,12 @@ impl Scenario {
         let key = self.key(py, channels)?;
         Stream::begin(self.sessions.clone(), key, FrameNumbers { first, step, count })
     }
+}
+
+/// Writes the built-in flight to a folder, and returns the path of its scenario.
+#[pyfunction]
+pub fn unpack_demo(folder: PathBuf) -> PyResult<PathBuf> {
+    builtin::unpack(&folder).or_run_error()
 }
 
 /// Every key of a scenario file, as `camsim render --print-default` prints it.

@@ -1,7 +1,7 @@
 //! Frames one after the other, rendered ahead on a thread of their own.
 
 use std::{
-    fmt,
+    ops::ControlFlow,
     sync::{
         Condvar, Mutex,
         atomic::{AtomicBool, Ordering},
@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use camsim::{cli::failure::Failure, core::scenario::Channel, engine::RenderError};
+use camsim::{cli::failure::Failure, core::scenario::Channel};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -24,18 +24,6 @@ use crate::{
 const WAITING: usize = 2;
 /// How often Python looks for Ctrl-C while it waits.
 const GLANCE: Duration = Duration::from_millis(50);
-
-/// Nobody wants the next frame.
-#[derive(Debug)]
-struct Unwanted;
-
-impl fmt::Display for Unwanted {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("no more frames are wanted")
-    }
-}
-
-impl std::error::Error for Unwanted {}
 
 /// Whether the program ends, and the number of threads that render.
 static ENDS: AtomicBool = AtomicBool::new(false);
@@ -153,19 +141,13 @@ fn render(
     sender: &SyncSender<Result<Delivery, Failure>>,
 ) -> Result<(), Failure> {
     let epoch_ns = key.sequence.epoch_ns;
-    let rendered = pool.with_session(key, |session| {
-        session.render(frames.iter(), &mut |finished| {
-            let unwanted = |_| Unwanted;
-            if ENDS.load(Ordering::SeqCst) {
-                return Err(Unwanted);
-            }
-            sender.send(Ok(Delivery::new(finished, epoch_ns))).map_err(unwanted)
+    pool.with_opened(key, |opened| {
+        opened.render(frames.iter(), &mut |finished| {
+            let is_wanted =
+                !ENDS.load(Ordering::SeqCst) && sender.send(Ok(Delivery::new(finished, epoch_ns))).is_ok();
+            if is_wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         })
-    })?;
-    match rendered {
-        Err(RenderError::Sink(Unwanted)) | Ok(()) => Ok(()),
-        Err(fault) => Err(fault.into()),
-    }
+    })?
 }
 
 /// Renders one frame on this thread.
@@ -173,12 +155,12 @@ pub fn render_one(pool: &SessionPool, key: &SessionKey, frame: u64) -> PyResult<
     let _counted = Rendering::begin();
     let epoch_ns = key.sequence.epoch_ns;
     let mut made = None;
-    let rendered = pool.with_session(key, |session| {
-        session.render::<std::convert::Infallible>([frame], &mut |finished| {
+    let rendered = pool.with_opened(key, |opened| {
+        opened.render([frame].into_iter(), &mut |finished| {
             made = Some(Delivery::new(finished, epoch_ns));
-            Ok(())
+            ControlFlow::Continue(())
         })
     });
-    rendered.and_then(|rendered| Ok(rendered?)).map_err(|failure| raise(&failure))?;
+    rendered.and_then(|rendered| rendered).map_err(|failure| raise(&failure))?;
     made.ok_or_else(panicked)
 }

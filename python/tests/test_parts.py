@@ -14,10 +14,16 @@ import camsim
 from conftest import ROOT, SMALL, run_program
 from readers import numbers, read_exr, read_png, read_table
 
+BROWN = [-0.28, 0.07, 0.0006, -0.0004, -0.006, 0.01, 0.002, -0.001]
 LENSES: dict[str, list[float]] = {
     "pinhole": [],
-    "brown-conrady": [-0.28, 0.07, 0.0006, -0.0004, -0.006, 0.01, 0.002, -0.001],
+    "brown-conrady": BROWN,
+    "brown-conrady-prism": [*BROWN, 1e-3, -4e-4, 2e-3, 3e-4, 0.01, -0.02],
     "kannala-brandt": [-0.02, 0.004, -0.003, 0.0005],
+    "mei": [0.6, -0.2, 0.05, 1e-3, -5e-4],
+    "double-sphere": [-0.24, 0.56],
+    "fisheye624": [-0.02, 0.01, -0.006, 0.001, 0.0, 0.0, 2e-4, -1e-4, 1e-4, 0.0, -1e-4, 0.0],
+    "equirectangular": [],
 }
 
 
@@ -34,18 +40,69 @@ def test_lenses_there_and_back(model: str) -> None:
     lens = lens_of(model)
     at = pixels(5000)
     rays = lens.unproject(at)
-    assert rays.shape == (5000, 3) and np.allclose(np.linalg.norm(rays, axis=1), 1.0, atol=1e-15)
+    assert rays.shape == (5000, 3) and np.allclose(np.linalg.norm(rays, axis=1), 1.0, rtol=0, atol=2e-15)
     assert np.abs(lens.project(rays) - at).max() < 1e-9
     assert np.abs(lens.project(7.5 * rays) - at).max() < 1e-9
     assert np.abs(lens.distort(lens.undistort(at)) - at).max() < 1e-9
-    assert lens.valid(rays).all() and not lens.valid(-rays).any()
+    assert lens.valid(rays).all()
     step = 1e-6
     for axis in range(3):
         moved = step * np.eye(3)[axis]
         slope = (lens.project(rays + moved) - lens.project(rays - moved)) / (2 * step)
         # Central differences: rounding of 1e-13 px by the step, and its square.
         assert np.abs(slope - lens.jacobian(rays)[:, :, axis]).max() < 1e-4
-    assert np.isnan(lens.project([0.0, 0.0, -1.0])).all()
+    # What is not imaged has no pixel: rays behind a plane, and the axis of no lens.
+    behind = -rays
+    assert np.array_equal(np.isfinite(lens.project(behind)).all(axis=1), lens.valid(behind))
+    assert np.array_equal(np.isfinite(lens.jacobian(behind)).all(axis=(1, 2)), lens.valid(behind))
+    if model in ("pinhole", "brown-conrady", "brown-conrady-prism"):
+        assert not lens.valid(behind).any()
+    unknown = [[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [0.0, 0.0, np.inf]]
+    assert not lens.valid(unknown).any()
+
+
+def test_lenses_see_beyond_90_degrees() -> None:
+    k1, k2, k3, k4 = LENSES["kannala-brandt"]
+    wide = camsim.Lens((1280, 1280), (300.0, 300.0), model="kannala-brandt", coefficients=[k1, k2, k3, k4])
+    theta, phi = np.random.default_rng(9).uniform([0.0, -np.pi], [2.2, np.pi], (4000, 2)).T
+    rays = np.c_[np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    radius = 300.0 * theta * (1 + theta**2 * (k1 + theta**2 * (k2 + theta**2 * (k3 + theta**2 * k4))))
+    wanted = 639.5 + radius[:, None] * np.c_[np.cos(phi), np.sin(phi)]
+    assert (theta > np.pi / 2).sum() > 1000 and wide.valid(rays).all()
+    assert np.abs(wide.project(rays) - wanted).max() < 1e-9
+    assert np.abs(wide.unproject(wanted) - rays).max() < 1e-13
+    # A plane ends at 89 degrees.
+    ideal = wide.undistort(wanted)
+    before = theta < np.radians(89)
+    assert np.isnan(ideal[~before]).all()
+    assert np.abs(ideal[before] / (rays[before, :2] / rays[before, 2:]) - 1).max() < 1e-11
+    panorama = camsim.Lens((1256, 628), (200.0, 200.0), model="equirectangular")
+    longitude = np.arctan2(rays[:, 0], rays[:, 2])
+    assert np.abs(panorama.project(rays)[:, 0] - (627.5 + 200.0 * longitude)).max() < 1e-9
+
+
+def test_lenses_fold_where_their_formula_does() -> None:
+    # r (1 - 0.3 r^2) is largest, 0.70273, at r = 1.0541.
+    lens = camsim.Lens((640, 480), (300.0, 300.0), (0.0, 0.0), model="brown-conrady", coefficients=[-0.3])
+    at = np.c_[np.linspace(0.0, 639.0, 5000), np.zeros(5000)]
+    inside = at[:, 0] < 300.0 * 0.70272
+    ideal = lens.undistort(at)
+    assert np.isfinite(ideal[inside]).all() and np.isnan(ideal[at[:, 0] > 300.0 * 0.70274]).all()
+    assert (ideal[inside, 0] < 1.0542).all() and np.array_equal(np.isnan(lens.unproject(at)), np.isnan(ideal[:, [0, 1, 1]]))
+    u = ideal[inside, 0]
+    assert np.abs(300.0 * u * (1 - 0.3 * u * u) - at[inside, 0]).max() < 1e-9
+    assert not lens.valid([[1.06, 0.0, 1.0]])[0] and lens.valid([[1.05, 0.0, 1.0]])[0]
+
+
+def test_pixels_have_one_inverse() -> None:
+    """However many are asked for at once, and in whatever order."""
+    for model in LENSES:
+        lens, at = lens_of(model), pixels(3000)
+        ideal, rays = lens.undistort(at), lens.unproject(at)
+        for k in (0, 17, 1023, 1024, 2999):
+            assert np.array_equal(lens.undistort(at[k : k + 1]), ideal[k : k + 1])
+            assert np.array_equal(lens.unproject(at[k : k + 1]), rays[k : k + 1])
+        assert np.array_equal(lens.undistort(at[::-1]), ideal[::-1])
 
 
 def test_brown_conrady_is_the_formula() -> None:

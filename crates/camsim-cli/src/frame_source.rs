@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use anyhow::anyhow;
 use camsim_core::{
     imaging::{ImageSensor, Optics},
     late_photometric::LatePhotometric,
     reference::{Oracle, RenderOptions},
-    scenario::{Auto, Primary},
+    scenario::{Auto, Preset, Primary, Scenario, Solver, validate},
     scene::LodSelection,
     sequence::Sequence,
 };
@@ -87,6 +88,41 @@ impl FrameSource for EngineSource<'_> {
 
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {
         Ok(self.session.render(frames.iter().copied(), sink)?)
+    }
+}
+
+/// Whether a scenario is rendered by the reference renderer.
+#[must_use]
+pub fn is_reference(scenario: &Scenario) -> bool {
+    scenario.quality.solver == Auto::Value(Solver::Oracle)
+}
+
+/// The scenario with the reference renderer as a part of it.
+///
+/// # Errors
+/// It names another method.
+pub fn with_reference(mut scenario: Scenario) -> Result<Scenario, Failure> {
+    let refused = |what: &str| {
+        Err(Failure::bad_input(anyhow!(
+            "{what} cannot be combined with --backend reference, which always casts exact rays: leave \
+             --backend out, or use the default preset and solver (--preset default --set quality.solver=auto)"
+        )))
+    };
+    if scenario.quality.preset == Preset::Paper {
+        return refused("quality.preset = \"paper\"");
+    }
+    match scenario.quality.solver {
+        Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = Auto::Value(Solver::Oracle),
+        Auto::Value(Solver::Linear) => return refused("quality.solver = \"linear\""),
+        Auto::Value(Solver::Rk2) => return refused("quality.solver = \"rk2\""),
+        Auto::Value(Solver::Reproject) => return refused("quality.solver = \"reproject\""),
+    }
+    // Keys that are valid with `auto` but not with the oracle.
+    match validate(&scenario).first() {
+        Some(problem) => {
+            Err(Failure::bad_input(anyhow!("{problem} (--backend reference is quality.solver = \"oracle\")")))
+        }
+        None => Ok(scenario),
     }
 }
 

@@ -18,7 +18,7 @@ mod commands;
 pub mod console;
 pub mod failure;
 mod frame_list;
-mod frame_source;
+pub mod frame_source;
 mod inputs;
 mod interrupt;
 mod output;

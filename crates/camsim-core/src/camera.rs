@@ -11,10 +11,12 @@ use glam::{DVec2, DVec3};
 use crate::lens::{Lens, LensError, LensModel};
 use crate::scenario::CameraSpec;
 
+mod bulk;
 mod check;
 mod lens_inverse;
 mod zoom;
 
+pub use bulk::BulkInverse;
 pub use check::{LensCheck, fringes_px};
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;

@@ -23,6 +23,7 @@ pub use crate::scenario::LensModel;
 mod branch;
 mod brown_conrady;
 mod brown_conrady_prism;
+mod bulk;
 mod circle;
 mod direction;
 mod division;
@@ -48,6 +49,7 @@ mod table;
 mod ucm;
 
 pub use brown_conrady::BrownConrady;
+pub(crate) use bulk::{BLOCK, Block, Bulk};
 pub use circle::CircleLens;
 pub use direction::DirectionLens;
 pub use face::FaceLens;

@@ -10,7 +10,7 @@ use camsim_core::{
     camera::CameraModel,
     frame::RenderedFrame,
     noise::tail_table,
-    photometric::photometric,
+    photometric::{Photometry, photometric},
     reference::{Oracle, RenderOptions},
     scenario::{
         Channel, ChromaticSpec, Face, ImageCircleSpec, LensModel, LensSpec, MountSpec, OutputEncoding,
@@ -294,8 +294,8 @@ fn luminance_and_colored_gains_are_those_of_all_colors() {
         let [plain, grey, colored] =
             [&plain, &grey, &colored].map(|frame| &frame.color_rgba[4 * i..4 * i + 4]);
         let rgb = [plain[0], plain[1], plain[2]];
-        let spec = &grey_of.scenario.camera.photometric;
-        let expected = photometric(spec, rgb, 1.0, pixel, number, seed, &table);
+        let stage = Photometry::whole(&grey_of.scenario.camera, None);
+        let expected = photometric(&stage, rgb, 1.0, pixel, number, seed, &table);
         let [x, y] = pixel.map(f64::from);
         let r2 = ((x - 79.5).powi(2) + (y - 59.5).powi(2)) / (0.25 * (160.0 * 160.0 + 120.0 * 120.0));
         let gains = [1.0 - 0.4 * r2 + 0.1 * r2 * r2, 1.0 - 0.3 * r2, 1.0 - 0.3 * r2];

@@ -4,12 +4,12 @@ mod mtf;
 
 use std::{
     fs::File,
-    io::{self, Read},
+    io::{self, Read, Write},
     path::{Path, PathBuf},
 };
 
 use anyhow::{Context, anyhow, bail};
-use camsim_core::camera::{CameraModel, LensCheck, fringes_px};
+use camsim_core::camera::{BulkInverse, CameraModel, LensCheck, fringes_px};
 use camsim_core::mtf::CameraMtf;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
@@ -18,7 +18,7 @@ use camsim_io::{
     lens_table::{lens_table_csv, load_lens_table},
     scenario_file::{read_cameras, read_rig},
 };
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use crate::{
     console::Console,
@@ -198,23 +198,28 @@ fn warn_if_empty(is_empty: bool, console: &mut Console<'_>) {
 
 fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let points = read_points(args.points.as_deref(), ["x_px", "y_px"]).or_bad_input()?;
+    let inverse = BulkInverse::new(camera.clone());
     write_output(args.output.as_deref(), console, |out| {
         writeln!(out, "{},valid", if args.rays { "x,y,z" } else { "u,v" })?;
-        for pixel in points.iter().copied().map(DVec2::from) {
-            let (ray, ideal) = match args.rays {
-                true => (camera.ray(pixel), None),
-                false => (None, camera.unproject(pixel)),
-            };
-            match (ray, ideal) {
-                (Some(ray), _) => writeln!(out, "{:?},{:?},{:?},1", ray.x, ray.y, ray.z)?,
-                (_, Some(ideal)) => writeln!(out, "{:?},{:?},1", ideal.x, ideal.y)?,
-                _ => writeln!(out, "{},0", if args.rays { "NaN,NaN,NaN" } else { "NaN,NaN" })?,
-            }
+        if args.rays {
+            let mut rays = vec![[0.0; 3]; points.len()];
+            inverse.rays(&points, &mut rays);
+            return rays.iter().try_for_each(|ray| write_solution(out, ray));
         }
-        Ok(())
+        let mut ideal = vec![[0.0; 2]; points.len()];
+        inverse.unproject(&points, &mut ideal);
+        ideal.iter().try_for_each(|uv| write_solution(out, uv))
     })?;
     warn_if_empty(points.is_empty(), console);
     Ok(())
+}
+
+/// A row of an undistorted point: NaN and 0 where there is none.
+fn write_solution(out: &mut dyn Write, solution: &[f64]) -> io::Result<()> {
+    for value in solution {
+        write!(out, "{value:?},")?;
+    }
+    writeln!(out, "{}", u8::from(!solution[0].is_nan()))
 }
 
 /// What `check` prints.

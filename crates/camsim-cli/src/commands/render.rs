@@ -6,9 +6,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::scenario::{
-    Auto, Channel, DatasetFormat, ImageFormat, Preset, Rig, Scenario, Solver, validate,
-};
+use camsim_core::scenario::{Channel, DatasetFormat, ImageFormat, Rig, Scenario};
 use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
@@ -18,6 +16,7 @@ use crate::{
     console::Console,
     failure::Failure,
     frame_list::{FrameList, Shard},
+    frame_source::{is_reference, with_reference},
     inputs::{self, Changes},
     render_run::Outcome,
 };
@@ -232,41 +231,17 @@ fn default_folder(scenario: &Path) -> PathBuf {
 
 /// `--backend reference` becomes part of the scenario, so that frames of the two renderers never mix in one
 /// folder.
-fn with_backend(mut scenario: Scenario, backend: Option<RenderBackend>) -> Result<Scenario, Failure> {
-    let oracle = Auto::Value(Solver::Oracle);
-    let refused = |what: &str| {
-        Err(Failure::bad_input(anyhow!(
-            "{what} cannot be combined with --backend reference, which always casts exact rays: leave \
-             --backend out, or use the default preset and solver (--preset default --set quality.solver=auto)"
-        )))
-    };
+fn with_backend(scenario: Scenario, backend: Option<RenderBackend>) -> Result<Scenario, Failure> {
     match backend {
-        Some(RenderBackend::Reference) if scenario.quality.preset == Preset::Paper => {
-            return refused("quality.preset = \"paper\"");
-        }
-        Some(RenderBackend::Reference) => {
-            match scenario.quality.solver {
-                Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = oracle,
-                Auto::Value(Solver::Linear) => return refused("quality.solver = \"linear\""),
-                Auto::Value(Solver::Rk2) => return refused("quality.solver = \"rk2\""),
-                Auto::Value(Solver::Reproject) => return refused("quality.solver = \"reproject\""),
-            }
-            // Keys that are valid with `auto` but not with the oracle.
-            if let Some(problem) = validate(&scenario).first() {
-                return Err(Failure::bad_input(anyhow!(
-                    "{problem} (--backend reference is quality.solver = \"oracle\")"
-                )));
-            }
-        }
-        Some(RenderBackend::Cpu | RenderBackend::Gpu) if scenario.quality.solver == oracle => {
-            return Err(Failure::bad_input(anyhow!(
+        Some(RenderBackend::Reference) => with_reference(scenario),
+        Some(RenderBackend::Cpu | RenderBackend::Gpu) if is_reference(&scenario) => {
+            Err(Failure::bad_input(anyhow!(
                 "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or \
                  change the solver (--set quality.solver=auto)"
-            )));
+            )))
         }
-        _ => {}
+        _ => Ok(scenario),
     }
-    Ok(scenario)
 }
 
 /// `--outputs` and `--format` in place of `[output]`.

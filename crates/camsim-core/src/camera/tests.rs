@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::*;
 use crate::scenario::{LensSpec, ZoomSpec};
@@ -116,4 +116,33 @@ fn a_zoom_table_must_ascend() {
     spec.zoom[2].focal_px = [0.0; 2];
     assert!(ZoomTable::from_spec(&spec).unwrap_err().to_string().contains("camera.zoom[2].focal_px"));
     assert_eq!(ZoomTable::from_spec(&CameraSpec::default()).unwrap(), None);
+}
+
+#[test]
+fn bulk_inverse_is_the_inverse() {
+    let camera = s3_opencv();
+    // Over and beside the picture.
+    let at = |k: usize| [(k % 101) as f64 * 8.0 - 80.0, (k / 101) as f64 * 6.0 - 60.0];
+    let pixels: Vec<[f64; 2]> = (0..101 * 101).map(at).collect();
+    let bulk = BulkInverse::new(camera.clone());
+    let (mut ideal, mut rays) = (vec![[0.0; 2]; pixels.len()], vec![[0.0; 3]; pixels.len()]);
+    bulk.unproject(&pixels, &mut ideal);
+    bulk.rays(&pixels, &mut rays);
+    let mut seen = 0;
+    for ((pixel, ideal), ray) in pixels.iter().zip(ideal).zip(rays) {
+        let (ideal, ray) = (DVec2::from_array(ideal), DVec3::from_array(ray));
+        let single = camera.unproject(DVec2::from_array(*pixel));
+        assert_eq!((ideal.is_finite(), ray.is_finite()), (single.is_some(), single.is_some()), "{pixel:?}");
+        let Some(single) = single else { continue };
+        assert!((camera.project(ideal) - DVec2::from_array(*pixel)).length() < 1e-6, "{pixel:?}");
+        // Beside the fold the inverse magnifies roundings a thousandfold and more.
+        let off = camera.lens.jacobian(single) * (ideal - single);
+        assert!(
+            off.length() < 1e-13 && ideal.distance(single) < 1e-6,
+            "{pixel:?}: {ideal} instead of {single}"
+        );
+        assert!(ray.distance(ideal.extend(1.0).normalize()) < 1e-7, "{pixel:?}");
+        seen += 1;
+    }
+    assert!(seen > 3000 && seen < 5000, "{seen}");
 }

@@ -54,7 +54,7 @@ struct OpticsKey {
     kernel: Option<Arc<SpreadKernel>>,
     size_px: [u32; 2],
     sensor_pixel_um: Option<f64>,
-    /// The camera and the scenario's seed, whose simple model follows; `None` with an image sensor.
+    /// The camera, as far as its [`simple_model`] depends on it, and the scenario's seed; `None` with an image sensor.
     simple: Option<(CameraSpec, u64)>,
 }
 
@@ -83,8 +83,21 @@ impl OpticsKey {
             kernel: spec.kernel.as_ref().and_then(|file| file.kernel.clone()),
             size_px: camera.size_px,
             sensor_pixel_um: camera.sensor.as_ref().and_then(|sensor| with_facts(sensor).pixel_um),
-            simple: camera.sensor.is_none().then(|| (camera.clone(), seed)),
+            simple: camera.sensor.is_none().then(|| (simple_model(camera), seed)),
         })
+    }
+}
+
+/// What the simple model depends on.
+fn simple_model(camera: &CameraSpec) -> CameraSpec {
+    CameraSpec {
+        name: camera.name.clone(),
+        size_px: camera.size_px,
+        fps: camera.fps,
+        phase: camera.phase,
+        photometric: camera.photometric.clone(),
+        timing: camera.timing.clone(),
+        ..CameraSpec::default()
     }
 }
 

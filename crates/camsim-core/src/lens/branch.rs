@@ -85,6 +85,11 @@ impl Branch {
         Self { limit, border, centre, starts, reach, rim }
     }
 
+    /// Smallest radius of the branch.
+    pub(super) fn radius_min(&self) -> f64 {
+        self.border.smallest()
+    }
+
     /// Largest radius of the branch.
     pub(super) fn radius_max(&self) -> f64 {
         self.border.range().1

@@ -1,8 +1,9 @@
 //! Brown-Conrady, polynomial or rational, with tangential terms: the paper's eqs. 8 and 9, OpenCV's default
 //! model.
 
-use glam::{DMat2, DVec2};
+use glam::{DMat2, DVec2, DVec3};
 
+use super::bulk::PlaneFormula;
 use super::facts::{ModelFacts, Shape};
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
@@ -157,14 +158,17 @@ impl Formula {
         Self { k1, k2, k3, k4, k5, k6, p1, p2 }
     }
 
+    #[inline(always)]
     fn numerator(&self, r2: f64) -> f64 {
         1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
     }
 
+    #[inline(always)]
     pub(super) fn denominator(&self, r2: f64) -> f64 {
         1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6))
     }
 
+    #[inline(always)]
     pub(super) fn distort(&self, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
         let r2 = u * u + v * v;
         let d = self.numerator(r2) / self.denominator(r2);
@@ -174,6 +178,7 @@ impl Formula {
         )
     }
 
+    #[inline(always)]
     pub(super) fn jacobian(&self, DVec2 { x: u, y: v }: DVec2) -> DMat2 {
         let r2 = u * u + v * v;
         let denominator = self.denominator(r2);
@@ -194,5 +199,22 @@ impl Formula {
         let det = jacobian.determinant();
         let trace = jacobian.x_axis.x + jacobian.y_axis.y;
         [if trace > 0.0 { det } else { -det.abs() }, self.denominator(ideal.length_squared())]
+    }
+}
+
+impl PlaneFormula for Formula {
+    #[inline(always)]
+    fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
+        (self.distort(at), self.jacobian(at))
+    }
+
+    #[inline(always)]
+    fn place(&self, ray: DVec3) -> DVec2 {
+        ray.truncate() / ray.z
+    }
+
+    #[inline(always)]
+    fn ray(&self, at: DVec2) -> DVec3 {
+        at.extend(1.0)
     }
 }

@@ -4,6 +4,7 @@
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 use super::brown_conrady::Formula;
+use super::bulk::PlaneFormula;
 use super::direction::{DirectionFormula, direction, gradient_of_plane};
 use super::facts::ModelFacts;
 use super::fold::MAX_FIELD_RAD;
@@ -33,6 +34,7 @@ impl Prism {
     }
 
     /// Before the tilt, with the Jacobian.
+    #[inline(always)]
     fn flat(&self, ideal: DVec2) -> (DVec2, DMat2) {
         let [s1, s2, s3, s4] = self.prism;
         let r2 = ideal.length_squared();
@@ -60,18 +62,11 @@ fn tilt(tau_x: f64, tau_y: f64) -> DMat3 {
 
 impl DirectionFormula for Prism {
     fn image(&self, ray: DVec3) -> DVec2 {
-        let (flat, _) = self.flat(ray.truncate() / ray.z);
-        let tilted = self.tilt * flat.extend(1.0);
-        tilted.truncate() / tilted.z
+        self.value_and_jacobian(self.place(ray)).0
     }
 
     fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        let (flat, jacobian) = self.flat(ray.truncate() / ray.z);
-        let tilted = self.tilt * flat.extend(1.0);
-        let image = tilted.truncate() / tilted.z;
-        let column = |axis: DVec3| (axis.truncate() - image * axis.z) / tilted.z;
-        let of_tilt = DMat2::from_cols(column(self.tilt.x_axis), column(self.tilt.y_axis));
-        gradient_of_plane(of_tilt * jacobian, ray)
+        gradient_of_plane(self.value_and_jacobian(self.place(ray)).1, ray)
     }
 
     fn margin(&self, ray: DVec3) -> f64 {
@@ -82,5 +77,31 @@ impl DirectionFormula for Prism {
 
     fn angle_max(&self) -> f64 {
         MAX_FIELD_RAD
+    }
+
+    fn plane(&self) -> Option<&dyn PlaneFormula> {
+        Some(self)
+    }
+}
+
+impl PlaneFormula for Prism {
+    #[inline(always)]
+    fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
+        let (flat, jacobian) = self.flat(at);
+        let tilted = self.tilt * flat.extend(1.0);
+        let image = tilted.truncate() / tilted.z;
+        let column = |axis: DVec3| (axis.truncate() - image * axis.z) / tilted.z;
+        let of_tilt = DMat2::from_cols(column(self.tilt.x_axis), column(self.tilt.y_axis));
+        (image, of_tilt * jacobian)
+    }
+
+    #[inline(always)]
+    fn place(&self, ray: DVec3) -> DVec2 {
+        ray.truncate() / ray.z
+    }
+
+    #[inline(always)]
+    fn ray(&self, at: DVec2) -> DVec3 {
+        at.extend(1.0)
     }
 }

@@ -6,6 +6,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::LensModel;
 use super::branch::{Branch, ChartMap};
+use super::bulk::PlaneFormula;
 use super::fold::{FoldCurve, MAX_FIELD_RAD};
 
 /// A distorted point as a function of the ray.
@@ -28,6 +29,11 @@ pub(super) trait DirectionFormula: Debug + Send + Sync {
 
     /// The inverse, for a formula that knows it. Its image is then one-to-one wherever it is finite.
     fn closed_inverse(&self) -> Option<&dyn ClosedInverse> {
+        None
+    }
+
+    /// The formula as a map of a plane, for inverses of many points.
+    fn plane(&self) -> Option<&dyn PlaneFormula> {
         None
     }
 }
@@ -131,6 +137,15 @@ impl DirectionLens {
     /// Largest angle off axis of a ray, radians.
     pub fn angle_max_rad(&self) -> f64 {
         self.branch.as_ref().map_or(PI, |branch| branch.radius_max())
+    }
+
+    /// Angle off axis within which every ray lies on the principal branch, radians.
+    pub(super) fn smallest_angle(&self) -> f64 {
+        self.branch.as_ref().map_or(0.0, |branch| branch.radius_min())
+    }
+
+    pub(super) fn plane(&self) -> Option<&dyn PlaneFormula> {
+        self.formula.plane()
     }
 }
 

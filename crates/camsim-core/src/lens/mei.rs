@@ -4,6 +4,7 @@
 use glam::{DMat2, DVec2, DVec3};
 
 use super::brown_conrady::Formula;
+use super::bulk::PlaneFormula;
 use super::direction::{DirectionFormula, direction};
 use super::facts::ModelFacts;
 
@@ -33,7 +34,7 @@ impl Mei {
 
 impl DirectionFormula for Mei {
     fn image(&self, ray: DVec3) -> DVec2 {
-        self.formula.distort(ray.truncate() / self.below(ray))
+        self.formula.distort(self.place(ray))
     }
 
     fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
@@ -50,5 +51,29 @@ impl DirectionFormula for Mei {
 
     fn margin(&self, ray: DVec3) -> f64 {
         self.below(ray)
+    }
+
+    fn plane(&self) -> Option<&dyn PlaneFormula> {
+        Some(self)
+    }
+}
+
+/// The plane is that of the mirrored point.
+impl PlaneFormula for Mei {
+    #[inline(always)]
+    fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2) {
+        self.formula.value_and_jacobian(at)
+    }
+
+    fn place(&self, ray: DVec3) -> DVec2 {
+        ray.truncate() / self.below(ray)
+    }
+
+    /// The unit sphere's farther meeting with the line through the mirrored point.
+    #[inline(always)]
+    fn ray(&self, at: DVec2) -> DVec3 {
+        let r2 = at.length_squared();
+        let along = (self.xi + (1.0 + (1.0 - self.xi * self.xi) * r2).sqrt()) / (1.0 + r2);
+        (at * along).extend(along - self.xi)
     }
 }

@@ -134,7 +134,7 @@ impl RadialLens {
         if radius < 1e-12 {
             return Some(distorted / self.formula.slope(0.0));
         }
-        Some(distorted * (self.solve(radius, self.theta_max).tan() / radius))
+        Some(distorted * (self.angle_of(radius, self.theta_max).tan() / radius))
     }
 
     /// Forward, from a ray of any length.
@@ -179,7 +179,7 @@ impl RadialLens {
         if radius < 1e-12 {
             return Some((distorted / self.formula.slope(0.0)).extend(1.0));
         }
-        let (sin, cos) = self.solve(radius, self.angle_max).sin_cos();
+        let (sin, cos) = self.angle_of(radius, self.angle_max).sin_cos();
         Some((distorted * (sin / radius)).extend(cos))
     }
 
@@ -188,12 +188,24 @@ impl RadialLens {
         ray.truncate().length().atan2(ray.z) < self.angle_max
     }
 
-    fn without_linear(&self, distorted: DVec2) -> DVec2 {
+    /// Whether there is no linear map of the image.
+    pub(super) fn is_linear_identity(&self) -> bool {
+        self.linear.is_none()
+    }
+
+    /// Distorted radius at an angle off axis.
+    pub(super) fn radius(&self, angle: f64) -> f64 {
+        self.formula.radius(angle)
+    }
+
+    /// A distorted point before the linear map of the image.
+    pub(super) fn without_linear(&self, distorted: DVec2) -> DVec2 {
         self.linear.map_or(distorted, |[_, inverse]| inverse * distorted)
     }
 
-    /// Bracketed Newton iteration in the angle, started from the table.
-    fn solve(&self, radius: f64, angle_max: f64) -> f64 {
+    /// Angle off axis of a distorted radius, up to a largest one. Bracketed Newton iteration, started from the
+    /// table.
+    pub(super) fn angle_of(&self, radius: f64, angle_max: f64) -> f64 {
         let (mut low, mut high) = (0.0, angle_max);
         let mut theta = (radius * self.table.ratio(radius)).clamp(low, high);
         for _ in 0..60 {

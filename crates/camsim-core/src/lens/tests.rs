@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 
 /// Name, model, coefficients: real lenses, and lenses that defeat simple inverses.
-fn gallery() -> Vec<(&'static str, Lens)> {
+pub(super) fn gallery() -> Vec<(&'static str, Lens)> {
     use LensModel::{
         BrownConrady, BrownConradyPrism, Division, DoubleSphere, Equirectangular, Eucm, FTheta,
         FThetaInverse, Fisheye624, Fov, KannalaBrandt, Mei, Pinhole, Ucm,

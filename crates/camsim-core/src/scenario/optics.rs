@@ -236,7 +236,7 @@ mod tests {
         camera.photometric.output = OutputEncoding::Luma8;
         assert!(camera.is_finished_late() && camera.of_primary(Primary::Red).is_finished_late());
         camera.photometric.noise_sigma = 0.1;
-        assert_eq!(camera.photometric_of_renderers().noise_sigma, 0.0);
+        assert_eq!(crate::photometric::Photometry::new(&camera, None).noise_sigma, 0.0);
         let vignetting = VignettingSpec { polynomial_red: Some(vec![-0.1]), ..VignettingSpec::default() };
         let photometric = PhotometricSpec { vignetting: Some(vignetting), ..PhotometricSpec::default() };
         assert!(CameraSpec { photometric, ..CameraSpec::default() }.is_finished_late());

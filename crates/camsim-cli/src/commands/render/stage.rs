@@ -4,7 +4,7 @@ use std::{cell::OnceCell, ops::ControlFlow, path::Path};
 
 use anyhow::anyhow;
 use camsim_core::{
-    scenario::{Auto, DatasetFormat, Rig, Solver},
+    scenario::{DatasetFormat, Rig},
     sequence::Sequence,
 };
 use camsim_engine::{Engine, Finished};
@@ -27,7 +27,7 @@ use crate::{
     console::Console,
     failure::{FAILED, Failure, OrFail},
     frame_list::Shard,
-    frame_source::{EngineSource, FrameSource, ReferenceSource},
+    frame_source::{EngineSource, FrameSource, ReferenceSource, is_reference},
     inputs,
     render_run::{Outcome, Selected},
     times_table::TimesTable,
@@ -157,7 +157,7 @@ fn open<'s, 'e>(
     args: &RenderArgs,
     (times, is_quiet): (&mut TimesTable, bool),
 ) -> Result<&'s mut dyn FrameSource, Failure> {
-    let is_exact = sequence.scenario.quality.solver == Auto::Value(Solver::Oracle);
+    let is_exact = is_reference(&sequence.scenario);
     match slot {
         Some((exact, source)) if *exact == is_exact => {
             times.timed("scene upload", is_quiet, || source.renew(sequence))?;

@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 use crate::{
     imaging::optics::bessel::jinc,
-    scenario::{OutputEncoding, PerChannel},
+    scenario::{OutputEncoding, PerChannel, PhotometricSpec},
 };
 
 const SIZE_PX: [u32; 2] = [96, 80];
@@ -165,20 +165,20 @@ fn noise_comes_after_the_spread() {
         output: OutputEncoding::Luma8,
         ..PhotometricSpec::default()
     };
-    let camera = CameraSpec { photometric: photometric.clone(), ..camera(gaussian(3.0)) };
+    let camera = CameraSpec { photometric, ..camera(gaussian(3.0)) };
     let optics = Optics::new(&camera, 7).expect("a point spread");
     let color_rgba = picture(|_, _| [0.5, 0.25, 0.1]);
     let mut frame = RenderedFrame { index: 3, size_px: SIZE_PX, color_rgba, ..RenderedFrame::default() };
     optics.expose(&mut frame, None);
     let table = tail_table();
     for (x, y) in [(0, 0), (13, 70), (95, 79)] {
-        let expected = photometric_value(&photometric, [x, y], &table);
+        let expected = photometric_value(&camera, [x, y], &table);
         assert!((at(&frame.color_rgba, x, y)[0] - expected).abs() < 1e-5);
     }
 }
 
-fn photometric_value(spec: &PhotometricSpec, pixel: [u32; 2], table: &[f32]) -> f32 {
-    photometric(spec, [0.5, 0.25, 0.1], 1.0, pixel, 3, 7, table)[0]
+fn photometric_value(camera: &CameraSpec, pixel: [u32; 2], table: &[f32]) -> f32 {
+    photometric(&Photometry::whole(camera, None), [0.5, 0.25, 0.1], 1.0, pixel, 3, 7, table)[0]
 }
 
 #[test]

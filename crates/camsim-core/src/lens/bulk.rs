@@ -1,0 +1,137 @@
+//! The inverse of a lens for many points at once, to the last bits as the inverse of single points.
+//!
+//! A lens that is a formula of a plane starts all points from a grid of solutions and gives them the same Newton
+//! steps, which the compiler turns into vector instructions. The inverse of a rotation-symmetric lens is a table of
+//! polynomials. A point that these do not solve, or that is not surely on the principal branch, is NaN here, and the
+//! caller asks the inverse of single points: both answer the same points.
+
+use glam::DVec2;
+
+use super::{BrownConrady, DirectionLens, Lens, brown_conrady::Formula};
+
+mod grid;
+mod plane;
+mod polynomials;
+mod rotation_symmetric;
+
+pub(super) use plane::PlaneFormula;
+
+use grid::Grid;
+use rotation_symmetric::RotationSymmetric;
+
+/// Points of a block.
+pub(crate) const BLOCK: usize = 64;
+
+/// Share of the smallest border within which every point is surely on the principal branch: the border is known in
+/// some directions only.
+const SURELY_INSIDE: f64 = 0.99;
+
+/// Points and their solutions, by coordinate.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// Distorted points.
+    pub image: [[f64; BLOCK]; 2],
+    /// Points of the formula's plane.
+    at: [[f64; BLOCK]; 2],
+    /// Ideal points or rays; NaN in the first coordinate of what is not solved.
+    pub solved: [[f64; BLOCK]; 3],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self { image: [[0.0; BLOCK]; 2], at: [[0.0; BLOCK]; 2], solved: [[f64::NAN; BLOCK]; 3] }
+    }
+}
+
+/// What a lens prepares for many points.
+#[derive(Clone, Debug)]
+pub(crate) enum Bulk {
+    /// No distortion.
+    Pinhole,
+    /// A formula of a plane.
+    Plane(Grid),
+    /// A function of the radius.
+    RotationSymmetric(Box<RotationSymmetric>),
+    /// Every point by itself.
+    Singly,
+}
+
+impl Bulk {
+    /// For distorted points in a rectangle; others are solved singly.
+    pub(crate) fn new(lens: &Lens, low: DVec2, high: DVec2) -> Self {
+        match lens {
+            Lens::Pinhole(_) => Self::Pinhole,
+            Lens::BrownConrady(one) => {
+                Self::Plane(Grid::new(lens, &formula_of(one), [low, high], inside_of(one)))
+            }
+            Lens::Radial(one) => Self::RotationSymmetric(Box::new(RotationSymmetric::new(one, [low, high]))),
+            Lens::Direction(one) => match one.plane() {
+                Some(formula) => Self::Plane(Grid::new(lens, formula, [low, high], inside(one, formula))),
+                None => Self::Singly,
+            },
+            Lens::Face(_) | Lens::Scaled(_) | Lens::Circle(_) => Self::Singly,
+        }
+    }
+
+    /// Ideal points of a block.
+    pub(crate) fn ideal(&self, lens: &Lens, block: &mut Block) {
+        match (self, lens) {
+            (Self::Pinhole, _) => pinhole(block),
+            (Self::Plane(grid), Lens::BrownConrady(lens)) => grid.ideal(&formula_of(lens), block),
+            (Self::Plane(grid), Lens::Direction(lens)) => {
+                if let Some(formula) = lens.plane() {
+                    grid.ideal(formula, block);
+                }
+            }
+            (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.ideal(lens, block),
+            _ => block.solved[0].fill(f64::NAN),
+        }
+    }
+
+    /// Unit rays of a block.
+    pub(crate) fn rays(&self, lens: &Lens, block: &mut Block) {
+        match (self, lens) {
+            (Self::Pinhole, _) => {
+                pinhole(block);
+                plane::to_unit_length(block);
+            }
+            (Self::Plane(grid), Lens::BrownConrady(lens)) => grid.rays(&formula_of(lens), block),
+            (Self::Plane(grid), Lens::Direction(lens)) => {
+                if let Some(formula) = lens.plane() {
+                    grid.rays(formula, block);
+                }
+            }
+            (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.rays(lens, block),
+            _ => block.solved[0].fill(f64::NAN),
+        }
+    }
+}
+
+fn formula_of(lens: &BrownConrady) -> Formula {
+    Formula::new(&lens.coefficients)
+}
+
+fn inside_of(lens: &BrownConrady) -> f64 {
+    SURELY_INSIDE * lens.fold.smallest()
+}
+
+/// Radius of the formula's plane within which every point is on the principal branch.
+fn inside(lens: &DirectionLens, formula: &dyn PlaneFormula) -> f64 {
+    let (sin, cos) = (SURELY_INSIDE * lens.smallest_angle()).sin_cos();
+    formula.place(DVec2::new(sin, 0.0).extend(cos)).length()
+}
+
+/// What is not finite has no inverse.
+fn pinhole(block: &mut Block) {
+    let [x, y] = &block.image;
+    for i in 0..BLOCK {
+        // NaN for infinities too.
+        let zero = 0.0 * (x[i] + y[i]);
+        block.solved[0][i] = x[i] + zero;
+        block.solved[1][i] = y[i];
+        block.solved[2][i] = 1.0;
+    }
+}
+
+#[cfg(test)]
+mod tests;
