@@ -479,6 +479,16 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("magnetometer.jitter_ms", Number),
 ];
 
+/// Names that other programs have for keys.
+const OTHER_NAMES: [(&str, &str); 6] = [
+    ("resolution", "camera.size_px"),
+    ("image_size", "camera.size_px"),
+    ("focal_length", "camera.focal_px"),
+    ("principal_point", "camera.principal_point_px"),
+    ("exposure_time", "camera.shutter.exposure_ms"),
+    ("line_delay", "camera.shutter.line_time_us"),
+];
+
 /// Required keys, each with the table within which it is required.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("flight.log", ""),
@@ -569,6 +579,9 @@ impl Schema {
     /// [`Self::nearest`] for keys of one camera.
     fn nearest_like(&self, key: &str) -> Option<String> {
         let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
+        if let Some((_, own)) = OTHER_NAMES.iter().find(|(other, _)| *other == leaf) {
+            return self.kind(own).map(|_| (*own).to_owned());
+        }
         let mut names: Vec<&str> = Vec::new();
         if self.keys == KEYS {
             names.push(RANDOMIZE);

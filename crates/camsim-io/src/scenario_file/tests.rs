@@ -6,8 +6,8 @@ use camsim_core::scenario::{
     Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
     ChromaticSpec, Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec,
     ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel,
-    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, SensorModel, SpinSpec, TrackerSpec, TwinShutter,
-    TwinSpec, VignettingSpec,
+    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, Reset, SensorModel, SpinSpec, TimingSpec,
+    TrackerSpec, TwinShutter, TwinSpec, VignettingSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -81,6 +81,8 @@ fn needs_of_sensor(key: &str, value: &str) -> Vec<(&'static str, &'static str)> 
     }
     match (key, value) {
         ("camera.sensor.companding", "piecewise") => needs.push(("camera.sensor.companding_points", points)),
+        ("camera.shutter.reset", "global") => needs.push(("camera.shutter.exposure_ms", "4")),
+        ("camera.timing.late_stamp", "actual") => needs.push(("camera.timing.late_ms", "1")),
         ("camera.sensor.response", "table") => needs.push(("camera.sensor.response_points", points)),
         _ => {}
     }
@@ -168,6 +170,9 @@ fn every_key_of_the_structs_is_in_the_schema() {
     scenario.output.raw_format = camsim_core::scenario::RawFormat::Tiff;
     scenario.camera.sensor = Some(full_sensor());
     scenario.camera.point_spread = Some(full_point_spread());
+    let shutter = &mut scenario.camera.shutter;
+    (shutter.line_time_us, shutter.reset, shutter.allow_overlap) = (Some(20.0), Reset::Global, true);
+    scenario.camera.timing = Some(TimingSpec { drop: vec![1], double: vec![2], ..TimingSpec::default() });
     full_optics(&mut scenario.camera);
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);
@@ -353,7 +358,7 @@ fn errors_name_file_line_and_key() {
         ("[quality]\nxyz = 3", "quality.xyz: unknown key; `camsim render --print-default`"),
         (
             "[camera]\nresolution = [640, 480]",
-            "camera.resolution: unknown key; `camsim render --print-default`",
+            "camera.resolution: unknown key; did you mean `camera.size_px`?",
         ),
         ("qqqq = 1", "unknown key; `camsim render --print-default`"),
         ("[camera]\nfps = \"thirty\"", "dir/s.toml:7: camera.fps: expected a number, found \"thirty\""),

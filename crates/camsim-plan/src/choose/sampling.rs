@@ -1,5 +1,7 @@
 //! The cheapest sampling plan that keeps `quality.max_error_dn`.
 
+mod failed;
+
 use camsim_core::{
     scenario::{Auto, QualitySpec},
     temporal::{MAX_AREA_SIDE_PX, SAMPLES, TENT_PX2, TapStage},
@@ -18,12 +20,11 @@ use crate::{
     picture_error::resampling::dn,
     view::exposure::ExposurePath,
 };
+use failed::{FailedSampling, SURE, least_dn};
 
 /// One probe in so many is tried first, and so far above the tolerance these then settle it.
 const FEW: usize = 4;
 const FAR: f64 = 1.7;
-/// Part of what these find that all of them find at least.
-const SURE: f64 = 0.8;
 /// Scales of the ideal frame that are tried, of the camera's.
 const SCALES: [f64; 14] =
     [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, 4.0, 4.5, FINEST_SCALE];
@@ -390,42 +391,4 @@ enum Trial {
     Failed(FailedSampling),
     /// Price, error and plan, if it is cheaper than another.
     Within(Option<(f64, f64, SamplingPlan)>),
-}
-
-/// A sampling plan that does not keep the tolerance, with the most samples.
-struct FailedSampling {
-    plan: SamplingPlan,
-    /// Error by other causes.
-    others_dn: f64,
-    /// Error as a few probes give it.
-    roughly_dn: f64,
-    /// Error as all probes give it, where it is known.
-    known_dn: Option<f64>,
-}
-
-impl FailedSampling {
-    fn at_least_dn(&self) -> f64 {
-        self.known_dn.unwrap_or(SURE * self.roughly_dn)
-    }
-
-    fn exact_dn(&mut self, exactly_dn: &dyn Fn(&FailedSampling) -> f64) -> f64 {
-        let exact_dn = self.known_dn.unwrap_or_else(|| exactly_dn(self));
-        self.known_dn = Some(exact_dn);
-        exact_dn
-    }
-}
-
-/// The least error of all: those that may be better than the best known are tried, the most promising
-/// first.
-fn least_dn(failed: &mut [FailedSampling], exactly_dn: &dyn Fn(&FailedSampling) -> f64) -> f64 {
-    let mut order: Vec<&mut FailedSampling> = failed.iter_mut().collect();
-    order.sort_by(|a, b| a.at_least_dn().total_cmp(&b.at_least_dn()));
-    let mut least_dn = f64::INFINITY;
-    for failed in order {
-        if failed.at_least_dn() >= least_dn {
-            break;
-        }
-        least_dn = least_dn.min(failed.exact_dn(exactly_dn));
-    }
-    least_dn
 }

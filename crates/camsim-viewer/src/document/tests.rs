@@ -32,16 +32,16 @@ fn a_drag_is_one_undo_step() {
         document.set(key, Some(Value::Float(f64::from(ms))), true);
     }
     document.end_gesture();
-    document.set(key, Some(Value::Float(50.0)), true);
+    document.set(key, Some(Value::Float(30.0)), true);
     document.end_gesture();
-    assert_eq!(document.scenario.camera.shutter.readout_ms, 50.0);
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 30.0);
     assert!(document.undo());
     assert_eq!(document.scenario.camera.shutter.readout_ms, 19.0);
     assert!(document.undo());
     assert_eq!(document.scenario.camera.shutter.readout_ms, 33.0);
     assert!(!document.undo());
     assert!(document.redo() && document.redo() && !document.redo());
-    assert_eq!(document.scenario.camera.shutter.readout_ms, 50.0);
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 30.0);
 }
 
 #[test]

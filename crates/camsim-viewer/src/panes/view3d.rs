@@ -94,7 +94,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 /// Controls for the viewpoint, for use without a mouse.
 fn controls(ui: &mut Ui, orbit: &mut Orbit, sphere: BoundingSphere, camera_ned_m: DVec3, out: &mut Outbox) {
     ui.horizontal_wrapped(|ui| {
-        if ui.button("reset").with_tooltip("the whole scene (double click)").clicked() {
+        if ui.button("whole scene").with_tooltip("the whole scene (double click)").clicked() {
             *orbit = Orbit::default();
         }
         if ui.button("from above").with_tooltip("from above, north up, as the map").clicked() {

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// High enough for all sections at once: controls out of view have no nodes.
-const SIZE: [f32; 2] = [1200.0, 9000.0];
+const SIZE: [f32; 2] = [1200.0, 14000.0];
 
 /// A scenario with values under nearly every key: lists with entries, a board.
 fn full_scenario(folder: &std::path::Path) -> std::path::PathBuf {

@@ -99,7 +99,7 @@ fn the_view_rotates_pans_and_zooms_by_mouse_and_controls() {
         "{:?}",
         window.state().rejected_input
     );
-    window.click("reset");
+    window.click("whole scene");
     assert_eq!(orbit(&window), Orbit::default());
 }
 

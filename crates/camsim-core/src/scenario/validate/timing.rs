@@ -39,7 +39,6 @@ pub(super) fn check_shutter(check: &mut Check, camera: &CameraSpec) {
             "states the readout a second time; leave it out, or camera.shutter.readout_ms".into()
         });
     }
-    check_overlap(check, camera);
     let is_split = matches!(shutter.readout, Readout::MiddleOutward | Readout::EdgesInward);
     let [_, height] = camera.size_px;
     check.require(!is_split || (height >= 4 && height.is_multiple_of(2)), "camera.shutter.readout", || {
@@ -58,7 +57,7 @@ pub(super) fn check_shutter(check: &mut Check, camera: &CameraSpec) {
     });
 }
 
-/// Refuses a readout into the next frame.
+/// Checks that a frame is read before the next one begins. A camera by itself has no frame rate that matters.
 fn check_overlap(check: &mut Check, camera: &CameraSpec) {
     let shutter = &camera.shutter;
     let (readout_ms, period_ms) = (camera.readout_ms(), 1e3 / camera.fps);
@@ -123,6 +122,7 @@ pub(super) fn check_timing(check: &mut Check, camera: &CameraSpec) {
 
 /// Checks what only the rest of a scenario decides.
 pub(super) fn check_with_quality(check: &mut Check, scenario: &Scenario) {
+    check_overlap(check, &scenario.camera);
     let drops = |timing: &TimingSpec| !timing.drop.is_empty() || timing.drop_probability > 0.0;
     let video = scenario.output.format.iter().find(|format| format.is_video());
     if let (Some(video), Some(true)) = (video, scenario.camera.timing.as_ref().map(drops)) {

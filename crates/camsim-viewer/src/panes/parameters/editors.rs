@@ -270,7 +270,12 @@ fn number_list(
     param: &Param,
     out: &mut Outbox,
 ) -> Option<Edit> {
-    let array = value?.as_array()?;
+    let Some(array) = value.and_then(Value::as_array) else {
+        let add = ui.button("set").with_tooltip(param.tip);
+        named(&add, Role::Button, &format!("set {key}"));
+        let start = if key.ends_with("_scale") { 1.0 } else { 0.0 };
+        return add.clicked().then(|| Value::Array(vec![Value::Float(start)])).and_then(single_edit);
+    };
     let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
     let (more, less) =
         (ui.small_button("+").with_tooltip("one more"), ui.small_button("-").with_tooltip("one less"));
