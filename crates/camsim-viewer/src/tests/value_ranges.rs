@@ -69,7 +69,8 @@ fn out_of_range_input_is_reported_with_key_and_range_until_the_next_edit() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_drag_beyond_the_range_is_reported() {
-    let mut window = Window::open(Some(pattern()));
+    // Tall enough for the key to be on the page: a pointer drags what it sees.
+    let mut window = Window::with(Some(pattern()), None, [1200.0, 3000.0]);
     window.settle();
     let name = "camera.photometric.noise_sigma";
     let from = window.harness.get_by_label(name).rect().center();
