@@ -186,6 +186,8 @@ class Comparison:
     """Share of pixels that differ at all."""
     non_finite: int
     """Pixels with a NaN or an infinity in either picture; all but `differing` leave them out."""
+    formats: tuple[dict[str, Any], ...] = ()
+    """The same of all files of each `format` of two folders: EXR has linear values and PNG encoded ones."""
     files: tuple[dict[str, Any], ...] = ()
     """The same of each file of two folders, with its `file`."""
     only_in_a: tuple[str, ...] = ()
@@ -204,7 +206,7 @@ def compare(a: ArrayLike | Path, b: ArrayLike | Path) -> Comparison:
     """
     if isinstance(a, (str, os.PathLike)) and isinstance(b, (str, os.PathLike)):
         report: dict[str, Any] = json.loads(_command.output(["compare", a, b, "--json"]))
-        report.update({name: tuple(report[name]) for name in ("files", "only_in_a", "only_in_b")})
+        report.update({name: tuple(report[name]) for name in ("formats", "files", "only_in_a", "only_in_b")})
         return Comparison(**report)
     if isinstance(a, (str, os.PathLike)) or isinstance(b, (str, os.PathLike)):
         raise InputError("compare two files or folders, or two arrays")

@@ -105,7 +105,7 @@ def test_other_wrong_usage(pattern: pathlib.Path) -> None:
 
 def test_warnings_are_python_warnings(pattern: pathlib.Path) -> None:
     with pytest.warns(camsim.ScenarioWarning, match="longer than a frame's period"):
-        scenario = camsim.Scenario.load(pattern, sets={"camera.shutter.readout_ms": 50})
+        scenario = camsim.Scenario.load(pattern, sets={"camera.shutter.exposure_ms": 50})
     assert any("longer" in warning for warning in scenario.warnings)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
