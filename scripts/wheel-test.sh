@@ -36,3 +36,8 @@ fresh/bin/camsim demo -o demo --quiet
 fresh/bin/python -m camsim render demo/scene/demo.toml -o frames --frames 7 --format png --quiet
 cmp first.png frames/color/frame_000007.png
 echo "wheel: the command line renders the same picture"
+# It has no window, and says so.
+if fresh/bin/camsim viewer 2>viewer.txt || ! grep -q "leaves that command out" viewer.txt; then
+    cat viewer.txt >&2
+    exit 1
+fi

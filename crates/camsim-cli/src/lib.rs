@@ -10,7 +10,10 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{Parser, Subcommand, error::ErrorKind};
+use clap::{
+    Parser, Subcommand,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
 
 mod backend;
 mod channel_sheet;
@@ -151,7 +154,36 @@ fn report_clap(error: &clap::Error, console: &mut Console<'_>) -> u8 {
         },
         _ => {
             console.complain(&text.to_string());
+            if let Some(feature) = left_out(error) {
+                console.complain(&format!(
+                    "This build leaves that command out. `cargo build --release --features {feature}` in camsim's sources has it.\n"
+                ));
+            }
             failure::BAD_INPUT
         }
+    }
+}
+
+/// The feature with the command that an error does not know.
+fn left_out(error: &clap::Error) -> Option<&'static str> {
+    let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand) else { return None };
+    match name.as_str() {
+        "bench" | "reproduce" => Some("lab"),
+        "viewer" => Some("viewer"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::left_out;
+
+    #[test]
+    fn commands_of_other_builds_are_named() {
+        let other = clap::Command::new("camsim").subcommand(clap::Command::new("render"));
+        let unknown = |name| other.clone().try_get_matches_from(["camsim", name]).expect_err("unknown");
+        assert_eq!(left_out(&unknown("viewer")), Some("viewer"));
+        assert_eq!(left_out(&unknown("reproduce")), Some("lab"));
+        assert_eq!(left_out(&unknown("rendr")), None);
     }
 }

@@ -39,6 +39,7 @@
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
 //! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
 //! | [`transfer`] | transfer functions of means and samples |
+//! | [`simd`] | vector instructions beyond the baseline of the target |
 //!
 //! # Conventions
 //!
@@ -81,6 +82,7 @@ pub mod sensors;
 pub mod sequence;
 pub mod shutter;
 pub mod silhouette;
+pub mod simd;
 pub mod temporal;
 pub mod timing_faults;
 pub mod tracker;

@@ -26,9 +26,9 @@ mod source;
 mod truth;
 
 use crate::simd::lanes::{LANES, ZERO, per_lane};
-#[cfg(target_arch = "x86_64")]
-use crate::simd::vectors::Avx2;
 use crate::simd::vectors::{Vectors, widest};
+#[cfg(target_arch = "x86_64")]
+use camsim_core::simd::Avx2;
 use footprint::{Footprint, GridTaps};
 pub use ideal_texels::IdealTexels;
 pub use rays::LensMap;

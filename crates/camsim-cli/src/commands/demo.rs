@@ -140,7 +140,9 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(format_args!("  camsim explain {}", scene.display()))?;
     console
         .line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
-    console.line(format_args!("  camsim viewer {}", scene.display()))?;
+    if cfg!(feature = "viewer") {
+        console.line(format_args!("  camsim viewer {}", scene.display()))?;
+    }
     Ok(())
 }
 

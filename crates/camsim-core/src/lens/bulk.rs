@@ -77,10 +77,10 @@ impl Bulk {
     pub(crate) fn ideal(&self, lens: &Lens, block: &mut Block) {
         match (self, lens) {
             (Self::Pinhole, _) => pinhole(block),
-            (Self::Plane(grid), Lens::BrownConrady(lens)) => grid.ideal(&formula_of(lens), block),
+            (Self::Plane(grid), Lens::BrownConrady(lens)) => formula_of(lens).ideal(grid, block),
             (Self::Plane(grid), Lens::Direction(lens)) => {
                 if let Some(formula) = lens.plane() {
-                    grid.ideal(formula, block);
+                    formula.ideal(grid, block);
                 }
             }
             (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.ideal(lens, block),
@@ -95,10 +95,10 @@ impl Bulk {
                 pinhole(block);
                 plane::to_unit_length(block);
             }
-            (Self::Plane(grid), Lens::BrownConrady(lens)) => grid.rays(&formula_of(lens), block),
+            (Self::Plane(grid), Lens::BrownConrady(lens)) => formula_of(lens).rays(grid, block),
             (Self::Plane(grid), Lens::Direction(lens)) => {
                 if let Some(formula) = lens.plane() {
-                    grid.rays(formula, block);
+                    formula.rays(grid, block);
                 }
             }
             (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.rays(lens, block),

@@ -6,7 +6,7 @@
 macro_rules! widest {
     ($vectors:ident => $work:expr) => {{
         #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = $crate::simd::vectors::Avx2::find() {
+        if let Some(avx2) = camsim_core::simd::Avx2::find() {
             return avx2.run(
                 #[inline(always)]
                 |$vectors| $work,
@@ -131,63 +131,33 @@ impl Vectors for Baseline {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use x86::Avx2;
-
-#[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "functions for processors that have more than all have are unsafe to call")]
 mod x86 {
-    use std::arch::{
-        is_x86_feature_detected,
-        x86_64::{
-            __m128i, __m256, __m256i, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _mm256_add_epi32, _mm256_add_ps,
-            _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtph_ps,
-            _mm256_cvtps_ph, _mm256_movemask_ps, _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256,
-            _mm256_set1_epi32, _mm256_set1_ps, _mm256_sub_epi32,
-        },
+    use std::arch::x86_64::{
+        __m128i, __m256, __m256i, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _mm256_add_epi32, _mm256_add_ps,
+        _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtph_ps,
+        _mm256_cvtps_ph, _mm256_movemask_ps, _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256,
+        _mm256_set1_epi32, _mm256_set1_ps, _mm256_sub_epi32,
     };
+
+    use camsim_core::simd::Avx2;
 
     use super::{Coverage, FloatVector, IntVector, LANE_INDICES, VECTOR_LANES, VectorTriangle, Vectors};
 
-    /// x86-64 with AVX2, FMA and F16C, which nearly all processors have. A value exists only if they were
-    /// detected.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Avx2(());
-
-    impl Avx2 {
-        pub fn find() -> Option<Self> {
-            (is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("f16c"))
-            .then_some(Self(()))
-        }
-
-        /// Runs `work`, compiled for these instructions.
-        pub fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
-            #[target_feature(enable = "avx2,fma,f16c")]
-            fn compiled<R>(avx2: Avx2, work: impl FnOnce(Avx2) -> R) -> R {
-                work(avx2)
-            }
-            // SAFETY: `self` tells that this processor has them.
-            unsafe { compiled(self, work) }
-        }
-    }
-
-    impl Avx2 {
-        /// The sign bit of each lane is set where it is not inside.
-        #[inline(always)]
-        fn outside_mask(self, triangle: &Coverage<'_>) -> __m256 {
-            let [(a, of_a), (b, of_b), (c, of_c)] = triangle.edges;
-            let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
-            let places: __m256i = bytemuck::cast(LANE_INDICES);
-            // SAFETY: `self` tells that this processor has it.
-            unsafe {
-                let sum = |all: i32, per_lane: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), per_lane);
-                let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
-                _mm256_castsi256_ps(_mm256_or_si256(
-                    beside,
-                    _mm256_sub_epi32(_mm256_set1_epi32(triangle.last), places),
-                ))
-            }
+    /// The sign bit of each lane is set where it is not inside.
+    #[inline(always)]
+    fn outside_mask(_: Avx2, triangle: &Coverage<'_>) -> __m256 {
+        let [(a, of_a), (b, of_b), (c, of_c)] = triangle.edges;
+        let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
+        let places: __m256i = bytemuck::cast(LANE_INDICES);
+        // SAFETY: a value of `Avx2` tells that this processor has it.
+        unsafe {
+            let sum = |all: i32, per_lane: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), per_lane);
+            let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
+            _mm256_castsi256_ps(_mm256_or_si256(
+                beside,
+                _mm256_sub_epi32(_mm256_set1_epi32(triangle.last), places),
+            ))
         }
     }
 
@@ -230,7 +200,7 @@ mod x86 {
         #[inline(always)]
         fn is_any_covered(self, triangle: &Coverage<'_>) -> bool {
             // SAFETY: `self` tells that this processor has it.
-            unsafe { _mm256_movemask_ps(self.outside_mask(triangle)) != 0xff }
+            unsafe { _mm256_movemask_ps(outside_mask(self, triangle)) != 0xff }
         }
 
         #[inline(always)]
@@ -242,7 +212,7 @@ mod x86 {
         ) {
             let (depth_sum, old_depth): (__m256, __m256) =
                 (bytemuck::cast(*triangle.depth_sum.1), bytemuck::cast(*depth));
-            let outside_mask = self.outside_mask(&triangle.coverage);
+            let outside_mask = outside_mask(self, &triangle.coverage);
             // SAFETY: `self` tells that this processor has it.
             unsafe {
                 let depth_sum = _mm256_add_ps(_mm256_set1_ps(triangle.depth_sum.0), depth_sum);
@@ -261,7 +231,7 @@ mod x86 {
 
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
-    use camsim_core::noise::pcg4d;
+    use camsim_core::{noise::pcg4d, simd::Avx2};
 
     use super::*;
 

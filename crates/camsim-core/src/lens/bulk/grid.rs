@@ -8,8 +8,6 @@ use crate::lens::Lens;
 /// Cells along each side. Between the nodes of a real lens's picture the start is off by some 1e-4 at most, so that
 /// two steps reach the last bit.
 const CELLS: usize = 128;
-/// Steps before the first test, and steps in all.
-const STEPS: [usize; 2] = [2, 4];
 
 /// Solutions on a grid, and where they are valid.
 #[derive(Clone, Debug)]
@@ -19,7 +17,7 @@ pub(crate) struct Grid {
     /// Points of the formula's plane; NaN where a node has none.
     nodes: Vec<DVec2>,
     /// Radius of the plane within which every point is on the principal branch.
-    inside: f64,
+    pub(super) inside: f64,
 }
 
 impl Grid {
@@ -33,47 +31,39 @@ impl Grid {
         Self { low, cells_per_unit: step.recip(), nodes, inside }
     }
 
-    /// Bilinear between the nodes; NaN outside of the grid.
-    fn start(&self, image: DVec2) -> DVec2 {
-        let place = (image - self.low) * self.cells_per_unit;
-        // Also false for NaN.
-        let is_inside = place.x >= 0.0 && place.y >= 0.0 && place.x < CELLS as f64 && place.y < CELLS as f64;
-        if !is_inside {
-            return DVec2::NAN;
-        }
-        let (x, y) = (place.x as usize, place.y as usize);
-        let share = place - DVec2::new(x as f64, y as f64);
-        let first = y * (CELLS + 1) + x;
-        let Some(&[a, b]) = self.nodes[first..].first_chunk() else { return DVec2::NAN };
-        let Some(&[c, d]) = self.nodes[first + CELLS + 1..].first_chunk() else { return DVec2::NAN };
-        let (upper, lower) = (a + (b - a) * share.x, c + (d - c) * share.x);
-        upper + (lower - upper) * share.y
-    }
-
-    /// Solutions in the formula's plane.
-    fn solve(&self, formula: &dyn PlaneFormula, block: &mut Block) {
+    /// Starts of a block's points: bilinear between the nodes, NaN outside of the grid.
+    #[inline(always)]
+    pub(super) fn start(&self, block: &mut Block) {
+        let (mut first, mut share) = ([0; BLOCK], [[0.0; BLOCK]; 2]);
+        let [x, y] = &block.image;
         for i in 0..BLOCK {
-            let start = self.start(DVec2::new(block.image[0][i], block.image[1][i]));
+            let (column, of_x) = cell((x[i] - self.low.x) * self.cells_per_unit.x);
+            let (row, of_y) = cell((y[i] - self.low.y) * self.cells_per_unit.y);
+            first[i] = row * (CELLS as u64 + 1) + column;
+            (share[0][i], share[1][i]) = (of_x, of_y);
+        }
+        for i in 0..BLOCK {
+            let start = self.between(first[i] as usize, [share[0][i], share[1][i]]);
             (block.at[0][i], block.at[1][i]) = (start.x, start.y);
         }
-        let mut is_solved = false;
-        for step in 0..STEPS[1] {
-            if step < STEPS[0] || !is_solved {
-                formula.step(block);
-            }
-            if step + 1 >= STEPS[0] && !is_solved {
-                is_solved = formula.certify(block, self.inside);
-            }
-        }
     }
 
-    pub(super) fn ideal(&self, formula: &dyn PlaneFormula, block: &mut Block) {
-        self.solve(formula, block);
-        formula.finish_ideal(block);
+    #[inline(always)]
+    fn between(&self, first: usize, [of_x, of_y]: [f64; 2]) -> DVec2 {
+        let Some(&[a, b]) = self.nodes[first..].first_chunk() else { return DVec2::NAN };
+        let Some(&[c, d]) = self.nodes[first + CELLS + 1..].first_chunk() else { return DVec2::NAN };
+        let (upper, lower) = (a + (b - a) * of_x, c + (d - c) * of_x);
+        upper + (lower - upper) * of_y
     }
+}
 
-    pub(super) fn rays(&self, formula: &dyn PlaneFormula, block: &mut Block) {
-        self.solve(formula, block);
-        formula.finish_rays(block);
-    }
+/// The cell of a place along a side, and the share of it, NaN outside. Without a conversion that saturates, so that
+/// it becomes vector instructions.
+#[inline(always)]
+fn cell(place: f64) -> (u64, f64) {
+    /// Added to a small number, it leaves the nearest integer in the lowest bits.
+    const ROUND: f64 = (3_u64 << 51) as f64;
+    let is_inside = (place >= 0.0) & (place < CELLS as f64);
+    let cell = if is_inside { place - 0.5 } else { 0.0 } + ROUND;
+    (cell.to_bits() & (CELLS as u64 - 1), if is_inside { place - (cell - ROUND) } else { f64::NAN })
 }
