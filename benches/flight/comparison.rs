@@ -192,6 +192,10 @@ pub const MS_TO_FIRST: Column = ("ms a frame to the first", |variant, first, _| 
     format!("{:+.1}", quartiles(&differences)[1])
 });
 
+/// Column: time of a frame over that of the first row.
+pub const TIMES_FIRST: Column =
+    ("times the first's time", |variant, first, _| format!("{:.2}", median_ratio(&variant.ms, &first.ms)));
+
 /// Column: how many times the paper preset's frame rate a variant has.
 pub const TIMES_PRESET: Column = ("times the preset's rate", |variant, _, preset| {
     preset.map_or(String::new(), |preset| format!("{:.2}", median_ratio(&preset.ms, &variant.ms)))

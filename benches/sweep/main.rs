@@ -3,12 +3,13 @@
 //! cpu renderer, the gpu renderer and the paper's preset side by side, measured in the same rounds.
 //!
 //! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two
-//! (`renderers`, `size`, `blur`, `effects`, `alike`, `passes`, `houses`, `costs`, `files`).
+//! (`renderers`, `size`, `blur`, `effects`, `alike`, `features`, `passes`, `houses`, `costs`, `files`).
 //! `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 
 mod cameras;
+mod features;
 mod files;
 #[path = "../flight/mod.rs"]
 mod flight;
@@ -21,12 +22,13 @@ use flight::{Outcome, comparison::Renderers};
 /// Prints a table; a single row with one frame unless the program measures.
 type Table = fn(&Renderers, bool) -> Outcome<()>;
 
-const TABLES: [(&str, Table); 9] = [
+const TABLES: [(&str, Table); 10] = [
     ("renderers", cameras::renderers),
     ("size", cameras::size),
     ("blur", cameras::blur),
     ("effects", cameras::effects),
     ("alike", cameras::alike),
+    ("features", features::features),
     ("passes", passes::passes),
     ("houses", houses::houses),
     ("costs", passes::costs),

@@ -65,7 +65,9 @@ def dataset(
 
 def _rendered(samples: Samples, concurrency: int | tuple[int, int], num_cpus: float, batch_size: int) -> Any:
     blocks = max(1, -(-len(samples) // batch_size))
-    numbers = ray.data.range(len(samples), override_num_blocks=blocks)
+    # Not `ray.data.range`: its tasks want processors, and wait forever where a machine was lost and the renderers
+    # have taken those of the others.
+    numbers = ray.data.from_items([{"id": number} for number in range(len(samples))], override_num_blocks=blocks)
     return numbers.map_batches(
         _Renderer,
         fn_constructor_args=(samples,),
@@ -73,6 +75,4 @@ def _rendered(samples: Samples, concurrency: int | tuple[int, int], num_cpus: fl
         batch_format="numpy",
         concurrency=concurrency,
         num_cpus=num_cpus,
-        # A renderer takes a machine's processors: actors go to different machines first.
-        scheduling_strategy="SPREAD",
     )
