@@ -8,6 +8,9 @@ use crate::lens::{BLOCK, Block, Bulk};
 /// How far beside the picture points are still fast, as a share of its size.
 const BESIDE: f64 = 0.05;
 
+/// So few pixels are solved sooner one by one: less than twice the nodes of a grid of starts.
+const FEW: u64 = 32_768;
+
 /// [`CameraModel::unproject`] and [`CameraModel::ray`] for many pixels: the same pixels have an inverse, and the
 /// same one but for rounding, in a fraction of the time. It takes milliseconds to prepare.
 #[derive(Clone, Debug)]
@@ -26,6 +29,15 @@ impl BulkInverse {
         let high = camera.distorted_from_pixel(last + beside);
         let bulk = Bulk::new(&camera.lens, low, high);
         Self { camera, bulk }
+    }
+
+    /// For the pixels of the picture alone: what is prepared is worth it where these are many.
+    pub(super) fn of_picture(camera: CameraModel) -> Self {
+        let [width, height] = camera.size_px;
+        if u64::from(width) * u64::from(height) < FEW {
+            return Self { bulk: Bulk::Singly, camera };
+        }
+        Self::new(camera)
     }
 
     /// Ideal points of as many pixels; NaN where the lens has no inverse.
@@ -58,6 +70,8 @@ impl BulkInverse {
                 *solved = std::array::from_fn(|n| block.solved[n][i]);
                 if solved[0].is_nan() {
                     *solved = singly(DVec2::from_array(*pixel));
+                } else if solved[0].is_infinite() {
+                    *solved = [f64::NAN; N];
                 }
             }
         }

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::*;
-use crate::scenario::{LensSpec, ZoomSpec};
+use crate::scenario::{ChromaticSpec, Face, ImageCircleSpec, LensSpec, Primary, ZoomSpec};
 
 fn s3_opencv() -> CameraModel {
     let k = [-0.428129, 0.158059, 0.000245, -0.002286, -0.029194];
@@ -145,4 +145,66 @@ fn bulk_inverse_is_the_inverse() {
         seen += 1;
     }
     assert!(seen > 3000 && seen < 5000, "{seen}");
+}
+
+/// Cameras with many pixels: every kind of lens that is solved in bulk, or holds one that is.
+fn large_cameras() -> Vec<(&'static str, CameraModel)> {
+    let brown = || LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.1, 0.001, -0.002] };
+    let fisheye = || LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.02, 0.001] };
+    let chromatic = ChromaticSpec { red_scale: vec![1.01, 0.0, -0.004], ..Default::default() };
+    let circle = |radius_px| ImageCircleSpec { radius_px: Some(radius_px), ..Default::default() };
+    let flat = || CameraSpec { size_px: [320, 240], focal_px: [230.0, 232.0], ..Default::default() };
+    let wide = || CameraSpec { size_px: [320, 240], focal_px: [82.0, 81.0], ..Default::default() };
+    let mut specs = vec![
+        ("plane", CameraSpec { lens: brown(), ..flat() }),
+        ("rotation-symmetric", CameraSpec { lens: fisheye(), ..flat() }),
+        (
+            "scaled",
+            CameraSpec {
+                lens: brown(),
+                chromatic: Some(chromatic.clone()),
+                primary: Some(Primary::Red),
+                ..flat()
+            },
+        ),
+        ("circle", CameraSpec { lens: brown(), image_circle: Some(circle(130.0)), ..flat() }),
+        (
+            "circle of scaled",
+            CameraSpec {
+                lens: fisheye(),
+                image_circle: Some(circle(110.0)),
+                chromatic: Some(chromatic),
+                primary: Some(Primary::Red),
+                ..flat()
+            },
+        ),
+    ];
+    for face in Face::ALL {
+        let image_circle = Some(circle(140.0));
+        specs.push(("face", CameraSpec { lens: fisheye(), image_circle, face: Some(face), ..wide() }));
+    }
+    specs.into_iter().map(|(name, spec)| (name, CameraModel::from_spec(&spec).unwrap())).collect()
+}
+
+#[test]
+fn lens_maps_are_the_inverses_of_pixels() {
+    let mut faces = vec![0; 320 * 240];
+    for (name, camera) in large_cameras() {
+        let map = camera.lens_inverse();
+        let mut seen = 0;
+        for (i, uv) in map.iter().enumerate() {
+            let pixel = [i as u32 % 320, i as u32 / 320];
+            let wanted = camera.unproject_pixel(pixel);
+            assert_eq!(uv[0] < INVALID_UV, wanted.is_some(), "{name}, {pixel:?}: {uv:?} for {wanted:?}");
+            let Some(wanted) = wanted else { continue };
+            let off = DVec2::new(f64::from(uv[0]), f64::from(uv[1])).distance(wanted);
+            assert!(off < 1e-7 * (1.0 + wanted.length()), "{name}, {pixel:?}: {uv:?} for {wanted}");
+            seen += 1;
+            faces[i] += usize::from(name == "face");
+        }
+        assert!(seen > 1000 || name == "face", "{name}: {seen}");
+    }
+    // Each pixel of the circle is on one face.
+    assert!(faces.iter().all(|count| *count <= 1));
+    assert!(faces.iter().sum::<usize>() > 50_000);
 }

@@ -5,9 +5,11 @@
 //! polynomials. A point that these do not solve, or that is not surely on the principal branch, is NaN here, and the
 //! caller asks the inverse of single points: both answer the same points.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use super::{BrownConrady, DirectionLens, Lens, brown_conrady::Formula};
+use super::{
+    BrownConrady, DirectionLens, Lens, brown_conrady::Formula, circle::CircleLens, scaled::ScaledLens,
+};
 
 mod grid;
 mod plane;
@@ -33,7 +35,7 @@ pub(crate) struct Block {
     pub image: [[f64; BLOCK]; 2],
     /// Points of the formula's plane.
     at: [[f64; BLOCK]; 2],
-    /// Ideal points or rays; NaN in the first coordinate of what is not solved.
+    /// Ideal points or rays; in the first coordinate NaN for what is not solved, infinity for what has none.
     pub solved: [[f64; BLOCK]; 3],
 }
 
@@ -52,6 +54,10 @@ pub(crate) enum Bulk {
     Plane(Grid),
     /// A function of the radius.
     RotationSymmetric(Box<RotationSymmetric>),
+    /// A lens with a scaled image: of what it is before.
+    Scaled(Box<Bulk>),
+    /// A lens with an image circle: of what it is without.
+    Circle(Box<Bulk>),
     /// Every point by itself.
     Singly,
 }
@@ -69,7 +75,15 @@ impl Bulk {
                 Some(formula) => Self::Plane(Grid::new(lens, formula, [low, high], inside(one, formula))),
                 None => Self::Singly,
             },
-            Lens::Face(_) | Lens::Scaled(_) | Lens::Circle(_) => Self::Singly,
+            Lens::Scaled(one) => {
+                let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
+                    .map(|corner| one.unscaled(corner).unwrap_or(corner));
+                let [low, high] =
+                    [DVec2::min, DVec2::max].map(|end| corners.into_iter().reduce(end).unwrap_or(low));
+                Self::Scaled(Box::new(Self::new(one.whole(), low, high)))
+            }
+            Lens::Circle(one) => Self::Circle(Box::new(Self::new(one.whole(), low, high))),
+            Lens::Face(_) => Self::Singly,
         }
     }
 
@@ -84,6 +98,13 @@ impl Bulk {
                 }
             }
             (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.ideal(lens, block),
+            (Self::Scaled(whole), Lens::Scaled(lens)) => {
+                scaled(lens, block, |block| whole.ideal(lens.whole(), block));
+            }
+            (Self::Circle(whole), Lens::Circle(lens)) => {
+                whole.ideal(lens.whole(), block);
+                within(lens, block, |[x, y, _]| DVec3::new(x, y, 1.0));
+            }
             _ => block.solved[0].fill(f64::NAN),
         }
     }
@@ -102,6 +123,13 @@ impl Bulk {
                 }
             }
             (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.rays(lens, block),
+            (Self::Scaled(whole), Lens::Scaled(lens)) => {
+                scaled(lens, block, |block| whole.rays(lens.whole(), block));
+            }
+            (Self::Circle(whole), Lens::Circle(lens)) => {
+                whole.rays(lens.whole(), block);
+                within(lens, block, |[x, y, z]| DVec3::new(x, y, z));
+            }
             _ => block.solved[0].fill(f64::NAN),
         }
     }
@@ -119,6 +147,29 @@ fn inside_of(lens: &BrownConrady) -> f64 {
 fn inside(lens: &DirectionLens, formula: &dyn PlaneFormula) -> f64 {
     let (sin, cos) = (SURELY_INSIDE * lens.smallest_angle()).sin_cos();
     formula.place(DVec2::new(sin, 0.0).extend(cos)).length()
+}
+
+/// Solves points as they are before the image is scaled.
+fn scaled(lens: &ScaledLens, block: &mut Block, solve: impl FnOnce(&mut Block)) {
+    let image = block.image;
+    let [x, y] = &mut block.image;
+    for (x, y) in x.iter_mut().zip(y) {
+        let before = lens.unscaled(DVec2::new(*x, *y)).unwrap_or(DVec2::NAN);
+        (*x, *y) = (before.x, before.y);
+    }
+    solve(block);
+    block.image = image;
+}
+
+/// Leaves what a lens shows.
+fn within(lens: &CircleLens, block: &mut Block, ray: impl Fn([f64; 3]) -> DVec3) {
+    for i in 0..BLOCK {
+        let solved = [0, 1, 2].map(|k: usize| block.solved[k][i]);
+        let image = DVec2::new(block.image[0][i], block.image[1][i]);
+        if !solved[0].is_nan() && !lens.shows(ray(solved), image) {
+            block.solved[0][i] = f64::INFINITY;
+        }
+    }
 }
 
 /// What is not finite has no inverse.

@@ -42,7 +42,7 @@ impl CircleLens {
         self.half_angle_rad
     }
 
-    fn shows(&self, ray: DVec3, distorted: DVec2) -> bool {
+    pub(super) fn shows(&self, ray: DVec3, distorted: DVec2) -> bool {
         ((distorted - self.centre) * self.focal_px).length() <= self.radius_px + HAIR_PX
             && ray.truncate().length().atan2(ray.z) <= self.half_angle_rad
     }

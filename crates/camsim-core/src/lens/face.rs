@@ -49,7 +49,16 @@ impl FaceLens {
 
     /// `None` for points that other faces hold, but for those near the border.
     pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        let ray = self.ray(distorted)?;
+        self.ideal(self.whole.ray(distorted)?)
+    }
+
+    /// Ideal point of a ray of the whole camera that this face is made from.
+    pub(crate) fn held(&self, whole: DVec3) -> Option<DVec2> {
+        if whole.is_nan() || Face::of(whole) != self.face { None } else { self.ideal(whole) }
+    }
+
+    fn ideal(&self, whole: DVec3) -> Option<DVec2> {
+        let ray = self.whole_from_face.transpose() * whole;
         let uv = ray.truncate() / ray.z;
         (ray.z > 0.0 && uv.abs().max_element() <= MOST_TANGENT).then_some(uv)
     }

@@ -138,8 +138,13 @@ impl ScaledLens {
         self.scale.jacobian(self.whole.distort(ideal)) * self.whole.jacobian(ideal)
     }
 
+    /// A distorted point before its image is scaled; `None` for one that nothing is scaled to.
+    pub(super) fn unscaled(&self, distorted: DVec2) -> Option<DVec2> {
+        self.scale.undo(distorted)
+    }
+
     pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        self.whole.undistort(self.scale.undo(distorted)?)
+        self.whole.undistort(self.unscaled(distorted)?)
     }
 
     pub(super) fn image(&self, ray: DVec3) -> DVec2 {
@@ -152,7 +157,7 @@ impl ScaledLens {
     }
 
     pub(super) fn ray(&self, distorted: DVec2) -> Option<DVec3> {
-        self.whole.ray(self.scale.undo(distorted)?)
+        self.whole.ray(self.unscaled(distorted)?)
     }
 
     pub(super) fn contains_ray(&self, ray: DVec3) -> bool {

@@ -1,6 +1,7 @@
 //! Starts of Newton's iteration: solutions on a grid of distorted points.
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::{BLOCK, Block, PlaneFormula};
 use crate::lens::Lens;
@@ -27,7 +28,7 @@ impl Grid {
             let at = low + step * DVec2::new((k % (CELLS + 1)) as f64, (k / (CELLS + 1)) as f64);
             lens.ray(at).map_or(DVec2::NAN, |ray| formula.place(ray))
         };
-        let nodes = (0..(CELLS + 1) * (CELLS + 1)).map(node).collect();
+        let nodes = (0..(CELLS + 1) * (CELLS + 1)).into_par_iter().map(node).collect();
         Self { low, cells_per_unit: step.recip(), nodes, inside }
     }
 

@@ -15,7 +15,7 @@ const STEPS: [usize; 2] = [2, 4];
 ///
 /// The functions of blocks are compiled for each formula: no implementation replaces them. A formula's own functions
 /// are `#[inline(always)]`, so that the loops become vector instructions.
-pub(in crate::lens) trait PlaneFormula {
+pub(in crate::lens) trait PlaneFormula: Sync {
     /// Distorted point and Jacobian of a point of the plane.
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2);
 
