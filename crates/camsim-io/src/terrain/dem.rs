@@ -1,6 +1,9 @@
 //! A digital elevation model: heights stay in the file's type and are converted to metres on access.
 
-use std::path::{Path, PathBuf};
+use std::{
+    f64::consts::PI,
+    path::{Path, PathBuf},
+};
 
 use rayon::prelude::*;
 
@@ -25,6 +28,9 @@ use super::{
 /// Range of plausible heights, metres: from below the deepest sea to above the highest mountain. Others are
 /// undeclared no-data values.
 const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
+
+/// The Earth's mean radius.
+const MEAN_RADIUS_M: f64 = 6_371_000.0;
 
 /// Range of common heights, metres; others are reported.
 const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
@@ -253,6 +259,23 @@ impl Dem {
     /// Latitude, longitude of a post, radians; `None` outside of the projection's domain.
     pub fn geodetic_rad(&self, post: [u32; 2]) -> Option<[f64; 2]> {
         self.crs.geodetic_from_model(self.model(post))
+    }
+
+    /// Width along the middle row and height along the middle column on the ground; `None` where the projection
+    /// ends within.
+    pub fn ground_size_m(&self) -> Option<[f64; 2]> {
+        let [width, height] = self.size;
+        let between = |from: [u32; 2], to: [u32; 2]| {
+            let [[from_lat, from_lon], [to_lat, to_lon]] = [self.geodetic_rad(from)?, self.geodetic_rad(to)?];
+            let turn = (to_lon - from_lon + PI).rem_euclid(2.0 * PI) - PI;
+            let east = turn * (0.5 * (from_lat + to_lat)).cos();
+            Some(MEAN_RADIUS_M * east.hypot(to_lat - from_lat))
+        };
+        let across = between([0, height / 2], [width - 1, height / 2])?;
+        let down = between([width / 2, 0], [width / 2, height - 1])?;
+        // From posts to cells.
+        let cells = |length: f64, posts: u32| length * f64::from(posts) / f64::from(posts - 1);
+        Some([cells(across, width), cells(down, height)])
     }
 
     /// Number of posts outside of the projection's domain.

@@ -37,6 +37,9 @@ pub(super) struct Ortho {
 /// screen pixel, mip levels keep the image's border exact to a texel.
 const MARGIN_PX: u32 = 64;
 
+/// Largest logarithm of the ratio of two shapes, width over height, that are taken for the same.
+const LIKE_SHAPE: f64 = 0.05;
+
 /// Georeference of an ortho-image.
 pub(super) struct OrthoGeoreference {
     pixel_from_model: Affine,
@@ -89,6 +92,7 @@ impl Ortho {
                 texture = crate::pictures::oriented(texture, orientation);
             }
             notes.extend(geo.notes);
+            notes.extend(stretched(texture.size_px, dem));
             let valid = valid_pixels(&texture);
             fill_invalid(&mut texture, None, spec.beyond);
             return Ok(Self {
@@ -180,6 +184,21 @@ impl Ortho {
         let [x, y] = [0, 1].map(|k: usize| pixel[k].min(size[k] - 1.0) as usize);
         valid[y * size[0] as usize + x]
     }
+}
+
+/// Says that a picture without georeference has neither the shape of the DEM's ground nor that of its grid.
+fn stretched(size_px: [u32; 2], dem: &Dem) -> Option<String> {
+    let aspect = |[width, height]: [f64; 2]| width / height;
+    let of_picture = aspect(size_px.map(f64::from));
+    let of_ground = aspect(dem.ground_size_m()?);
+    let is_like = |other: f64| (of_picture / other).ln().abs() < LIKE_SHAPE;
+    (!is_like(of_ground) && !is_like(aspect(dem.size.map(f64::from)))).then(|| {
+        format!(
+            "it has no georeference and is spread over the DEM, which makes it {:.2} times as wide for its height: if it shows \
+             other ground, give it a world file, or cut it to the DEM's extent",
+            of_ground / of_picture
+        )
+    })
 }
 
 /// Whether each pixel has an alpha above 0; `None` if all have.

@@ -200,6 +200,13 @@ fn ortho_image_is_placed_by_its_georeference() {
     // Without georeference the image covers the DEM's extent.
     let loaded = read_terrain(&spec(&dem, Some(&ortho)), &ned, None).unwrap();
     assert_eq!((loaded.terrain.vertices[0].uv, loaded.summary.outside_ortho), ([0.125, 1.0 / 6.0], 0));
+    let is_stretched =
+        |notes: &[String]| notes.iter().any(|note| note.contains("times as wide for its height"));
+    assert!(!is_stretched(&loaded.notes), "{:?}", loaded.notes);
+    let square = folder.path().join("square.png");
+    image::RgbImage::from_pixel(8, 8, image::Rgb([9, 8, 7])).save(&square).unwrap();
+    let notes = read_terrain(&spec(&dem, Some(&square)), &ned, None).unwrap().notes;
+    assert!(is_stretched(&notes) && notes.iter().any(|note| note.contains("1.33 times")), "{notes:?}");
     // 5 m pixels from 10 m further west and north.
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 499992.5 5000007.5").unwrap();
     let with_edge = TerrainSpec { beyond: Beyond::Edge, ..spec(&dem, Some(&ortho)) };
