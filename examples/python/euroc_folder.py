@@ -1,6 +1,6 @@
 """A EuRoC folder (pictures, inertial unit, true poses) in 20 lines; `camsim export --as euroc` writes all of it.
 
-python euroc_folder.py assets/demo.toml euroc 30
+python euroc_folder.py [SCENARIO.toml]: 30 frames of it, or of the built-in flight, into euroc/
 """
 
 import pathlib
@@ -10,8 +10,9 @@ import numpy as np
 
 import camsim
 
-folder, count = pathlib.Path(sys.argv[2]) / "mav0", int(sys.argv[3])
-scenario = camsim.Scenario.load(sys.argv[1], sets={"imu": [{"name": "imu0", "rate_hz": 200, "axes": "flu"}]})
+folder, count = pathlib.Path("euroc/mav0"), 30
+scenario = camsim.Scenario.load(sys.argv[1]) if sys.argv[1:] else camsim.Scenario.demo()
+scenario = scenario.replace({"imu": [{"name": "imu0", "rate_hz": 200, "axes": "flu"}]})
 for part in ("cam0/data", "imu0", "state_groundtruth_estimate0"):
     (folder / part).mkdir(parents=True, exist_ok=True)
 

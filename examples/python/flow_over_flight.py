@@ -1,6 +1,6 @@
 """How the picture moves over a flight: optical flow to the next frame, and what it hides.
 
-python flow_over_flight.py assets/demo.toml
+python flow_over_flight.py [SCENARIO.toml]; without it, the built-in flight
 """
 
 import sys
@@ -9,7 +9,7 @@ import numpy as np
 
 import camsim
 
-scenario = camsim.Scenario.load(sys.argv[1])
+scenario = camsim.Scenario.load(sys.argv[1]) if sys.argv[1:] else camsim.Scenario.demo()
 print("frame  time_s  speed_m_s  median_px  p99_px  hidden  left")
 for frame in scenario.frames(step=max(1, len(scenario) // 20), channels=["flow"]):
     state = frame.flow[..., 2]

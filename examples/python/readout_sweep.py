@@ -1,6 +1,7 @@
 """What a rolling shutter costs a tracker that takes it for a global one: rotation by tracked points against the true one.
 
-pip install opencv-python-headless matplotlib; python readout_sweep.py assets/demo.toml sweep.png
+pip install opencv-python-headless matplotlib; python readout_sweep.py [SCENARIO.toml]:
+of it, or of the built-in flight; the plot is sweep.png
 """
 
 import sys
@@ -16,7 +17,8 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
 READOUTS_MS = [0, 5, 10, 15, 20, 25, 30]
-scenario = camsim.Scenario.load(sys.argv[1], sets={"camera.shutter.exposure_ms": 0, "camera.photometric.noise_sigma": 0.002})
+scenario = camsim.Scenario.load(sys.argv[1]) if sys.argv[1:] else camsim.Scenario.demo()
+scenario = scenario.replace({"camera.shutter.exposure_ms": 0, "camera.photometric.noise_sigma": 0.002})
 
 
 def rotation(wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,9 +34,9 @@ def error_deg(one: camsim.Frame, other: camsim.Frame, swept: camsim.Scenario) ->
     points = cv2.goodFeaturesToTrack(pictures[0], 600, 0.01, 8)
     moved, ok, _ = cv2.calcOpticalFlowPyrLK(pictures[0], pictures[1], points, None)
     tracked = ok.ravel() == 1
-    rays = [swept.lens.undistort(pixels.reshape(-1, 2)[tracked]) for pixels in (points, moved)]
-    essential, inliers = cv2.findEssentialMat(*rays, np.eye(3), threshold=1e-3)
-    _, estimated, _, _ = cv2.recoverPose(essential, *rays, np.eye(3), mask=inliers)
+    before, after = (swept.lens.undistort(pixels.reshape(-1, 2)[tracked]) for pixels in (points, moved))
+    essential, inliers = cv2.findEssentialMat(before, after, np.eye(3), threshold=1e-3)
+    _, estimated, _, _ = cv2.recoverPose(essential, before, after, np.eye(3), mask=inliers)
     poses = [swept.trajectory.camera_at_ns(frame.stamp_ns).ned_from_camera_wxyz for frame in (one, other)]
     true = rotation(poses[1]).T @ rotation(poses[0])
     return float(np.degrees(np.arccos(np.clip((np.trace(estimated @ true.T) - 1) / 2, -1, 1))))
@@ -52,4 +54,4 @@ plt.plot(READOUTS_MS, medians, "o-")
 plt.xlabel("readout, ms")
 plt.ylabel("median error of the rotation, degrees")
 plt.title("A tracker that takes a rolling shutter for a global one")
-plt.savefig(sys.argv[2])
+plt.savefig("sweep.png")

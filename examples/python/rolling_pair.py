@@ -1,6 +1,6 @@
 """Pairs for learning: a rolling shutter, a global one at the same instant, and the displacement between them.
 
-python rolling_pair.py assets/demo.toml pairs 10
+python rolling_pair.py [SCENARIO.toml]: ten pairs of it, or of the built-in flight, into pairs/
 """
 
 import pathlib
@@ -10,8 +10,9 @@ import numpy as np
 
 import camsim
 
-scenario_path, folder, count = sys.argv[1], pathlib.Path(sys.argv[2]), int(sys.argv[3])
-rolling = camsim.Scenario.load(scenario_path, sets={"camera.shutter.exposure_ms": 0})
+folder, count = pathlib.Path("pairs"), 10
+scenario = camsim.Scenario.load(sys.argv[1]) if sys.argv[1:] else camsim.Scenario.demo()
+rolling = scenario.replace({"camera.shutter.exposure_ms": 0})
 sharp = rolling.replace({"camera.shutter.readout_ms": 0})
 
 folder.mkdir(parents=True, exist_ok=True)
