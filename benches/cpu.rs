@@ -1,5 +1,5 @@
-//! Work on the processor, each part alone: plans, row poses, terrain triangles, tracker and file encoding. No
-//! graphics adapter is needed.
+//! Work on the processor, each part alone: lens maps, plans, row poses, terrain triangles, tracker and file
+//! encoding. No graphics adapter is needed.
 //!
 //! `cargo bench --bench cpu`
 
@@ -13,9 +13,13 @@ use std::{
 
 use camsim::{
     core::{
+        camera::CameraModel,
         frame::RenderedFrame,
         pose::CameraPose,
-        scenario::{Channel, ExrCompression, ImageFormat, OutputSpec, TrackerKind, TrackerSpec},
+        scenario::{
+            CameraSpec, Channel, ExrCompression, ImageFormat, LensModel, LensSpec, OutputSpec, TrackerKind,
+            TrackerSpec,
+        },
         scene::{Terrain, TerrainDetail},
         tracker::track,
     },
@@ -43,11 +47,29 @@ fn main() -> Outcome<()> {
         .sample_size(20)
         .configure_from_args();
     let loaded = flight::load()?;
+    lens_maps(&mut criterion, &loaded)?;
     planning(&mut criterion, &loaded)?;
     terrain(&mut criterion, &loaded)?;
     tracking(&mut criterion, &loaded);
     files(&mut criterion, &loaded)?;
     criterion.final_summary();
+    Ok(())
+}
+
+/// The table of rays that is made once for each lens or zoom value.
+fn lens_maps(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
+    let mut group = criterion.benchmark_group("lens map");
+    let spec = &loaded.sequence.scenario.camera;
+    for (name, model, coefficients) in [
+        ("brown-conrady", LensModel::BrownConrady, &[-0.28, 0.07, 6e-4, -4e-4, -0.006][..]),
+        ("kannala-brandt", LensModel::KannalaBrandt, &[-0.02, 0.004, -0.003, 5e-4]),
+        ("double-sphere", LensModel::DoubleSphere, &[-0.2, 0.6]),
+    ] {
+        let lens = LensSpec { model, coefficients: coefficients.to_vec() };
+        let camera = CameraModel::from_spec(&CameraSpec { lens, ..spec.clone() })?;
+        group.bench_function(name, |bencher| bencher.iter(|| black_box(&camera).lens_inverse()));
+    }
+    group.finish();
     Ok(())
 }
 
