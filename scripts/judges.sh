@@ -1,5 +1,6 @@
 #!/bin/sh
-# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, DuckDB. Renders a small scene, and makes a Python
+# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, DuckDB. OpenCV also calibrates three lenses from pictures.
+# Renders small scenes, and makes a Python
 # environment with these packages (a download of about 300 MB, once).
 #   CAMSIM=target/release/camsim   the program; without it, it is built
 #   JUDGES_VENV=DIR                the environment; default target/judges-venv
@@ -61,4 +62,5 @@ for format in kalibr euroc orbslam3 basalt stmap; do
 done
 judge calibrations "$calib"
 judge shards "$dir/rig/run"
+judge lens_calibration "${CAMSIM:-cargo run --quiet --}"
 say "judges: all agree"

@@ -74,6 +74,9 @@ def find(picture, columns, rows, expected):
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(picture, (columns, rows), flags=flags)
     if not found:
+        # Rows that a fisheye bends much only the classic detector follows.
+        found, corners = cv2.findChessboardCorners(picture, (columns, rows), flags=cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE)
+    if not found:
         return None
     # The detector's own places suffer where the lens bends the rows; the classic refinement does not.
     stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 200, 1e-4)
