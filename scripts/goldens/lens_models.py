@@ -2,7 +2,8 @@
 """Goldens of the lens models beside Brown-Conrady and Kannala-Brandt: pixels of rays by OpenCV, COLMAP and the papers' formulas.
 
 Writes tests/data/lens_models.csv (the cameras) and tests/data/lens_models_forward.csv (x, y, z of a ray and its pixel). Reads the
-calibrations of shared data/calib/other_models_real.csv, whose folder is the argument.
+calibrations of shared data/calib/other_models_real.csv, whose folder is the argument, and those of published_lenses.csv beside this
+script, collected from public repositories: its last column says where from.
 
     pip install opencv-contrib-python-headless pycolmap numpy
     python3 scripts/goldens/lens_models.py DATA/calib
@@ -126,8 +127,10 @@ BY = {
 
 def cameras(folder):
     """Cameras: name, model, size, fx, fy, cx, cy, coefficients, whether the calibration was published."""
-    def camera(name, model, size, f, c, k, kind="made"):
-        return dict(name=name, model=model, width=size[0], height=size[1], fx=f[0], fy=f[1], cx=c[0], cy=c[1], k=list(map(float, k)), kind=kind)
+    def camera(name, model, size, f, c, k, kind="made", source=""):
+        (width, height), (fx, fy), (cx, cy) = size, f, c
+        k = list(map(float, k))
+        return dict(name=name, model=model, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, k=k, kind=kind, source=source)
 
     found = []
     with open(folder / "other_models_real.csv", newline="") as file:
@@ -136,13 +139,13 @@ def cameras(folder):
             p = json.loads(row["parameters_json"])
             if row["model"] == "MEI":
                 f, c = (p["gamma1"], p["gamma2"]), (p["u0"], p["v0"])
-                found.append(camera(row["name"], "mei", size, f, c, [p[key] for key in ("xi", "k1", "k2", "p1", "p2")], "published"))
+                found.append(camera(row["name"], "mei", size, f, c, [p[key] for key in ("xi", "k1", "k2", "p1", "p2")], "published", row["source"]))
             elif row["model"].startswith("double sphere"):
                 f, c = (p["fx"], p["fy"]), (p["cx"], p["cy"])
-                found.append(camera(row["name"], "double-sphere", size, f, c, [p["xi"], p["alpha"]], "published"))
+                found.append(camera(row["name"], "double-sphere", size, f, c, [p["xi"], p["alpha"]], "published", row["source"]))
     # COLMAP's own test values (src/colmap/sensor/models_test.cc), which are a lens of Project Aria.
     aria = [-0.0232, 0.0924, -0.0591, 0.003, 0.0048, -0.0009, 0.0002, 0.0005, -0.0009, -0.0001, 0.00007, -0.00017]
-    found.append(camera("colmap_test_aria", "fisheye624", (640, 480), (241.6, 241.6), (319.2, 240.7), aria, "published"))
+    found.append(camera("colmap_test_aria", "fisheye624", (640, 480), (241.6, 241.6), (319.2, 240.7), aria, "published", "colmap/colmap src/colmap/sensor/models_test.cc"))
     euroc = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0, 0.0, 0.0, 0.0]
     k4a = [0.5, -2.6, 0.0008, -0.0003, 1.5, 0.38, -2.4, 1.4]
     for name, k in [
@@ -170,6 +173,11 @@ def cameras(folder):
     found.append(camera("f_theta_skewed", "f-theta", (1920, 1208), (920.0, 920.0), (957.0, 605.0), polynomial + [1.01, 0.002, -0.003]))
     inverse = [1.0, 0.02, -0.01, 0.03, -0.002]
     found.append(camera("f_theta_inverse", "f-theta-inverse", (1920, 1208), (920.0, 920.0), (957.0, 605.0), inverse + [0.99, 0.001, 0.002]))
+    with open(pathlib.Path(__file__).with_name("published_lenses.csv"), newline="") as file:
+        for row in csv.DictReader(file):
+            fx, fy, cx, cy = (float(row[key]) for key in ("fx", "fy", "cx", "cy"))
+            size, k = (int(row["width"]), int(row["height"])), row["coefficients"].split()
+            found.append(camera(row["name"], row["model"], size, (fx, fy), (cx, cy), k, row["kind"], row["source"]))
     return found
 
 
@@ -179,8 +187,10 @@ def main():
     sets, rows = [], []
     for c in cameras(pathlib.Path(sys.argv[1])):
         project, widest = BY[c["model"]]
+        if c["model"].startswith("f-theta") and len(c["k"]) == 9:
+            widest = min(widest, c["k"][8])
         sets.append([c["name"], c["model"], *(repr(c[key]) for key in ("width", "height")), *(repr(float(c[key])) for key in ("fx", "fy", "cx", "cy")),
-                     " ".join(repr(k) for k in c["k"]), c["kind"]])
+                     " ".join(repr(k) for k in c["k"]), c["kind"], c["source"]])
         theta, phi = widest * np.sqrt(random.random(24)), random.random(24) * 2 * np.pi
         length = 0.5 + 4.0 * random.random(24)
         rays = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1) * length[:, None]
@@ -188,7 +198,7 @@ def main():
             if np.isfinite(px).all():
                 rows.append([c["name"], *(repr(float(value)) for value in (*ray, *px))])
     for name, header, lines in (
-        ("lens_models.csv", "name,model,width,height,fx,fy,cx,cy,coefficients,kind", sets),
+        ("lens_models.csv", "name,model,width,height,fx,fy,cx,cy,coefficients,kind,source", sets),
         ("lens_models_forward.csv", "set,x,y,z,x_px,y_px", rows),
     ):
         with open(DATA / name, "w", newline="") as file:

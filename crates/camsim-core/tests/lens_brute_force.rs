@@ -54,12 +54,26 @@ impl Set {
         }
         let r = p.x.hypot(p.y);
         let above = 1.0 + k[0] * r.powi(2) + k[1] * r.powi(4) + k[4] * r.powi(6);
-        let below = 1.0 + k[5] * r.powi(2) + k[6] * r.powi(4) + k[7] * r.powi(6);
-        let radial = above / below;
+        let radial = above / self.below(r);
         DVec2::new(
             p.x * radial + 2.0 * k[2] * p.x * p.y + k[3] * (r * r + 2.0 * p.x * p.x),
             p.y * radial + k[2] * (r * r + 2.0 * p.y * p.y) + 2.0 * k[3] * p.x * p.y,
         )
+    }
+
+    /// The denominator of a Brown-Conrady lens.
+    fn below(&self, r: f64) -> f64 {
+        let k = &self.k;
+        1.0 + k[5] * r.powi(2) + k[6] * r.powi(4) + k[7] * r.powi(6)
+    }
+
+    /// Beyond a pole the determinant may be positive again.
+    fn is_regular(&self, p: DVec2) -> bool {
+        !self.has_pole(p.length()) && self.determinant(p) > 0.0
+    }
+
+    fn has_pole(&self, r: f64) -> bool {
+        self.model == LensModel::BrownConrady && self.below(r) <= 0.0
     }
 
     fn determinant(&self, p: DVec2) -> f64 {
@@ -72,17 +86,17 @@ impl Set {
         a.perp_dot(b)
     }
 
-    /// First radius along a ray at which the determinant is not positive, at most that of 89 degrees.
+    /// First radius along a ray at which the lens is not regular, at most that of 89 degrees.
     fn fold_radius(&self, phi: f64) -> f64 {
         let ray = DVec2::from_angle(phi);
         let radius = |step: usize| (step as f64 / STEPS as f64 * 89.0 * PI / 180.0).tan();
-        let Some(first) = (1..=STEPS).find(|step| self.determinant(ray * radius(*step)) <= 0.0) else {
+        let Some(first) = (1..=STEPS).find(|step| !self.is_regular(ray * radius(*step))) else {
             return radius(STEPS);
         };
         let (mut good, mut bad) = (radius(first - 1), radius(first));
         for _ in 0..40 {
             let middle = 0.5 * (good + bad);
-            *(if self.determinant(ray * middle) > 0.0 { &mut good } else { &mut bad }) = middle;
+            *(if self.is_regular(ray * middle) { &mut good } else { &mut bad }) = middle;
         }
         0.5 * (good + bad)
     }
@@ -122,13 +136,15 @@ fn judge(set: &Set) -> usize {
             camera.lens.fold_radius(phi)
         );
     }
-    // 0.1 % inside, which avoids the rounding errors near a pole and moves the image by 1e-6 at a fold.
+    // 0.1 % inside, which moves the image by 1e-6 at a fold. At a pole it may be flung out as late as 1e-5 before;
+    // finite differences see the pole 2e-6 before.
     let border: Vec<DVec2> = fold
         .iter()
         .enumerate()
         .map(|(ray, radius)| {
+            let inside = if set.has_pole(radius * (1.0 + 1e-5)) { 1e-5 } else { 1e-3 };
             let image =
-                set.forward(DVec2::from_angle(ray as f64 * TAU / RAYS as f64) * (radius * (1.0 - 1e-3)));
+                set.forward(DVec2::from_angle(ray as f64 * TAU / RAYS as f64) * (radius * (1.0 - inside)));
             image * camera.focal_px + camera.principal_point_px
         })
         .collect();

@@ -72,8 +72,10 @@ impl Branch {
         let limit = one_to_one_limit(map, &border, limit, least);
         if border.range().1 > limit {
             let whole = border.clone();
-            // Directions of a curve are exact on its rays.
-            border = FoldCurve::with_limit(|phi| Some(whole.radius(phi).min(limit)), limit, false, value);
+            // Of its rays: between two sheets the curve has the smaller radius, and phi is rounded.
+            let of_ray =
+                |phi: f64| whole.radii()[(phi / TAU * FOLD_RAYS as f64).round() as usize % FOLD_RAYS];
+            border = FoldCurve::with_limit(|phi| Some(of_ray(phi).min(limit)), limit, false, value);
         }
         let centre = map.value(DVec2::ZERO);
         let starts = starts(map, &border);
@@ -181,14 +183,14 @@ impl Branch {
         let mut stalls = 0;
         for _ in 0..MAX_STEPS {
             let mut step = solve_linear(map.jacobian(at), -error)?;
-            let mut next = self.inside(at, at + step);
+            let mut next = self.inside(map, at, at + step);
             let mut next_error = map.value(next) - image;
             for _ in 0..20 {
                 if next_error.length_squared() <= error.length_squared() {
                     break;
                 }
                 step *= 0.5;
-                next = self.inside(at, at + step);
+                next = self.inside(map, at, at + step);
                 next_error = map.value(next) - image;
             }
             let (before, after) = (error.length_squared(), next_error.length_squared());
@@ -225,7 +227,7 @@ impl Branch {
             let Some(mut step) = solve_linear(map.jacobian(at), -full) else { return at };
             let mut moved = None;
             for _ in 0..20 {
-                let next = self.inside(at, at + step);
+                let next = self.inside(map, at, at + step);
                 let next_value = map.value(next);
                 let next_error = flat(next_value) - wanted;
                 if next_error.length_squared() < error.length_squared() {
@@ -241,13 +243,14 @@ impl Branch {
     }
 
     /// `to`, or if that is outside, the point in its direction midway between the radius of `from` and the border.
-    fn inside(&self, from: DVec2, to: DVec2) -> DVec2 {
+    fn inside(&self, map: &impl ChartMap, from: DVec2, to: DVec2) -> DVec2 {
         let radius = to.length();
         if radius < self.border.smallest() {
             return to;
         }
         let border = self.border.radius(to.y.atan2(to.x));
-        if radius < border {
+        // Between two sheets the curve has the smaller radius, and the branch may reach farther.
+        if radius < border || self.border.has_sheets(to.y.atan2(to.x)) && self.contains(map, to) {
             return to;
         }
         to.normalize_or_zero() * (0.5 * (from.length().min(border) + border))

@@ -81,6 +81,12 @@ impl FoldCurve {
         (here.min(next), here.max(next))
     }
 
+    /// Whether the two rays about a direction end on different sheets.
+    pub(super) fn has_sheets(&self, phi_rad: f64) -> bool {
+        let (near, far) = self.neighbours(phi_rad);
+        far > SHEET_RATIO * near
+    }
+
     /// Smallest radius.
     pub fn smallest(&self) -> f64 {
         self.smallest
