@@ -50,20 +50,28 @@ def determinant(model, k, r, phi):
     return (d_r[:, 0] * d_phi[:, 1] - d_r[:, 1] * d_phi[:, 0]).reshape(shape)
 
 
+def pole(model, k):
+    """Radius of the first zero of a rational lens's denominator; beyond, the determinant may be positive again."""
+    below = np.append(k[5:8], np.zeros(3))[:3] if model == "brown-conrady" else np.zeros(3)
+    roots = np.roots([*below[::-1], 1.0])
+    real = roots[np.abs(roots.imag) < 1e-12].real
+    return np.sqrt(min(real[real > 0.0], default=np.inf))
+
+
 def branch(model, k):
     """Polar grid (radii, angles), its image, and which of its points lie before the first fold of their ray."""
     radii = np.tan(np.linspace(0.0, MAX_FIELD, STEPS + 1)[1:])
     angles = np.arange(RAYS) * 2 * np.pi / RAYS
     grid_r, grid_phi = np.meshgrid(radii, angles, indexing="ij")
     det = determinant(model, k, grid_r, grid_phi)
-    regular = np.logical_and.accumulate(det > 0.0, axis=0)
+    regular = np.logical_and.accumulate((det > 0.0) & (grid_r < pole(model, k)), axis=0)
     image = forward(model, k, polar(grid_r.ravel(), grid_phi.ravel())).reshape(grid_r.shape + (2,))
     return radii, angles, image, regular
 
 
 def before_fold(model, k, r, phi):
     """Whether det J stays positive from the axis to (r, phi), on 400 radii."""
-    return bool((determinant(model, k, np.linspace(r / 400, r * (1 - 1e-7), 400), phi) > 0.0).all())
+    return r < pole(model, k) and bool((determinant(model, k, np.linspace(r / 400, r * (1 - 1e-7), 400), phi) > 0.0).all())
 
 
 def search(model, k, prepared, target):
@@ -81,7 +89,7 @@ def search(model, k, prepared, target):
         offsets = np.linspace(-1.0, 1.0, 9)
         residual = np.inf
         for _ in range(75):
-            theta = np.clip(centre_theta + box_theta * offsets, 0.0, MAX_FIELD)
+            theta = np.clip(centre_theta + box_theta * offsets, 0.0, min(MAX_FIELD, np.arctan(pole(model, k))))
             phi = centre_phi + box_phi * offsets
             t, p = np.meshgrid(theta, phi, indexing="ij")
             errors = np.linalg.norm(forward(model, k, polar(np.tan(t).ravel(), p.ravel())) - target, axis=1)
