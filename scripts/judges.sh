@@ -1,7 +1,6 @@
 #!/bin/sh
 # Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, DuckDB. OpenCV also calibrates three lenses from pictures.
-# Renders small scenes, and makes a Python
-# environment with these packages (a download of about 300 MB, once).
+# Renders small scenes, and makes a Python environment with these packages (a download of about 300 MB, once).
 #   CAMSIM=target/release/camsim   the program; without it, it is built
 #   JUDGES_VENV=DIR                the environment; default target/judges-venv
 #   JUDGES_DIR=DIR                 scenes and exports; default target/judges, made anew
