@@ -206,6 +206,9 @@ fn warn_of_delivery(sequence: &Sequence, frame: u64, console: &mut Console<'_>) 
         Some(Delivery::Doubled(picture)) => console.warn(format_args!(
             "frame {frame} is doubled by camera.timing: it has the picture of frame {picture}, whose plan this is"
         )),
+        Some(Delivery::Missed) => console.warn(format_args!(
+            "frame {frame} has no trigger by camera.timing: `render` leaves it out; this is the plan that it would have"
+        )),
         Some(Delivery::Own) | None => {}
     }
 }
