@@ -10,7 +10,7 @@ use camsim_core::{
     timing_faults::Delivery,
     tracker::{ResolvedLimits, Saturation},
 };
-use camsim_engine::MOVING_RAYS;
+use camsim_engine::{MOVING_RAYS, SMALL_LAMP_PX};
 use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
 use camsim_plan::{FramePlan, Placement, PlanSummary, Planner};
 use serde::Serialize;
@@ -301,6 +301,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         console.print(&plan.to_string())?;
     }
     print_moving(&moving, console)?;
+    print_lamps(&loaded.sequence.scene, console)?;
     print_source(&source_frame, &plan, console)?;
     let Placement { ideal, reverse } = plan.placement;
     console.line(format_args!("rendered on {engine}"))?;
@@ -475,6 +476,18 @@ fn print_moving(moving: &[&str], console: &mut Console<'_>) -> Result<(), Failur
         console.line(format_args!(
             "moves: {names}; pixels that show it, or its shadow, are means of {MOVING_RAYS} rays of their own, which \
              the predicted errors do not cover"
+        ))?;
+    }
+    Ok(())
+}
+
+/// Prints how many lamps there are, whose light the plan knows nothing of.
+fn print_lamps(scene: &scene::Scene, console: &mut Console<'_>) -> Result<(), Failure> {
+    let count = scene.lamps().count();
+    if count > 0 {
+        console.line(format_args!(
+            "lamps: {count} meshes emit light above white; pixels that those of at most {SMALL_LAMP_PX} px may reach are \
+             means of rays of their own"
         ))?;
     }
     Ok(())
