@@ -24,12 +24,7 @@ const EXPOSURE_S: f64 = 0.1;
 const SIDES_PX: [f64; 6] = [0.5, 1.0, 2.0, 3.6, 6.0, 10.0];
 
 /// Four turned lamps, one in each quarter of the picture, as far above the ground as stated.
-fn lamps(
-    side_px: f64,
-    streak_px: f64,
-    above_m: f64,
-    change: impl FnOnce(&mut CameraSpec),
-) -> Arc<Sequence> {
+fn lamps(side_px: f64, streak_px: f64, above_m: f64, change: impl FnOnce(&mut CameraSpec)) -> Arc<Sequence> {
     let mut scenario = scenario();
     let camera = &mut scenario.camera;
     (camera.size_px, camera.focal_px) = (SIZE_PX, [FOCAL_PX; 2]);

@@ -9,12 +9,13 @@
 use std::sync::Arc;
 
 use camsim_core::{
+    mount::CameraPath,
     photometric::Photometry,
     scenario::Preset,
     scene::{Mesh, RigidMotion},
     sequence::Sequence,
 };
-use camsim_cpu::{Instant, RayScratch};
+use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
 use glam::{DMat2, DVec2, DVec3, Vec3};
 
@@ -70,7 +71,7 @@ struct Line<'a> {
 
 /// What the pixels of a row share.
 struct Job<'a> {
-    painter: &'a Painter,
+    caster: &'a MovingCaster,
     plan: &'a FramePlan,
     rays: u32,
     instants: Vec<Instant>,
@@ -105,7 +106,13 @@ impl Lamps {
             let spans = outline::merged(&spans);
             (!spans.is_empty()).then_some(Line { number, lamps, spans })
         });
-        Painter::paint(color_rgba, lines.collect(), |line, before| self.line(plan, &line, before));
+        let lines: Vec<Line<'_>> = lines.collect();
+        if lines.is_empty() {
+            return;
+        }
+        // Made here: nothing waits for it within the loop.
+        let caster = self.painter.caster();
+        Painter::paint(color_rgba, lines, |line, before| self.line(caster, plan, &line, before));
     }
 
     /// A lamp, if it is small in a frame and in view.
@@ -127,13 +134,19 @@ impl Lamps {
     }
 
     /// Colours of the pixels of a row of the readout that small lamps may reach.
-    fn line(&self, plan: &FramePlan, line: &Line<'_>, color_rgba: &[f32]) -> Vec<Painted> {
+    fn line(
+        &self,
+        caster: &MovingCaster,
+        plan: &FramePlan,
+        line: &Line<'_>,
+        color_rgba: &[f32],
+    ) -> Vec<Painted> {
         let pixels = line.spans.iter().flat_map(|&[first, last]| first..=last);
         let pixels = pixels.map(|along| outline::pixel(plan, line.number, along));
         let pixels: Vec<[u32; 2]> =
             pixels.filter(|&pixel| color_rgba[4 * index(plan, pixel) + 3] > 0.0).collect();
         let Some(&first) = pixels.first() else { return Vec::new() };
-        let job = Job::new(&self.painter, plan, &line.lamps, first);
+        let job = Job::new(caster, &self.painter.sequence.path, plan, (&line.lamps, first));
         let stage = Photometry::new(&self.painter.sequence.scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
         let color = |pixel| {
@@ -145,12 +158,17 @@ impl Lamps {
 }
 
 impl<'a> Job<'a> {
-    fn new(painter: &'a Painter, plan: &'a FramePlan, lamps: &[&Small<'_>], [x, y]: [u32; 2]) -> Self {
+    /// For the lamps and the first pixel of a row.
+    fn new(
+        caster: &'a MovingCaster,
+        path: &CameraPath,
+        plan: &'a FramePlan,
+        (lamps, [x, y]): (&[&Small<'_>], [u32; 2]),
+    ) -> Self {
         let rays = lamps.iter().map(|lamp| lamp.rays).max().unwrap_or(RAYS);
         let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
         let exposure_s = plan.shutter.exposure_pixel_s(x, y);
         let count = if exposure_s > 0.0 { INSTANTS.min(rays) } else { 1 };
-        let path = &painter.sequence.path;
         let (mut instants, mut spheres) = (Vec::new(), Vec::new());
         for k in 0..count {
             let t_s = mid_s + ((f64::from(k) + 0.5) / f64::from(count) - 0.5) * exposure_s;
@@ -163,9 +181,9 @@ impl<'a> Job<'a> {
                 }
             };
             spheres.push(lamps.iter().map(sphere).collect());
-            instants.push(painter.caster().at(t_s, pose));
+            instants.push(caster.at(t_s, pose));
         }
-        Self { painter, plan, rays, instants, spheres }
+        Self { caster, plan, rays, instants, spheres }
     }
 
     /// Mean light over a pixel's area and exposure; `None` if no lamp comes near.
@@ -184,7 +202,7 @@ impl<'a> Job<'a> {
             DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length()) / f64::from(RAYS).sqrt();
         let count = self.instants.len();
         let mut cast = |k: usize, uv: DVec2| {
-            self.painter.caster().color(&self.instants[k], uv, step_uv, self.plan.surface_reads, scratch)
+            self.caster.color(&self.instants[k], uv, step_uv, self.plan.surface_reads, scratch)
         };
         let passes = |k: usize, uv: DVec2| self.spheres[k].iter().any(|sphere| sphere.is_within(uv, 0.0));
         let (mut of_lamps, mut passing) = (Vec3::ZERO, 0_u32);

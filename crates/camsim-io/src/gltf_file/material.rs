@@ -109,8 +109,9 @@ impl<'a> Materials<'a> {
         let emissive_factor = material.emissive_factor().map(|part| part * strength);
         let emissive_key =
             if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
-        // Of a picture and a factor one texture with 8 bits is made, which ends at white.
-        let most_emissive = if material.emissive_texture().is_some() { 1.0 } else { MOST_EMISSIVE };
+        // A factor alone ends at white, and so does the texture of 8 bits that is made of a picture and a factor.
+        let is_strong = strength != 1.0 && material.emissive_texture().is_none();
+        let most_emissive = if is_strong { MOST_EMISSIVE } else { 1.0 };
         self.check_factors(material, [(key, &factor, 1.0), (emissive_key, &emissive_factor, most_emissive)])?;
         let emissive_factor = emissive_factor.map(|part| part.clamp(0.0, most_emissive));
         // KHR_materials_unlit shows the base colour alone.
@@ -199,7 +200,7 @@ impl<'a> Materials<'a> {
                 )));
             }
             if parts.iter().any(|part| !(0.0..=most).contains(part)) {
-                let of_picture = if key.starts_with("emissive") && most == 1.0 {
+                let of_picture = if key.ends_with("emissiveStrength") && most == 1.0 {
                     "; above white it needs a material without emissiveTexture"
                 } else {
                     ""
