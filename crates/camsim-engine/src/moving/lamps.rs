@@ -6,10 +6,11 @@
 //! and exposure: of thousands of rays those are cast that pass within the lamp's sphere, and a few others
 //! for what is beside it.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use camsim_core::{
     mount::CameraPath,
+    noise::pcg4d,
     photometric::Photometry,
     scenario::Preset,
     scene::{Mesh, RigidMotion},
@@ -32,6 +33,10 @@ pub const SMALL_LAMP_PX: f64 = 16.0;
 /// instant.
 const RAYS_OF_LAMP: f64 = 4096.0;
 const MOST_RAYS: u32 = 16_384;
+/// Rays that show first whether all is alike beside a lamp, how many of them must, and by how much.
+const FIRST_RAYS: u32 = 16;
+const FIRST_BESIDE: u32 = 8;
+const ALIKE: f32 = 1.0 / 255.0;
 /// Instants of an exposure; several rays share one.
 const INSTANTS: u32 = 256;
 /// How far beyond its borders an ideal frame may show a surface, ideal pixels, and beyond that in the picture.
@@ -65,7 +70,9 @@ struct Sphere {
 /// A row of the readout, with the lamps that it may see.
 struct Line<'a> {
     number: usize,
-    lamps: Vec<&'a Small<'a>>,
+    /// With the first and last pixels along it between which each may be.
+    lamps: Vec<(&'a Small<'a>, Vec<[u32; 2]>)>,
+    /// Of all lamps.
     spans: Vec<[u32; 2]>,
 }
 
@@ -73,7 +80,7 @@ struct Line<'a> {
 struct Job<'a> {
     caster: &'a MovingCaster,
     plan: &'a FramePlan,
-    rays: u32,
+    line: &'a Line<'a>,
     instants: Vec<Instant>,
     /// Of each instant, those of all lamps.
     spheres: Vec<Vec<Sphere>>,
@@ -98,8 +105,8 @@ impl Lamps {
             for lamp in small.iter().filter(|lamp| lamp.swept.may_be_in(plan, number)) {
                 let own = lamp.swept.spans(path, plan, number);
                 if !own.is_empty() {
-                    lamps.push(lamp);
-                    spans.extend(own);
+                    spans.extend(&own);
+                    lamps.push((lamp, own));
                 }
             }
             spans.sort_unstable();
@@ -141,16 +148,16 @@ impl Lamps {
         line: &Line<'_>,
         color_rgba: &[f32],
     ) -> Vec<Painted> {
-        let pixels = line.spans.iter().flat_map(|&[first, last]| first..=last);
-        let pixels = pixels.map(|along| outline::pixel(plan, line.number, along));
-        let pixels: Vec<[u32; 2]> =
-            pixels.filter(|&pixel| color_rgba[4 * index(plan, pixel) + 3] > 0.0).collect();
-        let Some(&first) = pixels.first() else { return Vec::new() };
-        let job = Job::new(caster, &self.painter.sequence.path, plan, (&line.lamps, first));
+        let along = line.spans.iter().flat_map(|&[first, last]| first..=last);
+        let pixels = along.map(|along| (along, outline::pixel(plan, line.number, along)));
+        let pixels: Vec<(u32, [u32; 2])> =
+            pixels.filter(|&(_, pixel)| color_rgba[4 * index(plan, pixel) + 3] > 0.0).collect();
+        let Some(&(_, first)) = pixels.first() else { return Vec::new() };
+        let job = Job::new(caster, &self.painter.sequence.path, plan, (line, first));
         let stage = Photometry::new(&self.painter.sequence.scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
-        let color = |pixel| {
-            let light = job.light(pixel, &mut scratch)?;
+        let color = |(along, pixel)| {
+            let light = job.light(along, pixel, &mut scratch)?;
             Some(self.painter.finished(&stage, plan, pixel, light))
         };
         pixels.into_iter().filter_map(color).collect()
@@ -163,9 +170,9 @@ impl<'a> Job<'a> {
         caster: &'a MovingCaster,
         path: &CameraPath,
         plan: &'a FramePlan,
-        (lamps, [x, y]): (&[&Small<'_>], [u32; 2]),
+        (line, [x, y]): (&'a Line<'a>, [u32; 2]),
     ) -> Self {
-        let rays = lamps.iter().map(|lamp| lamp.rays).max().unwrap_or(RAYS);
+        let rays = line.lamps.iter().map(|(lamp, _)| lamp.rays).max().unwrap_or(RAYS);
         let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
         let exposure_s = plan.shutter.exposure_pixel_s(x, y);
         let count = if exposure_s > 0.0 { INSTANTS.min(rays) } else { 1 };
@@ -173,63 +180,103 @@ impl<'a> Job<'a> {
         for k in 0..count {
             let t_s = mid_s + ((f64::from(k) + 0.5) / f64::from(count) - 0.5) * exposure_s;
             let pose = path.pose(t_s);
-            let sphere = |lamp: &&Small<'_>| {
+            let sphere = |(lamp, _): &(&Small<'_>, Vec<[u32; 2]>)| {
                 let bounds = lamp.mesh.bounds_between(t_s, t_s);
                 Sphere {
                     centre_m: pose.ned_from_camera.conjugate() * (bounds.centre() - pose.position_ned_m),
                     radius_m: 0.5 * (bounds.max - bounds.min).length(),
                 }
             };
-            spheres.push(lamps.iter().map(sphere).collect());
+            spheres.push(line.lamps.iter().map(sphere).collect());
             instants.push(caster.at(t_s, pose));
         }
-        Self { caster, plan, rays, instants, spheres }
+        Self { caster, plan, line, instants, spheres }
     }
 
-    /// Mean light over a pixel's area and exposure; `None` if no lamp comes near.
-    fn light(&self, pixel: [u32; 2], scratch: &mut RayScratch) -> Option<Vec3> {
+    /// Mean light over the area and exposure of a pixel, whose place along the row is stated; `None` if no lamp comes
+    /// near.
+    fn light(&self, along: u32, pixel: [u32; 2], scratch: &mut RayScratch) -> Option<Vec3> {
         let camera = &self.plan.camera;
         let uv = camera.unproject(DVec2::from_array(pixel.map(f64::from)))?;
         let uv_from_px = (DMat2::from_diagonal(camera.focal_px) * camera.lens.jacobian(uv)).inverse();
         let half = 0.5 * (uv_from_px.x_axis.abs() + uv_from_px.y_axis.abs()).length();
         let room = half * (1.0 + 2.0 * room_px(self.plan));
-        let is_near = |spheres: &Vec<Sphere>| spheres.iter().any(|sphere| sphere.is_within(uv, room));
-        if !self.spheres.iter().any(is_near) {
+        let is_in = |spans: &[[u32; 2]]| spans.iter().any(|&[first, last]| (first..=last).contains(&along));
+        let lamps = self.line.lamps.iter().enumerate().filter(|(_, (_, spans))| is_in(spans));
+        let (lamps, rays): (Vec<usize>, Vec<u32>) = lamps.map(|(i, (lamp, _))| (i, lamp.rays)).unzip();
+        let rays = rays.into_iter().max()? as usize;
+        let within = |k: usize, uv, room| lamps.iter().any(|&i| self.spheres[k][i].is_within(uv, room));
+        let count = self.instants.len();
+        let near: Vec<usize> = (0..count).filter(|&k| within(k, uv, room)).collect();
+        if near.is_empty() {
             return None;
         }
-        // Each ray stands for its part of the pixel's area.
-        let step_uv =
-            DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length()) / f64::from(RAYS).sqrt();
-        let count = self.instants.len();
-        let mut cast = |k: usize, uv: DVec2| {
-            self.caster.color(&self.instants[k], uv, step_uv, self.plan.surface_reads, scratch)
-        };
-        let passes = |k: usize, uv: DVec2| self.spheres[k].iter().any(|sphere| sphere.is_within(uv, 0.0));
+        let mut pixel = Pixel { job: self, uv, uv_from_px, scratch };
         let (mut of_lamps, mut passing) = (Vec3::ZERO, 0_u32);
-        for i in 0..self.rays {
-            let k = (i as usize * count) / self.rays as usize;
-            let uv = uv + uv_from_px * place(i);
-            if passes(k, uv) {
-                of_lamps += cast(k, uv);
-                passing += 1;
+        for k in near {
+            let shift = shift(k);
+            for i in (k * rays).div_ceil(count)..((k + 1) * rays).div_ceil(count) {
+                let place = PLACES[i] + shift;
+                let place = place - (place + 0.5).floor();
+                if within(k, uv + uv_from_px * place, 0.0) {
+                    of_lamps += pixel.cast(k, place);
+                    passing += 1;
+                }
             }
         }
-        let (mut beside, mut others) = (Vec3::ZERO, 0_u32);
-        for (place, phase) in (0..RAYS).map(ray) {
-            let k = (((phase + 0.5) * count as f64) as usize).min(count - 1);
-            let uv = uv + uv_from_px * place;
-            if !passes(k, uv) {
-                beside += cast(k, uv);
-                others += 1;
-            }
-        }
-        Some(match (passing, others) {
-            (_, 0) => of_lamps / passing.max(1) as f32,
-            _ => {
-                let share = passing as f32 / self.rays as f32;
-                of_lamps / self.rays as f32 + (1.0 - share) * beside / others as f32
+        Some(match pixel.beside(|k, uv| !within(k, uv, 0.0)) {
+            None => of_lamps / passing.max(1) as f32,
+            Some(beside) => {
+                let share = passing as f32 / rays as f32;
+                of_lamps / rays as f32 + (1.0 - share) * beside
             }
         })
+    }
+}
+
+/// A pixel that is cast.
+struct Pixel<'a> {
+    job: &'a Job<'a>,
+    uv: DVec2,
+    uv_from_px: DMat2,
+    scratch: &'a mut RayScratch,
+}
+
+impl Pixel<'_> {
+    /// Linear R G B at an instant and a place in the pixel.
+    fn cast(&mut self, k: usize, place: DVec2) -> Vec3 {
+        // Each ray stands for its part of the pixel's area.
+        let sides = DVec2::new(self.uv_from_px.row(0).length(), self.uv_from_px.row(1).length());
+        let step_uv = sides / f64::from(RAYS).sqrt();
+        let Job { caster, plan, instants, .. } = self.job;
+        let uv = self.uv + self.uv_from_px * place;
+        caster.color(&instants[k], uv, step_uv, plan.surface_reads, self.scratch)
+    }
+
+    /// Mean of the rays that are beside all lamps; `None` without any. Few will do where they are alike.
+    fn beside(&mut self, is_beside: impl Fn(usize, DVec2) -> bool) -> Option<Vec3> {
+        let mut mean = |rays: &mut dyn Iterator<Item = (DVec2, f64)>| {
+            let count = self.job.instants.len();
+            let (mut sum, mut low, mut high) = (Vec3::ZERO, Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let mut cast = 0_u32;
+            for (place, phase) in rays {
+                let k = (((phase + 0.5) * count as f64) as usize).min(count - 1);
+                if is_beside(k, self.uv + self.uv_from_px * place) {
+                    let color = self.cast(k, place);
+                    (sum, low, high) = (sum + color, low.min(color), high.max(color));
+                    cast += 1;
+                }
+            }
+            (sum / cast.max(1) as f32, (high - low).max_element(), cast)
+        };
+        let phase = |i: u32| f64::from(11 * i % FIRST_RAYS) / f64::from(FIRST_RAYS) - 0.5;
+        let first = &mut (0..FIRST_RAYS).map(|i| (PLACES[i as usize], phase(i)));
+        let (color, spread, cast) = mean(first);
+        if cast >= FIRST_BESIDE && spread < ALIKE {
+            return Some(color);
+        }
+        let (color, _, cast) = mean(&mut (0..RAYS).map(ray));
+        (cast > 0).then_some(color)
     }
 }
 
@@ -247,6 +294,15 @@ impl Sphere {
 fn room_px(plan: &FramePlan) -> f64 {
     IDEAL_ROOM_PX / plan.ideal.scale(&plan.camera).max(LEAST_SCALE)
 }
+
+/// What the places of an instant are shifted by, so that a lamp's steps from instant to instant do not beat with them.
+fn shift(instant: usize) -> DVec2 {
+    let [x, y, ..] = pcg4d([instant as u32, 0, 0, 0]);
+    DVec2::new(f64::from(x >> 8), f64::from(y >> 8)) / 2.0_f64.powi(24)
+}
+
+/// [`place`] of every ray.
+static PLACES: LazyLock<Vec<DVec2>> = LazyLock::new(|| (0..MOST_RAYS).map(place).collect());
 
 /// Place of ray i in its pixel, -0.5 to 0.5: the first two coordinates of Sobol's sequence. Any 2^k consecutive ones
 /// from a multiple of it are a net: every box with sides of 2^-a and 2^-b, a + b = k, has one.
