@@ -26,8 +26,8 @@ use super::{
 };
 use crate::truth::{RAYS, ray};
 
-/// Longest side of the box, in the picture, of a lamp that gets rays of its own, pixels. Of larger ones the borders are
-/// a small part.
+/// Longest side of the box, in the picture, of a lamp that gets rays of its own, pixels. Of larger ones the
+/// borders are a small part.
 pub const SMALL_LAMP_PX: f64 = 16.0;
 /// Rays that are to pass a lamp, and most of a pixel: of a lamp of half a pixel a quarter passes it, 16 at each
 /// instant.
@@ -304,8 +304,8 @@ fn shift(instant: usize) -> DVec2 {
 /// [`place`] of every ray.
 static PLACES: LazyLock<Vec<DVec2>> = LazyLock::new(|| (0..MOST_RAYS).map(place).collect());
 
-/// Place of ray i in its pixel, -0.5 to 0.5: the first two coordinates of Sobol's sequence. Any 2^k consecutive ones
-/// from a multiple of it are a net: every box with sides of 2^-a and 2^-b, a + b = k, has one.
+/// Place of ray i in its pixel, -0.5 to 0.5: the first two coordinates of Sobol's sequence. Any 2^k consecutive
+/// ones from a multiple of it are a net: every box with sides of 2^-a and 2^-b, a + b = k, has one.
 fn place(i: u32) -> DVec2 {
     let mut direction = 1_u32 << 31;
     let mut second = 0;

@@ -1,8 +1,8 @@
-//! Vignetting (`pa`) of lensfun: what arrives is `1 + k1 r^2 + k2 r^4 + k3 r^6` of the light, r in half the diagonal of
-//! the calibration's sensor.
+//! Vignetting (`pa`) of lensfun: what arrives is `1 + k1 r^2 + k2 r^4 + k3 r^6` of the light, r in half the
+//! diagonal of the calibration's sensor.
 //!
-//! Between calibrations all of them count, with the weight `d^-3.5`: d is the distance in focal length over the lens's
-//! range, 4 / aperture and 0.1 m / distance. None counts if the nearest is farther than 1.
+//! Between calibrations all of them count, with the weight `d^-3.5`: d is the distance in focal length over the
+//! lens's range, 4 / aperture and 0.1 m / distance. None counts if the nearest is farther than 1.
 
 use camsim_core::scenario::VignettingSpec;
 use roxmltree::Node;
