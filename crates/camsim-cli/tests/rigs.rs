@@ -314,3 +314,85 @@ fn commands_take_one_camera() {
         assert!(code == 2 && err.contains(wanted), "{args:?}: {err}");
     }
 }
+
+/// A pair on one wire: pictures of one instant, late by up to 20 ms.
+const WIRED: &str = r#"
+[[cameras]]
+name = "left"
+size_px = [32, 24]
+focal_px = [21.0, 21.0]
+fps = 20.0
+mount = { angles_deg = [0.0, -90.0, 0.0] }
+timing = { trigger = "wire", late_ms = 20.0, miss = [3], jitter_ms = 0.5, drop = [5] }
+
+[[cameras]]
+name = "right"
+size_px = [32, 24]
+focal_px = [21.0, 21.0]
+fps = 20.0
+mount = { angles_deg = [0.0, -90.0, 0.0], offset_m = [0.0, 0.4, 0.0] }
+timing = { trigger = "wire", late_ms = 20.0, miss = [3], jitter_ms = 0.5, drop_probability = 0.1 }
+"#;
+
+/// Where each picture of a camera was taken from, by frame.
+fn poses(folder: &Path) -> BTreeMap<String, (glam::DVec3, glam::DQuat)> {
+    let rows = table(&folder.join("frames.csv"));
+    let pose = |row: &Vec<String>| {
+        let [n, e, d, w, x, y, z] = std::array::from_fn(|i| row[2 + i].parse::<f64>().unwrap());
+        (row[0].clone(), (glam::DVec3::new(n, e, d), glam::DQuat::from_xyzw(x, y, z, w)))
+    };
+    rows.iter().map(pose).collect()
+}
+
+/// Largest error of the lever arm from the left camera to the right one, over pictures of the same number.
+fn stereo_error_m(rig: &Path) -> f64 {
+    let [left, right] = ["left", "right"].map(|name| poses(&rig.join(name)));
+    let both = left.iter().filter_map(|(frame, left)| Some((left, right.get(frame)?)));
+    let error_m = |((from, q), (to, _)): (&(glam::DVec3, glam::DQuat), &(glam::DVec3, _))| {
+        (q.conjugate() * (*to - *from) - glam::DVec3::new(0.4, 0.0, 0.0)).length()
+    };
+    let errors: Vec<f64> = both.map(error_m).collect();
+    assert!(errors.len() > 20, "{}", errors.len());
+    errors.into_iter().fold(0.0, f64::max)
+}
+
+#[test]
+fn cameras_of_one_trigger_are_late_together() {
+    let base = tempfile::tempdir().unwrap();
+    let path = |name: &str| base.path().join(name);
+    let scenario = scenario(base.path(), WIRED, "");
+    let (code, _, err) = render(&scenario, &path("wired"), &["--outputs", "color"]);
+    assert_eq!(code, 0, "{err}");
+    let [left, right] = ["left", "right"].map(|name| table(&path("wired").join(name).join("timing.csv")));
+    assert_eq!((left.len(), left[3][1].as_str(), left[5][1].as_str()), (40, "missed", "dropped"));
+    let own = |of: &[Vec<String>], frame: usize| of[frame][1] == "own";
+    for (frame, (a, b)) in left.iter().zip(&right).enumerate() {
+        // Nominal time and trigger are the wire's; stamps and dropped pictures the camera's.
+        assert_eq!((&a[3], &a[4], a[1] == "missed"), (&b[3], &b[4], b[1] == "missed"), "{frame}");
+        assert_ne!(a[5], b[5], "{frame}");
+        for (camera, of) in [("left", &left), ("right", &right)] {
+            let picture = path("wired").join(camera).join(format!("color/frame_{frame:06}.png"));
+            assert_eq!(picture.is_file(), own(of, frame), "{camera} {frame}");
+        }
+    }
+    assert!((0..40).any(|frame| own(&left, frame) && !own(&right, frame)));
+    // The mount is the pose of the right camera in the left one, to the digits of the table.
+    assert!(stereo_error_m(&path("wired")) < 1e-6, "{}", stereo_error_m(&path("wired")));
+    // A camera alone has the triggers of its rig.
+    let run = path("wired/right/run.json");
+    let (code, _, err) = render(run.to_str().unwrap(), &path("alone"), &["--outputs", "color"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(table(&path("alone/timing.csv")), right);
+    // Triggers of their own part them.
+    let apart = WIRED.replace("trigger = \"wire\", ", "");
+    let scenario = self::scenario(base.path(), &apart, "");
+    let (code, _, err) = render(&scenario, &path("apart"), &["--outputs", "color"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(stereo_error_m(&path("apart")) > 0.1, "{}", stereo_error_m(&path("apart")));
+    // What the cameras of a wire say of it is the same.
+    let scenario = self::scenario(base.path(), &WIRED.replacen("late_ms = 20.0", "late_ms = 3.0", 1), "");
+    let (code, _, err) = render(&scenario, &path("never"), &[]);
+    let wanted =
+        "cameras.1.timing.late_ms: differs from that of camera left, which has the same trigger \"wire\"";
+    assert!(code == 2 && err.contains(wanted), "{err}");
+}

@@ -25,6 +25,7 @@ use crate::{
 mod disocclusion;
 mod flow;
 mod flow_errors;
+mod lamps;
 mod lens_inverse;
 mod measure;
 mod mesh_bvh;
@@ -88,6 +89,8 @@ pub struct Oracle {
     shading: Shading,
     /// Whether the scene has blended surfaces.
     blends: bool,
+    /// Numbers of the meshes that emit light above white.
+    lamps: Vec<usize>,
     optics: Option<Optics>,
     sensor: Option<ImageSensor>,
 }
@@ -172,6 +175,7 @@ impl Oracle {
             moving: moving_meshes(&scene.meshes, scene.light),
             shading: Shading::new(scene),
             blends: scene.has_blended(),
+            lamps: scene.lamps().collect(),
             optics: Optics::new(&sequence.scenario.camera, sequence.scenario.seed),
             sensor: ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed),
             sequence,

@@ -54,7 +54,7 @@ pub use sensors::{
     BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec, PerAxis, SensorAxes, SensorCarrier, SensorMountSpec,
     TriadSpec,
 };
-pub use timing::{LateStamp, TimingSpec};
+pub use timing::{LateStamp, StampedBy, TimingSpec};
 pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{

@@ -97,6 +97,11 @@ impl Scene {
         object.and_then(|object| self.objects.get(object as usize)).map_or(0, |object| object.class.into())
     }
 
+    /// Numbers of the meshes that emit light above white.
+    pub fn lamps(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..).zip(&self.meshes).filter(|(_, mesh)| mesh.material.is_above_white()).map(|(number, _)| number)
+    }
+
     /// Whether any mesh is blended with what is behind it.
     #[must_use]
     pub fn has_blended(&self) -> bool {

@@ -95,10 +95,10 @@ impl Sequence {
         TimingFaults::new(&self.scenario.camera, self.scenario.seed)
     }
 
-    /// Whether a frame arrives: dropped ones have a number but no picture.
+    /// Whether a frame arrives: dropped and missed ones have a number but no picture.
     #[must_use]
     pub fn arrives(&self, frame: u64) -> bool {
-        self.timing_faults().is_none_or(|faults| !faults.is_dropped(frame))
+        self.timing_faults().is_none_or(|faults| !faults.is_lost(frame))
     }
 
     /// Exposure of a frame, if it follows the pictures; else it is the scenario's.

@@ -4,13 +4,14 @@
 //! Every draw is a function of (seed, camera, frame), so that any frame can be asked for by itself. Frame i is
 //! triggered at the nominal time `start + (i + phase)/fps`, plus its lateness. Times of rows refer to the
 //! trigger. A frame that is doubled shows the picture of the last frame before it that arrived, noise
-//! included, under a stamp of its own.
+//! included, under a stamp of its own. Cameras with one trigger draw its faults as functions of (seed, name of
+//! the trigger, frame), each for itself: a camera that is rendered alone has those of its rig.
 
 use std::sync::LazyLock;
 
 use crate::{
     noise::{camera_seed, normal_from_bits, sample_words, tail_table},
-    scenario::{CameraSpec, LateStamp, TimingSpec},
+    scenario::{CameraSpec, LateStamp, StampedBy, TimingSpec},
 };
 
 /// Streams of the draws.
@@ -19,6 +20,7 @@ mod stream {
     pub const JITTER: u32 = 49;
     pub const DROP: u32 = 50;
     pub const DOUBLE: u32 = 51;
+    pub const MISS: u32 = 52;
 }
 
 /// Most of the least time between two triggers by which a stamp is wrong at random, so that stamps ascend.
@@ -31,10 +33,12 @@ static TAILS: LazyLock<Vec<f32>> = LazyLock::new(tail_table);
 pub enum Delivery {
     /// It arrives with its own picture.
     Own,
-    /// It does not arrive.
+    /// Its picture is taken, but does not arrive.
     Dropped,
     /// It arrives with the picture of another frame.
     Doubled(u64),
+    /// Its trigger does not come: there is no picture.
+    Missed,
 }
 
 /// The faults of one camera.
@@ -44,6 +48,8 @@ pub struct TimingFaults<'a> {
     fps: f64,
     phase: f64,
     seed: u64,
+    /// Seed of the trigger's draws: that of the camera, if its trigger is its own.
+    trigger_seed: u64,
 }
 
 /// Number of the frame whose picture a frame of a camera shows ([`TimingFaults::picture`]). `seed` is the
@@ -60,24 +66,43 @@ impl<'a> TimingFaults<'a> {
         let spec = camera.timing.as_ref()?;
         // The pictures of a burst have names of their own, but come from one trigger.
         let name = camera.name.split('/').next().unwrap_or_default();
-        Some(Self { spec, fps: camera.fps, phase: camera.phase, seed: camera_seed(seed, name) })
+        let own_seed = camera_seed(seed, name);
+        // No camera's name has a slash.
+        let shared_seed =
+            spec.trigger.as_ref().map(|trigger| camera_seed(seed, &format!("trigger/{trigger}")));
+        Some(Self {
+            spec,
+            fps: camera.fps,
+            phase: camera.phase,
+            seed: own_seed,
+            trigger_seed: shared_seed.unwrap_or(own_seed),
+        })
     }
 
     /// What becomes of a frame.
     #[must_use]
     pub fn delivery(&self, frame: u64) -> Delivery {
-        if self.is_dropped(frame) {
+        if self.is_missed(frame) {
+            return Delivery::Missed;
+        }
+        if self.is_lost(frame) {
             return Delivery::Dropped;
         }
         let picture = self.picture(frame as i64);
         if picture == frame as i64 { Delivery::Own } else { Delivery::Doubled(picture as u64) }
     }
 
-    /// Whether a frame does not arrive.
+    /// Whether a frame does not arrive: its trigger was missed, or its picture dropped.
     #[must_use]
-    pub fn is_dropped(&self, frame: u64) -> bool {
-        self.spec.drop.contains(&frame)
-            || self.is_drawn(frame as i64, stream::DROP, self.spec.drop_probability)
+    pub fn is_lost(&self, frame: u64) -> bool {
+        self.is_missed(frame)
+            || self.spec.drop.contains(&frame)
+            || is_drawn(frame, self.seed, stream::DROP, self.spec.drop_probability)
+    }
+
+    fn is_missed(&self, frame: u64) -> bool {
+        self.spec.miss.contains(&frame)
+            || is_drawn(frame, self.trigger_seed, stream::MISS, self.spec.miss_probability)
     }
 
     /// Number of the frame whose picture a frame shows: its own, or, of a doubled one, that of the last frame
@@ -87,7 +112,7 @@ impl<'a> TimingFaults<'a> {
         let Ok(number) = u64::try_from(frame) else { return frame };
         let mut shown = number;
         while self.is_doubled(shown) {
-            match (0..shown).rev().find(|&before| !self.is_dropped(before)) {
+            match (0..shown).rev().find(|&before| !self.is_lost(before)) {
                 Some(before) => shown = before,
                 None => break,
             }
@@ -99,15 +124,15 @@ impl<'a> TimingFaults<'a> {
         let spec = self.spec;
         frame > 0
             && (spec.double.contains(&frame)
-                || self.is_drawn(frame as i64, stream::DOUBLE, spec.double_probability))
-            && !self.is_dropped(frame)
+                || is_drawn(frame, self.seed, stream::DOUBLE, spec.double_probability))
+            && !self.is_lost(frame)
     }
 
     /// How late the trigger of a frame comes, seconds.
     #[must_use]
     pub fn late_s(&self, frame: i64) -> f64 {
         if self.spec.late_ms > 0.0 {
-            1e-3 * self.spec.late_ms * self.uniform(frame, stream::LATE)
+            1e-3 * self.spec.late_ms * uniform(frame, self.trigger_seed, stream::LATE)
         } else {
             0.0
         }
@@ -152,19 +177,23 @@ impl<'a> TimingFaults<'a> {
         }
         let late_ms = if spec.late_stamp == LateStamp::Actual { spec.late_ms } else { 0.0 };
         let most_s = MOST_JITTER * rate * (1.0 / self.fps - 1e-3 * late_ms);
-        let [bits, ..] = sample_words(frame, self.seed, stream::JITTER);
+        let seed = match spec.stamped_by {
+            StampedBy::Camera => self.seed,
+            StampedBy::Trigger => self.trigger_seed,
+        };
+        let [bits, ..] = sample_words(frame, seed, stream::JITTER);
         (1e-3 * spec.jitter_ms * f64::from(normal_from_bits(bits, &TAILS))).clamp(-most_s, most_s)
     }
+}
 
-    fn is_drawn(&self, frame: i64, stream: u32, probability: f64) -> bool {
-        probability > 0.0 && self.uniform(frame, stream) < probability
-    }
+fn is_drawn(frame: u64, seed: u64, stream: u32, probability: f64) -> bool {
+    probability > 0.0 && uniform(frame as i64, seed, stream) < probability
+}
 
-    /// Between 0 and 1.
-    fn uniform(&self, frame: i64, stream: u32) -> f64 {
-        let [bits, ..] = sample_words(frame, self.seed, stream);
-        (f64::from(bits >> 8) + 0.5) * 0.5_f64.powi(24)
-    }
+/// Between 0 and 1.
+fn uniform(frame: i64, seed: u64, stream: u32) -> f64 {
+    let [bits, ..] = sample_words(frame, seed, stream);
+    (f64::from(bits >> 8) + 0.5) * 0.5_f64.powi(24)
 }
 
 #[cfg(test)]
@@ -221,7 +250,7 @@ mod tests {
             (0..FRAMES).filter(|&frame| is(frame.into())).count() as f64 / f64::from(FRAMES)
         };
         // Five standard deviations of each count.
-        assert!((share(&|frame| faults.is_dropped(frame)) - 0.1).abs() < 0.0075);
+        assert!((share(&|frame| faults.is_lost(frame)) - 0.1).abs() < 0.0075);
         let doubled = share(&|frame| matches!(faults.delivery(frame), Delivery::Doubled(_)));
         assert!((doubled - 0.9 * 0.2).abs() < 0.0096, "{doubled}");
         let mean = |value: &dyn Fn(i64) -> f64| {
@@ -269,5 +298,48 @@ mod tests {
         let actual = camera(actual);
         assert!(faults(&actual).stamp_error_s(5).abs() < 1e-12);
         assert!((faults(&left).stamp_error_s(5) + faults(&left).late_s(5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn cameras_of_one_trigger_are_late_together_and_lose_pictures_apart() {
+        let timing = TimingSpec {
+            trigger: Some("wire".into()),
+            late_ms: 10.0,
+            jitter_ms: 1.0,
+            drop_probability: 0.1,
+            miss: vec![7],
+            miss_probability: 0.2,
+            ..TimingSpec::default()
+        };
+        let left = camera(timing.clone());
+        let right = CameraSpec { name: "right".into(), ..left.clone() };
+        let (a, b) = (faults(&left), faults(&right));
+        assert_eq!(a.delivery(7), Delivery::Missed);
+        let frames = 0..10_000_u64;
+        let is_missed = |of: &TimingFaults<'_>, frame| of.delivery(frame) == Delivery::Missed;
+        let both_dropped = |frame: &u64| [a, b].iter().all(|of| of.delivery(*frame) == Delivery::Dropped);
+        for frame in frames.clone() {
+            assert_eq!(a.late_s(frame as i64), b.late_s(frame as i64));
+            assert_eq!(a.trigger_s(frame as i64), b.trigger_s(frame as i64));
+            assert_eq!(is_missed(&a, frame), is_missed(&b, frame));
+        }
+        // Five standard deviations: a fifth is missed, and of the rest a hundredth dropped by both by chance.
+        let missed = frames.clone().filter(|frame| is_missed(&a, *frame)).count();
+        assert!((1800..2200).contains(&missed), "{missed}");
+        let both = frames.filter(both_dropped).count();
+        assert!((35..125).contains(&both), "{both}");
+        assert_ne!(a.stamp_s(3), b.stamp_s(3));
+        // Another wire is late by itself, and so is a camera of the wire's name.
+        let other = camera(TimingSpec { trigger: Some("other".into()), ..timing.clone() });
+        assert_ne!(faults(&other).late_s(3), a.late_s(3));
+        let own = camera(TimingSpec { trigger: None, ..timing.clone() });
+        let own = CameraSpec { name: "wire".into(), ..own };
+        assert_ne!(faults(&own).late_s(3), a.late_s(3));
+        // One device writes the stamps of both.
+        let stamped = TimingSpec { stamped_by: StampedBy::Trigger, ..timing };
+        let left = camera(stamped);
+        let right = CameraSpec { name: "right".into(), ..left.clone() };
+        assert!((0..100).all(|frame| faults(&left).stamp_s(frame) == faults(&right).stamp_s(frame)));
+        assert_ne!(faults(&left).stamp_s(3), faults(&left).nominal_s(3));
     }
 }

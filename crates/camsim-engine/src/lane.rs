@@ -13,12 +13,16 @@ use camsim_plan::{EdgeStage, FramePlan, PrefilterTaps, Renderer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::{Finished, moving::MovingScene};
+use crate::{
+    Finished,
+    moving::{Lamps, MovingScene},
+};
 
 /// What a session keeps for its camera, or for one of its faces, beside the planner.
 #[derive(Debug, Default)]
 pub(crate) struct Lane {
     pub moving: Option<MovingScene>,
+    pub lamps: Option<Lamps>,
     pub ideal: Option<IdealCache>,
 }
 

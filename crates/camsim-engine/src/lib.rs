@@ -42,5 +42,5 @@ pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
 pub use lane::join_parts;
 pub use memory::peak_memory_mb;
-pub use moving::MOVING_RAYS;
+pub use moving::{MOVING_RAYS, SMALL_LAMP_PX};
 pub use session::Session;

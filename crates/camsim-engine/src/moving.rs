@@ -6,40 +6,33 @@
 //! need no approximation there. With shadows of the sun, so is each pixel where the thing's shadow may fall.
 //! Elsewhere nothing changes.
 
+mod lamps;
 mod outline;
+mod painter;
 mod sweep;
 
 /// Rays of a pixel in which something moves.
 pub const MOVING_RAYS: u32 = RAYS;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use camsim_core::{
-    noise::tail_table,
-    photometric::{Photometry, photometric},
-    scene::Scene,
-    sequence::Sequence,
-    shutter::RowAxis,
-};
+use camsim_core::{photometric::Photometry, scene::Scene, sequence::Sequence, shutter::RowAxis};
 use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
 use glam::{DMat2, DVec2, Vec3};
-use rayon::prelude::*;
 
 use crate::truth::{RAYS, ray};
+pub(crate) use lamps::Lamps;
+pub use lamps::SMALL_LAMP_PX;
 use outline::Outline;
+use painter::{Painted, Painter, index};
 
 /// A sequence whose scene has things that move.
 #[derive(Debug)]
 pub(crate) struct MovingScene {
-    /// With everything.
-    sequence: Arc<Sequence>,
+    painter: Painter,
     /// Without what moves.
     still: Arc<Sequence>,
-    /// Built for the first frame that shows something that moves.
-    caster: Arc<OnceLock<MovingCaster>>,
-    vignette: Vec<f32>,
-    noise_table: Vec<f32>,
 }
 
 impl MovingScene {
@@ -50,7 +43,7 @@ impl MovingScene {
         if scene.meshes.iter().all(|mesh| mesh.motion.is_none()) {
             return None;
         }
-        let known = before.filter(|before| Arc::ptr_eq(&before.sequence.scene, scene));
+        let known = before.filter(|before| Arc::ptr_eq(&before.painter.sequence.scene, scene));
         let still_scene = known.map_or_else(
             || {
                 let mut still = Scene::clone(scene);
@@ -61,11 +54,8 @@ impl MovingScene {
         );
         let still = Sequence { scene: still_scene, ..Sequence::clone(sequence) };
         Some(Self {
-            sequence: sequence.clone(),
+            painter: Painter::new(sequence, known.map(|before| &before.painter)),
             still: Arc::new(still),
-            caster: known.map_or_else(Arc::default, |before| before.caster.clone()),
-            vignette: sequence.vignette_weights().1,
-            noise_table: tail_table(),
         })
     }
 
@@ -76,20 +66,16 @@ impl MovingScene {
 
     /// Replaces the colours of the pixels in which something may move: linear R G B A, row-major.
     pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
-        let swept = sweep::all_that_moves(&self.sequence.scene, plan.window_s);
-        let outline = Outline::new(&self.sequence.path, plan, &swept);
+        let Sequence { scene, path, .. } = &*self.painter.sequence;
+        let swept = sweep::all_that_moves(scene, plan.window_s);
+        let outline = Outline::new(path, plan, &swept);
         let lines: Vec<usize> = (0..outline.spans.len()).filter(|&i| !outline.spans[i].is_empty()).collect();
         if lines.is_empty() {
             return;
         }
-        let caster = self.caster.get_or_init(|| MovingCaster::new(&self.sequence.scene));
-        let painted: Vec<Vec<(usize, [f32; 3])>> = lines
-            .into_par_iter()
-            .map(|line| self.line(caster, plan, line, &outline.spans[line], color_rgba))
-            .collect();
-        for (i, color) in painted.into_iter().flatten() {
-            color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
-        }
+        let caster = self.painter.caster();
+        let line = |line: usize, before: &[f32]| self.line(caster, plan, line, &outline.spans[line], before);
+        Painter::paint(color_rgba, lines, line);
     }
 
     /// Colours of the pixels of a row of the readout that are in an outline, by their index.
@@ -100,38 +86,26 @@ impl MovingScene {
         line: usize,
         spans: &[[u32; 2]],
         color_rgba: &[f32],
-    ) -> Vec<(usize, [f32; 3])> {
+    ) -> Vec<Painted> {
         let pixels = spans.iter().flat_map(|&[first, last]| first..=last);
         let pixels = pixels.map(|along| outline::pixel(plan, line, along));
-        let width = plan.camera.size_px[0] as usize;
-        let index = |[x, y]: [u32; 2]| y as usize * width + x as usize;
-        let pixels: Vec<[u32; 2]> = pixels.filter(|&pixel| color_rgba[4 * index(pixel) + 3] > 0.0).collect();
+        let pixels: Vec<[u32; 2]> =
+            pixels.filter(|&pixel| color_rgba[4 * index(plan, pixel) + 3] > 0.0).collect();
         let Some(&[x, y]) = pixels.first() else { return Vec::new() };
         let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+        let Sequence { path, scenario, .. } = &*self.painter.sequence;
         let instants: Vec<(DVec2, Instant)> = (0..RAYS)
             .map(ray)
             .map(|(place, phase)| {
                 let t_s = mid_s + phase * plan.shutter.exposure_pixel_s(x, y);
-                (place, caster.at(t_s, self.sequence.path.pose(t_s)))
+                (place, caster.at(t_s, path.pose(t_s)))
             })
             .collect();
-        let stage = Photometry::new(&self.sequence.scenario.camera, plan.exposure.as_ref());
+        let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
         let mut scratch = RayScratch::default();
-        let scenario = &self.sequence.scenario;
-        let picture = scenario.picture(plan.frame) as u32;
         let color = |pixel: [u32; 2]| {
-            let linear = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
-            let weight = self.vignette.get(index(pixel)).or(self.vignette.first()).copied().unwrap_or(1.0);
-            let value = photometric(
-                &stage,
-                linear.to_array(),
-                weight,
-                pixel,
-                picture,
-                scenario.noise_seed(),
-                &self.noise_table,
-            );
-            Some((index(pixel), value))
+            let light = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
+            Some(self.painter.finished(&stage, plan, pixel, light))
         };
         pixels.into_iter().filter_map(color).collect()
     }

@@ -25,7 +25,7 @@ use crate::{
     error::RenderErrorBase,
     finished,
     lane::{IdealCache, IdealKey, Lane, add_part, in_whole_camera, joined},
-    moving::MovingScene,
+    moving::{Lamps, MovingScene},
     planner_threads,
     prepare_ahead::{Job, PrepareAhead, Prepared, Preparer},
     truth::{FramePixels, hits, planes},
@@ -99,7 +99,7 @@ impl<'a> Session<'a> {
         let late = LatePhotometric::new(&still);
         Ok(Self {
             engine,
-            lanes: lanes(&planner, scene_planner.as_deref(), moving),
+            lanes: lanes(&planner, scene_planner.as_deref(), moving, &[]),
             cpu: CpuRenderer::new(still, meshes),
             planner,
             scene_planner,
@@ -144,7 +144,7 @@ impl<'a> Session<'a> {
         self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
         self.late = LatePhotometric::new(&still);
         self.cpu.renew(still);
-        self.lanes = lanes(&planner, scene_planner.as_deref(), moving);
+        self.lanes = lanes(&planner, scene_planner.as_deref(), moving, &self.lanes);
         self.planner = planner;
         self.channels = channels.into();
         self.scene_planner = scene_planner;
@@ -398,6 +398,9 @@ impl<'a> Session<'a> {
         if let Some(moving) = &self.lanes[lane].moving {
             moving.paint(&mut color_rgba, plan);
         }
+        if let Some(lamps) = &self.lanes[lane].lamps {
+            lamps.paint(&mut color_rgba, plan);
+        }
         let planes = match &mut truth {
             Some(truth) => self.complete_truth(lane, plan, &color_rgba, truth)?,
             None => Vec::new(),
@@ -482,15 +485,28 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What is kept for each lane of a planner. `moving` is of the whole camera.
-fn lanes(planner: &Planner, scene_planner: Option<&Planner>, moving: Option<MovingScene>) -> Vec<Lane> {
-    let (Some(scene_planner), 2..) = (scene_planner, planner.lanes()) else {
-        return std::iter::once(Lane { moving, ideal: None })
-            .chain((1..planner.lanes()).map(|_| Lane::default()))
-            .collect();
-    };
-    let of_face = |number| MovingScene::new(scene_planner.lane(number).sequence(), moving.as_ref());
-    (0..planner.lanes()).map(|number| Lane { moving: of_face(number), ideal: None }).collect()
+/// What is kept for each lane of a planner. `moving` is of the whole camera. Lamps keep the scene of those before.
+fn lanes(
+    planner: &Planner,
+    scene_planner: Option<&Planner>,
+    moving: Option<MovingScene>,
+    before: &[Lane],
+) -> Vec<Lane> {
+    let whole = scene_planner.unwrap_or(planner);
+    let lamps_before = before.first().and_then(|lane| lane.lamps.as_ref());
+    let lamps = |number: usize| Lamps::new(whole.lane(number).sequence(), lamps_before);
+    let count = planner.lanes();
+    let mut lanes: Vec<Lane> =
+        (0..count).map(|number| Lane { lamps: lamps(number), ..Lane::default() }).collect();
+    match scene_planner.filter(|_| count > 1) {
+        None => lanes[0].moving = moving,
+        Some(scene_planner) => {
+            for (number, lane) in lanes.iter_mut().enumerate() {
+                lane.moving = MovingScene::new(scene_planner.lane(number).sequence(), moving.as_ref());
+            }
+        }
+    }
+    lanes
 }
 
 /// Collects the faces and colours of a frame, which are finished one after the other.

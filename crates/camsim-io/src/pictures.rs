@@ -7,7 +7,7 @@ use camsim_core::{
     scene::{Encoding, Texture},
     sequence::GrayImage,
 };
-use image::{DynamicImage, ImageDecoder, ImageReader, metadata::Orientation};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
 
 use crate::{
     similar_file::suggestion,
@@ -199,6 +199,7 @@ pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
     if reader.format().is_none() {
         return Err("it is none of them".into());
     }
+    refuse_floats(reader.format())?;
     reader.into_dimensions().map(|(width, height)| [width, height]).map_err(|error| error.to_string())
 }
 
@@ -218,6 +219,21 @@ pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
     }
 }
 
+/// Refuses formats of linear floats: textures have 8 bits and end at white.
+fn refuse_floats(format: Option<ImageFormat>) -> Result<(), String> {
+    let name = match format {
+        Some(ImageFormat::OpenExr) => "OpenEXR",
+        Some(ImageFormat::Hdr) => "Radiance HDR",
+        _ => return Ok(()),
+    };
+    Err(format!(
+        "it is {name}, whose values are linear and go beyond white, while textures and maps end at \
+         white: make a PNG of it, for example with `oiiotool IN --colorconvert linear sRGB -d uint8 -o OUT.png`. \
+         Only emitted light goes beyond: a model's emissiveFactor with KHR_materials_emissive_strength, and \
+         scene.sky_brightness"
+    ))
+}
+
 /// Decodes a file. Returns pixels in stored order, and the orientation.
 fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
@@ -227,6 +243,7 @@ fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     if reader.format().is_none() {
         return Err(PictureError::decode(path, "not a PNG, JPEG, WebP, GIF, BMP or TIFF file"));
     }
+    refuse_floats(reader.format()).map_err(|reason| PictureError::decode(path, reason))?;
     let decode_error = |error: image::ImageError| PictureError::decode(path, error.to_string());
     // The default limit of 512 MiB is raised in proportion to the size of the file.
     let mut limits = image::Limits::default();
@@ -247,6 +264,28 @@ fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn pictures_of_floats_are_refused_with_the_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        let exr = folder.path().join("sky.exr");
+        let white = |_, _| (3.0_f32, 1.0_f32, 0.5_f32);
+        exr::prelude::write_rgb_file(&exr, 4, 3, white).unwrap();
+        let hdr = folder.path().join("sky.hdr");
+        std::fs::write(&hdr, b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x81").unwrap();
+        for (path, name) in [(&exr, "OpenEXR"), (&hdr, "Radiance HDR")] {
+            let errors = [
+                read_texture(path, Encoding::Srgb).unwrap_err().to_string(),
+                read_gray_image(path).unwrap_err().to_string(),
+            ];
+            for error in errors {
+                assert!(error.starts_with(&path.display().to_string()), "{error}");
+                assert!(error.contains(&format!("it is {name}, whose values are linear")), "{error}");
+                assert!(error.contains("oiiotool") && error.contains("emissiveFactor"), "{error}");
+            }
+            assert!(size_of_bytes(&std::fs::read(path).unwrap()).unwrap_err().contains(name));
+        }
+    }
 
     #[test]
     fn formats_are_detected_by_content() {

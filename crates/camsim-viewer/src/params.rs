@@ -239,6 +239,16 @@ pub const PARAMS: &[Param] = &[
     param("camera.timing.drop_probability", "", [0.0, 1.0], 0.005, "share of the others that do not"),
     param("camera.timing.double", "", ANY, 1.0, "numbers of frames that show the picture before them again"),
     param("camera.timing.double_probability", "", [0.0, 1.0], 0.005, "share of the others that do"),
+    param("camera.timing.trigger", "", ANY, 1.0, "name of the trigger that cameras share"),
+    param("camera.timing.miss", "", ANY, 1.0, "numbers of frames whose trigger does not come"),
+    param("camera.timing.miss_probability", "", [0.0, 1.0], 0.005, "share of the other triggers that do not"),
+    param(
+        "camera.timing.stamped_by",
+        "",
+        ANY,
+        1.0,
+        "whose errors stamps have: the camera's or the trigger's",
+    ),
     param(
         "camera.photometric.vignette",
         "",

@@ -47,7 +47,7 @@ Examples:
   camsim camera import cam0.yaml -o CAMERA.toml
   camsim camera import camchain.yaml --rig -o RIG.toml    # then, in a scenario: cameras = \"RIG.toml\"
   camsim camera import TUM1.yaml --size 640x480 -o CAMERA.toml
-  camsim camera import slr-canon.xml --lens 'EF 24-70mm f/2.8L USM' --focal 35 --size 6000x4000 -o CAMERA.toml")]
+  camsim camera import slr-canon.xml --lens 'EF 24-70mm f/2.8L USM' --focal 35 --aperture 4 --size 6000x4000 -o CAMERA.toml")]
 struct ImportArgs {
     /// Calibration file
     file: PathBuf,
@@ -79,6 +79,12 @@ struct ImportArgs {
     /// Crop factor of the camera with that lens [default: that of the calibration]
     #[arg(long, value_name = "FACTOR", requires = "lens")]
     crop: Option<f64>,
+    /// f-number of that lens, on which its vignetting depends
+    #[arg(long, value_name = "N", requires = "lens")]
+    aperture: Option<f64>,
+    /// Distance of what is in focus, m, on which its vignetting depends
+    #[arg(long, value_name = "M", requires = "aperture", default_value_t = 1000.0)]
+    distance: f64,
 }
 
 /// `--body`.
@@ -132,7 +138,14 @@ pub fn run(args: &CameraArgs, console: &mut Console<'_>) -> Result<(), Failure> 
 fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let (format, notes, text) = match (&args.lens, args.focal, args.size) {
         (Some(lens), Some(focal_mm), Some(size_px)) => {
-            let query = LensfunQuery { lens, focal_mm, size_px, crop: args.crop };
+            let query = LensfunQuery {
+                lens,
+                focal_mm,
+                size_px,
+                crop: args.crop,
+                aperture: args.aperture,
+                distance_m: args.distance,
+            };
             let camera = import_lensfun(&args.file, &query).or_bad_input()?;
             ("lensfun", camera.notes, toml::to_string(&camera.spec).or_failed()?)
         }

@@ -10,7 +10,7 @@ use camsim_core::{
     timing_faults::Delivery,
     tracker::{ResolvedLimits, Saturation},
 };
-use camsim_engine::MOVING_RAYS;
+use camsim_engine::{MOVING_RAYS, SMALL_LAMP_PX};
 use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
 use camsim_plan::{FramePlan, Placement, PlanSummary, Planner};
 use serde::Serialize;
@@ -206,6 +206,9 @@ fn warn_of_delivery(sequence: &Sequence, frame: u64, console: &mut Console<'_>) 
         Some(Delivery::Doubled(picture)) => console.warn(format_args!(
             "frame {frame} is doubled by camera.timing: it has the picture of frame {picture}, whose plan this is"
         )),
+        Some(Delivery::Missed) => console.warn(format_args!(
+            "frame {frame} has no trigger by camera.timing: `render` leaves it out; this is the plan that it would have"
+        )),
         Some(Delivery::Own) | None => {}
     }
 }
@@ -298,6 +301,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         console.print(&plan.to_string())?;
     }
     print_moving(&moving, console)?;
+    print_lamps(&loaded.sequence.scene, console)?;
     print_source(&source_frame, &plan, console)?;
     let Placement { ideal, reverse } = plan.placement;
     console.line(format_args!("rendered on {engine}"))?;
@@ -472,6 +476,18 @@ fn print_moving(moving: &[&str], console: &mut Console<'_>) -> Result<(), Failur
         console.line(format_args!(
             "moves: {names}; pixels that show it, or its shadow, are means of {MOVING_RAYS} rays of their own, which \
              the predicted errors do not cover"
+        ))?;
+    }
+    Ok(())
+}
+
+/// Prints how many lamps there are, whose light the plan knows nothing of.
+fn print_lamps(scene: &scene::Scene, console: &mut Console<'_>) -> Result<(), Failure> {
+    let count = scene.lamps().count();
+    if count > 0 {
+        console.line(format_args!(
+            "lamps: {count} meshes emit light above white; pixels that those of at most {SMALL_LAMP_PX} px may reach are \
+             means of rays of their own"
         ))?;
     }
     Ok(())

@@ -4,7 +4,7 @@
 use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{FrameView, Oracle, RaySample};
+use super::{FrameView, Oracle, RaySample, lamps::RowLamps};
 use crate::{
     frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
@@ -230,6 +230,7 @@ impl FrameJob<'_> {
             sum_of_squares: 0.0,
         };
         let mut instants = SamplePoses::new(self, y);
+        let mut lamps = RowLamps::new(&self.view, y, width);
         for x in 0..width {
             // A pixel is valid where its centre has a ray.
             let wanted = self
@@ -239,7 +240,7 @@ impl FrameJob<'_> {
                 .is_none_or(|only| only.get((y * width + x) as usize).copied().unwrap_or(false));
             let valid = wanted && self.view.ray([x, y], DVec2::ZERO).is_some();
             if valid {
-                let pixel = self.pixel([x, y], &mut instants);
+                let pixel = self.pixel([x, y], lamps.may_be_in(x), &mut instants);
                 row.convergence.pixels += 1;
                 row.convergence.samples += u64::from(pixel.samples);
                 row.convergence.unfinished += u64::from(!pixel.finished);
@@ -258,13 +259,14 @@ impl FrameJob<'_> {
         row
     }
 
-    /// Mean light over area and exposure.
-    fn pixel(&self, [x, y]: [u32; 2], instants: &mut SamplePoses<'_>) -> PixelMean {
+    /// Mean light over area and exposure; of a pixel that is refined, of all its samples.
+    fn pixel(&self, [x, y]: [u32; 2], is_refined: bool, instants: &mut SamplePoses<'_>) -> PixelMean {
         let options = self.options;
         let [shift_x, shift_y, _] = shifts(u64::from(y) << 32 | u64::from(x));
         let steps = if instants.is_exposed { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
         let max_batches = options.max_samples.div_ceil(BATCH).max(BATCHES_A_CHECK);
-        let min_batches = options.min_samples.div_ceil(BATCH).clamp(BATCHES_A_CHECK, max_batches);
+        let least = if is_refined { options.max_samples } else { options.min_samples };
+        let min_batches = least.div_ceil(BATCH).clamp(BATCHES_A_CHECK, max_batches);
         let visible = Visible::new(&self.view, [x, y]);
         // Of each colour.
         let (mut sum, mut samples) = (DVec3::ZERO, DVec3::ZERO);

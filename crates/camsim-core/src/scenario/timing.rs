@@ -25,6 +25,37 @@ pub struct TimingSpec {
     pub double: Vec<u64>,
     /// Share of the other frames that do.
     pub double_probability: f64,
+    /// Name of the trigger that the camera shares with others: late and missed triggers are those of the name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trigger: Option<String>,
+    /// Numbers of frames whose trigger does not come.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub miss: Vec<u64>,
+    /// Share of the other triggers that do not come.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub miss_probability: f64,
+    /// Whether stamps have errors of the camera's own or those of the shared trigger.
+    #[serde(skip_serializing_if = "is_default")]
+    pub stamped_by: StampedBy,
+}
+
+fn is_zero(probability: &f64) -> bool {
+    *probability == 0.0
+}
+
+fn is_default(stamped_by: &StampedBy) -> bool {
+    *stamped_by == StampedBy::Camera
+}
+
+/// Who writes the stamps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StampedBy {
+    /// The camera.
+    #[default]
+    Camera,
+    /// The device that triggers the cameras.
+    Trigger,
 }
 
 /// What the stamp of a late trigger shows.

@@ -114,6 +114,12 @@ impl Material {
         }
     }
 
+    /// Whether it emits light above white.
+    #[must_use]
+    pub fn is_above_white(&self) -> bool {
+        self.emissive.iter().any(|&light| light > 1.0)
+    }
+
     /// Whether its picture is read between texels, and is not mirrored beyond its borders.
     #[must_use]
     pub fn is_bilinear(&self) -> bool {

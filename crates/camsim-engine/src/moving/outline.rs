@@ -51,9 +51,8 @@ impl Outline {
     pub fn new(path: &CameraPath, plan: &FramePlan, swept: &[Swept]) -> Self {
         let swept: Vec<Swept> = swept.iter().filter_map(|swept| swept.in_view(path, plan)).collect();
         let spans = (0..line_count(plan)).into_par_iter().map(|line| {
-            let boxes = swept.iter().flat_map(|swept| swept.project(path, plan, line));
             let mut spans: Vec<[u32; 2]> =
-                boxes.filter_map(|projected| span(plan, line, &projected)).collect();
+                swept.iter().flat_map(|swept| swept.spans(path, plan, line)).collect();
             spans.sort_unstable();
             merged(&spans)
         });
@@ -69,13 +68,51 @@ pub(super) struct Swept {
     /// Parts of the way from it along the sun's rays, metres: the first is itself, the others are those on
     /// which a shadow may meet something.
     pub ways_ned_m: Vec<[DVec3; 2]>,
+    /// Room around its projected corners, pixels.
+    room_px: f64,
+    /// First and last place across the rows of the readout at which it may be, pixels.
+    across_px: [f64; 2],
 }
 
 impl Swept {
+    pub fn new(motion: Arc<RigidMotion>, bounds: Aabb, ways_ned_m: Vec<[DVec3; 2]>, room_px: f64) -> Self {
+        let across_px = [f64::NEG_INFINITY, f64::INFINITY];
+        Self { motion, bounds, ways_ned_m, room_px: room_px.max(ROOM_PX), across_px }
+    }
+
+    /// With the rows of the readout that it can be in, which spares the others a look.
+    pub fn within_lines(self, path: &CameraPath, plan: &FramePlan) -> Self {
+        let [begin_s, end_s] = plan.window_s;
+        let swept = self.motion.bounds(&self.bounds, begin_s, end_s);
+        let poses: Vec<(f64, CameraPose)> = (0..=INSTANTS)
+            .map(|i| begin_s + (end_s - begin_s) * f64::from(i) / f64::from(INSTANTS))
+            .map(|t_s| (t_s, path.pose(t_s)))
+            .collect();
+        let ends = |projected: Projected| {
+            let axis = usize::from(plan.shutter.row_axis() == RowAxis::Rows);
+            [projected.low_px[axis], projected.high_px[axis]]
+        };
+        let all = self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way), &self));
+        let across_px = all.map(ends).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        Self { across_px: across_px.unwrap_or(self.across_px), ..self }
+    }
+
+    /// Whether it may be in a row of the readout.
+    pub fn may_be_in(&self, plan: &FramePlan, line: usize) -> bool {
+        let [x, y] = pixel(plan, line, 0).map(f64::from);
+        let across = if plan.shutter.row_axis() == RowAxis::Rows { y } else { x };
+        (self.across_px[0]..=self.across_px[1]).contains(&across)
+    }
+
+    /// First and last pixels along a row of the readout between which its parts may be.
+    pub fn spans(&self, path: &CameraPath, plan: &FramePlan, line: usize) -> Vec<[u32; 2]> {
+        self.project(path, plan, line).iter().filter_map(|projected| span(plan, line, projected)).collect()
+    }
+
     /// The parts of it that any row may see; `None` if there are none. All rays of the frame have directions
     /// within its ideal frame's field of view, and begin no farther from that frame's camera than the path
     /// leads.
-    fn in_view(&self, path: &CameraPath, plan: &FramePlan) -> Option<Self> {
+    pub fn in_view(&self, path: &CameraPath, plan: &FramePlan) -> Option<Self> {
         let [begin_s, end_s] = plan.window_s;
         let swept = self.motion.bounds(&self.bounds, begin_s, end_s);
         let instants_s =
@@ -92,7 +129,7 @@ impl Swept {
             })
         };
         let ways_ned_m: Vec<[DVec3; 2]> = self.ways_ned_m.iter().copied().filter(may_be_seen).collect();
-        let seen = Self { motion: self.motion.clone(), bounds: self.bounds, ways_ned_m };
+        let seen = Self { motion: self.motion.clone(), ways_ned_m, ..*self };
         (!seen.ways_ned_m.is_empty()).then_some(seen)
     }
 
@@ -108,7 +145,7 @@ impl Swept {
             let t_s = mid_s + phase * exposure_s;
             (t_s, path.pose(t_s))
         });
-        self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way))).collect()
+        self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way), self)).collect()
     }
 }
 
@@ -118,8 +155,25 @@ fn along(bounds: &Aabb, way: &[DVec3; 2]) -> Aabb {
     Aabb { min: bounds.min + from.min(*to), max: bounds.max + from.max(*to) }
 }
 
-/// Where a box may be seen from poses at path times; `None` if it is behind the camera.
-fn project(plan: &FramePlan, poses: &[(f64, CameraPose)], Aabb { min, max }: &Aabb) -> Option<Projected> {
+/// Width and height of a box in the picture, pixels; `None` if it is behind the camera or not wholly in view.
+pub(super) fn size_px(plan: &FramePlan, poses: &[(f64, CameraPose)], bounds: &Aabb) -> Option<[f64; 2]> {
+    let Projected { low_px, high_px } = corners(plan, poses, bounds)?;
+    let size_px = high_px - low_px;
+    size_px.is_finite().then(|| size_px.to_array())
+}
+
+/// Where a box may be seen from poses at path times, with the room about it; `None` if it is behind the camera.
+fn project(plan: &FramePlan, poses: &[(f64, CameraPose)], bounds: &Aabb, swept: &Swept) -> Option<Projected> {
+    let Projected { low_px, high_px } = corners(plan, poses, bounds)?;
+    if !(low_px.is_finite() && high_px.is_finite()) {
+        return Some(Projected { low_px, high_px });
+    }
+    let room_px = DVec2::splat(swept.room_px) + ROOM * (high_px - low_px);
+    Some(Projected { low_px: low_px - room_px, high_px: high_px + room_px })
+}
+
+/// The corners of a box from poses at path times; everywhere if some are not in view, `None` if all are behind.
+fn corners(plan: &FramePlan, poses: &[(f64, CameraPose)], Aabb { min, max }: &Aabb) -> Option<Projected> {
     let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY };
     let (mut low_px, mut high_px) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (mut shown, mut in_front, mut all) = (0, 0, 0);
@@ -140,10 +194,7 @@ fn project(plan: &FramePlan, poses: &[(f64, CameraPose)], Aabb { min, max }: &Aa
     match (shown, in_front) {
         (_, 0) => None,
         (shown, _) if shown < all => Some(everywhere),
-        _ => {
-            let room_px = DVec2::splat(ROOM_PX) + ROOM * (high_px - low_px);
-            Some(Projected { low_px: low_px - room_px, high_px: high_px + room_px })
-        }
+        _ => Some(Projected { low_px, high_px }),
     }
 }
 
@@ -167,7 +218,7 @@ fn span(plan: &FramePlan, line: usize, projected: &Projected) -> Option<[u32; 2]
 }
 
 /// Sorted spans without overlap.
-fn merged(spans: &[[u32; 2]]) -> Vec<[u32; 2]> {
+pub(super) fn merged(spans: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let mut merged: Vec<[u32; 2]> = Vec::new();
     for &[first, last] in spans {
         match merged.last_mut() {

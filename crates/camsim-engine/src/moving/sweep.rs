@@ -15,7 +15,7 @@ pub(super) fn all_that_moves(scene: &Scene, window_s: [f64; 2]) -> Vec<Swept> {
     let with_shadow = |(motion, bounds): (Arc<RigidMotion>, Aabb)| {
         let mut ways_ned_m = vec![[DVec3::ZERO; 2]];
         ways_ned_m.extend(shadow_ways(scene, &motion.bounds(&bounds, window_s[0], window_s[1])));
-        Swept { motion, bounds, ways_ned_m }
+        Swept::new(motion, bounds, ways_ned_m, 0.0)
     };
     motions(scene).into_iter().map(with_shadow).collect()
 }

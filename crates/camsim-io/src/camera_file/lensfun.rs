@@ -19,8 +19,10 @@ use crate::calibration::text::shortest;
 
 mod fit;
 mod tca;
+mod vignetting;
 
 use tca::Tca;
+use vignetting::Vignetting;
 
 /// Diagonal of a sensor with crop factor 1, millimetres.
 const FULL_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -38,6 +40,10 @@ pub struct LensfunQuery<'a> {
     pub size_px: [u32; 2],
     /// Crop factor of the camera; `None`: that of the calibration.
     pub crop: Option<f64>,
+    /// f-number, for the vignetting; `None`: without vignetting.
+    pub aperture: Option<f64>,
+    /// Distance of what is in focus, metres, for the vignetting.
+    pub distance_m: f64,
 }
 
 /// A lens of the database on a camera.
@@ -60,7 +66,9 @@ struct Calibration {
     entries: Vec<Entry>,
     tca: Vec<Tca>,
     has_other_tca: bool,
-    has_vignetting: bool,
+    vignetting: Vec<Vignetting>,
+    has_other_vignetting: bool,
+    focal_range_mm: [f64; 2],
 }
 
 /// Terms at a focal length.
@@ -84,6 +92,9 @@ pub fn import_lensfun(path: &Path, query: &LensfunQuery<'_>) -> Result<LensfunCa
     let positive = |value: f64| value.is_finite() && value > 0.0;
     if !positive(query.focal_mm) || !query.crop.is_none_or(positive) {
         return Err(fail("--focal", "and --crop are positive numbers".to_owned()));
+    }
+    if !query.aperture.is_none_or(positive) || !positive(query.distance_m) {
+        return Err(fail("--aperture", "and --distance are positive numbers".to_owned()));
     }
     let text = read(path)?;
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
@@ -156,6 +167,7 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
     let name = text(lens, "model").unwrap_or_default().to_owned();
     let crop = text(lens, "cropfactor").unwrap_or("1");
     let aspect = text(lens, "aspect-ratio").unwrap_or("1.5");
+    let focal_range_mm = vignetting::focal_range_mm(lens)?;
     let of = |calibration: Node<'_, '_>| {
         let has = |name: &str| calibration.children().any(|child| child.has_tag_name(name));
         let nodes: Vec<Node<'_, '_>> =
@@ -166,6 +178,7 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
         let mut entries = same.map(|node| entry(*node, &model)).collect::<Result<Vec<_>, String>>()?;
         entries.sort_by(|a, b| a.focal_mm.total_cmp(&b.focal_mm));
         let tca = tca::entries(calibration)?;
+        let vignetting = vignetting::entries(calibration)?;
         Ok(Calibration {
             name: name.clone(),
             kind: text(lens, "type").unwrap_or("rectilinear").to_owned(),
@@ -175,7 +188,9 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
             entries,
             has_other_tca: has("tca") && tca.is_empty(),
             tca,
-            has_vignetting: has("vignetting"),
+            has_other_vignetting: has("vignetting") && vignetting.is_empty(),
+            vignetting,
+            focal_range_mm,
         })
     };
     lens.children().filter(|child| child.has_tag_name("calibration")).map(of).collect()
@@ -321,6 +336,15 @@ fn camera(calibration: &Calibration, query: &LensfunQuery<'_>) -> Result<Lensfun
     };
     let half_short = 0.5 * width.min(height) * pitch_mm / half_short_mm;
     spec.chromatic = tca::chromatic(&calibration.tca, query.focal_mm, half_short);
+    match vignetting::of_camera(
+        &calibration.vignetting,
+        calibration.focal_range_mm,
+        query,
+        calibration.crop / crop,
+    ) {
+        Ok(found) => spec.photometric.vignetting = found,
+        Err(left_out) => notes.push(left_out),
+    }
     notes.extend(left_out(calibration, &entry, crop));
     Ok(LensfunCamera { spec, notes })
 }
@@ -345,7 +369,7 @@ fn left_out(calibration: &Calibration, entry: &Entry, crop: f64) -> Vec<String> 
         shortest(entry.real_focal_mm, 1e-4),
         calibration.crop
     )];
-    let parts = [(calibration.has_other_tca, "tca"), (calibration.has_vignetting, "vignetting")];
+    let parts = [(calibration.has_other_tca, "tca"), (calibration.has_other_vignetting, "vignetting")];
     let parts: Vec<&str> = parts.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
     if !parts.is_empty() {
         notes.push(format!("not applied: {} of this lens", parts.join(", ")));

@@ -66,6 +66,8 @@ pub(super) struct Materials<'a> {
 const MAX_SIDE_PX: u32 = 32_768;
 /// Longest texture side that common GPUs support, pixels.
 const COMMON_MAX_SIDE_PX: u32 = 16_384;
+/// Brightest emitted light, whites: the largest half float, as ideal frames have.
+const MOST_EMISSIVE: f32 = 65_504.0;
 /// Pixels above which a note states the GPU memory: a third of a gigabyte with mip levels.
 const LARGE_TEXTURE_PX: u64 = 1 << 26;
 
@@ -107,8 +109,11 @@ impl<'a> Materials<'a> {
         let emissive_factor = material.emissive_factor().map(|part| part * strength);
         let emissive_key =
             if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
-        self.check_factors(material, [(key, &factor), (emissive_key, &emissive_factor)])?;
-        let emissive_factor = emissive_factor.map(|part| part.clamp(0.0, 1.0));
+        // A factor alone ends at white, and so does the texture of 8 bits that is made of a picture and a factor.
+        let is_strong = strength != 1.0 && material.emissive_texture().is_none();
+        let most_emissive = if is_strong { MOST_EMISSIVE } else { 1.0 };
+        self.check_factors(material, [(key, &factor, 1.0), (emissive_key, &emissive_factor, most_emissive)])?;
+        let emissive_factor = emissive_factor.map(|part| part.clamp(0.0, most_emissive));
         // KHR_materials_unlit shows the base colour alone.
         let is_emissive = !material.unlit() && emissive_factor.iter().any(|&part| part > 0.0);
         // A black base colour still gives the alpha.
@@ -181,21 +186,27 @@ impl<'a> Materials<'a> {
         Ok((result, rule))
     }
 
-    /// Refuses factors that are not finite and notes those outside of 0 to 1.
+    /// Refuses factors that are not finite and notes those outside of 0 to their limit.
     fn check_factors(
         &mut self,
         material: &gltf::Material<'_>,
-        factors: [(&str, &[f32]); 2],
+        factors: [(&str, &[f32], f32); 2],
     ) -> Result<(), GltfError> {
         let name = self.asset.material_name(material.index());
-        for (key, parts) in factors {
+        for (key, parts, most) in factors {
             if parts.iter().any(|part| !part.is_finite()) {
                 return Err(self.asset.error(format!(
-                    "{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1"
+                    "{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to {most}"
                 )));
             }
-            if parts.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.notes.push(format!("{name}: {key} is {parts:?} and is clamped to 0 to 1"));
+            if parts.iter().any(|part| !(0.0..=most).contains(part)) {
+                let of_picture = if key.ends_with("emissiveStrength") && most == 1.0 {
+                    "; above white it needs a material without emissiveTexture"
+                } else {
+                    ""
+                };
+                self.notes
+                    .push(format!("{name}: {key} is {parts:?} and is clamped to 0 to {most}{of_picture}"));
             }
         }
         let cutoff = material.alpha_cutoff().unwrap_or(0.5);

@@ -44,7 +44,7 @@ pub(super) const EXTENSIONS: &[SupportRow] = &[
     (
         "KHR_materials_emissive_strength",
         Applied,
-        "factor of emissiveFactor; more than white is clamped, and reported",
+        "factor of emissiveFactor, up to 65504; with an emissiveTexture more than white is clamped, and reported",
     ),
     ("KHR_node_visibility", Applied, "invisible nodes and their descendants are not shown"),
     ("EXT_mesh_gpu_instancing", Applied, "TRANSLATION, ROTATION and SCALE"),

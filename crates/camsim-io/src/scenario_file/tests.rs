@@ -6,8 +6,8 @@ use camsim_core::scenario::{
     Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
     ChromaticSpec, Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec,
     ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel,
-    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, Reset, SensorModel, SpinSpec, TimingSpec,
-    TrackerSpec, TwinShutter, TwinSpec, VignettingSpec,
+    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, Reset, SensorModel, SpinSpec, StampedBy,
+    TimingSpec, TrackerSpec, TwinShutter, TwinSpec, VignettingSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -83,6 +83,7 @@ fn needs_of_sensor(key: &str, value: &str) -> Vec<(&'static str, &'static str)> 
         ("camera.sensor.companding", "piecewise") => needs.push(("camera.sensor.companding_points", points)),
         ("camera.shutter.reset", "global") => needs.push(("camera.shutter.exposure_ms", "4")),
         ("camera.timing.late_stamp", "actual") => needs.push(("camera.timing.late_ms", "1")),
+        ("camera.timing.stamped_by", "trigger") => needs.push(("camera.timing.trigger", "wire")),
         ("camera.sensor.response", "table") => needs.push(("camera.sensor.response_points", points)),
         _ => {}
     }
@@ -172,7 +173,15 @@ fn every_key_of_the_structs_is_in_the_schema() {
     scenario.camera.point_spread = Some(full_point_spread());
     let shutter = &mut scenario.camera.shutter;
     (shutter.line_time_us, shutter.reset, shutter.allow_overlap) = (Some(20.0), Reset::Global, true);
-    scenario.camera.timing = Some(TimingSpec { drop: vec![1], double: vec![2], ..TimingSpec::default() });
+    scenario.camera.timing = Some(TimingSpec {
+        drop: vec![1],
+        double: vec![2],
+        trigger: Some("wire".into()),
+        miss: vec![3],
+        miss_probability: 0.1,
+        stamped_by: StampedBy::Trigger,
+        ..TimingSpec::default()
+    });
     full_optics(&mut scenario.camera);
     scenario.output.datasets = vec![camsim_core::scenario::DatasetFormat::CarlaRs];
     scenario.output.channels.push(camsim_core::scenario::Channel::Object);

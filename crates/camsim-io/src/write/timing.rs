@@ -22,6 +22,7 @@ pub fn timing_csv(sequence: &Sequence) -> Option<String> {
             Delivery::Own => ("own", frame),
             Delivery::Dropped => ("dropped", frame),
             Delivery::Doubled(picture) => ("doubled", picture),
+            Delivery::Missed => ("missed", frame),
         };
         let nominal_ns = ns(faults.nominal_s(frame as i64));
         let trigger_ns = ns(faults.trigger_s(frame as i64));

@@ -1,6 +1,6 @@
 //! Checks of `[[cameras]]`.
 
-use super::{Check, Problem, twins::check_folder_name, validate, validate_camera};
+use super::{Check, Problem, timing::check_triggers, twins::check_folder_name, validate, validate_camera};
 use crate::scenario::{CameraSpec, Rig, Scenario, SensorCarrier};
 
 /// As [`validate`], for every camera of a rig. Keys of `[[cameras]]` begin with `cameras.` and the camera's
@@ -15,6 +15,8 @@ pub fn validate_rig(rig: &Rig) -> Vec<Problem> {
     let names: Vec<&str> = rig.names().collect();
     check_names(&mut check, &names);
     check_twins(&mut check, rig.first(), &names);
+    let cameras: Vec<&CameraSpec> = rig.scenarios().iter().map(|scenario| &scenario.camera).collect();
+    check_triggers(&mut check, &cameras);
     let of_each: Vec<Vec<Problem>> = rig.scenarios().iter().map(validate).collect();
     for (i, problems) in of_each.iter().enumerate() {
         for problem in problems {
@@ -47,6 +49,7 @@ pub fn validate_cameras(cameras: &[CameraSpec]) -> Vec<Problem> {
     let mut check = Check::default();
     let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
     check_names(&mut check, &names);
+    check_triggers(&mut check, &cameras.iter().collect::<Vec<_>>());
     for (i, camera) in cameras.iter().enumerate() {
         check
             .problems

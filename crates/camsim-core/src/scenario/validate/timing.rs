@@ -1,7 +1,12 @@
 //! Checks of `[camera.shutter]` and `[camera.timing]`.
 
-use super::Check;
-use crate::scenario::{CameraSpec, FieldOr, LateStamp, Preset, Readout, Reset, Scenario, TimingSpec};
+use super::{
+    Check,
+    names::{ADVICE, is_portable},
+};
+use crate::scenario::{
+    CameraSpec, FieldOr, LateStamp, Preset, Readout, Reset, Scenario, StampedBy, TimingSpec,
+};
 
 /// Fastest and slowest clock, millionths off.
 const MOST_DRIFT_PPM: f64 = 1e5;
@@ -85,7 +90,14 @@ fn check_overlap(check: &mut Check, camera: &CameraSpec) {
 pub(super) fn check_timing(check: &mut Check, camera: &CameraSpec) {
     let Some(timing) = &camera.timing else { return };
     let TimingSpec {
-        jitter_ms, drift_ppm, late_ms, late_stamp, drop_probability, double_probability, ..
+        jitter_ms,
+        drift_ppm,
+        late_ms,
+        late_stamp,
+        drop_probability,
+        double_probability,
+        miss_probability,
+        ..
     } = *timing;
     check.not_negative("camera.timing.jitter_ms", jitter_ms, "it is a standard deviation");
     check.require(drift_ppm.abs() < MOST_DRIFT_PPM, "camera.timing.drift_ppm", || {
@@ -101,29 +113,81 @@ pub(super) fn check_timing(check: &mut Check, camera: &CameraSpec) {
     check.require(late_stamp == LateStamp::Nominal || late_ms > 0.0, "camera.timing.late_stamp", || {
         "is that of late triggers; write camera.timing.late_ms too, or leave it out".into()
     });
-    for (key, probability) in
-        [("drop_probability", drop_probability), ("double_probability", double_probability)]
-    {
+    for (key, probability) in [
+        ("drop_probability", drop_probability),
+        ("double_probability", double_probability),
+        ("miss_probability", miss_probability),
+    ] {
         check.require((0.0..1.0).contains(&probability), format!("camera.timing.{key}"), || {
             format!("must be 0 to below 1, not {probability}")
         });
     }
-    let both = timing.double.iter().find(|frame| timing.drop.contains(frame));
-    if let Some(frame) = both {
-        check.fail(
-            "camera.timing.double",
-            format!("has frame {frame}, which camera.timing.drop has too; leave one out"),
-        );
+    for (key, lost) in [("drop", &timing.drop), ("miss", &timing.miss)] {
+        if let Some(frame) = timing.double.iter().find(|frame| lost.contains(frame)) {
+            check.fail(
+                "camera.timing.double",
+                format!("has frame {frame}, which camera.timing.{key} has too; leave one out"),
+            );
+        }
     }
     if timing.double.contains(&0) {
         check.fail("camera.timing.double", "has frame 0, before which no picture arrived; leave it out");
     }
+    let name = timing.trigger.as_deref();
+    check.require(name.is_none_or(is_portable), "camera.timing.trigger", || {
+        format!("names a trigger that cameras share; give it a name of {ADVICE}, or leave it out")
+    });
+    let is_named = timing.stamped_by == StampedBy::Camera || name.is_some();
+    check.require(is_named, "camera.timing.stamped_by", || {
+        "= \"trigger\" needs camera.timing.trigger, the name of that trigger".into()
+    });
+}
+
+/// Checks that cameras of one trigger say the same of it: the first that does not is named.
+pub(super) fn check_triggers(check: &mut Check, cameras: &[&CameraSpec]) {
+    for (i, camera) in cameras.iter().enumerate() {
+        let Some((timing, trigger)) = with_trigger(camera) else { continue };
+        let first =
+            cameras[..i].iter().find(|other| with_trigger(other).is_some_and(|(_, it)| it == trigger));
+        let Some((first, of_first)) = first.and_then(|first| Some((first, with_trigger(first)?.0))) else {
+            continue;
+        };
+        let is_stamped = [timing, of_first].iter().all(|spec| spec.stamped_by == StampedBy::Trigger);
+        let same = |a: f64, b: f64| a == b || a.is_nan() || b.is_nan();
+        let agreements = [
+            ("fps", same(camera.fps, first.fps)),
+            ("phase", same(camera.phase, first.phase)),
+            ("timing.late_ms", same(timing.late_ms, of_first.late_ms)),
+            ("timing.miss", timing.miss == of_first.miss),
+            ("timing.miss_probability", same(timing.miss_probability, of_first.miss_probability)),
+            ("timing.jitter_ms", !is_stamped || same(timing.jitter_ms, of_first.jitter_ms)),
+            ("timing.drift_ppm", !is_stamped || same(timing.drift_ppm, of_first.drift_ppm)),
+            ("timing.late_stamp", !is_stamped || timing.late_stamp == of_first.late_stamp),
+        ];
+        for (key, agrees) in agreements {
+            check.require(agrees, format!("cameras.{i}.{key}"), || {
+                format!(
+                    "differs from that of camera {}, which has the same trigger \"{trigger}\": give both the same \
+                     value, or triggers of their own",
+                    first.name
+                )
+            });
+        }
+    }
+}
+
+fn with_trigger(camera: &CameraSpec) -> Option<(&TimingSpec, &str)> {
+    let timing = camera.timing.as_ref()?;
+    Some((timing, timing.trigger.as_deref()?))
 }
 
 /// Checks what only the rest of a scenario decides.
 pub(super) fn check_with_quality(check: &mut Check, scenario: &Scenario) {
     check_overlap(check, &scenario.camera);
-    let drops = |timing: &TimingSpec| !timing.drop.is_empty() || timing.drop_probability > 0.0;
+    let drops = |timing: &TimingSpec| {
+        let lists = timing.drop.len() + timing.miss.len();
+        lists > 0 || timing.drop_probability > 0.0 || timing.miss_probability > 0.0
+    };
     let video = scenario.output.format.iter().find(|format| format.is_video());
     if let (Some(video), Some(true)) = (video, scenario.camera.timing.as_ref().map(drops)) {
         check.fail("output.format", format!(
@@ -224,6 +288,10 @@ mod tests {
             (TimingSpec { double_probability: -0.1, ..timing() }, "camera.timing.double_probability"),
             (TimingSpec { double: vec![3], drop: vec![3], ..timing() }, "camera.timing.double"),
             (TimingSpec { double: vec![0], ..timing() }, "camera.timing.double"),
+            (TimingSpec { double: vec![3], miss: vec![3], ..timing() }, "camera.timing.double"),
+            (TimingSpec { miss_probability: f64::NAN, ..timing() }, "camera.timing.miss_probability"),
+            (TimingSpec { trigger: Some("a/b".into()), ..timing() }, "camera.timing.trigger"),
+            (TimingSpec { stamped_by: StampedBy::Trigger, ..timing() }, "camera.timing.stamped_by"),
         ];
         for (timing, key) in cases {
             let found = of_timing(timing);
@@ -231,5 +299,35 @@ mod tests {
         }
         let legal = TimingSpec { drop: vec![3], double: vec![5], late_ms: 1.0, ..timing() };
         assert_eq!(of_timing(legal), []);
+    }
+
+    #[test]
+    fn cameras_of_one_trigger_agree_on_it() {
+        let timing = TimingSpec {
+            trigger: Some("wire".into()),
+            late_ms: 2.0,
+            stamped_by: StampedBy::Trigger,
+            ..TimingSpec::default()
+        };
+        let left = CameraSpec { name: "left".into(), timing: Some(timing.clone()), ..CameraSpec::default() };
+        let keys = |right: CameraSpec| {
+            let mut check = Check::default();
+            check_triggers(&mut check, &[&CameraSpec::default(), &left, &right]);
+            check.problems.into_iter().map(|problem| problem.key).collect::<Vec<_>>()
+        };
+        let right = |timing| CameraSpec { timing: Some(timing), ..left.clone() };
+        let drops = TimingSpec { drop_probability: 0.1, ..timing.clone() };
+        assert_eq!(keys(right(drops)), [""; 0]);
+        let alone = TimingSpec { trigger: Some("other".into()), late_ms: 9.0, ..timing.clone() };
+        assert_eq!(keys(right(alone)), [""; 0]);
+        assert_eq!(keys(CameraSpec { fps: 7.0, ..left.clone() }), ["cameras.2.fps"]);
+        assert_eq!(keys(CameraSpec { phase: 0.5, ..left.clone() }), ["cameras.2.phase"]);
+        let other = TimingSpec { late_ms: 3.0, miss: vec![1], jitter_ms: 0.1, ..timing.clone() };
+        assert_eq!(
+            keys(right(other)),
+            ["cameras.2.timing.late_ms", "cameras.2.timing.miss", "cameras.2.timing.jitter_ms"]
+        );
+        let own = TimingSpec { jitter_ms: 0.1, stamped_by: StampedBy::Camera, ..timing };
+        assert_eq!(keys(right(own)), [""; 0]);
     }
 }

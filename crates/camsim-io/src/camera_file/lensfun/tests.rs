@@ -26,6 +26,9 @@ const DATABASE: &str = r#"<!DOCTYPE lensdatabase SYSTEM "lensfun-database.dtd">
             <tca model="linear" focal="20" kr="1.0003" kb="0.9998"/>
             <tca model="poly3" focal="40" vr="1.0007" cr="0.0002" br="-0.0004" vb="0.9996"/>
             <vignetting model="pa" focal="20" aperture="4" distance="10" k1="-0.3" k2="0.1" k3="0"/>
+            <vignetting model="pa" focal="20" aperture="4" distance="1000" k1="-0.32" k2="0.11" k3="-0.02"/>
+            <vignetting model="pa" focal="20" aperture="8" distance="1000" k1="-0.2" k2="0.05" k3="0.01"/>
+            <vignetting model="pa" focal="80" aperture="4" distance="1000" k1="-0.5" k2="0.2" k3="-0.07"/>
         </calibration>
     </lens>
     <lens>
@@ -60,10 +63,20 @@ const DATABASE: &str = r#"<!DOCTYPE lensdatabase SYSTEM "lensfun-database.dtd">
 "#;
 
 fn import(lens: &str, focal_mm: f64, crop: Option<f64>) -> Result<LensfunCamera, String> {
+    import_at(lens, focal_mm, crop, None, 1000.0)
+}
+
+fn import_at(
+    lens: &str,
+    focal_mm: f64,
+    crop: Option<f64>,
+    aperture: Option<f64>,
+    distance_m: f64,
+) -> Result<LensfunCamera, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lenses.xml");
     std::fs::write(&path, DATABASE).unwrap();
-    let query = LensfunQuery { lens, focal_mm, size_px: [6000, 4000], crop };
+    let query = LensfunQuery { lens, focal_mm, size_px: [6000, 4000], crop, aperture, distance_m };
     import_lensfun(&path, &query).map_err(|error| error.to_string())
 }
 
@@ -134,7 +147,8 @@ fn polynomials_are_lensfuns() {
     let stated: f64 = note.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
     // numpy's least squares for the same rational function: 0.282 px.
     assert!(error <= 1.1 * stated && (stated - 0.282).abs() < 0.02, "{error} {note}");
-    assert!(camera.notes.iter().any(|note| note.contains("not applied: vignetting")));
+    let wanted = "not applied: vignetting, which depends on the aperture: add --aperture N (calibrated from f/4 to f/8)";
+    assert!(camera.notes.iter().any(|note| note == wanted), "{:?}", camera.notes);
 }
 
 #[test]
@@ -154,6 +168,40 @@ fn colors_are_scaled_as_lensfun_has_it() {
     let smaller = scales(60.0, Some(2.0 * 1.534));
     assert!(close(&smaller[0], &[1.0007, 0.0001, -0.0001]), "{smaller:?}");
     assert!(import("Prime 35mm", 35.0, None).unwrap().spec.chromatic.is_none());
+}
+
+#[test]
+fn vignetting_is_lensfuns() {
+    // What lensfun 0.3.4 (lensfunpy 1.18, Modifier.apply_color_modification) divides a picture of 601 x 401 by,
+    // at pixels (0, 0), (100, 50), (300, 0), (600, 200), whose centres it counts from the middle one's.
+    let places = [(300.0, 200.0), (200.0, 150.0), (0.0, 200.0), (300.0, 0.0)];
+    let golden: [(f64, f64, f64, f64, [f64; 4]); 6] = [
+        (20.0, 4.0, 10.0, 1.534, [0.799_999_95, 0.878_883_00, 0.917_159_02, 0.840_235_77]),
+        (20.0, 4.0, 1000.0, 1.534, [0.769_999_98, 0.869_356_45, 0.911_369_26, 0.824_546_05]),
+        (30.0, 5.6, 50.0, 1.534, [0.820_924_52, 0.894_520_34, 0.928_335_85, 0.859_507_38]),
+        (30.0, 5.6, 50.0, 3.068, [0.940_645_69, 0.970_242_74, 0.980_694_29, 0.957_866_31]),
+        (65.0, 4.5, 1000.0, 1.534, [0.642_262_70, 0.804_181_75, 0.867_180_11, 0.734_947_74]),
+        (20.0, 22.0, 1000.0, 1.534, [0.853_332_88, 0.912_824_93, 0.940_951_41, 0.883_877_64]),
+    ];
+    for (focal_mm, aperture, distance_m, crop, expected) in golden {
+        let camera = import_at("Zoom 20-80mm f/4", focal_mm, Some(crop), Some(aperture), distance_m).unwrap();
+        let found = camera.spec.photometric.vignetting.unwrap();
+        for ((x, y), expected) in places.into_iter().zip(expected) {
+            let r2 = (x * x + y * y) / (300.0 * 300.0 + 200.0 * 200.0_f64);
+            let terms = found.polynomial.iter().rev();
+            let weight = 1.0 + r2 * terms.fold(0.0, |sum, k| sum * r2 + k);
+            // Single precision there.
+            assert!((weight - expected).abs() < 2e-6, "{focal_mm} mm f/{aperture}: {weight} {expected}");
+        }
+        assert!(!camera.notes.iter().any(|note| note.contains("vignetting")), "{:?}", camera.notes);
+    }
+    // A focus as near as 5 cm is far from all, as for lensfun; a lens without vignetting needs no aperture.
+    let camera = import_at("Zoom 20-80mm f/4", 20.0, None, Some(5.0), 0.05).unwrap();
+    let wanted = "not applied: vignetting, none of whose calibrations is near 20 mm at f/5";
+    assert!(camera.spec.photometric.vignetting.is_none());
+    assert!(camera.notes.iter().any(|note| note.starts_with(wanted)), "{:?}", camera.notes);
+    assert!(import("Prime 35mm", 35.0, None).unwrap().notes.iter().all(|note| !note.contains("vignetting")));
+    assert!(import_at("Prime 35mm", 35.0, None, Some(0.0), 10.0).unwrap_err().contains("positive numbers"));
 }
 
 #[test]

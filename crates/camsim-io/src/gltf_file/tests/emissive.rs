@@ -70,4 +70,10 @@ fn emissive_texture_on_a_second_uv_set_is_shown_in_place() {
     let mesh = strength.place(DVec3::ZERO, 0.0, 1.0).next().unwrap();
     let reddest = mesh.material.texture.rgba8.chunks_exact(4).map(|pixel| pixel[0]).max();
     assert_eq!(reddest, Some(188), "half of the light in sRGB");
+    let strong = read(
+        &second,
+        r#", "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 5.0 } }"#,
+    );
+    let wanted = "clamped to 0 to 1; above white it needs a material without emissiveTexture";
+    assert!(strong.notes.iter().any(|note| note.contains(wanted)), "{:?}", strong.notes);
 }

@@ -123,7 +123,7 @@ fn node_visibility_hides_descendants_only() {
 }
 
 #[test]
-fn emissive_strength_scales_and_is_clamped() {
+fn emissive_strength_scales_beyond_white() {
     let emissive_and_notes = |factor: f64, strength: f64| {
         let strength = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": strength } });
         let model =
@@ -139,13 +139,12 @@ fn emissive_strength_scales_and_is_clamped() {
         (EXTENSIONS, json!({ "KHR_materials_unlit": {} })),
     ];
     assert_eq!(read_with(&unlit).unwrap().parts[0].material.emissive, [0.0; 3]);
-    let (emissive, notes) = emissive_and_notes(1.0, 5.0);
-    assert_eq!(emissive, [1.0, 0.0, 0.0]);
-    assert!(
-        notes.len() == 1
-            && notes[0].contains("materials.0: emissiveFactor times emissiveStrength is [5.0, 0.0, 0.0]"),
-        "{notes:?}"
-    );
+    assert_eq!(emissive_and_notes(0.5, 5.0), ([2.5, 0.0, 0.0], Vec::new()));
+    // Half floats end there.
+    let (emissive, notes) = emissive_and_notes(1.0, 1e5);
+    assert_eq!(emissive, [65_504.0, 0.0, 0.0]);
+    let wanted = "materials.0: emissiveFactor times emissiveStrength is [100000.0, 0.0, 0.0] and is clamped to 0 to 65504";
+    assert!(notes.len() == 1 && notes[0].contains(wanted), "{notes:?}");
 }
 
 #[test]

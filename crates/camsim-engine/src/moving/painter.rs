@@ -1,0 +1,72 @@
+//! Colours by rays in place of a renderer's.
+
+use std::sync::{Arc, OnceLock};
+
+use camsim_core::{
+    noise::tail_table,
+    photometric::{Photometry, photometric},
+    sequence::Sequence,
+};
+use camsim_cpu::MovingCaster;
+use camsim_plan::FramePlan;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// What is painted with: rays through everything in a scene, and what follows the light of a pixel.
+#[derive(Debug)]
+pub(super) struct Painter {
+    /// With everything.
+    pub sequence: Arc<Sequence>,
+    /// Built for the first frame that needs it.
+    caster: Arc<OnceLock<MovingCaster>>,
+    vignette: Vec<f32>,
+    noise_table: Vec<f32>,
+}
+
+/// A pixel by its index, and its colour.
+pub(super) type Painted = (usize, [f32; 3]);
+
+impl Painter {
+    /// `before` has the scene of an earlier sequence, which is kept if it is the same.
+    pub fn new(sequence: &Arc<Sequence>, before: Option<&Self>) -> Self {
+        let known = before.filter(|before| Arc::ptr_eq(&before.sequence.scene, &sequence.scene));
+        Self {
+            sequence: sequence.clone(),
+            caster: known.map_or_else(Arc::default, |before| before.caster.clone()),
+            vignette: sequence.vignette_weights().1,
+            noise_table: tail_table(),
+        }
+    }
+
+    pub fn caster(&self) -> &MovingCaster {
+        self.caster.get_or_init(|| MovingCaster::new(&self.sequence.scene))
+    }
+
+    /// The colour of a pixel with this light.
+    pub fn finished(&self, stage: &Photometry, plan: &FramePlan, pixel: [u32; 2], light: Vec3) -> Painted {
+        let scenario = &self.sequence.scenario;
+        let i = index(plan, pixel);
+        let weight = self.vignette.get(i).or(self.vignette.first()).copied().unwrap_or(1.0);
+        let picture = scenario.picture(plan.frame) as u32;
+        let seed = scenario.noise_seed();
+        (i, photometric(stage, light.to_array(), weight, pixel, picture, seed, &self.noise_table))
+    }
+
+    /// Replaces the colours that `line` gives for a row of the readout: linear R G B A, row-major.
+    pub fn paint<T: Send>(
+        color_rgba: &mut [f32],
+        lines: Vec<T>,
+        line: impl Fn(T, &[f32]) -> Vec<Painted> + Sync,
+    ) {
+        let before: &[f32] = color_rgba;
+        let painted: Vec<Vec<Painted>> = lines.into_par_iter().map(|each| line(each, before)).collect();
+        for (i, color) in painted.into_iter().flatten() {
+            color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
+        }
+    }
+}
+
+/// Index of a pixel in its picture.
+pub(super) fn index(plan: &FramePlan, [x, y]: [u32; 2]) -> usize {
+    y as usize * plan.camera.size_px[0] as usize + x as usize
+}
