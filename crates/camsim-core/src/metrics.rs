@@ -56,7 +56,8 @@ pub enum MetricError {
 /// Differences between two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// Root of the mean square difference over colour samples that are finite in both images.
+    /// Root of the mean square difference over colour samples that are finite in both images. NaN, as `max` and
+    /// `ssim`, if a NaN or an infinity of one image faces another value.
     pub rmse: f64,
     /// Largest absolute difference over the same samples.
     pub max: f64,
@@ -64,8 +65,8 @@ pub struct Comparison {
     pub ssim: Option<f64>,
     /// Share of pixels in which any sample differs, including alpha, 0..=1.
     pub differing: f64,
-    /// Number of pixels with a NaN or an infinity in either image. They are left out of `rmse`, `max` and
-    /// `ssim` unless bitwise equal.
+    /// Number of pixels with a NaN or an infinity in either image. `rmse`, `max` and `ssim` leave out those that
+    /// are alike.
     pub non_finite: u64,
     /// Pixels compared.
     pub pixels: u64,
@@ -91,8 +92,11 @@ impl Comparison {
         let differing: f64 = set.iter().map(|c| c.differing * c.pixels as f64).sum();
         let ssims: Vec<f64> = set.iter().filter_map(|c| c.ssim).collect();
         Some(Self {
-            rmse: if samples == 0 { 0.0 } else { (squares / samples as f64).sqrt() },
-            max: set.iter().fold(0.0, |max, c| max.max(c.max)),
+            rmse: if samples == 0 { squares } else { (squares / samples as f64).sqrt() },
+            max: set
+                .iter()
+                .map(|c| c.max)
+                .fold(0.0, |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }),
             ssim: (!ssims.is_empty()).then(|| ssims.iter().sum::<f64>() / ssims.len() as f64),
             differing: differing / pixels as f64,
             non_finite: set.iter().map(|c| c.non_finite).sum(),
@@ -127,6 +131,7 @@ pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricE
 
     let (mut squares, mut max, mut samples, mut differing, mut non_finite) =
         (0.0_f64, 0.0_f64, 0_u64, 0_u64, 0_u64);
+    let mut comparable = true;
     let mut usable = Vec::with_capacity(a.samples.len() / a.channels);
     for (pixel_a, pixel_b) in a.samples.chunks_exact(a.channels).zip(b.samples.chunks_exact(b.channels)) {
         let same = |(x, y): (&f32, &f32)| x == y || x.to_bits() == y.to_bits();
@@ -135,6 +140,7 @@ pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricE
         usable.push(finite);
         if !finite {
             non_finite += 1;
+            comparable &= pixel_a.iter().zip(pixel_b).all(|(x, y)| are_comparable(*x, *y));
             continue;
         }
         for (channel, (&x, &y)) in pixel_a.iter().zip(pixel_b).enumerate() {
@@ -147,15 +153,23 @@ pub fn compare(a: ImageView<'_>, b: ImageView<'_>) -> Result<Comparison, MetricE
         }
     }
     let pixels = usable.len() as u64;
+    // No number says how far a picture is from one with NaN.
+    let told = |figure: f64| if comparable { figure } else { f64::NAN };
+    let ssim = ssim(&luminance(a, &usable), &luminance(b, &usable), a.size_px);
     Ok(Comparison {
-        rmse: if samples == 0 { 0.0 } else { (squares / samples as f64).sqrt() },
-        max,
-        ssim: ssim(&luminance(a, &usable), &luminance(b, &usable), a.size_px),
+        rmse: told(if samples == 0 { 0.0 } else { (squares / samples as f64).sqrt() }),
+        max: told(max),
+        ssim: ssim.map(told),
         differing: differing as f64 / pixels as f64,
         non_finite,
         pixels,
         samples,
     })
+}
+
+/// Whether two samples have a difference, or are alike without one.
+fn are_comparable(x: f32, y: f32) -> bool {
+    x == y || x.is_finite() && y.is_finite() || x.is_nan() && y.is_nan()
 }
 
 /// Rec. 709 luminance of three or more channels, else the first channel; unusable pixels are 0 in both
@@ -292,15 +306,30 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_not_finite_are_counted_and_left_out() {
+    fn values_that_are_not_finite_are_counted_and_left_out_where_alike() {
         let mut a = vec![0.5_f32; 4];
         let mut b = a.clone();
         a[0] = f32::NAN;
-        b[0] = f32::NAN;
-        a[1] = f32::INFINITY;
+        b[0] = -f32::NAN;
+        (a[1], b[1]) = (f32::INFINITY, f32::INFINITY);
         b[2] = 0.75;
-        let c = compare(view([4, 1], 1, &a), view([4, 1], 1, &b)).unwrap();
-        assert_eq!((c.non_finite, c.differing, c.max, c.samples), (2, 0.5, 0.25, 2));
+        let alike = compare(view([4, 1], 1, &a), view([4, 1], 1, &b)).unwrap();
+        assert_eq!((alike.non_finite, alike.differing, alike.max, alike.samples), (2, 0.5, 0.25, 2));
+        for other in [0.5, f32::NAN, f32::NEG_INFINITY] {
+            b[1] = other;
+            let c = compare(view([4, 1], 1, &a), view([4, 1], 1, &b)).unwrap();
+            assert!(c.rmse.is_nan() && c.max.is_nan() && c.psnr_db().is_nan() && c.non_finite == 2);
+            for set in [[c, alike], [alike, c]] {
+                let both = Comparison::pooled(&set).unwrap();
+                assert!(both.rmse.is_nan() && both.max.is_nan(), "{both:?}");
+            }
+        }
+        let (empty, black) = (vec![f32::NAN; 144], vec![0.0; 144]);
+        let c = compare(view([12, 12], 1, &empty), view([12, 12], 1, &black)).unwrap();
+        assert!(
+            c.rmse.is_nan() && c.ssim.unwrap().is_nan() && Comparison::pooled(&[c]).unwrap().rmse.is_nan()
+        );
+        assert_eq!(compare(view([12, 12], 1, &empty), view([12, 12], 1, &empty)).unwrap().rmse, 0.0);
     }
 
     #[test]

@@ -60,7 +60,8 @@ pub enum CompareError {
 /// The figures of one comparison, as `camsim compare --json` prints them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// Root mean square difference.
+    /// Root mean square difference. NaN (null), as all but `differing`, if a NaN or an infinity of one picture
+    /// faces another value.
     pub rmse: f64,
     /// Largest absolute difference.
     pub max: f64,
@@ -70,8 +71,8 @@ pub struct Figures {
     pub ssim: Option<f64>,
     /// Share of pixels that differ at all.
     pub differing: f64,
-    /// Number of pixels with a NaN or an infinity in either picture. RMSE, maximum, PSNR and SSIM leave them
-    /// out.
+    /// Number of pixels with a NaN or an infinity in either picture. RMSE, maximum, PSNR and SSIM leave out
+    /// those that are alike.
     pub non_finite: u64,
 }
 

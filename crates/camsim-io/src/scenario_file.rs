@@ -27,6 +27,7 @@ pub use randomize::{
 pub use rig::{rig_json, rig_of_table, rig_table};
 pub use schema::{CAMERAS, ValueKind};
 use tree::Tree;
+pub use tree::UNSET;
 
 /// Why a scenario cannot be used.
 #[derive(Debug, Error)]

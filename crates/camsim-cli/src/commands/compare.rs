@@ -51,7 +51,8 @@ pub fn run(args: &CompareArgs, console: &mut Console<'_>) -> Result<(), Failure>
     }
     if report.total.non_finite > 0 {
         console.warn(format_args!(
-            "{} pixels contain NaN or infinity and count only as differing",
+            "{} pixels contain NaN or infinity: the figures leave out those that are alike, and are NaN if any \
+             is not",
             report.total.non_finite
         ));
     }
@@ -60,7 +61,8 @@ pub fn run(args: &CompareArgs, console: &mut Console<'_>) -> Result<(), Failure>
 
 fn row(figures: &Figures) -> String {
     let Figures { rmse, max, psnr_db, ssim, differing, .. } = figures;
-    let psnr = psnr_db.map_or("inf".to_owned(), |psnr| format!("{psnr:.2}"));
+    let without_psnr = if rmse.is_nan() { "NaN" } else { "inf" };
+    let psnr = psnr_db.map_or(without_psnr.to_owned(), |psnr| format!("{psnr:.2}"));
     let ssim = ssim.map_or("-".to_owned(), |ssim| format!("{ssim:.5}"));
     format!("{rmse:>11.4e} {max:>11.4e} {psnr:>9} {ssim:>8} {:>9.3} %", 100.0 * differing)
 }

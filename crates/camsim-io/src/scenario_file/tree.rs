@@ -19,6 +19,12 @@ use super::{
 
 mod cameras;
 
+/// Text in place of a value that takes the key out, so that its default holds. No shell can pass it.
+pub const UNSET: &str = "\0";
+
+/// Characters of a value that messages show.
+const SHOWN: usize = 120;
+
 /// Where a key is written.
 #[derive(Clone, Debug)]
 pub(crate) enum KeyLocation {
@@ -169,13 +175,33 @@ impl Tree {
 
     /// Applies `--set key=text`.
     pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), ScenarioError> {
-        let shown = format!("{key}={text}");
+        let shown = format!("{key}={}", shortened(text));
         let fail = |message: String| ScenarioError::Set { set: shown.clone(), message };
         if key.is_empty() || key.split('.').any(str::is_empty) {
             return Err(fail("the key is empty; write --set camera.fps=25".into()));
         }
         let key = self.numbered(key).map_err(fail)?;
+        if text == UNSET {
+            return self.unset(&key, fail);
+        }
         self.put(&key, value(text), &KeyLocation::Set(shown.clone()), fail)
+    }
+
+    /// Takes a key out, if it is there.
+    fn unset(&mut self, key: &str, fail: impl Fn(String) -> ScenarioError) -> Result<(), ScenarioError> {
+        if !self.has(key) {
+            return Ok(());
+        }
+        match key.rsplit_once('.') {
+            None => drop(self.root.remove(key)),
+            Some((parent, leaf)) => match slot(&mut self.root, parent, &fail)? {
+                Value::Table(table) => drop(table.remove(leaf)),
+                _ => return Err(fail("is an element of a list; give the whole list".into())),
+            },
+        }
+        self.forget_below(key);
+        self.locations.remove(key);
+        Ok(())
     }
 
     /// Puts a value, which stands at `location`, at a key with the numbers of cameras.
@@ -282,6 +308,14 @@ fn from_json(json: &serde_json::Value) -> Option<Value> {
 pub(super) fn value(text: &str) -> Value {
     let parsed = toml::from_str::<Table>(&format!("v = {text}")).ok().filter(|table| table.len() == 1);
     parsed.and_then(|mut table| table.remove("v")).unwrap_or_else(|| Value::String(text.into()))
+}
+
+/// A value as messages show it.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{} ...", &text[..end]),
+        None => text.replace(UNSET, "(left out)"),
+    }
 }
 
 /// The dotted key of `key` within the table `prefix`.

@@ -10,7 +10,7 @@ use super::{
         ScenarioError, for_each_path,
         schema::{CAMERAS, SCENARIO, ValueKind, like_camera},
         similar::nearest_word,
-        tree::{KeyLocation, Tree, join, value},
+        tree::{KeyLocation, Tree, UNSET, join, value},
     },
     RANDOMIZE, RandomizeSpec, SEED,
     draw::Draw,
@@ -66,6 +66,10 @@ impl Written {
 
     /// Applies `--set randomize.key=text`.
     pub(super) fn set(written: &mut Option<Self>, tree: &mut Tree, key: &str, text: &str) {
+        if text == UNSET {
+            written.get_or_insert_default().values.remove(key);
+            return;
+        }
         let location = KeyLocation::Set(format!("{RANDOMIZE}.{key}={text}"));
         tree.locations.insert(join(RANDOMIZE, key), location);
         written.get_or_insert_default().values.insert(key.to_owned(), value(text));
